@@ -49,7 +49,7 @@ ifeq ($(SEEDS),)
 	$(BIN)/python -m tests.certificate.table
 	$(BIN)/python -m tests.soak.mutant_table
 else
-	$(BIN)/python -m robolink_simulators.soak --seeds $(SEEDS) --count $(COUNT) --share $(SHARE) \
+	$(BIN)/python -m tests.soak.adversary --seeds $(SEEDS) --count $(COUNT) --share $(SHARE) \
 		--hours $(HOURS)
 endif
 

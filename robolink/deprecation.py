@@ -138,6 +138,36 @@ def deprecated(instead: str) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
     return marked
 
 
+def old_hook(kind: type, old: str, new: str, adapted: Callable[..., object]) -> None:
+    """Let a class that overrides a hook by its old name be what it was, and warn whoever wrote it.
+
+    A base, which is an ABC, calls it from its ``__init_subclass__``.
+
+    Args:
+        kind: The class that derives from the base.
+        old: How the hook was called.
+        new: How it is called now.
+        adapted: The new hook, made of the old one.
+
+    Example:
+        >>> import warnings
+        >>> from robolink.deprecation import old_hook
+        >>> class Base:
+        ...     def __init_subclass__(cls):
+        ...         old_hook(cls, "_length", "length_mm", lambda self: self._length())
+        >>> with warnings.catch_warnings(record=True) as told:
+        ...     warnings.simplefilter("always")
+        ...     class Part(Base):
+        ...         def _length(self):
+        ...             return 12.0
+        >>> Part().length_mm(), str(told[0].message)
+        (12.0, 'Part._length is now length_mm. The old name goes in robolink 0.2.0.')
+    """
+    if old in vars(kind) and new not in vars(kind):
+        _warn(f"{kind.__qualname__}.{old}", new, 5)
+        setattr(kind, new, adapted)
+
+
 def _warn(old: str, new: str, stacklevel: int) -> None:
     warnings.warn(
         f"{old} is now {new}. The old name goes in robolink {GONE_IN}.",

@@ -5,9 +5,8 @@ from collections.abc import Iterator
 from statistics import median
 from time import perf_counter
 
-from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.kinematics import forward, hand_of, inverse
-from robolink_simulators.epson.arm.robots import find_robot
+from robolink_simulators.epson.arm.robots import Joints, find_robot
 
 from benchmarks.table import Amount, Figure
 

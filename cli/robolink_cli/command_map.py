@@ -8,16 +8,16 @@ working, with the same options and the same exit codes.
 from typing import Final
 
 from robolink.messages import declared
-from robolink_cli.command_folders import (
-    COMPANIONS,
-    COMPUTER,
-    CONTROLLER,
-    GROUPS,
-    MEASURE,
-    RECORD,
-    SHIPPED,
-    SIMULATE,
-)
+
+CONTROLLER: Final = "robolink_cli.commands.controller"
+MEASURE: Final = "robolink_cli.commands.measure"
+RECORD: Final = "robolink_cli.commands.record"
+SIMULATE: Final = "robolink_cli.commands.simulate"
+COMPUTER: Final = "robolink_cli.commands.computer"
+COMPANIONS: Final = "robolink_cli.commands.companions"
+SHIPPED: Final = "robolink_cli.commands.shipped"
+GROUPS: Final = "robolink_cli.commands.groups"
+
 
 _EVERY_DAY: Final = {
     "change": (

@@ -16,17 +16,18 @@ from robolink.ways import speaking
 from robolink_cli.command_map import RENAMED, SECTIONS, SHORT_NAMES
 from robolink_cli.console.help_pages import in_language
 from robolink_cli.console.language import speaking_for
-from robolink_cli.console.output import hand_over, watched_output
-from robolink_cli.console.render import dumps, json_is_on, note, print_document, say
-from robolink_cli.console.tolerance import (
+from robolink_cli.console.output import (
     colour_wanted,
+    hand_over,
     help_width,
     may_be_guided,
     tolerate_any_console,
+    watched_output,
 )
+from robolink_cli.console.render import dumps, json_is_on, note, print_document, say
 from robolink_cli.console.ways import SHELL_WAYS
 from robolink_cli.console.window_closing import closing_in_order
-from robolink_cli.front_page import FrontPage
+from robolink_cli.lazy_group import FrontPage
 from robolink_cli.options.shared import TYPED, shared_options
 
 if TYPE_CHECKING:

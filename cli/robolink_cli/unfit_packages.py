@@ -11,11 +11,9 @@ from contextlib import suppress
 from typing import Final
 
 from robolink.messages import joined, tr
-from robolink_cli.commands.computer.doctor_finding import Level, Remark
-from robolink_cli.commands.computer.requirements import check_versions
+from robolink_cli.commands.computer.checkup import Level, Remark, check_versions
 from robolink_cli.console.language import speaking_for
-from robolink_cli.console.output import visible
-from robolink_cli.console.tolerance import tolerate_any_console
+from robolink_cli.console.output import tolerate_any_console, visible
 
 _FOUND = 1
 _NOT_RUNNABLE = 2

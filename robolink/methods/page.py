@@ -8,8 +8,8 @@ from typing import Final, Literal, get_args, get_origin
 
 from annotated_types import Ge, Gt, Le, Len, MaxLen, MinLen
 
-from robolink.methods.declaration.fields import ParameterField, bare, fields_of
-from robolink.methods.declaration.method import AnyMethod
+from robolink.methods.method import AnyMethod
+from robolink.methods.parameter_checks import ParameterField, bare, fields_of
 from robolink.methods.registry import all_methods
 
 _OPENING: Final = """\
@@ -20,7 +20,7 @@ This page is made from the code: `python -m robolink.methods.page > docs/methods
 [Recipes](recipes.md) says what else is in a recipe.
 
 A method has one name. It is used in the command `robolink calibrate NAME`, as the `kind` in the
-`[source]` table of a recipe, and for the method's folder in `robolink/methods`. Its parameters are
+`[source]` table of a recipe, and for the method's module in `robolink/methods`. Its parameters are
 options of the command and keys of `[source]`, with the same limits. Limits are inclusive; a value
 outside them is refused before anything moves. Lengths are in mm, angles in degrees. Every command
 also has `--station`, `--sigma` and the other options of its help page.

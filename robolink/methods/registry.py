@@ -14,7 +14,7 @@ from typing import Final, cast
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.methods.declaration.method import AnyMethod
+from robolink.methods.method import AnyMethod
 from robolink.plug_ins import PlugInError, find_plug_in
 
 METHODS_GROUP: Final = "robolink.methods"
@@ -30,12 +30,12 @@ _OWN: Final = {
     "board": "robolink.methods.board",
     "runout-table": "robolink.methods.runout_table",
     "pivot": "robolink.methods.pivot",
-    "six-point": "robolink.methods.six_point",
-    "plane-touch": "robolink.methods.plane_touch",
-    "sphere-touch": "robolink.methods.sphere_touch",
+    "six-point": "robolink.methods.pivot.six_point",
+    "plane-touch": "robolink.methods.surface_touch.plane",
+    "sphere-touch": "robolink.methods.surface_touch.sphere",
     "points": "robolink.methods.points",
 }
-"""Name and folder, in the order of the help page."""
+"""Name and module, in the order of the help page."""
 
 _registered: dict[str, AnyMethod] = {}
 

@@ -8,8 +8,8 @@ from typing import Final
 from robolink.calibration import offset_sigma_mm
 from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
-from robolink.methods.beams.parameters import BeamsParameters
-from robolink.methods.z_touch.parameters import ZTouchParameters
+from robolink.methods.beams import BeamsParameters
+from robolink.methods.z_touch import ZTouchParameters
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import PinTouches, TouchPlan
 from robolink.runner import Procedure

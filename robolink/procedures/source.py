@@ -1,8 +1,8 @@
 """Where a measurement comes from: what every source of it offers to a nozzle change."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Protocol, TypeVar, runtime_checkable
+from typing import ClassVar, Protocol, TypeVar, runtime_checkable
 
 from robolink.calibration import CalibrationResult, VerifyResult
 from robolink.model import (
@@ -17,6 +17,27 @@ from robolink.model import (
 )
 from robolink.runner import EndingWatch, Operator, Procedure, Runner, RunSettings, StepDone
 from robolink.stations import Found
+
+
+class PoseMethod(Protocol):
+    """Solves flange poses that touch a pin.
+
+    Attributes:
+        upright: Whether the tool stands upright in all of them, so that only X and Y follow.
+        needs: Coordinates that a pose must state besides x_mm, y_mm and u_deg.
+    """
+
+    upright: ClassVar[bool]
+    needs: ClassVar[tuple[str, ...]]
+
+    def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
+        """Return the offset; what is not measured is kept from ``stored``.
+
+        Raises:
+            CalibrationError: The poses give no trustworthy result; its code says why.
+            ConfigError: Too many poses for the method.
+        """
+
 
 T = TypeVar("T")
 

@@ -15,8 +15,13 @@ from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import Path, Pose
 from robolink.procedures.approach import offset_z
-from robolink.procedures.pin.touch_plan import TouchPlan, fresh_seed, plain_pose
-from robolink.procedures.pin.witnessed import WitnessedTouches, you_touch
+from robolink.procedures.witnessed_touches import (
+    TouchPlan,
+    WitnessedTouches,
+    fresh_seed,
+    plain_pose,
+    you_touch,
+)
 from robolink.runner import Move, Procedure, TouchedAt, TouchSubject
 
 if TYPE_CHECKING:

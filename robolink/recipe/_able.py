@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.methods import PointsParameters
-from robolink.methods.pivot.source import LEAST_AXES
+from robolink.methods.pivot import LEAST_AXES
 from robolink.model import Capabilities, Controller, LookingController, says_it_is_simulated
 from robolink.sensing import VISION_GUIDE
 

@@ -11,7 +11,7 @@ from robolink.serving._judging import CallbackLimits, require_poses_sent, requir
 
 if TYPE_CHECKING:
     from robolink.calibration import CalibrationResult, Crossing, VerifyResult
-    from robolink.methods.beams.solving import CrossingSolver
+    from robolink.methods.beams.crossings import CrossingSolver
     from robolink.stations import BeamStation
 
 LEAST_CROSSINGS: Final = 8
@@ -106,7 +106,7 @@ class ProgramCrossings:
                 :func:`~robolink.calibration.solve_crossed_beams`.
         """
         from robolink.calibration import MIN_ROTATION_DEG, angle_spread_deg
-        from robolink.methods.beams.solving import require_straight
+        from robolink.methods.beams.crossings import require_straight
 
         self._measured.require(LEAST_CROSSINGS)
         crossings, shaft = _by_depth(self._measured.crossings)
@@ -172,7 +172,7 @@ class ProgramCrossings:
 
     def _solver(self, frame: Pose, expected: ToolOffset) -> "CrossingSolver":
         from robolink.calibration import FlangePlane
-        from robolink.methods.beams.solving import CrossingSolver
+        from robolink.methods.beams.crossings import CrossingSolver
 
         station = self._station
         tip_z_mm = frame.z_mm + FlangePlane.of(frame).rise_mm(expected)

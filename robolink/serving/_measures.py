@@ -75,7 +75,7 @@ def measure_named(
 
     method, at, place = name.partition("@")
     if method == "beams" and place:
-        from robolink.methods.beams.parameters import BeamsParameters
+        from robolink.methods.beams import BeamsParameters
         from robolink.serving._crossings import ProgramCrossings
         from robolink.stations import beam_station
 

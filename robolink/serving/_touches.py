@@ -124,9 +124,9 @@ class ProgramTouches:
 def touches_by(method: str, limits: CallbackLimits) -> ProgramTouches:
     """Return touches of a pin, ``n-angle`` or ``pivot``, of which there is none yet."""
     if method == "pivot":
-        from robolink.methods.pivot.source import PivotTouches
+        from robolink.methods.pivot import PivotTouches
 
         return ProgramTouches(PivotTouches(sigma_mm=limits.sigma_mm), limits)
-    from robolink.methods.n_angle.source import ManyTouches
+    from robolink.methods.n_angle import ManyTouches
 
     return ProgramTouches(ManyTouches(sigma_mm=limits.sigma_mm), limits)

@@ -14,7 +14,7 @@ from robolink.calibration import (
     rotation_of,
     solve_crossed_beams,
 )
-from robolink.methods.beams.solving import CrossingSolver
+from robolink.methods.beams.crossings import CrossingSolver
 from robolink.model import Pose, ToolOffset, angle_difference_deg, rotate_xy
 from tests.calibration._simulated import assert_honest, coverage, refused
 

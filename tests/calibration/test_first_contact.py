@@ -7,9 +7,9 @@ import pytest
 
 from robolink.calibration import TouchedPlane
 from robolink.methods import SphereSurvey
-from robolink.methods.pivot.proof import TiltTest
-from robolink.methods.plane_touch.proof import PlaneTest
-from robolink.methods.sphere_touch.proof import SphereTest, TouchedSphere
+from robolink.methods.pivot.procedure import TiltTest
+from robolink.methods.surface_touch.plane_procedure import PlaneTest
+from robolink.methods.surface_touch.sphere_procedure import SphereTest, TouchedSphere
 from robolink.model import Hand, Pose, ToolOffset
 from robolink.procedures import TouchPlan, TurnTest
 from robolink.runner import Ask, Consider, TouchedAt

@@ -34,12 +34,12 @@ from robolink.methods import (
     ZTouchSource,
     informative_tilts,
 )
-from robolink.methods.plane_touch.proof import PlaneTest
-from robolink.methods.sphere_touch.proof import SphereTest
+from robolink.methods.surface_touch.plane_procedure import PlaneTest
+from robolink.methods.surface_touch.sphere_procedure import SphereTest
 from robolink.model import Path, Pose, SpotUnit, ToolOffset
 from robolink.nozzle_change import Limits
 from robolink.procedures import MeasurementContext, TouchPlan
-from robolink.procedures.pin.tilting_proof import TiltingProof
+from robolink.procedures.tilting_proof import TiltingProof
 from robolink.runner import Ask, Move, TouchedAt
 from robolink.stations import BeamStation, CameraStation, TouchStation
 from robolink.testing import MemoryController, PaperCell

@@ -17,7 +17,7 @@ from robolink.calibration import (
     tip_did_not_move,
 )
 from robolink.model import Pose, Spot, SpotUnit
-from robolink.procedures.camera.watch import SpotWatch
+from robolink.procedures.camera_watch import SpotWatch
 from robolink.runner import SeenAt
 from robolink.stations import CameraStation
 

@@ -8,7 +8,7 @@ import pytest
 from robolink.calibration import PlaneTouchResult, rotation_of
 from robolink.errors import CalibrationError
 from robolink.methods import OverPin, PlaneSurvey, Tilt, measure_plane_touch
-from robolink.methods.plane_touch.proof import verify_on_plane
+from robolink.methods.surface_touch.plane_procedure import PlaneTest
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import SurfaceProof
 from robolink.runner import TouchedAt
@@ -140,19 +140,20 @@ def proved(plate, result: PlaneTouchResult, tip, *, axes):
     x, y, z = (np.array(here.coordinates()[:3]) + rotation_of(here) @ LENGTHS).tolist()
     frame = Pose(x, y, z, *here.coordinates()[3:], tool=1)
     left = ToolOffset(*np.subtract(tip.components()[:3], LENGTHS).tolist())
-    procedure = verify_on_plane(
-        PLAN,
-        result.plane,
-        here=frame,
-        tip=ToolOffset(),
-        frame=result.offset,
+    proof = PlaneTest(
+        tool=1,
+        written=result.offset,
+        tip=result.offset,
+        tolerance_mm=0.1,
+        touch=PLAN,
+        u_mm=0.01,
+        upright=frame,
+        plane=result.plane,
         tilt_deg=30.0,
         axes=axes,
-        tolerance_mm=0.1,
-        u_mm=0.01,
     )
     person = SurfacePerson(plate, start=frame, sigma_mm=0.0, tip=left)
-    shown = person.run(procedure)
+    shown = person.run(proof.steps(frame))
     assert person.flown > PLAN.lift_mm - 4.0
     return shown
 

@@ -8,7 +8,7 @@ import pytest
 from robolink.calibration import rotation_of
 from robolink.errors import CalibrationError
 from robolink.methods import AxisTeachPlan, informative_tilts, measure_six_point
-from robolink.methods.six_point.procedure import go_on_six_point
+from robolink.methods.pivot.six_point_procedure import retake_six_point
 from robolink.model import Path, Pose, ToolOffset
 from robolink.runner import TeachPrompt, TouchedAt
 from tests.calibration._tilting_person import (
@@ -187,7 +187,7 @@ def test_from_the_values_one_touch_is_made_again_and_the_ways_stay(again):
     assert np.linalg.norm(np.subtract(before.offset.components()[:3], TIP.components()[:3])) > 0.01
     taken = [TouchedAt.of(pose) for pose in before.inputs]
     result = guide.run(
-        go_on_six_point(
+        retake_six_point(
             PLAN,
             AxisTeachPlan(),
             here=guide.steps[-1][2],

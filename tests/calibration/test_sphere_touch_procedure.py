@@ -9,8 +9,7 @@ import pytest
 from robolink.calibration import rotation_of
 from robolink.errors import CalibrationError
 from robolink.methods import SphereSurvey, measure_sphere_touch
-from robolink.methods.sphere_touch.proof import TouchedSphere, verify_on_sphere
-from robolink.methods.sphere_touch.survey import LEAST_COUNT
+from robolink.methods.surface_touch.sphere_procedure import SphereTest, TouchedSphere
 from robolink.model import Pose, ToolOffset
 from tests.calibration._surface_person import PLAN, STORED, TIP, Ball, SurfacePerson, slips
 
@@ -72,7 +71,7 @@ def test_with_the_least_number_of_touches_no_good_run_is_refused():
     ball = Ball(10.0)
     for seed in range(60):
         person = SurfacePerson(ball, start=over_top(ball), seed=seed, sigma_mm=0.05)
-        measured(person, count=LEAST_COUNT)
+        measured(person, count=SphereSurvey.least_count)
 
 
 @pytest.mark.parametrize(
@@ -127,19 +126,20 @@ def measured_once(axes):
 def test_the_proof_on_a_sphere_shows_a_tip_that_slipped_in_any_direction(axes, aside):
     ball, result = measured_once(axes)
     frame = replace(over_top(ball, tip=ToolOffset()), tool=1)
-    procedure = verify_on_sphere(
-        PLAN,
-        SphereSurvey(10.0),
-        TouchedSphere(result.reference_point_mm, result.radius_mm),
-        here=frame,
-        tip=ToolOffset(),
-        frame=result.offset,
-        axes=axes,
+    proof = SphereTest(
+        tool=1,
+        written=result.offset,
+        tip=result.offset,
         tolerance_mm=0.1,
+        touch=PLAN,
         u_mm=0.01,
+        upright=frame,
+        survey=SphereSurvey(10.0),
+        sphere=TouchedSphere(result.reference_point_mm, result.radius_mm),
+        axes=axes,
     )
     slipped = ToolOffset(*map(float, aside))
-    found = SurfacePerson(ball, start=frame, sigma_mm=0.0, tip=slipped).run(procedure)
+    found = SurfacePerson(ball, start=frame, sigma_mm=0.0, tip=slipped).run(proof.steps(frame))
     assert found.passed is not any(aside)
     # A sphere is no plane: beside the expected place its way along the normal is a little longer.
     assert found.max_drift_mm == pytest.approx(float(np.linalg.norm(aside)), abs=0.02)

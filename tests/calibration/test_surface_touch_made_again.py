@@ -9,9 +9,14 @@ import pytest
 
 from robolink.calibration import rotation_of
 from robolink.errors import CalibrationError
-from robolink.methods import PlaneSurvey, SphereSurvey, measure_plane_touch, measure_sphere_touch
-from robolink.methods.plane_touch.procedure import go_on_plane_touch
-from robolink.methods.sphere_touch.procedure import go_on_sphere_touch
+from robolink.methods import (
+    PlaneSurvey,
+    PlaneTouchSource,
+    SphereSurvey,
+    SphereTouchSource,
+    measure_plane_touch,
+    measure_sphere_touch,
+)
 from robolink.procedures import SamplingPolicy, SurfaceTouches, touches_of
 from robolink.runner import Ask, Confirm, TakenAgainError, TouchedAt
 from tests.calibration._surface_person import PLAN, START, STORED, TIP, Ball, Plate, SurfacePerson
@@ -24,8 +29,8 @@ UPRIGHTS = {"plane": 3, "sphere": 4}
 COUNT = 12
 _BALL = Ball(10.0)
 _MEASURED: dict[str, tuple[Any, Any, Any]] = {
-    "plane": (measure_plane_touch, go_on_plane_touch, PlaneSurvey(COUNT)),
-    "sphere": (measure_sphere_touch, go_on_sphere_touch, SphereSurvey(9.0, COUNT)),
+    "plane": (measure_plane_touch, PlaneTouchSource, PlaneSurvey(COUNT)),
+    "sphere": (measure_sphere_touch, SphereTouchSource, SphereSurvey(9.0, COUNT)),
 }
 
 
@@ -75,17 +80,9 @@ def measured(kind, person, **more):
 
 
 def gone_on(kind, person, before, again):
-    _, go_on, survey = _MEASURED[kind]
-    steps = go_on(
-        PLAN,
-        survey,
-        here=person.moves[-1].target,
-        taken=touches_of(before),
-        again=again,
-        stored=STORED,
-        axes=6,
-    )
-    return person.run(steps)
+    _, source, survey = _MEASURED[kind]
+    here, taken = person.moves[-1].target, touches_of(before)
+    return person.run(source(PLAN, survey, axes=6).further_steps(here, taken, again, STORED))
 
 
 def miss_mm(result):

@@ -7,7 +7,7 @@ import pytest
 from robolink.calibration import rotation_of
 from robolink.errors import CalibrationError
 from robolink.methods import informative_tilts, measure_pivot
-from robolink.methods.pivot.procedure import go_on_pivot
+from robolink.methods.pivot.procedure import retake_pivot
 from robolink.procedures import touches_of
 from robolink.runner import TakenAgainError
 from tests.calibration._tilting_person import PIN, PLAN, STORED, TIP, Person, tip_mm, turned_deg
@@ -37,7 +37,7 @@ def test_a_tilted_touch_is_made_again_in_its_orientation_and_the_tool_ends_uprig
     assert miss_mm(first) > 0.02
     end = person.steps[-1][2]
     result = person.run(
-        go_on_pivot(
+        retake_pivot(
             PLAN,
             here=end,
             taken=touches_of(first),
@@ -58,7 +58,7 @@ def test_a_touch_made_again_that_is_refused_leaves_the_tool_upright():
     person = SlipsALittle(-1)
     first = person.run(measure_pivot(PLAN, tilts=TILTS, stored=STORED))
     person.slip_mm, person.slip = 8.0, len(person.touches)
-    again = go_on_pivot(
+    again = retake_pivot(
         PLAN,
         here=person.steps[-1][2],
         taken=touches_of(first),

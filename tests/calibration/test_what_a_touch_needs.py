@@ -6,7 +6,7 @@ import pytest
 
 from robolink.calibration import PERSON_U_DRIFT_MM, solve_n_angle
 from robolink.errors import CalibrationError
-from robolink.methods.n_angle.procedure import _came_from_mm
+from robolink.methods.n_angle import _came_from_mm
 from robolink.model import InputEdge, Pose
 from robolink.procedures import PinTouches, TouchPlan, drift_uncertainty_mm
 from robolink.runner import Ask, Move, Notify, TouchedAt

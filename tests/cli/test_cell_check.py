@@ -174,7 +174,7 @@ def watched(simulator, monkeypatch, tmp_path):
                 raise DeclinedError("You said no.")
 
         monkeypatch.setattr("robolink_cli.prompts.questions.on_terminal", lambda: True)
-        monkeypatch.setattr("robolink_cli.commands.measure.sensor_check.on_terminal", lambda: True)
+        monkeypatch.setattr("robolink_cli.commands.computer.cell_check.on_terminal", lambda: True)
         monkeypatch.setattr("robolink_cli.prompts.questions.require_yes", require_yes)
         return asked
 

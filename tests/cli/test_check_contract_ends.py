@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 import pytest
 from robolink_cli import main
-from robolink_cli.commands.controller.contract_trials import TrialConnections
+from robolink_cli.commands.controller.contract_report import TrialConnections
 from robolink_simulators.faults import Fault, FaultAction
 
 import robolink

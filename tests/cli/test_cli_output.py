@@ -9,7 +9,7 @@ import click
 import pytest
 from robolink_cli import main
 from robolink_cli.console import render
-from robolink_cli.console.tolerance import PLAINLY
+from robolink_cli.console.output import PLAINLY
 
 from robolink import errors
 
@@ -100,8 +100,8 @@ def test_brackets_in_a_table_are_text(command, capsys):
 @pytest.mark.parametrize("encoding", ["ascii", "cp1252", "cp936"])
 def test_no_console_makes_a_sentence_fail(encoding):
     program = (
-        "from robolink_cli.console import render, tolerance\n"
-        "tolerance.tolerate_any_console()\n"
+        "from robolink_cli.console import render, output\n"
+        "output.tolerate_any_console()\n"
         "render.say('90° ✓ 机器人 µm')\n"
         "render.note('90° ✓ 机器人 µm')\n"
         "render.table('°', ['µ'], [['✓']])\n"

@@ -4,9 +4,12 @@ import json
 
 import pytest
 from robolink_cli import main
-from robolink_cli.commands.simulate.demonstrated import AcceptedChange
-from robolink_cli.commands.simulate.demonstration import DemoOperator, require_refused
-from robolink_cli.commands.simulate.demonstration import _on_plc as on_plc
+from robolink_cli.commands.simulate.demo import (
+    AcceptedChange,
+    DemoOperator,
+    require_refused,
+)
+from robolink_cli.commands.simulate.demo import _on_plc as on_plc
 
 STORED = {"x_mm": 12.0, "y_mm": -3.5, "z_mm": -20.0}
 

@@ -9,8 +9,8 @@ from types import ModuleType, SimpleNamespace
 import pytest
 from robolink_cli import main
 from robolink_cli.commands.computer import checkup
-from robolink_cli.commands.computer.doctor_finding import Level
-from robolink_cli.commands.computer.requirements import (
+from robolink_cli.commands.computer.checkup import (
+    Level,
     check_name,
     check_versions,
     fits,

@@ -12,12 +12,11 @@ from xml.etree import ElementTree
 
 import pytest
 from rich.console import Console
-from robolink_cli.commands.record.drift_views import show_drift
+from robolink_cli.commands.record.journal_drift import show_drift
 from robolink_cli.console import render
-from robolink_cli.console.columns import within
-from robolink_cli.console.tables import column_widths, drawn_table, is_figures
+from robolink_cli.console.tables import column_widths, drawn_table, is_figures, within
 from robolink_cli.options.impact import show_impact
-from robolink_cli.views.calibration import show_proposal
+from robolink_cli.views.fit import show_proposal
 from robolink_cli.views.journal import show_entry, show_list
 from robolink_cli.views.tables import show_change, show_pose, show_tools
 from robolink_cli.wizard.screens.told import told_before, told_question

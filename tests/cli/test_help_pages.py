@@ -7,8 +7,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from robolink_cli import main
-from robolink_cli.console.columns import columns
 from robolink_cli.console.help_pages import WideHelpFormatter
+from robolink_cli.console.tables import columns
 
 from robolink import messages
 

@@ -5,9 +5,9 @@ import json
 import pytest
 from robolink_cli import main
 from robolink_cli.commands.companions import serve
-from robolink_cli.prompts import jumps
 from robolink_cli.prompts import operator as _operator
 from robolink_cli.prompts import questions as consent
+from robolink_cli.prompts import questions as jumps
 
 import robolink
 from robolink.config import find_cell

@@ -187,9 +187,7 @@ def person(monkeypatch):
     def sits(plc, *answers):
         person = Person(plc, *answers)
         monkeypatch.setattr("robolink_cli.prompts.questions.on_terminal", lambda: True)
-        monkeypatch.setattr(
-            "robolink_cli.commands.companions.map_comparison.on_terminal", lambda: True
-        )
+        monkeypatch.setattr("robolink_cli.commands.companions.check_map.on_terminal", lambda: True)
         monkeypatch.setattr("robolink_cli.prompts.operator.terminal", lambda: person)
         return person
 

@@ -14,7 +14,7 @@ import click
 import pytest
 from robolink_cli import main
 from robolink_cli.console import language
-from robolink_cli.console.columns import columns
+from robolink_cli.console.tables import columns
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process.epson import register, unregister
 from robolink_simulators.hosting.streams.epson import serve_tcp

@@ -11,8 +11,8 @@ from types import SimpleNamespace
 
 import pytest
 from robolink_cli import main
-from robolink_cli.commands.computer import scanning
-from robolink_cli.commands.computer.scanning import AddressProbe, State, parse_range
+from robolink_cli.commands.computer import scan
+from robolink_cli.commands.computer.scan import AddressProbe, State, parse_range
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
 from robolink_simulators.hosting.streams.epson import serve_serial
@@ -109,7 +109,7 @@ def test_each_way_of_not_answering_has_its_name(monkeypatch, failure, state):
         raise failure
 
     monkeypatch.setattr(socket, "create_connection", fail)
-    (probe,) = scanning.probe_all(["192.0.2.1"], 5000, 0.3)
+    (probe,) = scan.probe_all(["192.0.2.1"], 5000, 0.3)
     assert (probe.address, probe.state) == ("192.0.2.1", state)
 
 
@@ -124,9 +124,9 @@ def test_256_addresses_are_tried_a_few_at_a_time_and_told_in_order(monkeypatch):
         running.remove(address)
         return AddressProbe(address, State.SILENT, 0.0)
 
-    monkeypatch.setattr(scanning, "_probe", probe)
+    monkeypatch.setattr(scan, "_probe", probe)
     wanted = parse_range("192.0.2.0/24")
-    assert [p.address for p in scanning.probe_all(wanted, 5000, 0.3)] == wanted
+    assert [p.address for p in scan.probe_all(wanted, 5000, 0.3)] == wanted
     assert 1 < max(most) <= 32
 
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 from robolink_cli import main
-from robolink_cli.commands.shipped.page_lines import page_lines
-from robolink_cli.console.columns import columns
+from robolink_cli.commands.shipped.docs import page_lines
+from robolink_cli.console.tables import columns
 
 ROOT = Path(__file__).parents[2]
 RECIPES = sorted(path.stem for path in (ROOT / "examples" / "recipes").glob("*.toml"))

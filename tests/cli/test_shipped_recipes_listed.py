@@ -3,8 +3,7 @@
 import json
 
 from robolink_cli import main
-from robolink_cli.commands.shipped.recipe_copies import first_comment, models
-from robolink_cli.commands.shipped.recipe_purposes import PURPOSES
+from robolink_cli.commands.shipped.recipe import PURPOSES, first_comment, models
 
 from tests.contract._terminal import Terminal
 

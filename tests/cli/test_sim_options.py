@@ -6,7 +6,7 @@ import click
 import pytest
 from robolink_cli import main
 from robolink_cli.commands.simulate.sim import sim
-from robolink_cli.console.help_sections import SectionedCommand
+from robolink_cli.console.help_pages import SectionedCommand
 
 from tests.cli.test_names_of_before import run_on_terminal
 

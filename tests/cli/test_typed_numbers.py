@@ -8,8 +8,8 @@ from robolink_cli import main
 from robolink_cli.commands.measure.calibrate.values import type_of
 from robolink_cli.console.numbers import decimal
 
-from robolink.methods.declaration.fields import fields_of
-from robolink.methods.declaration.look_parameters import LookParameters
+from robolink.methods.parameter_checks import fields_of
+from robolink.methods.shared_parameters import LookParameters
 
 STRANGE = [
     "\uff11\uff12.\uff15",

@@ -5,7 +5,7 @@ import re
 from datetime import datetime
 
 import pytest
-from robolink_cli.commands.record.recorded_change import report_payload
+from robolink_cli.commands.record.report import report_payload
 
 from robolink.model import EntryKind
 from robolink.report import reports_of, save

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from robolink_simulators.epson.arm.joints import Joints
+from robolink_simulators.epson.arm.robots import Joints
 from robolink_simulators.epson.memory.points import Point
 
 from robolink.calibration import rotation_of

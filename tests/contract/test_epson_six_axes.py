@@ -7,8 +7,8 @@ import pytest
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.frames import transposed
 from robolink_simulators.epson import EpsonSimulator
-from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.kinematics import continued, forward, frame_of
+from robolink_simulators.epson.arm.robots import Joints
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.hosting.in_process.epson import register, unregister
 

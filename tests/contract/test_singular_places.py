@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from robolink_simulators.epson.arm.joints import Joints
+from robolink_simulators.epson.arm.robots import Joints
 
 from robolink.model import ToolOffset
 from tests.contract._camera_cell import furnish

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 from robolink_cli import main
-from robolink_simulators.epson.vision.calibration import VisionCalibration
-from robolink_simulators.epson.vision.project import VisionObject, VisionProject, VisionSequence
-from robolink_simulators.epson.vision.system import VisionSystem
+from robolink_simulators.epson.camera_calibrations import VisionCalibration
+from robolink_simulators.epson.vision_project import VisionObject, VisionProject, VisionSequence
+from robolink_simulators.epson.vision_system import VisionSystem
 
 from robolink.errors import CalibrationError, ConfigError, OutcomeUnknownError, StoppedError
 from robolink.methods import CameraSource

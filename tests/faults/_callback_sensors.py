@@ -4,14 +4,14 @@ import math
 from dataclasses import replace
 
 from robolink_simulators.cell.tip_switches import LightBeam
+from robolink_simulators.epson.camera_calibrations import VisionCalibration
 from robolink_simulators.epson.memory.points import Point
-from robolink_simulators.epson.vision.calibration import VisionCalibration
-from robolink_simulators.epson.vision.project import VisionObject, VisionProject, VisionSequence
-from robolink_simulators.epson.vision.system import VisionSystem
+from robolink_simulators.epson.vision_project import VisionObject, VisionProject, VisionSequence
+from robolink_simulators.epson.vision_system import VisionSystem
 
 from robolink.calibration import Beam
+from robolink.methods.beams import BeamsParameters
 from robolink.methods.beams.drive import BeamDrive
-from robolink.methods.beams.parameters import BeamsParameters
 from robolink.model import TIP, Pose, ToolOffset
 from robolink.stations import BeamStation, Found, StationKind, station_entry
 from tests.faults._callback_cell import IDENTITY, NOMINAL, CallbackCell, main_of

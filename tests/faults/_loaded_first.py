@@ -18,7 +18,7 @@ import robolink_cli.commands.controller.jog
 import robolink_cli.commands.measure.calibrate
 import robolink_cli.commands.record.recover
 import robolink_cli.main
-import robolink_cli.session.selected_tool
+import robolink_cli.session.motion_consent
 import robolink_cli.stopping.notes
 import robolink_simulators.assist.port
 import robolink_simulators.cell.clock

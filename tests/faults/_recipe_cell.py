@@ -183,7 +183,7 @@ class RecipeCell(ABC):
         ):
             patch.setattr(sys, "stdin", (_Terminal if asks else io.StringIO)())
             # A run is taken again, up to each of its instants: the same one.
-            patch.setattr("robolink.procedures.pin.touches.fresh_seed", lambda: 7)
+            patch.setattr("robolink.procedures.pin_touches.fresh_seed", lambda: 7)
             patch.setattr(simulator, "on_request", lambda _, text: seen.pass_by("request", text))
             patch.setattr(simulator, "on_reply", lambda _, text: seen.pass_by("answer", text))
             patch.setattr(self.clock, "on_wait", lambda: seen.pass_by("wait"))

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from robolink_simulators.epson.vision.calibration import VisionCalibration
+from robolink_simulators.epson.camera_calibrations import VisionCalibration
 
 from robolink import ambient
 from robolink.journal import memory_journal

@@ -6,7 +6,7 @@ from contextlib import nullcontext
 
 import pytest
 from robolink_cli.prompts.present import sitting_at
-from robolink_cli.wizard.choices import ChoiceSubject
+from robolink_cli.wizard.state import ChoiceSubject
 
 from robolink.model import Marker, MarkerKind
 from robolink.timing import local_label

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 from robolink_cli import main
-from robolink_simulators.epson.vision.vision_file import install_vision
+from robolink_simulators.epson.vision_file import install_vision
 
 import robolink
 from robolink.errors import OutcomeUnknownError

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from robolink_cli.commands.measure.solve.solving import load as load_case
 from robolink_cli.commands.measure.solve.solving import solve_document
 from robolink_simulators.epson.options import PROFILE_SCHEMA, options_from_text, read_profile
-from robolink_simulators.epson.spel.programs.io_label_file import read_io_labels
-from robolink_simulators.epson.spel.source.point_file import read_points
+from robolink_simulators.epson.spel.file_commands import read_points
+from robolink_simulators.epson.spel.programs.project import read_io_labels
 from robolink_simulators.faults import read_fault_file
 from robolink_simulators.hosting.replay import read_recording
 

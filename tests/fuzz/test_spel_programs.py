@@ -9,7 +9,7 @@ from typing import Literal
 import pytest
 from hypothesis import strategies as st
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
-from robolink_simulators.epson.spel.source.faults import ProgramRefused
+from robolink_simulators.epson.spel.source_text import ProgramRefused
 
 from tests.fuzz._mutating import fuzzed
 

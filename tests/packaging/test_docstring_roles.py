@@ -163,10 +163,10 @@ def test_what_a_page_of_the_api_names_has_a_page():
     [
         ("robolink.model.motion.movement", ("WorkBox",), "about", True),
         ("robolink.model.motion.movement", ("WorkBox",), "above", False),
-        ("robolink.methods.points.source", (), "TwoTouches", True),
-        ("robolink.methods.points.source", (), "robolink.procedures.TipSource", True),
-        ("robolink.methods.points.source", (), "robolink.procedures.TipSink", False),
-        ("robolink.methods.points.source", (), "solve_two_poses", False),
+        ("robolink.methods.given_poses", (), "TwoTouches", True),
+        ("robolink.methods.given_poses", (), "robolink.procedures.TipSource", True),
+        ("robolink.methods.given_poses", (), "robolink.procedures.TipSink", False),
+        ("robolink.methods.given_poses", (), "solve_two_poses", False),
     ],
 )
 def test_a_wrong_name_is_found(module, owners, target, there):

@@ -11,7 +11,7 @@ import canopen
 import pytest
 from canopen.objectdictionary import datatypes
 from robolink_cli import main
-from robolink_cli.commands.companions.plc_export import plc_texts
+from robolink_cli.commands.companions.plc import plc_texts
 
 from robolink.protocols.mailbox import (
     COMMAND,

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from blark.parse import parse_source_code
 from robolink_cli import main
-from robolink_cli.commands.companions.plc_export import plc_texts
+from robolink_cli.commands.companions.plc import plc_texts
 from robolink_simulators.softmotion.program.structured_plc import PROGRAM_SOURCES
 from robolink_simulators.structured_text import SourceText, StructuredProgram, TextDialect
 from robolink_simulators.structured_text.parse import RESERVED_WORDS, is_vendor_word, parse

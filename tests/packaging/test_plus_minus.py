@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[2]
 SHIPPED = ("robolink", "cli", "simulators", "companions", "docs")
 OTHER_WAYS = ("\u00b1", r"\u00b1", "+/-")
 ONE_PLACE = "robolink/report/_markup.py"
-OF_OTHERS = "cli/robolink_cli/console/tolerance.py"
+OF_OTHERS = "cli/robolink_cli/console/output.py"
 """Writes what people typed, or a page says, for a console that lacks the sign."""
 
 

@@ -7,7 +7,7 @@ from string import Formatter
 
 import pytest
 from babel.messages.pofile import read_po
-from robolink_cli.console.columns import columns, filled
+from robolink_cli.console.tables import columns, filled
 
 from robolink.model import ControllerState, ControllerStatus, Hand
 from tests.packaging.test_catalogue import CATALOGUE

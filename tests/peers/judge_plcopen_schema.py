@@ -9,7 +9,7 @@ import os
 from pathlib import Path
 
 import pytest
-from robolink_cli.commands.companions.plc_export import plc_texts
+from robolink_cli.commands.companions.plc import plc_texts
 
 from robolink.protocols.mailbox import ExportProfile
 from robolink.protocols.mailbox.exports import PlcopenSchema

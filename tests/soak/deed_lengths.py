@@ -12,11 +12,11 @@ from typing import Any, Final
 from unittest import mock
 
 from robolink_simulators.faults.counted import CountedFaults
-from robolink_simulators.soak import CellKind, live_through
-from robolink_simulators.soak.cell import VirtualCell
-from robolink_simulators.soak.drawing.hours import deeds_of
-from robolink_simulators.soak.history import Deed, Habit, History, Hour
-from robolink_simulators.soak.plant.counted_acts import CountedActs
+
+from tests.soak.adversary import CellKind, live_through
+from tests.soak.adversary.cell import VirtualCell
+from tests.soak.adversary.drawn_hours import deeds_of
+from tests.soak.adversary.history import CountedActs, Deed, Habit, History, Hour
 
 RUNS: Final = 3
 SEED: Final = 3

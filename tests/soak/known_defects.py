@@ -11,12 +11,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from robolink_simulators.soak import CellKind
-
 from robolink.controllers.epson.tools import EpsonToolTable
 from robolink.model import MarkerKind
 from robolink.standing import UNTOUCHED
 from tests.soak import stand_ins
+from tests.soak.adversary import CellKind
 
 
 @dataclass(frozen=True, slots=True)
@@ -214,7 +213,7 @@ DEFECTS: Final = (
     KnownDefect(
         "who only presses ENTER gets a proof",
         {
-            "robolink.procedures.pin.touch_plan.TouchPlan.__init__": stand_ins.nominal,
+            "robolink.procedures.witnessed_touches.TouchPlan.__init__": stand_ins.nominal,
             "robolink.nozzle_change._turn_verdict.require_proved": stand_ins.nothing,
         },
         found_by="careless people",

@@ -10,8 +10,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-from robolink_simulators.soak import CellKind, run
-
+from tests.soak.adversary import CellKind, run
 from tests.soak.known_defects import DEFECTS, KnownDefect
 
 MOST_HOURS: Final = 200

@@ -33,7 +33,7 @@ from robolink.model import (
     Verdict,
     new_operation,
 )
-from robolink.procedures.pin.touch_plan import TouchPlan
+from robolink.procedures.witnessed_touches import TouchPlan
 from robolink.protocols.epson_text import parse_status
 from robolink.stop_latch import StopLatch
 from robolink.timing import wall_label

@@ -3,12 +3,12 @@
 import pytest
 from robolink_simulators.faults import FaultAction, LinkKind, PlcFaultAction, links_of
 from robolink_simulators.faults.drawn import INSTANTS, RARE
-from robolink_simulators.soak import CellKind, drawn_history
-from robolink_simulators.soak.drawing.faults import LINE_KINDS, MAILBOX_KINDS
-from robolink_simulators.soak.drawing.hours import deeds_of
-from robolink_simulators.soak.drawing.lengths import length_of
-from robolink_simulators.soak.history import Hindrance
-from robolink_simulators.soak.plant.lines.bent_line import LineBend
+
+from tests.soak.adversary import CellKind, drawn_history
+from tests.soak.adversary.deed_lengths import length_of
+from tests.soak.adversary.drawn_hours import LINE_KINDS, MAILBOX_KINDS, deeds_of
+from tests.soak.adversary.history import Hindrance
+from tests.soak.adversary.plant.lines import LineBend
 
 pytestmark = pytest.mark.soak
 

@@ -5,15 +5,16 @@ from collections import Counter
 
 import pytest
 from robolink_cli.console.exit_codes import BUG, exit_code
-from robolink_simulators.soak import CellKind, live_through
-from robolink_simulators.soak.drawing.commands import (
+
+from tests.soak.adversary import CellKind, live_through
+from tests.soak.adversary.command_lines import (
     LEFT_OUT,
     drawn_commands,
     drawn_line,
     every_command,
     left_out,
 )
-from robolink_simulators.soak.history import Deed, Habit, History, Hour
+from tests.soak.adversary.history import Deed, Habit, History, Hour
 
 
 def cell_of(lines, *, kind=CellKind.EPSON):

@@ -4,8 +4,9 @@ docs/reliability.md says of each what was wrong, in which of the two, and what h
 """
 
 import pytest
-from robolink_simulators.soak import drawn_history, live_through
-from robolink_simulators.soak.history import (
+
+from tests.soak.adversary import drawn_history, live_through
+from tests.soak.adversary.history import (
     CellKind,
     Deed,
     Disturbance,

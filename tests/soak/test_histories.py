@@ -5,8 +5,9 @@ import subprocess
 import sys
 
 import pytest
-from robolink_simulators.soak import CellKind, live_through, run
-from robolink_simulators.soak.history import Deed, Disturbance, Habit, Hindrance, History, Hour
+
+from tests.soak.adversary import CellKind, live_through, run
+from tests.soak.adversary.history import Deed, Disturbance, Habit, Hindrance, History, Hour
 
 HOURS = 10
 STOP = Disturbance(Hindrance.STOP, match="lock 2103", seconds=0.01)
@@ -41,7 +42,7 @@ def test_one_seed_is_one_history():
 
 @pytest.mark.soak
 def test_one_seed_is_one_history_in_every_process():
-    program = "from robolink_simulators.soak import run; print(run(5, 1).hash, run(6, 1).hash)"
+    program = "from tests.soak.adversary import run; print(run(5, 1).hash, run(6, 1).hash)"
     told = subprocess.run(
         [sys.executable, "-c", program],
         env={**os.environ, "PYTHONHASHSEED": "12345"},

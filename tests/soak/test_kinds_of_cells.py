@@ -5,12 +5,12 @@ import subprocess
 import sys
 
 import pytest
-from robolink_simulators.soak import CellKind, live_through, run
-from robolink_simulators.soak.drawing.hours import deeds_of
-from robolink_simulators.soak.history import Habit, History, Hour
 
 from robolink.model import Marker, MarkerKind, plain_offset
 from robolink.serving._book import ProgramChange
+from tests.soak.adversary import CellKind, live_through, run
+from tests.soak.adversary.drawn_hours import deeds_of
+from tests.soak.adversary.history import Habit, History, Hour
 from tests.soak.known_defects import DEFECTS
 
 pytestmark = pytest.mark.soak
@@ -42,7 +42,7 @@ def test_undisturbed_deeds_come_off(kind):
 @pytest.mark.parametrize("kind", CellKind)
 def test_one_seed_is_one_history_in_every_process_and_kind(kind):
     program = (
-        "from robolink_simulators.soak import CellKind, run; "
+        "from tests.soak.adversary import CellKind, run; "
         f"print(run(11, 3, kind=CellKind.{kind.name}).hash)"
     )
     told = subprocess.run(

@@ -5,9 +5,9 @@ from functools import cache
 from unittest import mock
 
 import pytest
-from robolink_simulators.soak import CellKind, live_through
-from robolink_simulators.soak.history import Deed, Disturbance, Habit, Hindrance, History, Hour
 
+from tests.soak.adversary import CellKind, live_through
+from tests.soak.adversary.history import Deed, Disturbance, Habit, Hindrance, History, Hour
 from tests.soak.known_defects import DEFECTS
 from tests.soak.mutant_table import Search, table
 

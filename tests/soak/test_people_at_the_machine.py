@@ -1,9 +1,9 @@
 """What people at the machine do while robolink asks, and the defects that only this shows."""
 
 import pytest
-from robolink_simulators.soak import CellKind, live_through
-from robolink_simulators.soak.history import Deed, Disturbance, Habit, Hindrance, History, Hour
 
+from tests.soak.adversary import CellKind, live_through
+from tests.soak.adversary.history import Deed, Disturbance, Habit, Hindrance, History, Hour
 from tests.soak.known_defects import DEFECTS
 
 BY_NAME = {defect.name: defect.replacements for defect in DEFECTS}

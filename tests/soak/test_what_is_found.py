@@ -5,11 +5,12 @@ from functools import cache
 
 import pytest
 from click.testing import CliRunner
-from robolink_simulators.soak import CellKind, live_through
-from robolink_simulators.soak.__main__ import main
-from robolink_simulators.soak.history import Deed, Disturbance, Habit, Hindrance, History, Hour
-from robolink_simulators.soak.results import ResultsFile
-from robolink_simulators.soak.shrinking import as_test, shrink
+
+from tests.soak.adversary import CellKind, live_through
+from tests.soak.adversary.__main__ import main
+from tests.soak.adversary.history import Deed, Disturbance, Habit, Hindrance, History, Hour
+from tests.soak.adversary.history_run import as_test, shrink
+from tests.soak.adversary.seed_records import ResultsFile
 
 STOP = Disturbance(Hindrance.STOP, match="lock Move", at=2)
 DROPPED = Disturbance(Hindrance.WIRE, "DROP_REPLY", "Move ", 3)

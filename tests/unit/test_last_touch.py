@@ -17,7 +17,7 @@ from robolink.methods import (
     find_last_touch,
     find_method,
 )
-from robolink.methods.declaration.site import Site
+from robolink.methods.method import Site
 from robolink.model import EntryKind, NewEntry, Path, Pose, ToolOffset, plain_offset
 from robolink.runner import Ask, Move
 from robolink.stations import Station, StationKind

@@ -4,8 +4,7 @@ import random
 from typing import Any
 
 import pytest
-from robolink_simulators.epson.arm.joints import Joints
-from robolink_simulators.epson.arm.robots import find_robot
+from robolink_simulators.epson.arm.robots import Joints, find_robot
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.options import EpsonOptions, SpelNumbers
 from robolink_simulators.epson.spel import Interpreter

@@ -3,10 +3,17 @@
 import importlib
 import pickle
 import warnings
+from dataclasses import dataclass, field
+from typing import ClassVar
 
 import pytest
 
+from robolink import Pose, ToolOffset
 from robolink.deprecation import GONE_IN, OLD_NAMES, deprecated
+from robolink.methods import TwoPoseSource, measure_two_pose
+from robolink.procedures import InputSource, ManualPinSource, TouchPlan
+from robolink.runner import foreseen_steps
+from robolink.testing import PaperCell
 from robolink.version import VERSION
 
 ROWS = [(package, name, new) for package, row in OLD_NAMES.items() for name, new in row.items()]
@@ -100,3 +107,67 @@ def test_an_old_method_does_what_it_did_and_warns_where_it_is_called():
         assert (one.category, one.filename) == (DeprecationWarning, __file__)
         assert str(one.message).startswith(message)
     assert Tolerance.doubts.__doc__ == "Return whether it is."
+
+
+def a_source_with_old_hooks():
+    @dataclass(frozen=True)
+    class Once(ManualPinSource):
+        sentence: ClassVar[str] = "A pin is touched."
+        adds_touch: ClassVar[bool] = False
+        touch: TouchPlan = field(default_factory=TouchPlan)
+
+        def _steps(self, stored, *, live):
+            return measure_two_pose(self._touching(live=live), stored=stored)
+
+        def _further_steps(self, here, taken, again, stored):
+            return TwoPoseSource(self.touch).further_steps(here, taken, again, stored)
+
+    return Once()  # type: ignore[abstract]  # made of the old name
+
+
+def test_a_source_of_touches_with_hooks_by_their_old_names_measures_and_shows_as_before():
+    caught, source = told(a_source_with_old_hooks)
+    assert [str(one.message).partition(". ")[0] for one in caught] == [
+        f"a_source_with_old_hooks.<locals>.Once.{old} is now {new}"
+        for old, new in (("_steps", "steps"), ("_further_steps", "further_steps"))
+    ]
+    assert {one.filename for one in caught} == {__file__}
+    stored = ToolOffset(12, -4, -20)
+    cell = PaperCell(Pose(300, 100, 20, 0), ToolOffset(12.3, -3.9, -20), (310, 95, -40))
+    caught, found = told(lambda: cell.run(source.steps(stored)))
+    assert {str(one.message).partition(" is now ")[2].partition(".")[0] for one in caught} == {
+        "touch"
+    }
+    again = cell.run(source.further_steps(cell.here, found.inputs, 1, stored))
+    for result in (found, again):
+        assert result.offset.x_mm == pytest.approx(12.3)
+    shown = told(lambda: foreseen_steps(source.procedure(stored, cell.here), cell.here))[1]
+    whole = foreseen_steps(TwoPoseSource().procedure(stored, cell.here), cell.here)
+    assert [one.step for one in shown] == [one.step for one in whole]
+
+
+def test_a_source_of_an_input_with_its_hook_by_the_old_name_measures_and_shows_as_before():
+    @dataclass(frozen=True)
+    class Plan:
+        until_mm: float | None = 0.1
+        retake: bool = True
+
+    def made():
+        @dataclass(frozen=True)
+        class Switched(InputSource[Plan]):
+            plan: Plan = Plan()
+
+            def _steps(self, stored, here, plan):
+                return stored, here, plan
+
+            def proof(self, context, tool, result, *, tip, tolerance_mm):
+                raise NotImplementedError
+
+        return Switched()  # type: ignore[abstract]  # made of the old name
+
+    caught, source = told(made)
+    assert [str(one.message).partition(". ")[0].rpartition(".")[2] for one in caught] == [
+        "_steps is now steps"
+    ]
+    assert source.steps(1, 2) == (1, 2, Plan())
+    assert source.procedure(1, 2) == (1, 2, Plan(None, retake=False))

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from robolink_cli.commands.shipped.recipe_copies import copy_recipe, models
+from robolink_cli.commands.shipped.recipe import copy_recipe, models
 
 import robolink
 from robolink.controllers import capabilities_of_kind

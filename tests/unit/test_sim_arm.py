@@ -6,13 +6,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from robolink_simulators.epson.arm.arm import Arm, rest_of
-from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.kinematics import forward, tip_of
 from robolink_simulators.epson.arm.motion_parameters import MotionParameters
-from robolink_simulators.epson.arm.ramps import Ramp
-from robolink_simulators.epson.arm.robots import find_robot
-from robolink_simulators.epson.arm.trajectory import JointPace, LinePace
-from robolink_simulators.epson.refusals import OutOfReach, SpelRefusal
+from robolink_simulators.epson.arm.robots import Joints, find_robot
+from robolink_simulators.epson.arm.trajectory import JointPace, LinePace, Ramp
+from robolink_simulators.epson.condition import OutOfReach, SpelRefusal
 
 from robolink.model import Hand, Pose, ToolOffset
 

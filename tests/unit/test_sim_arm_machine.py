@@ -1,13 +1,13 @@
 import random
 
 import pytest
+from robolink_simulators.epson.arm.coordinate_systems import Local
 from robolink_simulators.epson.arm.motion_parameters import MotionParameters
 from robolink_simulators.epson.arm.robots import find_robot
-from robolink_simulators.epson.definitions.local_frames import Local
+from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.bits import BitBank
 from robolink_simulators.epson.memory.points import Point
-from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 from robolink.model import ToolOffset
 

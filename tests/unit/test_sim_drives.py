@@ -5,13 +5,12 @@ import random
 
 import pytest
 from robolink_simulators.cell.surfaces import STIFFNESS_N_PER_MM, FlatPlate, RoundBall, resistance_n
-from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.kinematics import forward
-from robolink_simulators.epson.arm.robots import find_robot
-from robolink_simulators.epson.drives.observer import DriveQuantity
-from robolink_simulators.epson.drives.torque import (
+from robolink_simulators.epson.arm.robots import Joints, find_robot
+from robolink_simulators.epson.arm.torques import (
     OWN_KG,
     CarriedLoad,
+    DriveQuantity,
     JointMotion,
     momentary,
     torques,

@@ -1,7 +1,6 @@
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robolink_simulators.epson.arm.joints import Joints, check_ranges
 from robolink_simulators.epson.arm.kinematics import (
     flange_of,
     forward,
@@ -10,8 +9,15 @@ from robolink_simulators.epson.arm.kinematics import (
     solve,
     tip_of,
 )
-from robolink_simulators.epson.arm.robots import Evidence, Mechanism, find_robot, robots
-from robolink_simulators.epson.refusals import OutOfReach
+from robolink_simulators.epson.arm.robots import (
+    Evidence,
+    Joints,
+    Mechanism,
+    check_ranges,
+    find_robot,
+    robots,
+)
+from robolink_simulators.epson.condition import OutOfReach
 
 from robolink.errors import ConfigError
 from robolink.model import Hand, Pose, ToolOffset

@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 from robolink_simulators.cell.frames import zyx
 from robolink_simulators.epson import EpsonSimulator
-from robolink_simulators.epson.arm.joints import Joints
+from robolink_simulators.epson.arm.coordinate_systems import frame_at
 from robolink_simulators.epson.arm.robot_settings import SingularSurroundings
-from robolink_simulators.epson.arm.robots import find_robot
+from robolink_simulators.epson.arm.robots import Joints, find_robot
 from robolink_simulators.epson.arm.six_axes import forward
 from robolink_simulators.epson.arm.tilted_legs import plan_line
 from robolink_simulators.epson.arm.trajectory import LinePace
-from robolink_simulators.epson.definitions.local_frames import frame_at
 
 from robolink.model import Elbow, Posture, Wrist
 from robolink.protocols.spel import parse_point, parse_where

@@ -9,7 +9,6 @@ import click
 import pytest
 from robolink_cli.commands.simulate.sim import sim
 from robolink_simulators.cell.frames import product, transposed, zyx
-from robolink_simulators.epson.arm.joints import Joints, check_ranges
 from robolink_simulators.epson.arm.kinematics import (
     continued,
     forward,
@@ -18,8 +17,15 @@ from robolink_simulators.epson.arm.kinematics import (
     inverse,
     tip_of,
 )
-from robolink_simulators.epson.arm.robots import Mechanism, Mount, find_robot, robots
-from robolink_simulators.epson.refusals import OutOfReach
+from robolink_simulators.epson.arm.robots import (
+    Joints,
+    Mechanism,
+    Mount,
+    check_ranges,
+    find_robot,
+    robots,
+)
+from robolink_simulators.epson.condition import OutOfReach
 
 from robolink.model import Elbow, Hand, Posture, ToolOffset, Wrist
 

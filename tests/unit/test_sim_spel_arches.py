@@ -4,7 +4,7 @@ import math
 
 import pytest
 from robolink_simulators.epson import EpsonSimulator
-from robolink_simulators.epson.definitions.arches import Arch
+from robolink_simulators.epson.arm.arch import Arch
 
 from tests.unit.test_sim_spel_motion import Cell
 

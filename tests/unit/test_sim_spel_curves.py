@@ -5,8 +5,7 @@ from itertools import pairwise
 
 import pytest
 from robolink_simulators.epson import EpsonSimulator
-from robolink_simulators.epson.arm.ways.curve import through
-from robolink_simulators.epson.definitions.curves import CurveSwitch, FreeCurve
+from robolink_simulators.epson.arm.curves import CurveSwitch, FreeCurve, through
 
 from tests.unit.test_sim_spel_motion import Cell
 

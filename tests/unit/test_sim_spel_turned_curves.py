@@ -8,12 +8,15 @@ from itertools import pairwise
 import pytest
 from robolink_simulators.cell.frames import axis_and_angle, product, subtract, transposed
 from robolink_simulators.epson import EpsonOptions
-from robolink_simulators.epson.arm.joints import Joints
+from robolink_simulators.epson.arm.coordinate_systems import frame_at
+from robolink_simulators.epson.arm.curves import (
+    CurveFiles,
+    CurveSwitch,
+    FreeCurve,
+    smooth_course_through,
+)
 from robolink_simulators.epson.arm.kinematics import frame_of
-from robolink_simulators.epson.arm.robots import find_robot
-from robolink_simulators.epson.arm.ways.turned_curve import smooth_course_through
-from robolink_simulators.epson.definitions.curves import CurveFiles, CurveSwitch, FreeCurve
-from robolink_simulators.epson.definitions.local_frames import frame_at
+from robolink_simulators.epson.arm.robots import Joints, find_robot
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.spel.interpreter import Interpreter
 

@@ -4,7 +4,8 @@ import sqlite3
 from contextlib import closing
 
 import pytest
-from robolink_simulators.soak.books import Books
+
+from tests.soak.adversary.books import Books
 
 
 @pytest.fixture

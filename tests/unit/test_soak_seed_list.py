@@ -3,12 +3,17 @@
 import subprocess
 
 import pytest
-from robolink_simulators.soak import __main__ as adversary
-from robolink_simulators.soak.__main__ import FRESH, _noted
-from robolink_simulators.soak.results import source_digest
-from robolink_simulators.soak.seed_list import LOWEST, ListedRange, SeedList, committed
 
 from robolink.errors import ConfigError
+from tests.soak.adversary import __main__ as adversary
+from tests.soak.adversary.__main__ import FRESH, _noted
+from tests.soak.adversary.seed_records import (
+    LOWEST,
+    ListedRange,
+    SeedList,
+    committed,
+    source_digest,
+)
 
 COMMIT = "0123456789abcdef0123456789abcdef01234567"
 
@@ -91,5 +96,10 @@ def test_sources_that_differ_from_the_commit_draw_nothing(tmp_path):
     (tmp_path / "seeds_run.txt").write_text("0-9 a\n")
     assert len(committed(tmp_path)) == 40
     (tmp_path / "robolink" / "a.py").write_text("2\n")
+    with pytest.raises(ConfigError, match="Commit the changes first"):
+        committed(tmp_path)
+    git("commit", "-q", "-a", "-m", "b")
+    (tmp_path / "tests" / "soak" / "adversary").mkdir(parents=True)
+    (tmp_path / "tests" / "soak" / "adversary" / "rule.py").write_text("3\n")
     with pytest.raises(ConfigError, match="Commit the changes first"):
         committed(tmp_path)

@@ -8,15 +8,15 @@ from typing import Any, cast
 import pytest
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.frames import Frame
-from robolink_simulators.soak import drawn_history
-from robolink_simulators.soak.books import BookedMarker
-from robolink_simulators.soak.cell import VirtualCell
-from robolink_simulators.soak.people import wish_of
-from robolink_simulators.soak.plant.epson import EpsonPlant
-from robolink_simulators.soak.plant.machine import USUAL_TOOL, SentKind, SentRequest
-from robolink_simulators.soak.rules import Rulebook
 
 from robolink.model import ToolOffset, plain_offset
+from tests.soak.adversary import drawn_history
+from tests.soak.adversary.books import BookedMarker
+from tests.soak.adversary.cell import VirtualCell
+from tests.soak.adversary.people import wish_of
+from tests.soak.adversary.plant.epson import EpsonPlant
+from tests.soak.adversary.plant.machine import USUAL_TOOL, SentKind, SentRequest
+from tests.soak.adversary.rules import Rulebook
 
 WRITE = SentRequest(SentKind.WRITE, '$Execute,"TLSet 2, XY(1, 2, 3, 0)"', 2)
 MOVE = SentRequest(SentKind.MOVE, '$Execute,"Move XY(1, 2, 3, 0)"')

@@ -1,9 +1,8 @@
 """Lines that differ in their numbers alone: what is filled is what would have been read."""
 
 import pytest
-from robolink_simulators.epson.refusals import SpelRefusal
-from robolink_simulators.epson.spel.parse import _read, parse
-from robolink_simulators.epson.spel.shapes import filler, marked
+from robolink_simulators.epson.condition import SpelRefusal
+from robolink_simulators.epson.spel.parse import _read, filler, marked, parse
 
 LINES = [
     "Go XY(172.331, -477.810, -96.529, 0.000) /R /0",

@@ -18,8 +18,8 @@ from robolink_simulators.epson.spel.parse import (
     UNSIMULATED_FUNCTIONS,
     WINDOW_ONLY,
 )
-from robolink_simulators.epson.spel.programs.families.texts import FUNCTIONS_OF_ARRAYS
-from robolink_simulators.epson.spel.tasks.functions import TASK_FUNCTIONS
+from robolink_simulators.epson.spel.programs.text_statements import FUNCTIONS_OF_ARRAYS
+from robolink_simulators.epson.spel.tasks.task_functions import TASK_FUNCTIONS
 
 PAGE = Path(__file__).parents[2] / "docs" / "spel-programs.md"
 _ROW = re.compile(r"^\| `(?P<statement>[^|]+)` \| (?P<who>[^|]+) \| (?P<answer>[^|]+) \|$")

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from robolink.methods.one_touch.stored_z import find_stored_z
+from robolink.methods.one_touch.solvers import find_stored_z
 from robolink.model import EntryKind, NewEntry, ToolOffset, plain_offset
 from robolink.testing import MemoryController
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Final, Literal
 
 import pyte
-from robolink_cli.wizard.key_gate import ALONE_S
+from robolink_cli.wizard.keys import ALONE_S
 from robolink_simulators.assist.port import InProcessEyes
 from robolink_simulators.epson.device import EpsonSimulator
 from wcwidth import wcwidth

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from robolink.messages import tr
 from robolink.timing import local_label
-from robolink_cli.console.next_command import recover_after
+from robolink_cli.console.exit_codes import recover_after
 from robolink_cli.console.render import note
 
 if TYPE_CHECKING:

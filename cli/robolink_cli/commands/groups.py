@@ -8,7 +8,7 @@ from typing import Final
 import click
 
 from robolink.messages import declared
-from robolink_cli.command_folders import COMPANIONS, COMPUTER, CONTROLLER, MEASURE, SHIPPED
+from robolink_cli.command_map import COMPANIONS, COMPUTER, CONTROLLER, MEASURE, SHIPPED
 from robolink_cli.lazy_group import LazyGroup
 from robolink_cli.options.shared import shared_options
 

@@ -12,9 +12,8 @@ from typing import TYPE_CHECKING
 import click
 
 from robolink.messages import tr
-from robolink_cli.console.columns import SCREEN
 from robolink_cli.console.output import beside, drawn_elsewhere, hand_over, sentences, show, visible
-from robolink_cli.console.tables import drawn_table
+from robolink_cli.console.tables import SCREEN, drawn_table
 
 if TYPE_CHECKING:
     from robolink.methods import NextStep

@@ -13,10 +13,47 @@ from robolink.errors import ConfigError
 from robolink.messages import declared, tr
 from robolink.pose_tables import NOTHING_SAID, ReadingChoices
 from robolink_cli.console.numbers import decimal
-from robolink_cli.options.pose_reading import reading_options
 
 if TYPE_CHECKING:
     from robolink.model import Controller, Pose
+
+
+def reading_options(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--columns``, ``--length`` and ``--euler``, passed on as ``choices``."""
+
+    @wraps(function)
+    def with_choices(
+        *args: object,
+        columns: str | None,
+        length: str | None,
+        euler: str | None,
+        **others: object,
+    ) -> object:
+        return function(*args, choices=ReadingChoices(columns, length, euler), **others)
+
+    command: Callable[..., Any] = with_choices
+    for option in (
+        click.option(
+            "--euler",
+            metavar="NAME",
+            help=declared(
+                "How its angles turn: epson, kuka, fanuc, xyzrpw, codesys, rotvec, RzRyRx .."
+            ),
+        ),
+        click.option(
+            "--length",
+            type=click.Choice(["mm", "cm", "m", "in"]),
+            help=declared("Unit of its lengths, when the file does not say it."),
+        ),
+        click.option(
+            "--columns",
+            metavar="x,y,z,u",
+            help=declared("What its columns are, when the file does not say it; '-' skips one."),
+        ),
+    ):
+        command = option(command)
+    return command
+
 
 _RANGE: Final = re.compile(r"([0-9]{1,3})(?:-([0-9]{1,3}))?", re.ASCII)
 

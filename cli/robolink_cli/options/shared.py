@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 from click.core import ParameterSource
@@ -12,11 +12,45 @@ from robolink.messages import declared, tr
 from robolink_cli.access.cell import complete_cell
 from robolink_cli.console.language import OPTION, VARIABLE
 from robolink_cli.console.numbers import NumberInside
+from robolink_cli.console.output import visible
 from robolink_cli.console.render import switch_json_on
-from robolink_cli.options.line import LINE
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
+
+
+if TYPE_CHECKING:
+    _ParamType = click.ParamType[str]
+else:
+    _ParamType = click.ParamType  # click 8.1 knows no parameter of it
+
+LONGEST: Final = 200
+"""Characters, as in recipes."""
+
+
+class LineType(_ParamType):
+    """One line without control characters, refused in the words of recipes."""
+
+    name = "text"
+
+    def convert(
+        self, value: object, param: click.Parameter | None, ctx: click.Context | None
+    ) -> str:
+        """Return the text.
+
+        Raises:
+            BadParameter: It holds a control character or a line break, or is too long.
+        """
+        text = str(value)
+        if visible(text) != text or "\n" in text:
+            self.fail(tr("it must not hold control characters or line breaks"), param, ctx)
+        if len(text) > LONGEST:
+            self.fail(tr("it has more than {most} characters", most=LONGEST), param, ctx)
+        return text
+
+
+LINE: Final = LineType()
+
 
 CommandT = TypeVar("CommandT", bound=Callable[..., Any])
 

@@ -11,7 +11,7 @@ import click
 from click.core import ParameterSource
 
 from robolink.messages import declared, tr
-from robolink_cli.console.help_sections import HelpSection
+from robolink_cli.console.help_pages import HelpSection
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import note
 from robolink_cli.options.program_encoding import encoding_option

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from robolink.model import Controller, MotionTerms
     from robolink.stations import StationKind
     from robolink_cli.prompts.present import AskingDesk
-    from robolink_cli.wizard.check_list import CheckPoint
+    from robolink_cli.wizard.state import CheckPoint
 
 
 def agree_to_procedure(
@@ -163,7 +163,7 @@ def _answer_to_list(
     from robolink.model import AnsweredBy
     from robolink.runner import POLL_S, Question
     from robolink_cli.prompts.questions import keep_answer
-    from robolink_cli.wizard.check_list import SWITCH_ON, CheckSubject, Mark
+    from robolink_cli.wizard.state import SWITCH_ON, CheckSubject, Mark
 
     off = _motors_are_off(controller, purpose, tried=tried)
     name, terms = _name(controller), controller.groups[0].terms()
@@ -217,7 +217,7 @@ def saved_tools(controller: "Controller") -> "CheckPoint":
     from robolink.backup import kept_backup
     from robolink.errors import ConfigError
     from robolink.timing import local_label
-    from robolink_cli.wizard.check_list import CheckPoint, Mark
+    from robolink_cli.wizard.state import CheckPoint, Mark
 
     if not controller.outcomes.durable:
         gone = tr("The tools are not saved: what is simulated ends with this command")
@@ -234,7 +234,7 @@ def saved_tools(controller: "Controller") -> "CheckPoint":
 
 
 def _as_left(controller: "Controller", tools: "Sequence[int]") -> "Iterator[CheckPoint]":
-    from robolink_cli.wizard.check_list import CheckPoint, Mark
+    from robolink_cli.wizard.state import CheckPoint, Mark
 
     for sentence in tools_as_left(controller, tools):
         yield CheckPoint(Mark.OK, sentence)
@@ -275,7 +275,7 @@ def tools_as_left(controller: "Controller", tools: "Sequence[int]") -> tuple[str
 def _points(
     name: str, terms: "MotionTerms", left: "tuple[CheckPoint, ...]", new: str, *, off: bool
 ) -> "tuple[CheckPoint, ...]":
-    from robolink_cli.wizard.check_list import CheckPoint, Mark
+    from robolink_cli.wizard.state import CheckPoint, Mark
 
     points = [
         CheckPoint(Mark.OK, tr("Controller answers: {name}", name=name)),

@@ -1,24 +1,33 @@
 """What every command that talks to a controller has in common."""
 
+import os
+import shlex
 from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import click
 
-from robolink.errors import ConfigError
+from robolink.backup import ToolState, read_tools
+from robolink.errors import ConfigError, NotReadyError
+from robolink.messages import joined, tr
+from robolink.model import Controller
+from robolink_cli.access.capabilities import require_epson
 from robolink_cli.access.cell import (
     is_cell_name,
     link_options,
+    nothing_named,
+    only_cell,
+    which_cell,
 )
-from robolink_cli.access.only_cell import nothing_named, only_cell, which_cell
+from robolink_cli.console.output import may_be_guided
 from robolink_cli.console.render import emit_json, json_is_on, note, say
-from robolink_cli.console.tolerance import may_be_guided
-from robolink_cli.options.shared import GIVEN, shared_options
+from robolink_cli.options.shared import GIVEN, TYPED, shared_options
 from robolink_cli.stopping.request import StopRequest
 
 if TYPE_CHECKING:
     from robolink.config import Cell, Expected, Reach
+    from robolink_cli.wizard.state import Header
 
 
 class CliContext(NamedTuple):
@@ -244,3 +253,124 @@ def _calming_context_from(given: Mapping[str, Any]) -> CliContext:
             raise error from None
         note(reach.doubt or error.what)
         return CliContext(**{**given, "url": reach.url, "doubt": error, "reach": reach})
+
+
+T = TypeVar("T")
+
+
+def guided_if_alone(
+    context: CliContext,
+    do: Callable[[], T],
+    *,
+    job: str,
+    alone: bool = True,
+    following: Callable[[], T] | None = None,
+    steps: int = 0,
+) -> T:
+    """Do the work of a command; as a wizard where a person sits at the terminal.
+
+    Args:
+        context: What the command was told.
+        do: The work.
+        job: What it is called in the first row.
+        alone: Whether it is a person who is asked, and not a simulator's stand-in for one.
+        following: What begins for the next tool, with a choice; ``None`` where none can.
+        steps: How many numbered steps it has, 0 for none.
+
+    Raises:
+        BaseException: Whatever ended the work.
+    """
+    if not alone or not may_be_guided():
+        return do()
+    from robolink_cli.wizard.host import guided
+
+    head = header_of(context, job, steps=steps)
+    return guided(head, do, report=_page, following=following)
+
+
+def _page(change: str) -> tuple[str, ...]:
+    from robolink_cli.access.change_page import page_of_change  # report and journal, not before
+
+    return page_of_change(change)
+
+
+def header_of(
+    context: CliContext,
+    job: str,
+    *chosen: str,
+    needle: str = "",
+    anew: bool = False,
+    steps: int = 0,
+) -> "Header":
+    """Return the first row of a command's screens.
+
+    Args:
+        context: What the command was told.
+        job: What it is called.
+        chosen: What was chosen from a list, as it would be typed behind the command.
+        needle: Id of the needle that is mounted.
+        anew: Whether the line that began the command was about another job.
+        steps: How many numbered steps the job has, 0 for none.
+    """
+    from robolink_cli.wizard.state import Header
+
+    url = context.url or ""
+    name = context.cell.name if context.cell is not None else url.partition("?")[0]
+    return Header(
+        name,
+        job,
+        simulated="+sim://" in url,
+        command=_typed_again(context, chosen, anew=anew),
+        needle=needle,
+        steps=steps,
+    )
+
+
+def _typed_again(context: CliContext, chosen: tuple[str, ...], *, anew: bool) -> str:
+    """Return the command line that begins the same job, with what was chosen meanwhile."""
+    typed = () if anew else click.get_current_context().meta.get(TYPED, ())
+    words = [*typed, *chosen]
+    if anew and context.cell is None and context.url is not None:
+        words = ["-c", context.url, *words]
+    named = any(word in ("-c", "--controller") or word[:13] == "--controller=" for word in words)
+    if context.cell is not None and not named:
+        words = ["-c", context.cell.name, *words]
+    words = ["robolink", *words]
+    if os.name != "nt":
+        return shlex.join(words)
+    import subprocess
+
+    # cmd.exe and PowerShell both know double quotes; single ones are letters to cmd.exe.
+    return subprocess.list2cmdline(words)
+
+
+def find_tools(controller: Controller, *, published: bool) -> ToolState:
+    """Return all tools and the one in force.
+
+    Args:
+        controller: A connected controller.
+        published: Whether to read what the companion program published, which is legal while
+            production runs and for a client that may only monitor.
+
+    Raises:
+        NotReadyError: The controller cannot be asked now; says what may be done instead.
+        ConfigError: The project publishes no tools.
+    """
+    if not published:
+        try:
+            return read_tools(controller)
+        except NotReadyError as error:
+            hint = tr("With the companion program in the project, --published works now too.")
+            error.remedy = joined(" ", (error.remedy, hint))
+            raise
+    found = require_epson(controller, tr("published tools")).published_tools()
+    if found is None:
+        raise ConfigError(
+            tr("The project in {url} publishes no tools.", url=controller.identity),
+            remedy=tr(
+                "Add the program that 'robolink expert spel export DIR' "
+                "writes and call RobolinkPublish "
+                "once; docs/monitor-only.md says how."
+            ),
+        )
+    return ToolState(found.tools, found.selected)

@@ -1,18 +1,112 @@
 """Asking before the robot moves: who stopped it, which tool is selected, is the cell clear?"""
 
+from contextlib import suppress
 from typing import TYPE_CHECKING, Final
 
 import click
 
-from robolink.errors import DeclinedError
+from robolink.errors import DeclinedError, JournalError
 from robolink.messages import tr
+from robolink.model import EntryKind
 from robolink_cli.prompts import questions
 from robolink_cli.prompts.questions import WATCHED
-from robolink_cli.session.selected_tool import heed_selection
 from robolink_cli.stopping.notes import heed_stop
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from robolink.config import Expected
     from robolink.model import Controller
+
+
+def doubt_about(selected: int | None, controller: "Controller", cell: "Expected | None") -> str:
+    """Return why the selected tool may be a wrong one, one sentence; empty for no doubt.
+
+    Args:
+        selected: The selected tool, ``None`` where the controller does not tell.
+        controller: The controller, connected.
+        cell: What the cell file says, if a cell was named.
+    """
+    if selected is None:
+        return ""
+    if cell is not None and cell.tool is not None:
+        if cell.tool == selected:
+            return ""
+        return tr(
+            "Tool {selected} is selected, but the cell {cell} works with tool {tool}.",
+            selected=selected,
+            cell=cell.cell,
+            tool=cell.tool,
+        )
+    before = _of_the_last_procedure(controller) if selected == 0 else 0
+    if not before:
+        return ""
+    return tr(
+        "Tool 0, the bare flange, is selected; the last procedure on record began with tool "
+        "{tool}.",
+        tool=before,
+    )
+
+
+def heed_selection(controller: "Controller", cell: "Expected | None", *, yes: bool) -> None:
+    """Ask before something moves in a tool that may be a wrong one.
+
+    ``--yes`` was given before anybody could know of it, so it is no answer.
+
+    Raises:
+        DeclinedError: The answer was no, or nobody could be asked.
+    """
+    from robolink_cli.console.render import json_is_on
+    from robolink_cli.prompts.questions import asked, on_terminal
+
+    if controller.outcomes.open_markers():
+        return  # which block it, and say more
+    doubt = doubt_about(controller.tools.selected(), controller, cell)
+    if not doubt:
+        return
+    remedy = tr(
+        "Nothing moved. Another program or computer may have left it so. Select the right "
+        "one: 'robolink tool select N'; the key 'tool' of the cell file says which it is."
+    )
+    if yes or json_is_on() or not on_terminal():
+        raise DeclinedError(doubt, remedy=remedy)
+    if not asked(tr("{doubt} Move with it anyway?", doubt=doubt)):
+        raise DeclinedError(doubt, remedy=remedy)
+
+
+def note_doubts(
+    payload: "Mapping[str, object]", controller: "Controller", cell: "Expected | None"
+) -> None:
+    """Say, beside the state of a controller, what other programs seem to have left on it.
+
+    Args:
+        payload: The state, as ``status`` shows it.
+        controller: The controller, connected; nothing was sent but questions.
+        cell: What the cell file says, if a cell was named.
+    """
+    from robolink_cli.console.render import note
+
+    selected = payload.get("selected_tool")
+    doubt = doubt_about(selected if isinstance(selected, int) else None, controller, cell)
+    if doubt:
+        note(doubt)
+    if payload.get("owned"):
+        # This command only asks, so it is not the owner.
+        note(
+            tr(
+                "Another client owns the mailbox: a program here, or on another computer. What "
+                "moves or writes is refused until it ends."
+            )
+        )
+
+
+def _of_the_last_procedure(controller: "Controller") -> int:
+    """Return the tool that was selected before the last procedure on record, 0 for none."""
+    with suppress(JournalError):
+        for entry in controller.outcomes.recorded(kinds=(EntryKind.SELECTION,)):
+            return entry.tool or 0
+    return 0
+
 
 CELL: Final = "robolink.cell"
 """Where the cell is found that was named, ``None`` for none."""

@@ -19,10 +19,13 @@ from robolink_cli.console.exit_codes import is_cut_off
 from robolink_cli.console.render import json_is_on, note
 from robolink_cli.prompts.questions import WATCHED, asked, on_terminal
 from robolink_cli.session.context import CliContext
-from robolink_cli.session.desk_watch import watched_at_desk
 from robolink_cli.session.motion_consent import CELL, REACHED
 from robolink_cli.session.operator_identity import signature_of
-from robolink_cli.session.stop_listening import listening_for_stop, remember_address
+from robolink_cli.session.stop_listening import (
+    listening_for_stop,
+    remember_address,
+    watched_at_desk,
+)
 
 if TYPE_CHECKING:
     from robolink.config import Expected

@@ -9,7 +9,7 @@ import click
 from robolink.errors import ConfigError
 from robolink.messages import declared, tr
 from robolink_cli.console.render import json_is_on
-from robolink_cli.options.line import LINE
+from robolink_cli.options.shared import LINE
 
 if TYPE_CHECKING:
     from robolink.config import Expected

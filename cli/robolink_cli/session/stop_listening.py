@@ -2,13 +2,16 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 import click
 
 from robolink.errors import RobolinkError
 from robolink.messages import tr
+from robolink.model import says_it_is_simulated
 from robolink_cli.console.render import note
+from robolink_cli.prompts.present import present_desk
 
 if TYPE_CHECKING:
     from robolink.model import Controller, ControllerStatus
@@ -102,3 +105,63 @@ def _who(context: "CliContext") -> str:
 
 def _say_who(who: str) -> None:
     note(tr("Stopped from another terminal by {who}.", who=who))
+
+
+_SEVERAL_CLIENTS = "+modbus-tcp://"
+"""Such a server can be asked itself, by as many as want."""
+
+
+def seen_by_another(url: str) -> dict[str, object] | None:
+    """Return the document of what the holder of a controller saw last.
+
+    ``None`` where nobody on this computer has it, where its holder lets nobody look, and where
+    the controller serves several clients. The controller is not asked: it serves one client, and
+    that one is at work.
+
+    Args:
+        url: The controller.
+    """
+    if _SEVERAL_CLIENTS in url or "+sim://" in url:
+        return None
+    from robolink.stopping import HolderGoneError, far_end_of, holders_of
+
+    try:
+        holders = list(holders_of(far_end_of(url)))
+    except RobolinkError:
+        return None  # what is wrong with the URL is told by who connects
+    for holder in holders:
+        try:
+            seen = holder.last_seen()
+        except HolderGoneError:
+            continue
+        flags = {} if seen is None else asdict(seen.status)
+        return {
+            "controller": url.partition("?")[0],
+            "held_by": holder.who or tr("process {pid}", pid=holder.pid),
+            "pid": holder.pid,
+            "age_s": None if seen is None else round(seen.age_s, 3),
+            "state": None if seen is None else str(seen.status.state),
+            **flags,
+        }
+    return None
+
+
+@contextmanager
+def watched_at_desk(controller: "Controller") -> Iterator[None]:
+    """Let the desk of a wizard look at ``controller`` while a person is asked, for the block."""
+    desk = present_desk()
+    if desk is None:
+        yield
+        return
+    from robolink_cli.wizard.glance import ControllerGlance
+    from robolink_cli.wizard.happenings import CellIs
+
+    if says_it_is_simulated(controller):
+        desk.regard(CellIs(simulated=True))
+    glance = ControllerGlance(controller)
+    before, desk.glance = desk.glance, glance.at_rest
+    try:
+        with desk.following(glance.on_the_way):
+            yield
+    finally:
+        desk.glance = before

@@ -106,8 +106,7 @@ def url_of(request: "StopRequest") -> str:
     Raises:
         ConfigError: No controller is named, or no cell file has it.
     """
-    from robolink_cli.access.cell import is_cell_name
-    from robolink_cli.access.only_cell import nothing_named, only_cell, which_cell
+    from robolink_cli.access.cell import is_cell_name, nothing_named, only_cell, which_cell
 
     named = request.named
     if not named:

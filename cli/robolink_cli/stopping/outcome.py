@@ -6,8 +6,8 @@ from robolink.errors import JournalError, LeaseHeldError, RobolinkError
 from robolink.messages import joined, tr
 from robolink.stopping import leave_note
 from robolink.transport import parse_url
-from robolink_cli.access.only_cell import which_cell
-from robolink_cli.console.machine_words import state_word
+from robolink_cli.access.cell import which_cell
+from robolink_cli.console.ways import state_word
 from robolink_cli.stopping.request import StopRequest
 from robolink_cli.stopping.stop_first import StopOutcome, is_beside_another, who_asks
 

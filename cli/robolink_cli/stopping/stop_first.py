@@ -94,7 +94,7 @@ def _stop(request: StopRequest, outcome: StopOutcome) -> None:
     password_env = ""
     named = request.named
     if not named:
-        from robolink_cli.access.only_cell import nothing_named, only_cell
+        from robolink_cli.access.cell import nothing_named, only_cell
 
         named = outcome.only = only_cell()
         if not named:

@@ -19,8 +19,6 @@ from robolink.runner import (
     Question,
     refuse_decimal_comma,
 )
-from robolink_cli.wizard.check_list import CheckSubject
-from robolink_cli.wizard.choices import ChoiceSubject, subject_of
 from robolink_cli.wizard.happenings import (
     CellIs,
     Effect,
@@ -51,10 +49,13 @@ from robolink_cli.wizard.state import (
     ARMED_AFTER_S,
     LEAST_WAY_MM,
     STEP_SIZES,
+    CheckSubject,
+    ChoiceSubject,
     Header,
     Jogging,
     LastScreen,
     WizardState,
+    subject_of,
 )
 
 Advanced = tuple[WizardState, list[Effect]]

@@ -9,11 +9,10 @@ from robolink.errors import RobolinkError
 from robolink_cli.console.output import shown_by
 from robolink_cli.console.render import note
 from robolink_cli.prompts.present import sitting_at
-from robolink_cli.wizard.desk import Desk
 from robolink_cli.wizard.happenings import WizardCommand
 from robolink_cli.wizard.screens.ending import ended_of, kept_lines
 from robolink_cli.wizard.state import Header, WizardState
-from robolink_cli.wizard.work import Face, Work
+from robolink_cli.wizard.work import Desk, Face, Work
 
 T = TypeVar("T")
 

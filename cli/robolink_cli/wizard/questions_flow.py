@@ -9,11 +9,18 @@ from typing import Final
 from robolink.messages import tr
 from robolink.nozzle_change import WriteSubject
 from robolink.runner import BACK, MORE, FitSubject, Question
-from robolink_cli.wizard.check_list import SWITCH_ON, CheckSubject, Mark
-from robolink_cli.wizard.choices import CHANGE_LANGUAGE, ChoiceSubject
 from robolink_cli.wizard.happenings import KeyPressed, WizardCommand
 from robolink_cli.wizard.keys import folded, meaning_of
-from robolink_cli.wizard.state import ARMED_AFTER_S, LastScreen, WizardState
+from robolink_cli.wizard.state import (
+    ARMED_AFTER_S,
+    CHANGE_LANGUAGE,
+    SWITCH_ON,
+    CheckSubject,
+    ChoiceSubject,
+    LastScreen,
+    Mark,
+    WizardState,
+)
 
 Answered = WizardState | str
 

@@ -1,17 +1,134 @@
 """The state of a wizard."""
 
 import math
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
+from enum import StrEnum
 from typing import TYPE_CHECKING, Final
 
-from robolink.model import Pose
+from robolink.errors import DeclinedError
+from robolink.messages import tr
+from robolink.model import AnsweredBy, Pose
 from robolink.nozzle_change import ChangeReport, WriteSubject
-from robolink.runner import FINEST_STEP, FitSubject, JogRange, Question, TouchSubject
-from robolink_cli.wizard.choices import ChoiceSubject
+from robolink.runner import (
+    FINEST_STEP,
+    FitSubject,
+    JogRange,
+    OfferedChoice,
+    Question,
+    TouchSubject,
+    awaited_line,
+)
+from robolink_cli.console.language import other_language, speak_from_now
+from robolink_cli.prompts.present import AskingDesk
+from robolink_cli.prompts.questions import keep_answer
 from robolink_cli.wizard.happenings import Reading, WasAsked, WizardCommand
 
 if TYPE_CHECKING:
-    from robolink.calibration import Impact  # numpy, which a touch does without
+    from robolink.calibration import Impact
+
+
+@dataclass(frozen=True, slots=True)
+class ChoiceSubject:
+    """A list of which one is chosen.
+
+    Attributes:
+        step: What stands at the right of the first row.
+        above: What is to be read before.
+        options: What there is to choose from.
+        marked: Index of the one that is marked first; ``None`` where nothing says which.
+        does: What the main key is called.
+        leaves: What the stop key is called.
+        details: What is to be read of each option while it is marked; empty for nothing.
+        enters: Whether ENTER takes the marked row as the main key does; not where a row writes.
+        safe: Index of the row that ENTER takes all the same, and an empty line too; ``None`` for
+            none.
+        other: The language that a key changes to; empty where none does.
+    """
+
+    step: str
+    above: tuple[str, ...]
+    options: tuple[str, ...]
+    marked: int | None = 0
+    does: str = ""
+    leaves: str = ""
+    details: tuple[tuple[str, ...], ...] = ()
+    enters: bool = True
+    safe: int | None = None
+    other: str = ""
+
+
+def subject_of(offered: OfferedChoice) -> ChoiceSubject:
+    """Return the list of what the work lets a person choose; its first row is safe."""
+    return ChoiceSubject(
+        offered.title,
+        (),
+        tuple(row.does for row in offered.rows),
+        does=tr("Do it"),
+        leaves=offered.rows[0].does,
+        details=tuple((row.detail,) for row in offered.rows),
+        enters=False,
+        safe=0,
+    )
+
+
+CHANGE_LANGUAGE: Final = "language"
+"""The answer of a person who wants to read the other language."""
+
+
+def choose_in_either_language(
+    desk: AskingDesk, make: Callable[[], tuple[str, ChoiceSubject]], watch: Callable[[], object]
+) -> int:
+    """Have one chosen by a person who may change the language first; return its index.
+
+    Args:
+        desk: Where.
+        make: Makes the question and the list, in the language that is spoken by then.
+        watch: Called while nobody answers.
+
+    Raises:
+        DeclinedError: The person leaves.
+    """
+    while True:
+        question, subject = make()
+        answer = _answered(desk, question, replace(subject, other=other_language()), watch)
+        if answer != CHANGE_LANGUAGE:
+            return _index(answer, subject)
+        speak_from_now(other_language())
+
+
+def choose(
+    desk: AskingDesk, question: str, subject: ChoiceSubject, watch: Callable[[], object]
+) -> int:
+    """Have one chosen; return its index.
+
+    Args:
+        desk: Where.
+        question: What is asked.
+        subject: The list.
+        watch: Called while nobody answers.
+
+    Raises:
+        DeclinedError: The person leaves.
+    """
+    index = _index(_answered(desk, question, subject, watch), subject)
+    keep_answer(question, subject.options[index], AnsweredBy.PERSON)
+    return index
+
+
+def _answered(
+    desk: AskingDesk, question: str, subject: ChoiceSubject, watch: Callable[[], object]
+) -> str:
+    desk.regard(subject)
+    desk.ask(question, Question.TEXT)
+    return awaited_line(desk, watch)
+
+
+def _index(answer: str, subject: ChoiceSubject) -> int:
+    if answer.isdigit() and 1 <= int(answer) <= len(subject.options):
+        return int(answer) - 1
+    raise DeclinedError(tr("You left without choosing."), remedy=tr("Nothing was sent."))
+
 
 STEP_SIZES: Final = (0.01, 0.1, 0.5, 1.0, 5.0)
 """In mm, and in degrees for U; the largest is the runner's own limit."""
@@ -217,3 +334,60 @@ class WizardState:
             return None
         here, there = pose.coordinates()[:3], arrival.coordinates()[:3]
         return here[0] - there[0], here[1] - there[1], here[2] - there[2]
+
+
+class Mark(StrEnum):
+    """How a point of the list stands."""
+
+    OK = "ok"
+    TO_DO = "to do"
+    YOU = "you"
+    LOOK = "look"
+    """Worth knowing; nothing waits for it."""
+
+
+@dataclass(frozen=True, slots=True)
+class CheckPoint:
+    """One point.
+
+    Attributes:
+        mark: How it stands.
+        text: What it says.
+        name: What it is known by while the list is gone through; empty for what is only read.
+        does: What the main key does on its row.
+    """
+
+    mark: Mark
+    text: str
+    name: str = ""
+    does: str = ""
+
+    def is_open(self, confirmed: Collection[str]) -> bool:
+        """Tell whether something is still to be done or confirmed."""
+        return self.mark is Mark.TO_DO or (self.mark is Mark.YOU and self.name not in confirmed)
+
+
+@dataclass(frozen=True, slots=True)
+class CheckSubject:
+    """What is looked at before the robot starts.
+
+    Attributes:
+        points: The list.
+        plan: What the robot will do, a sentence.
+    """
+
+    points: tuple[CheckPoint, ...]
+    plan: str
+
+    @property
+    def rows(self) -> tuple[CheckPoint, ...]:
+        """The points that a person goes through; after them comes the row that starts."""
+        return tuple(point for point in self.points if point.name)
+
+    def open_rows(self, confirmed: Collection[str]) -> tuple[int, ...]:
+        """Return the indices of the rows that are not settled yet."""
+        return tuple(i for i, point in enumerate(self.rows) if point.is_open(confirmed))
+
+
+SWITCH_ON = "motors"
+"""The answer with which a person has the motors switched on."""

@@ -1,15 +1,156 @@
 """The work of a command in a thread of its own, and what may show it."""
 
 import contextvars
+import queue
 import threading
-from collections.abc import Callable
-from typing import Any, Generic, Protocol, TypeVar
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, Final, Generic, Protocol, TypeVar
 
 import click
 
-from robolink.interrupts import heard_by_this_thread
-from robolink_cli.wizard.desk import Desk
+from robolink.errors import DeclinedError, RobolinkError
+from robolink.interrupts import heard_by_this_thread, heed
+from robolink.messages import tr
+from robolink.runner import MoveSubject, Question
+from robolink_cli.wizard.happenings import (
+    Happening,
+    Reading,
+    SendAnswer,
+    WaitsForAnswer,
+    WasAsked,
+    WasRead,
+    WasRegarded,
+    WasTold,
+)
 from robolink_cli.wizard.state import WizardState
+
+FOLLOW_S: Final = 0.4
+"""Between two looks while the robot moves."""
+
+GLANCE_S: Final = 0.3
+"""Between two looks at the controller while a person is asked."""
+
+
+class Desk:
+    """The operator whom the work asks; a :class:`~robolink.runner.GuidedOperator`.
+
+    Args:
+        now_s: A monotonic clock of this computer, in seconds.
+    """
+
+    def __init__(self, now_s: Callable[[], float] = time.monotonic) -> None:
+        self._now_s = now_s
+        self._happened: queue.SimpleQueue[Happening] = queue.SimpleQueue()
+        self._answers: queue.SimpleQueue[SendAnswer] = queue.SimpleQueue()
+        self._number = 0
+        self._told_waiting = False
+        self._gone = False
+        self._looked_s = 0.0
+        self._moves = threading.Event()
+        self.glance: Callable[[], Reading | None] = lambda: None
+
+    def tell(self, text: str) -> None:
+        """Show a line."""
+        self._happened.put(WasTold(text))
+
+    def regard(self, subject: object) -> None:
+        """Take what comes next to be about ``subject``."""
+        if isinstance(subject, MoveSubject):
+            self._moves.set()
+        self._happened.put(WasRegarded(subject))
+
+    def ask(self, question: str, kind: Question) -> None:
+        """Ask; what was answered before counts for nothing."""
+        self._moves.clear()
+        self._number += 1
+        self._told_waiting = False
+        self._happened.put(WasAsked(self._number, question, kind, self._now_s()))
+
+    def poll(self, wait_s: float) -> str | None:
+        """Return the answer, ``None`` when none came; the controller is looked at meanwhile.
+
+        Raises:
+            DeclinedError: There is nobody to answer any more.
+            Interrupted: The work is to end.
+        """
+        end_s = self._now_s() + wait_s
+        if not self._told_waiting:
+            self._told_waiting = True
+            self._look()
+            self._happened.put(WaitsForAnswer(self._number, self._now_s()))
+        while True:
+            heed()
+            if self._gone:
+                raise DeclinedError(
+                    tr("The keyboard is gone. Nothing was answered for you."),
+                    remedy=tr("Run it on a terminal, or with --assist on a simulator."),
+                )
+            left_s = end_s - self._now_s()
+            try:
+                answer = self._answers.get(timeout=max(0.0, min(GLANCE_S, left_s)))
+            except queue.Empty:
+                if self._now_s() - self._looked_s >= GLANCE_S:
+                    self._look()
+                if self._now_s() >= end_s:
+                    return None
+                continue
+            if answer.number == self._number:
+                self._told_waiting = False
+                return answer.text
+
+    @contextmanager
+    def following(self, look: Callable[[], Reading | None]) -> Iterator[None]:
+        """Look at the controller while it moves, from a thread of its own, for the block.
+
+        A look that fails ends this alone: whoever waits for the movement is told of it.
+        """
+        over = threading.Event()
+
+        def follow() -> None:
+            while not over.wait(FOLLOW_S):
+                if not self._moves.is_set():
+                    continue
+                try:
+                    reading = look()
+                except (RobolinkError, OSError):
+                    self._moves.clear()
+                    continue
+                if reading is not None and self._moves.is_set():
+                    self._happened.put(WasRead(reading))
+
+        thread = threading.Thread(target=follow, name="following", daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            over.set()
+            thread.join()
+
+    def happened(self) -> list[Happening]:
+        """Return what happened since the last call; for the face."""
+        found: list[Happening] = []
+        while True:
+            try:
+                found.append(self._happened.get_nowait())
+            except queue.Empty:
+                return found
+
+    def leave(self) -> None:
+        """Say that there is nobody to answer any more; for the face."""
+        self._gone = True
+
+    def answer(self, answer: SendAnswer) -> None:
+        """Answer; for the face."""
+        self._answers.put(answer)
+
+    def _look(self) -> None:
+        self._looked_s = self._now_s()
+        reading = self.glance()
+        if reading is not None:
+            self._happened.put(WasRead(reading))
+
 
 T = TypeVar("T")
 

@@ -1,8 +1,8 @@
 """The line to a controller: its bytes, and the frames in which both ends speak.
 
 Over TCP, and in process, that is Remote Ethernet; on a serial line Remote RS232, whose frames are
-loaded only there, since a stop is timed (docs/decisions/0017). What an unanswered or a refused login
-means stands here too, since a stop needs nothing else of the answers.
+loaded only there, since a stop is timed (docs/decisions/0017).
+What an unanswered or a refused login means stands here too, since a stop needs nothing else of the answers.
 """
 
 from dataclasses import dataclass

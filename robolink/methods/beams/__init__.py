@@ -1,20 +1,384 @@
 """beams: two crossed light beams."""
 
-from dataclasses import asdict, replace
-from typing import TYPE_CHECKING
+import math
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field, replace
+from typing import TYPE_CHECKING, Annotated, Final
 
-from robolink.messages import declared
-from robolink.methods.beams.parameters import BeamsParameters
-from robolink.methods.declaration.method import Method, Needs
-from robolink.methods.declaration.site import Site
-from robolink.stations import StationKind
+from annotated_types import Ge, Le, Len
+
+from robolink.calibration import MIN_ROTATION_DEG, CalibrationResult, tip_pose
+from robolink.files.toml import Problem
+from robolink.messages import declared, tr
+from robolink.methods.method import (
+    DEGREES,
+    MM,
+    MM_S,
+    Angle,
+    Check,
+    Help,
+    InputNumber,
+    Length,
+    Method,
+    MethodParameters,
+    Needs,
+    Option,
+    Site,
+)
+from robolink.methods.z_touch import retake_of_nothing
+from robolink.model import MotionGroup, Pose, ToolOffset, angle_difference_deg
+from robolink.procedures import InputSource, MeasurementContext, SamplingPolicy, may_end_early
+from robolink.runner import Procedure
+from robolink.stations import BeamStation, StationKind
 
 if TYPE_CHECKING:
+    from robolink.methods.beams.procedure import CrossingTest
     from robolink.procedures import KeptProof, TipSource
 
 
+_LEAST_ANGLE_DEG: Final = 20.0
+"""Beams that cross at less leave one direction badly known, as the solver says too."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class BeamLine:
+    """Where one light beam is, from the reference record."""
+
+    input: Annotated[InputNumber, Help(declared("Number of the input that the beam switches."))]
+    x_mm: Annotated[float, MM, Help(declared("X of a point of the beam, base."))]
+    y_mm: Annotated[float, MM, Help(declared("Y of the same point, base."))]
+    direction_deg: Annotated[
+        Angle, Help(declared("Direction of the beam in the base, counter-clockwise from X."))
+    ]
+
+
+@dataclass(frozen=True, kw_only=True)
+class BeamsParameters(MethodParameters):
+    """How a tip is driven through two crossed light beams."""
+
+    beams: Annotated[
+        tuple[BeamLine, ...] | None,
+        Len(2, 2),
+        Option(flag="--beam", metavar="INPUT,X,Y,DEG"),
+        Help(declared("The two beams; without them, those of the station.")),
+    ] = None
+    z_mm: Annotated[
+        float | None,
+        MM,
+        Option(flag="--beams-z", metavar="MM"),
+        Help(declared("Height of the beams in the base, where they cross; goes with the beams.")),
+    ] = None
+    off_when_broken: Annotated[
+        bool,
+        Help(
+            declared(
+                "Whether an input goes off, not on, while its beam is broken; goes with the beams."
+            )
+        ),
+    ] = False
+    turn_deg: Annotated[
+        float,
+        Ge(0),
+        Le(360 - MIN_ROTATION_DEG),
+        DEGREES,
+        Option(metavar="DEG"),
+        Help(
+            declared(
+                "By how much U differs at a second measurement, so that moved beams do no harm; "
+                "0 for no second one."
+            )
+        ),
+    ] = 0.0
+    repeats: Annotated[
+        int,
+        Ge(1),
+        Le(10),
+        Help(declared("How often each beam is crossed both ways; once cannot be checked.")),
+    ] = 2
+    search_mm: Annotated[
+        float,
+        Ge(0.5),
+        Le(20),
+        MM,
+        Help(declared("How far beside the beam the tip starts; the new tip may be off by less.")),
+    ] = 2.0
+    aside_mm: Annotated[
+        float,
+        Ge(1),
+        Le(50),
+        MM,
+        Help(declared("How far from their crossing point the tip crosses each of the beams.")),
+    ] = 5.0
+    dip_mm: Annotated[
+        float, Ge(0.2), Le(20), MM, Help(declared("How far below the beams the end of the tip is."))
+    ] = 1.5
+    shaft_mm: Annotated[
+        float,
+        Ge(0),
+        Le(20),
+        MM,
+        Help(
+            declared(
+                "How much deeper the shaft is measured as well, to find a bent needle; 0 to "
+                "leave it out."
+            )
+        ),
+    ] = 3.0
+    max_lean_deg: Annotated[
+        float,
+        Ge(0.1),
+        Le(20),
+        DEGREES,
+        Help(declared("Largest angle at which the shaft may lean.")),
+    ] = 2.0
+    lift_mm: Annotated[
+        float,
+        Ge(1),
+        Le(100),
+        MM,
+        Help(declared("How far above the beams the tip arrives, leaves and turns.")),
+    ] = 10.0
+    crossing_mm_s: Annotated[
+        float,
+        Ge(0.5),
+        Le(20),
+        MM_S,
+        Option(flag="--crossing-speed"),
+        Help(
+            declared(
+                "How fast the tip crosses a beam; the faster it is, the further past an edge it "
+                "stops."
+            )
+        ),
+    ] = 5.0
+    until_mm: Annotated[
+        Length | None,
+        Option(metavar="MM"),
+        Help(declared("End early when X and Y are repeatable to this in 95 %.")),
+    ] = None
+    retake: Annotated[
+        bool,
+        Option(flag="--retake/--no-retake", default=True),
+        Help(declared("Whether robolink offers to make the crossing that fits worst again.")),
+    ] = False
+
+    @property
+    def sampling(self) -> SamplingPolicy:
+        """When it ends, and whether a crossing is offered to be made again."""
+        return SamplingPolicy(self.until_mm, retake=self.retake)
+
+    def may_end_early(self, *, sigma_stated: bool) -> bool:
+        """Tell whether the tip can be known well enough before the last crossing.
+
+        Args:
+            sigma_stated: Whether somebody stated the standard deviation of a crossing.
+        """
+        # X, Y and a lag for each beam; turned, by how far each beam was moved as well.
+        count, unknowns = (8, 6) if self.turn_deg else (4, 4)
+        return may_end_early(count * self.repeats, unknowns=unknowns, sigma_stated=sigma_stated)
+
+    def problems(self, check: Check) -> Iterator[Problem]:
+        """Check that the beams cross, and that one breaks at a time."""
+        yield from self._of_sampling(check)
+        yield from self._of_beams(check)
+        if self.aside_mm <= self.search_mm:
+            yield Problem(
+                "aside_mm",
+                tr(
+                    "must be larger than {other}, which is {search:g}, so that the tip breaks one "
+                    "beam at a time",
+                    other=check.spell("search_mm"),
+                    search=self.search_mm,
+                ),
+            )
+
+    def room_mm(self) -> float:
+        """Return how high the box has to be: lift, dip and shaft together."""
+        return self.lift_mm + self.dip_mm + self.shaft_mm
+
+    def no_residual(self) -> str:
+        """Return why residuals cannot be judged, empty when they can."""
+        if self.repeats > 1 or self.turn_deg:
+            return ""
+        return tr(
+            "cannot be judged: crossings that are not repeated cannot check each "
+            "other; repeat them, or limit the interval and state the standard "
+            "deviation"
+        )
+
+    def states_station(self) -> bool:
+        """Tell whether the beams are stated here, so that the station need not be known."""
+        return self.beams is not None
+
+    def _of_sampling(self, check: Check) -> Iterator[Problem]:
+        if "retake" in check.given and self.retake and self.no_residual():
+            yield retake_of_nothing()
+        if self.until_mm is None or check.sigma_stated is None:
+            return
+        if not self.may_end_early(sigma_stated=check.sigma_stated):
+            yield Problem(
+                "until_mm",
+                tr(
+                    "has nothing to leave out; give 3 {repeats}, or 2 with {sigma} or {turn}",
+                    repeats=check.spell("repeats"),
+                    sigma=check.spell("sigma_mm"),
+                    turn=check.spell("turn_deg"),
+                ),
+            )
+
+    def _of_beams(self, check: Check) -> Iterator[Problem]:
+        if (self.beams is None) != (self.z_mm is None):
+            absent = "beams" if self.beams is None else "z_mm"
+            yield Problem(
+                absent,
+                tr(
+                    "is missing: give {beams} and {height}, or neither",
+                    beams=check.spell("beams"),
+                    height=check.spell("z_mm"),
+                ),
+            )
+        if self.beams is None:
+            return
+        first, second = self.beams
+        between_deg = abs(angle_difference_deg(first.direction_deg, second.direction_deg))
+        if min(between_deg, 180.0 - between_deg) < _LEAST_ANGLE_DEG:
+            yield Problem(
+                "beams", tr("must cross at {limit:g} degrees or more", limit=_LEAST_ANGLE_DEG)
+            )
+
+
+_HALF_A_TURN_DEG = 180.0
+
+
+def farthest_from(first_deg: float, last_deg: float) -> float:
+    """Return the angle U farthest from two others, on the turn from the last that leads toward 0.
+
+    Args:
+        first_deg: One of them.
+        last_deg: The other, where the tip is.
+
+    Example:
+        >>> from robolink.methods.beams import farthest_from
+        >>> farthest_from(20, 20), farthest_from(0, 180), farthest_from(30, -60)
+        (-160.0, 90.0, 165.0)
+    """
+    between_deg = angle_difference_deg(first_deg, last_deg)
+    if abs(between_deg) == _HALF_A_TURN_DEG:
+        # Both ways are as far.
+        between_deg = math.copysign(_HALF_A_TURN_DEG, last_deg)
+    turn_deg = between_deg / 2 - math.copysign(_HALF_A_TURN_DEG, last_deg or -1.0)
+    target_deg = last_deg + turn_deg
+    return min((target_deg, target_deg - 360.0, target_deg + 360.0), key=abs)
+
+
+@dataclass(frozen=True, slots=True)
+class BeamsSource(InputSource[BeamsParameters]):
+    """Measures X and Y by driving the tip through two beams, from wherever the flange is.
+
+    Attributes:
+        station: Where the beams are, from the reference record.
+        plan: How they are crossed.
+        sigma_mm: Standard deviation of one crossing's middle, where it is known.
+        run_up_mm: In what way the tip reaches the speed of a crossing, where its controller told
+            it.
+        step_mm: How finely the controller tells where an edge was, likewise.
+    """
+
+    station: BeamStation
+    plan: BeamsParameters = field(default_factory=BeamsParameters)
+    sigma_mm: float | None = None
+    run_up_mm: float | None = None
+    step_mm: float | None = None
+
+    @property
+    def sentence(self) -> str:
+        """What it does, for a report."""
+        if self.plan.turn_deg:
+            return tr("measured on the robot: two crossed beams at two angles of U")
+        return tr("measured on the robot: two crossed beams")
+
+    @property
+    def remedy(self) -> str:
+        """What to do when a measurement makes the tip jump."""
+        return tr("Were the beams moved since the reference was taken, or does the needle lean?")
+
+    def measure(
+        self, context: MeasurementContext, tool: int, stored: ToolOffset | None
+    ) -> CalibrationResult:
+        """Cross and solve; see :class:`~robolink.procedures.MovingSource`."""
+        group, speed_mm_s = context.controller.groups[0], self.plan.crossing_mm_s
+        told = replace(
+            self, run_up_mm=group.run_up_mm(speed_mm_s), step_mm=group.edge_step_mm(speed_mm_s)
+        )
+        return InputSource.measure(told, context, tool, stored)
+
+    def require_able(self, group: MotionGroup, change_mm: float) -> None:
+        """Refuse crossings that are too fast for their way.
+
+        See :class:`~robolink.procedures.RequiresMotion`.
+
+        Raises:
+            CalibrationError: ``run_up_too_short``.
+        """
+        from robolink.methods.beams.drive import require_run_up  # numpy, a look does without
+
+        require_run_up(group, self.plan, change_mm)
+
+    def steps(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
+        """Return the steps of the measurement."""
+        from robolink.methods.beams.procedure import measure_beams  # numpy, a look does without
+
+        return measure_beams(
+            self.station,
+            self.plan,
+            here=here,
+            stored=stored,
+            sigma_mm=self.sigma_mm,
+            run_up_mm=self.run_up_mm,
+            step_mm=self.step_mm,
+        )
+
+    def proof(
+        self,
+        context: MeasurementContext,
+        tool: int,
+        result: CalibrationResult,
+        *,
+        tip: ToolOffset,
+        tolerance_mm: float,
+    ) -> "CrossingTest":
+        """Return the proof at another U; see :class:`~robolink.procedures.KeepsProof`.
+
+        Its crossings are others than those that were measured, and as far from them as a turn goes:
+        90 degrees and more from each. Where the beams were found too it is about those places: with
+        two angles four unknowns take up all that four crossings say, and only a third angle
+        contradicts them (docs/reference/evidence.md 12).
+        """
+        from robolink.calibration import moved_beams
+        from robolink.methods.beams.procedure import CrossingTest  # numpy
+
+        measured_deg = [
+            tip_pose(pose, result.offset, tool=tool).u_deg
+            for pose in (result.inputs[0], result.inputs[-1])
+        ]
+        station, lean = self.station, getattr(result, "lean", None)
+        return CrossingTest(
+            tool=tool,
+            written=result.offset,
+            tip=tip,
+            tolerance_mm=tolerance_mm,
+            beams=moved_beams(station.beams, getattr(result, "moved_mm", ())),
+            z_mm=station.z_mm,
+            inputs=station.inputs,
+            off_when_broken=station.off_when_broken,
+            plan=self.plan,
+            angles_deg=(farthest_from(*measured_deg),),
+            lean=None if lean is None else (lean.x, lean.y),
+            run_up_mm=context.controller.groups[0].run_up_mm(self.plan.crossing_mm_s),
+        )
+
+
 def _source(parameters: BeamsParameters, site: Site) -> "TipSource":
-    from robolink.methods.beams.source import BeamsSource
     from robolink.stations import beam_station
 
     station = site.station
@@ -28,7 +392,7 @@ def _source(parameters: BeamsParameters, site: Site) -> "TipSource":
 
 
 def _proof() -> "type[KeptProof]":
-    from robolink.methods.beams.proof import CrossingTest
+    from robolink.methods.beams.procedure import CrossingTest
 
     return CrossingTest
 

@@ -1,21 +1,165 @@
-"""How the one touch of a known pin is solved: as a difference, or against the place of the pin."""
+"""How the one touch of a known pin is solved: as a difference, or against the place of the pin.
+
+The offset that is written and the touches that it came from say together where the pin is,
+``P = p + R t``. As long as that offset stays stored and the pin stays where it is, a new tip that
+touches the pin shows by how much it differs from the old one (docs/reference/calibration.md 2.9).
+
+How well the stored Z is known is traced back through what was kept: a calibration that left Z as it
+was, and differences that were added to it, down to the measurement of Z itself. Whatever else wrote
+Z, such as a typed value, ends the trace: then nothing is known of it.
+"""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Final
 
-from robolink.calibration import CalibrationResult, NeedleLimits
+from robolink.calibration import NORMAL_95, CalibrationResult, NeedleChain, NeedleLimits, StoredZ
 from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
-from robolink.methods.one_touch.last_touch import LastTouch, find_last_touch
-from robolink.methods.one_touch.stored_z import find_stored_z
-from robolink.model import Controller, Pose, ToolOffset
+from robolink.model import (
+    Controller,
+    EntryKind,
+    Pose,
+    Recorded,
+    ToolOffset,
+    describe_offset,
+    read_offset,
+)
 from robolink.timing import local_label
 from robolink.ways import Way, way
 
 if TYPE_CHECKING:
-    from robolink.calibration import NeedleChangeResult, Pin, StoredZ
+    from robolink.calibration import NeedleChangeResult, Pin
+
+
+KEPT = (EntryKind.DONE, EntryKind.DECISION)
+"""Entries that say that a value stays, and what it rests on."""
+
+
+@dataclass(frozen=True, slots=True)
+class LastTouch:
+    """The pin as a tool's last calibration on it places it.
+
+    Attributes:
+        station: Name of the pin.
+        place_mm: Where it is then, base.
+        u_deg: U of the flange at the last touch.
+        value: The offset that was written with it.
+        chain: What has happened since the last full calibration.
+        touch_sigma_mm: Standard deviation of one coordinate of one touch then, ``None`` if nothing
+            told it.
+        nozzle: Id of the nozzle that was mounted, empty when nobody gave one.
+        at: When, as a label.
+        touches: How many touches the place rests on.
+        z_from: Where Z of the value came from, ``kept`` where nobody ever showed it.
+    """
+
+    station: str
+    place_mm: tuple[float, float, float]
+    u_deg: float
+    value: ToolOffset
+    chain: NeedleChain
+    touch_sigma_mm: float | None
+    nozzle: str
+    at: str
+    touches: int = 1
+    z_from: str = "kept"
+
+
+def find_last_touch(controller: Controller, tool: int, station: str) -> LastTouch:
+    """Return the last calibration of a tool on a pin, if it stands for what is stored.
+
+    Args:
+        controller: The controller, connected; its record is looked at.
+        tool: Number of the tool.
+        station: Name of the pin.
+
+    Raises:
+        CalibrationError: ``no_last_touch``: there is none; ``reference_outdated``: the tool was
+            changed since.
+
+    Example:
+        >>> from robolink.methods import PointsSource, find_last_touch
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
+        >>> from robolink.testing import MemoryController, MemoryMachine
+        >>> class Nobody:  # implements robolink.Operator
+        ...     def tell(self, text): ...
+        >>> source = PointsSource(lambda: [Pose(298, 99, -20, 0), Pose(322, 91, -20, 180)])
+        >>> tool = ToolPlan(1, source, verify=False, pin="PIN-07")
+        >>> plan = ChangePlan((tool,), ask_before_write=False)
+        >>> with MemoryController(MemoryMachine({1: ToolOffset(12, -3.5, -20)})) as controller:
+        ...     report = NozzleChange(controller, plan, operator=Nobody()).run()
+        ...     find_last_touch(controller, 1, "PIN-07").place_mm
+        (310.0, 95.0, -40.0)
+    """
+    kept = controller.outcomes.recorded(tool=tool, kinds=KEPT)
+    newest = newest_touch(kept, station)
+    if newest is None:
+        raise CalibrationError(
+            "no_last_touch",
+            tr(
+                "Tool {tool} was never calibrated on station {station}.", tool=tool, station=station
+            ),
+            remedy=tr(
+                "Make a full calibration there first: {calibrate}",
+                calibrate=way(Way.CALIBRATE_TOOL_AT, tool=tool, station=station),
+            ),
+        )
+    stored = controller.tools.read(tool)
+    if not controller.tools.same(stored, newest.value):
+        raise CalibrationError(
+            "reference_outdated",
+            tr(
+                "Tool {tool} holds {stored}; its last touch at {station}, of {at}, "
+                "belongs to {value}.",
+                tool=tool,
+                stored=describe_offset(stored),
+                station=station,
+                at=local_label(newest.at),
+                value=describe_offset(newest.value),
+            ),
+            remedy=tr(
+                "The tool is not what its last calibration left. Put that value back, or "
+                "make a full calibration."
+            ),
+        )
+    return newest
+
+
+def newest_touch(kept: Iterable[Recorded], station: str) -> LastTouch | None:
+    """Return the newest touch of a tool on a pin that is on record, ``None`` for none.
+
+    Args:
+        kept: Entries of the tool of the kinds :data:`KEPT`, the newest first.
+        station: Name of the pin.
+    """
+    return next((found for found in (_last_touch(entry, station) for entry in kept) if found), None)
+
+
+def _last_touch(entry: Recorded, station: str) -> LastTouch | None:
+    said, value = entry.details.get("touch"), read_offset(entry.details.get("value"))
+    if not isinstance(said, Mapping) or said.get("station") != station or value is None:
+        return None
+    sigma_mm = said["touch_sigma_mm"]
+    return LastTouch(
+        station=station,
+        place_mm=(float(said["x_mm"]), float(said["y_mm"]), float(said["z_mm"])),
+        u_deg=float(said["u_deg"]),
+        value=value,
+        chain=NeedleChain(
+            float(said["sigma_mm"]),
+            int(said["changes"]),
+            # Records of before do not say it; their chain then starts where it had got to.
+            said.get("full_sigma_mm"),
+        ),
+        touch_sigma_mm=None if sigma_mm is None else float(sigma_mm),
+        nozzle=entry.signature.nozzle,
+        at=entry.at,
+        touches=int(said.get("touches", 1)),
+        z_from=str(entry.details.get("z_from", "kept")),
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +178,8 @@ class Difference:
 
     last: LastTouch
     sigma_mm: float
-    limits: "NeedleLimits"
-    stored_z: "StoredZ | None" = None
+    limits: NeedleLimits
+    stored_z: StoredZ | None = None
 
     @property
     def place_mm(self) -> tuple[float, float, float]:
@@ -222,3 +366,127 @@ def one_of(poses: Sequence[Pose]) -> Pose:
             remedy=tr("Give one, or use the method n-angle."),
         )
     return poses[0]
+
+
+_SAME_MM: Final = 0.001
+"""Within this a value that was read back is the one that was written: EPSON keeps 0.001 mm."""
+
+
+@dataclass(slots=True)
+class _Trace:
+    """Where the trace has got to.
+
+    Attributes:
+        z_mm: The value whose origin is looked for.
+        added_mm2: Square of half the interval of what was added to it since, mm^2.
+        nozzle: Id of the nozzle whose Z it is, empty for one that nobody named.
+    """
+
+    z_mm: float
+    added_mm2: float = 0.0
+    nozzle: str = ""
+
+
+def find_stored_z(controller: Controller, tool: int, stored: ToolOffset) -> StoredZ:
+    """Return the stored Z of a tool, with the measurement on record that it goes back to.
+
+    Args:
+        controller: The controller, connected; its record is looked at.
+        tool: Number of the tool.
+        stored: What it holds.
+
+    Raises:
+        ConfigError: The record cannot be read.
+
+    Example:
+        >>> from robolink.methods.one_touch.solvers import find_stored_z
+        >>> from robolink.model import ToolOffset
+        >>> from robolink.testing import MemoryController
+        >>> find_stored_z(MemoryController(), 1, ToolOffset(12, -4, -20)).on_record
+        False
+    """
+    kinds = (*KEPT, EntryKind.CALIBRATION)
+    return traced(controller.outcomes.recorded(tool=tool, kinds=kinds), stored)
+
+
+def traced(entries: Iterable[Recorded], stored: ToolOffset) -> StoredZ:
+    """Return the same from the entries of the tool, the newest first."""
+    unknown, trace = StoredZ(stored.z_mm), _Trace(stored.z_mm)
+    kept: Recorded | None = None
+    for entry in entries:
+        if entry.kind is EntryKind.CALIBRATION:
+            # A measurement stands before the entry that kept its value; others were not kept.
+            if kept is None or kept.change != entry.change:
+                continue
+            found = _measured(trace, kept, entry)
+            if found is not None:
+                half_mm, number = found
+                return StoredZ(stored.z_mm, math.sqrt(half_mm**2 + trace.added_mm2), number)
+            if not _goes_on(trace, kept, entry):
+                return unknown
+            kept = None
+            continue
+        value = read_offset(entry.details.get("value"))
+        if value is None or (kept is not None and kept.change == entry.change):
+            continue
+        if kept is not None or abs(value.z_mm - trace.z_mm) > _SAME_MM:
+            return unknown
+        if "method" in entry.details:
+            kept = entry
+        elif not _left_z(entry, trace.z_mm):
+            return unknown
+    return unknown
+
+
+def _measured(trace: _Trace, kept: Recorded, calibration: Recorded) -> tuple[float, int] | None:
+    """Return half the interval that a calibration gave Z, and the entry; ``None`` for none."""
+    said = calibration.details
+    measured, halves = said.get("measured"), said.get("half_width95")
+    if kept.details.get("z_from") != "measured" or not isinstance(measured, Sequence):
+        return None
+    if "z_mm" not in measured or not isinstance(halves, Sequence) or not halves:
+        return None
+    if trace.nozzle and _nozzle(kept) != trace.nozzle:
+        return None  # of another needle than the one that is stored
+    value, tip = read_offset(kept.details.get("value")), read_offset(kept.details.get("tip"))
+    if value is None or tip is None or abs(value.z_mm - tip.z_mm) > _SAME_MM:
+        return None  # what was written is not where the tip was found
+    earlier, half_mm = said.get("stored_z"), float(halves[list(measured).index("z_mm")])
+    if isinstance(earlier, Mapping) and isinstance(earlier.get("half95_mm"), float):
+        # Touches between cancel, so that differences do not add up: it goes back to the start.
+        return float(earlier["half95_mm"]), int(earlier["entry"])
+    return half_mm, calibration.number
+
+
+def _goes_on(trace: _Trace, kept: Recorded, calibration: Recorded) -> bool:
+    """Take a trace on past a calibration in which Z was not measured; False where it ends there.
+
+    A Z that was kept is that of the needle before: it holds for the new one where the heights of
+    the touches said so, or where it is the same needle.
+    """
+    details, before = kept.details, read_offset(kept.details.get("before"))
+    changed = calibration.details.get("changed")
+    if before is None or (isinstance(changed, Sequence) and "z_mm" in changed):
+        return False
+    length, checked = details.get("length"), details.get("length_checked")
+    nozzle = _nozzle(kept)
+    same = bool(nozzle) and nozzle == (trace.nozzle or nozzle)
+    follows = details.get("z_from") == "measured"
+    said = length if isinstance(length, Mapping) else checked
+    if abs(before.z_mm - trace.z_mm) > _SAME_MM and not (follows and length):
+        return False
+    if follows and isinstance(said, Mapping):
+        trace.added_mm2 += (NORMAL_95 * float(said["u_mm"])) ** 2
+    elif not same:
+        return False
+    trace.z_mm, trace.nozzle = before.z_mm, "" if follows else nozzle
+    return True
+
+
+def _nozzle(kept: Recorded) -> str:
+    return str(kept.details.get("nozzle") or kept.signature.nozzle)
+
+
+def _left_z(entry: Recorded, z_mm: float) -> bool:
+    before = read_offset(entry.details.get("before"))
+    return before is not None and abs(before.z_mm - z_mm) <= _SAME_MM

@@ -1,19 +1,267 @@
 """pivot: one pin touched in tilted orientations, on five axes and six."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Annotated, ClassVar, Final, Self
 
-from robolink.messages import declared
-from robolink.methods.declaration.method import Method, Needs, PoseHelp
-from robolink.methods.declaration.site import Site
-from robolink.methods.pivot.parameters import PivotParameters
+from annotated_types import Ge, Le
+
+from robolink.calibration import CalibrationResult
+from robolink.errors import CalibrationError, ConfigError
+from robolink.messages import declared, tr
+from robolink.methods.method import (
+    DEGREES,
+    MM,
+    Help,
+    Length,
+    Method,
+    Needs,
+    Option,
+    PoseHelp,
+    Site,
+)
+from robolink.methods.shared_parameters import PinParameters, Retake
+from robolink.model import Controller, Pose, ToolOffset
+from robolink.procedures import (
+    TAKE_ALL,
+    MeasurementContext,
+    PinSource,
+    SamplingPolicy,
+    TouchPlan,
+    drift_uncertainty_mm,
+)
+from robolink.runner import Procedure, TouchedAt
 from robolink.stations import StationKind
 
 if TYPE_CHECKING:
+    from robolink.methods.pivot.procedure import TiltTest
+    from robolink.methods.pivot.tilts import Tilt
     from robolink.procedures import KeptProof, PoseMethod, TipSource
 
 
+@dataclass(frozen=True, kw_only=True)
+class PivotParameters(PinParameters):
+    """How one pin is touched with the tool tilted and turned."""
+
+    count: Annotated[
+        int,
+        Ge(4),
+        Le(12),
+        Help(
+            declared(
+                "Number of touches, the first one in the orientation in which the tool stands."
+            )
+        ),
+    ] = 6
+    tilt_deg: Annotated[
+        float,
+        Ge(5),
+        Le(45),
+        DEGREES,
+        Option(metavar="DEG"),
+        Help(declared("How far the tool leans in the other touches, relative to the first one.")),
+    ] = 20.0
+    lift_mm: Annotated[
+        float,
+        Ge(1),
+        Le(100),
+        MM,
+        Help(declared("How far the tip is lifted before it tilts and turns.")),
+    ] = 10.0
+    until_mm: Annotated[
+        Length | None,
+        Option(metavar="MM"),
+        Help(declared("End early when X, Y and Z are repeatable to this in 95 %.")),
+    ] = None
+    retake: Retake = False
+
+    @property
+    def sampling(self) -> SamplingPolicy:
+        """When it ends, and whether a pose is offered to be taken again."""
+        return SamplingPolicy(self.until_mm, retake=self.retake)
+
+
+LEAST_AXES: Final = 5
+"""X, Y, Z and a turn take four; whatever tilts needs another one."""
+
+
+@dataclass(frozen=True, slots=True)
+class PivotSource(PinSource):
+    """Measures by touching one pin with the tool tilted and turned.
+
+    Attributes:
+        tilts: Orientations of the touches after the first; see
+            :func:`~robolink.methods.informative_tilts`.
+        touch: Lift and clearance.
+        sigma_mm: Standard deviation of one coordinate of one placement, where it is known.
+        sampling: When a measurement ends, and whether a pose is offered again.
+    """
+
+    tilts: "tuple[Tilt, ...]"
+    touch: TouchPlan = field(default_factory=TouchPlan)
+    sigma_mm: float | None = None
+    sampling: SamplingPolicy = TAKE_ALL
+
+    @property
+    def sentence(self) -> str:
+        """What it does, for a report."""
+        return self._touched
+
+    @property
+    def _touched(self) -> str:
+        return tr(
+            "measured on the robot: one pin touched in {count} orientations, tilted by {tilt:g} "
+            "degrees",
+            count=len(self.tilts) + 1,
+            tilt=self._tilt_deg,
+        )
+
+    def proof(
+        self,
+        context: MeasurementContext,  # noqa: ARG002 - nothing of it is read
+        tool: int,
+        result: CalibrationResult,
+        *,
+        tip: ToolOffset,
+        tolerance_mm: float,
+    ) -> "TiltTest":
+        """Return the tilt test; see :class:`~robolink.procedures.KeepsProof`."""
+        from robolink.methods.pivot.procedure import TiltTest  # numpy
+        from robolink.procedures.tilting_proof import upright_of
+
+        x_mm, y_mm, z_mm = result.reference_point_mm
+        return TiltTest(
+            tool=tool,
+            written=result.offset,
+            tip=tip,
+            tolerance_mm=tolerance_mm,
+            touch=self.touch,
+            pin_mm=(x_mm, y_mm, z_mm),
+            tilt_deg=self._tilt_deg,
+            u_mm=drift_uncertainty_mm(result),
+            upright=upright_of(result, result.offset, tool),
+        )
+
+    def foreseen(self) -> Self:
+        """Return the source whose steps are only shown."""
+        return replace(PinSource.foreseen(self), sampling=TAKE_ALL)
+
+    @property
+    def adds_touch(self) -> bool:
+        """Which further tilt tells most depends on those of the plan."""
+        return False
+
+    def further_steps(
+        self, here: Pose, taken: Sequence[TouchedAt], again: int | None, stored: ToolOffset | None
+    ) -> Procedure[CalibrationResult]:
+        """Return the steps that make one touch again."""
+        from robolink.methods.pivot.procedure import retake_pivot  # numpy
+
+        return retake_pivot(
+            self.touch,
+            here=here,
+            taken=taken,
+            again=len(taken) - 1 if again is None else again,
+            tilts=self.tilts,
+            stored=require_known_tip(stored),
+            sigma_mm=self.sigma_mm,
+        )
+
+    @property
+    def _tilt_deg(self) -> float:
+        return max(abs(tilt.lean_deg) for tilt in self.tilts)
+
+    def steps(self, stored: ToolOffset | None) -> Procedure[CalibrationResult]:
+        """Return the steps.
+
+        Raises:
+            ConfigError: Nobody knows about where the tip is, so it cannot be kept off the pin.
+        """
+        from robolink.methods.pivot.procedure import (
+            measure_pivot,  # numpy, which a look does without
+        )
+
+        return measure_pivot(
+            self.touch,
+            tilts=self.tilts,
+            stored=require_known_tip(stored),
+            sigma_mm=self.sigma_mm,
+            sampling=self.sampling,
+        )
+
+
+def require_known_tip(stored: ToolOffset | None) -> ToolOffset:
+    """Return the offset by which a tip is kept off the pin while the tool tilts.
+
+    Raises:
+        ConfigError: There is none.
+    """
+    if stored is None:
+        raise ConfigError(
+            tr("The tool is not defined: where its tip would swing when it tilts is not known."),
+            remedy=tr(
+                "Write about where the tip is with 'tool set', to a millimetre or two, and "
+                "measure then."
+            ),
+        )
+    return stored
+
+
+@dataclass(frozen=True, slots=True)
+class PivotTouches:
+    """Touches of one pin with six axes, the tool tilted and turned.
+
+    Attributes:
+        sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
+    """
+
+    upright: ClassVar[bool] = False
+    needs: ClassVar[tuple[str, ...]] = ("z_mm", "v_deg", "w_deg")
+
+    sigma_mm: float | None = None
+
+    def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
+        """Solve three poses and more; see :class:`~robolink.procedures.PoseMethod`."""
+        from robolink.calibration import solve_pivot  # numpy, which a look does without
+
+        return solve_pivot(flange, stored=stored, sigma_mm=self.sigma_mm)
+
+
+def require_tilting(controller: Controller, method: str) -> None:
+    """Refuse a method with tilted poses on a robot of four axes; reads only.
+
+    A machine that does not tell its axes is not refused here: what it cannot take up shows when it
+    has moved.
+
+    Raises:
+        CalibrationError: ``rank_deficient``.
+    """
+    axes = axes_of(controller)
+    if not 0 < axes < LEAST_AXES:
+        return
+    raise CalibrationError(
+        "rank_deficient",
+        tr(
+            "{robot} has {axes} axes and turns its tool about Z only, so {method} cannot be "
+            "measured with it: nothing shows Z and the tilt of the tool.",
+            robot=", ".join(controller.facts().robot_models) or controller.identity,
+            axes=axes,
+            method=method,
+        ),
+        remedy=tr(
+            "Measure X and Y with 'calibrate n-angle' and Z with 'calibrate z-touch' or "
+            "'calibrate one-touch'."
+        ),
+    )
+
+
+def axes_of(controller: Controller) -> int:
+    """Return how many axes a robot has, 0 where its controller does not tell; reads only."""
+    counted = controller.groups[0].axes() if controller.groups else {}
+    return max((len(values) for name, values in counted.items() if name != "pulses"), default=0)
+
+
 def _source(parameters: PivotParameters, site: Site) -> "TipSource":
-    from robolink.methods.pivot.source import PivotSource, require_tilting
     from robolink.methods.pivot.tilts import informative_tilts  # numpy, for this robot alone
 
     require_tilting(site.controller, METHOD.name)
@@ -26,13 +274,11 @@ def _source(parameters: PivotParameters, site: Site) -> "TipSource":
 
 
 def _from_poses(_parameters: PivotParameters, site: Site) -> "PoseMethod":
-    from robolink.methods.pivot.source import PivotTouches
-
     return PivotTouches(site.sigma_mm)
 
 
 def _proof() -> "type[KeptProof]":
-    from robolink.methods.pivot.proof import TiltTest
+    from robolink.methods.pivot.procedure import TiltTest
 
     return TiltTest
 

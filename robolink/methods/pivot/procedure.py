@@ -6,6 +6,7 @@ above the pin, and comes down to a clearance; the last bit is done by the person
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 from robolink.calibration import (
     PERSON_U_DRIFT_MM,
@@ -14,12 +15,19 @@ from robolink.calibration import (
     pose_arrays,
     sigma_gain,
     solve_pivot,
+    tilted_from,
 )
 from robolink.messages import tr
-from robolink.methods.pivot.naming import TiltedNames
-from robolink.methods.pivot.reach import proving_in_reach, tilts_in_reach
-from robolink.methods.pivot.swing import tilt_in_air
-from robolink.methods.pivot.tilts import UPRIGHT, OverPin, Tilt
+from robolink.methods.pivot.tilts import (
+    UPRIGHT,
+    OverPin,
+    Tilt,
+    TiltedNames,
+    proving_in_reach,
+    proving_tilts,
+    tilt_in_air,
+    tilts_in_reach,
+)
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import (
     MOST_MORE,
@@ -32,6 +40,7 @@ from robolink.procedures import (
     resume_samples,
     sample_sequentially,
 )
+from robolink.procedures.tilting_proof import TiltingProof, Vector
 from robolink.runner import Notify, Procedure, TouchedAt
 
 
@@ -98,7 +107,7 @@ def pivot_then_lift(
     return result, swing.over.pose(UPRIGHT, plan.lift_mm)
 
 
-def go_on_pivot(
+def retake_pivot(
     plan: TouchPlan,
     *,
     here: Pose,
@@ -264,3 +273,37 @@ class _PivotSampler(TiltedNames):
 
     def gain(self, poses: Sequence[Pose]) -> float:
         return sigma_gain(pose_arrays(poses)[1])
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TiltTest(TiltingProof):
+    """All that a tilt test at a pin needs.
+
+    Attributes:
+        pin_mm: The pin as the measurement found it, base.
+        tilt_deg: How far the tool leans.
+    """
+
+    method: ClassVar[str] = "pivot"
+
+    pin_mm: tuple[float, float, float]
+    tilt_deg: float
+
+    def steps(self, here: Pose) -> Procedure[VerifyResult]:
+        """Return the steps from over the pin, lifted and upright."""
+        tip = tilted_from(self.written, self.tip)
+        return verify_by_tilting(
+            self.touch,
+            over=OverPin(here, self.pin_mm, tip=tip, frame=self.written),
+            tilts=proving_tilts(self.tilt_deg),
+            tolerance_mm=self.tolerance_mm,
+            u_mm=self.u_mm,
+        )
+
+    def _first(self) -> tuple[str, str]:
+        return tr("Jog the tip onto the pin."), tr("Lifting off the pin.")
+
+    def _apart_mm(self, found: Pose) -> Vector:
+        at = OverPin.touched(found, tilted_from(self.written, self.tip)).pin_mm
+        x_mm, y_mm, z_mm = (there - pin for there, pin in zip(at, self.pin_mm, strict=True))
+        return x_mm, y_mm, z_mm

@@ -1,4 +1,7 @@
-"""How a tool is tilted over a pin: in which orientations, and on which way from one to the next."""
+"""How a tool is tilted over a pin: in which orientations, and on which way between them.
+
+Which of them an arm can take up shows at the first touch; others then replace the rest.
+"""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -8,8 +11,12 @@ from typing import Final
 import numpy as np
 
 from robolink.calibration import Floats, rotation_of, rotations, select_poses, uvw_deg
-from robolink.model import Pose, ToolOffset
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+from robolink.model import Path, Pose, ToolOffset
 from robolink.procedures import NO_OFFSET
+from robolink.runner import Consider, Move, Notify, Procedure
+from robolink.ways import Way, way
 
 TURNS_DEG: Final = (0.0, 60.0, 120.0, 180.0, -120.0, -60.0)
 
@@ -146,3 +153,188 @@ def _leaning(start: Tilt, goal: Tilt) -> Iterator[Tilt]:
 
 def _own_rotation(frame: ToolOffset) -> Floats:
     return rotation_of(Pose(0.0, 0.0, 0.0, *frame.components()[3:]))
+
+
+class TiltedNames:
+    """What is the same for all samplers whose tool is tilted and turned."""
+
+    __slots__ = ()
+
+    @property
+    def known(self) -> str:
+        """Which lengths become known."""
+        return tr("X, Y and Z")
+
+    def counted(self, count: int) -> str:
+        """Return how many were taken."""
+        return tr("{count} touches", count=count)
+
+    def named(self, pose: Pose) -> str:
+        """Return where one was taken."""
+        return tr("U {u:.1f} V {v:.1f} W {w:.1f}", u=pose.u_deg, v=pose.v_deg, w=pose.w_deg)
+
+    def which(self, number: int, pose: Pose) -> str:
+        """Return which one it is."""
+        return tr("Touch {number} at {where}", number=number, where=self.named(pose))
+
+
+MOST_DEVIATION_DEG: Final = 1.0
+"""A robot that stands further from the orientation it was sent to cannot take it up."""
+
+
+def tilt_in_air(over: OverPin, stands: Tilt, goal: Tilt, lift_mm: float) -> Procedure[None]:
+    """Tilt a lifted tool with its tip where it is.
+
+    Args:
+        over: The place above which the tip is.
+        stands: How the tool stands.
+        goal: How it is to stand.
+        lift_mm: How far above the place the tip is.
+
+    Raises:
+        CalibrationError: ``not_tilted``: the robot stands otherwise than it was told.
+    """
+    for tilt in tilt_path(stands, goal):
+        target = over.pose(tilt, lift_mm)
+        reached: Pose = yield Move(target, Path.JOINT, tr("Tilting and turning in the air."))
+        amiss_deg = apart_deg(target, reached)
+        if amiss_deg > MOST_DEVIATION_DEG:
+            raise CalibrationError(
+                "not_tilted",
+                tr(
+                    "The tool is {amiss:.1f} degrees from the orientation it was sent to.",
+                    amiss=amiss_deg,
+                ),
+                remedy=tr(
+                    "This robot cannot reach it, and stands still with the tip "
+                    "lifted. Tilt less with {tilt}, or teach the poses and give "
+                    "{points}.",
+                    tilt=way(Way.TILT),
+                    points=way(Way.TAUGHT_POINTS),
+                ),
+            )
+
+
+LEAST_TILTS: Final = 3
+"""With the first touch that makes four, the fewest that a pivot is measured with."""
+
+
+def tilts_in_reach(
+    over: OverPin, wanted: Sequence[Tilt], lift_mm: float
+) -> Procedure[tuple[Tilt, ...]]:
+    """Return the wanted orientations, or those that tell the most of what the arm can take up.
+
+    Where the pin is shows at the first touch, and with it which orientations are in reach: inside
+    the limits, and away from a singular wrist. Others lean as far, or half as far.
+
+    Args:
+        over: The pin as the first touch showed it.
+        wanted: The orientations of the plan.
+        lift_mm: How far above the pin the tool tilts.
+
+    Raises:
+        CalibrationError: ``not_tilted``: fewer than three are left; nothing was tilted.
+    """
+    refusals = yield from _refusals(over, wanted, lift_mm)
+    if not any(refusals):
+        return tuple(wanted)
+    first = next(filter(None, refusals))
+    tilt_deg = max(abs(tilt.lean_deg) for tilt in wanted)
+    choice = [*tilts_around(tilt_deg), *tilts_around(tilt_deg / 2)]
+    found = yield from _refusals(over, choice, lift_mm)
+    free = [tilt for tilt, refusal in zip(choice, found, strict=True) if not refusal]
+    if len(free) < LEAST_TILTS:
+        raise _not_tilted(first)
+    chosen = best_tilts(free, min(len(wanted), len(free)))
+    yield Notify(
+        tr(
+            "{missed} of the {count} planned tilts cannot be reached over this pin: "
+            "{why} Others replace them, {chosen} in all.",
+            missed=sum(map(bool, refusals)),
+            count=len(wanted),
+            why=first,
+            chosen=len(chosen),
+        )
+    )
+    return chosen
+
+
+def free_tilts(
+    over: OverPin, choice: Sequence[Tilt], lift_mm: float
+) -> Procedure[tuple[Tilt, ...]]:
+    """Return which of many orientations the arm can take up over a place, in their order.
+
+    Args:
+        over: The place as the first touch showed it.
+        choice: What there is to choose from.
+        lift_mm: How far above it the tool tilts.
+
+    Raises:
+        CalibrationError: ``not_tilted``: fewer than three are left; nothing was tilted.
+    """
+    refusals = yield from _refusals(over, choice, lift_mm)
+    free = tuple(tilt for tilt, refusal in zip(choice, refusals, strict=True) if not refusal)
+    if len(free) < LEAST_TILTS:
+        raise _not_tilted(next(filter(None, refusals)))
+    if len(free) < len(choice):
+        yield Notify(
+            tr(
+                "{missed} of {count} tilts cannot be reached here: {why} The touches "
+                "are chosen from the others.",
+                missed=len(choice) - len(free),
+                count=len(choice),
+                why=next(filter(None, refusals)),
+            )
+        )
+    return free
+
+
+def proving_in_reach(
+    over: OverPin, wanted: Sequence[Tilt], lift_mm: float
+) -> Procedure[tuple[Tilt, ...]]:
+    """Return the orientations of a proof, or the first pair half a turn apart that can be taken up.
+
+    Args:
+        over: The pin, and the tip as it was measured.
+        wanted: The orientations of the plan.
+        lift_mm: How far above the pin the tool tilts.
+
+    Raises:
+        CalibrationError: ``not_tilted``: there is no such pair, so nothing is proved.
+    """
+    refusals = yield from _refusals(over, wanted, lift_mm)
+    if not any(refusals):
+        return tuple(wanted)
+    for pair in proving_pairs(max(abs(tilt.lean_deg) for tilt in wanted)):
+        if not any((yield from _refusals(over, pair, lift_mm))):
+            return pair
+    raise _not_tilted(next(filter(None, refusals)))
+
+
+def _refusals(over: OverPin, tilts: Sequence[Tilt], lift_mm: float) -> Procedure[list[str]]:
+    """Return for each orientation why the arm cannot go there and touch, empty where it can."""
+    ways = [tuple(_way(over, tilt, lift_mm)) for tilt in tilts]
+    told: tuple[str, ...] = yield Consider(tuple(move for moves in ways for move in moves))
+    left = iter(told)
+    return [next(filter(None, [next(left) for _ in moves]), "") for moves in ways]
+
+
+def _way(over: OverPin, tilt: Tilt, lift_mm: float) -> Iterator[Move]:
+    """Yield the movements that lead to a touch: tilting in the air, down to the pin, up again."""
+    for between in tilt_path(UPRIGHT, tilt):
+        yield Move(over.pose(between, lift_mm), Path.JOINT, "")
+    for above_mm in (0.0, lift_mm):
+        yield Move(over.pose(tilt, above_mm), Path.STRAIGHT, "")
+
+
+def _not_tilted(why: str) -> CalibrationError:
+    return CalibrationError(
+        "not_tilted",
+        tr("Too few orientations can be reached over this pin: {why}", why=why),
+        remedy=tr(
+            "Nothing was tilted. Put the pin where the arm has room to all sides, tilt less with "
+            "{tilt}, or teach the poses and give {points}.",
+            tilt=way(Way.TILT),
+            points=way(Way.TAUGHT_POINTS),
+        ),
+    )

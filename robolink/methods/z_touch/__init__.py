@@ -1,19 +1,270 @@
 """z-touch: a surface that switches an input when a tip touches it."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Annotated, Final
 
-from robolink.messages import declared
-from robolink.methods.declaration.method import Former, Method, Needs
-from robolink.methods.declaration.site import Site
-from robolink.methods.z_touch.parameters import ZTouchParameters
-from robolink.stations import StationKind
+from annotated_types import Ge, Le, MinLen
+
+from robolink.calibration import MIN_ROTATION_DEG, CalibrationResult, tip_pose
+from robolink.files.toml import Problem
+from robolink.messages import declared, tr
+from robolink.methods.method import (
+    DEGREES,
+    MM,
+    MM_S,
+    Check,
+    Former,
+    Help,
+    InputNumber,
+    Length,
+    Method,
+    MethodParameters,
+    Needs,
+    Option,
+    Site,
+)
+from robolink.methods.shared_parameters import clearance_below_lift
+from robolink.model import Pose, ToolOffset
+from robolink.procedures import InputSource, MeasurementContext, SamplingPolicy, may_end_early
+from robolink.runner import Procedure
+from robolink.stations import StationKind, TouchStation
 
 if TYPE_CHECKING:
+    from robolink.methods.z_touch.procedure import ProbeTest
     from robolink.procedures import KeptProof, TipSource
 
 
+_SPEEDS_APART: Final = 1.5
+"""Speeds that differ by less than this factor do not tell the latency, says the solver too."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ZTouchParameters(MethodParameters):
+    """How a tip is brought down on a surface that switches an input."""
+
+    input: Annotated[
+        InputNumber | None,
+        Help(declared("Number of the input that the surface switches; without it, the station's.")),
+    ] = None
+    off_when_touched: Annotated[
+        bool,
+        Help(declared("Whether the input goes off, not on, at a touch; goes with the input.")),
+    ] = False
+    speeds_mm_s: Annotated[
+        tuple[Annotated[float, Ge(0.1), Le(10)], ...],
+        MinLen(2),
+        MM_S,
+        Option(metavar="2,1,.."),
+        Help(
+            declared(
+                "Speed of each touch. Two different speeds show the latency of the trigger; "
+                "three speeds in four touches or more also show how far the robot moves while it"
+                " brakes."
+            )
+        ),
+    ] = (2.0, 1.0, 2.0, 1.0)
+    clearance_mm: Annotated[
+        float,
+        Ge(0.5),
+        Le(20),
+        MM,
+        Help(declared("How far above the expected touch the tip begins to search for it.")),
+    ] = 3.0
+    beyond_mm: Annotated[
+        float,
+        Ge(0.1),
+        Le(10),
+        MM,
+        Help(
+            declared(
+                "How far below the expected touch the search ends; "
+                "a new tip can be shorter by less."
+            )
+        ),
+    ] = 2.0
+    back_off_mm: Annotated[
+        float, Ge(0.2), Le(10), MM, Help(declared("How far the tip is lifted after each touch."))
+    ] = 1.0
+    lift_mm: Annotated[
+        float,
+        Ge(1),
+        Le(100),
+        MM,
+        Help(declared("How far above the surface the tip arrives, leaves and turns.")),
+    ] = 10.0
+    proof_turn_deg: Annotated[
+        float,
+        Ge(0),
+        Le(360 - MIN_ROTATION_DEG),
+        DEGREES,
+        Option(metavar="DEG"),
+        Help(
+            declared(
+                "By how much U differs at the touch that proves the new value; 0 on a machine that "
+                "cannot turn, such as a gantry."
+            )
+        ),
+    ] = 180.0
+    until_mm: Annotated[
+        Length | None,
+        Option(metavar="MM"),
+        Help(declared("End early when Z is repeatable to this in 95 %.")),
+    ] = None
+    retake: Annotated[
+        bool,
+        Option(flag="--retake/--no-retake", default=True),
+        Help(declared("Whether robolink offers to make the touch that fits worst again.")),
+    ] = False
+
+    @property
+    def sampling(self) -> SamplingPolicy:
+        """When it ends, and whether a touch is offered to be made again."""
+        return SamplingPolicy(self.until_mm, retake=self.retake)
+
+    def may_end_early(self, *, sigma_stated: bool) -> bool:
+        """Tell whether the tip can be known well enough before the last touch.
+
+        Args:
+            sigma_stated: Whether somebody stated the standard deviation of a touch.
+        """
+        # Z and the latency.
+        return may_end_early(len(self.speeds_mm_s), unknowns=2, sigma_stated=sigma_stated)
+
+    def problems(self, check: Check) -> Iterator[Problem]:
+        """Check speeds and heights, and that an early end and a retake can do something."""
+        if "retake" in check.given and self.retake and self.no_residual():
+            yield retake_of_nothing()
+        if (
+            self.until_mm is not None
+            and check.sigma_stated is not None
+            and not self.may_end_early(sigma_stated=check.sigma_stated)
+        ):
+            yield Problem(
+                "until_mm",
+                tr(
+                    "has nothing to leave out; give 7 {speeds}, or 4 with {sigma}",
+                    speeds=check.spell("speeds_mm_s"),
+                    sigma=check.spell("sigma_mm"),
+                ),
+            )
+        if max(self.speeds_mm_s) < _SPEEDS_APART * min(self.speeds_mm_s):
+            yield Problem(
+                "speeds_mm_s",
+                tr("must differ by a factor of {factor:g} or more", factor=_SPEEDS_APART),
+            )
+        yield from clearance_below_lift(self.clearance_mm, self.lift_mm, check)
+
+    def room_mm(self) -> float:
+        """Return how high the box has to be."""
+        return self.lift_mm
+
+    def no_residual(self) -> str:
+        """Return why residuals cannot be judged, empty when they can."""
+        if len(self.speeds_mm_s) > 2:
+            return ""
+        return tr(
+            "cannot be judged: two touches cannot check each other; give four speeds, "
+            "or limit the interval and state the standard deviation"
+        )
+
+
+def retake_of_nothing() -> Problem:
+    """Return what is wrong with a retake where nothing is repeated."""
+    return Problem("retake", tr("means nothing: nothing is repeated, so nothing can fit badly"))
+
+
+@dataclass(frozen=True, slots=True)
+class ZTouchSource(InputSource[ZTouchParameters]):
+    """Measures Z by touching a surface at two speeds, from wherever the flange is.
+
+    Attributes:
+        station: Where the surface is.
+        plan: How it is touched.
+        sigma_mm: Standard deviation of one touch, where it is known.
+        deceleration_mm_s2: How the robot brakes, where its controller told it.
+        step_mm: How finely the controller tells where an input switched, likewise.
+    """
+
+    station: TouchStation
+    plan: ZTouchParameters = field(default_factory=ZTouchParameters)
+    sigma_mm: float | None = None
+    deceleration_mm_s2: float | None = None
+    step_mm: float | None = None
+
+    @property
+    def sentence(self) -> str:
+        """What it does, for a report."""
+        return tr("measured on the robot: a surface touched at two speeds")
+
+    @property
+    def remedy(self) -> str:
+        """What to do when a measurement makes the tip jump."""
+        return tr("Clean tip and surface, and check that the nozzle is tight.")
+
+    def measure(
+        self, context: MeasurementContext, tool: int, stored: ToolOffset | None
+    ) -> CalibrationResult:
+        """Touch and solve; see :class:`~robolink.procedures.MovingSource`."""
+        told = replace(
+            self, deceleration_mm_s2=_told_braking(context), step_mm=_told_step(context, self.plan)
+        )
+        return InputSource.measure(told, context, tool, stored)
+
+    def steps(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
+        """Return the steps of the measurement."""
+        from robolink.methods.z_touch.procedure import measure_z_touch  # numpy, late
+
+        return measure_z_touch(
+            self.station,
+            self.plan,
+            here=here,
+            stored=stored,
+            sigma_mm=self.sigma_mm,
+            deceleration_mm_s2=self.deceleration_mm_s2,
+            step_mm=self.step_mm,
+        )
+
+    def proof(
+        self,
+        context: MeasurementContext,
+        tool: int,
+        result: CalibrationResult,
+        *,
+        tip: ToolOffset,
+        tolerance_mm: float,
+    ) -> "ProbeTest":
+        """Return the proof at another U; see :class:`~robolink.procedures.KeepsProof`."""
+        from robolink.calibration import toward_zero
+        from robolink.methods.z_touch.procedure import ProbeTest  # numpy
+
+        here = context.stands or context.controller.groups[0].pose()
+        # After a measurement that is the flange; else whatever is in force.
+        frame = here if here.tool == tool else tip_pose(here, result.offset, tool=tool)
+        return ProbeTest(
+            tool=tool,
+            written=result.offset,
+            tip=tip,
+            tolerance_mm=tolerance_mm,
+            station=self.station,
+            plan=self.plan,
+            angles_deg=(toward_zero(frame.u_deg, self.plan.proof_turn_deg),),
+            deceleration_mm_s2=_told_braking(context),
+            step_mm=_told_step(context, self.plan),
+        )
+
+
+def _told_braking(context: MeasurementContext) -> float | None:
+    """Return how the robot brakes, ``None`` where its controller does not tell."""
+    return context.controller.groups[0].deceleration_mm_s2() or None
+
+
+def _told_step(context: MeasurementContext, plan: ZTouchParameters) -> float | None:
+    """Return how finely the place of the fastest touch is told, ``None`` where nobody knows it."""
+    return context.controller.groups[0].edge_step_mm(max(plan.speeds_mm_s))
+
+
 def _source(parameters: ZTouchParameters, site: Site) -> "TipSource":
-    from robolink.methods.z_touch.source import ZTouchSource
     from robolink.stations import touch_station
 
     stated = parameters.input is not None
@@ -24,7 +275,7 @@ def _source(parameters: ZTouchParameters, site: Site) -> "TipSource":
 
 
 def _proof() -> "type[KeptProof]":
-    from robolink.methods.z_touch.proof import ProbeTest
+    from robolink.methods.z_touch.procedure import ProbeTest
 
     return ProbeTest
 

@@ -8,8 +8,8 @@ from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, create_
 from pydantic_core import CoreSchema
 
 from robolink.methods import AnyMethod, Help, MethodParameters, Unit, all_methods, fields_of
-from robolink.methods.declaration.fields import ParameterField as Parameter
-from robolink.methods.declaration.fields import bare
+from robolink.methods.parameter_checks import ParameterField as Parameter
+from robolink.methods.parameter_checks import bare
 from robolink.recipe.file.tables import Table
 
 _DESCRIBED = ConfigDict(use_attribute_docstrings=False)

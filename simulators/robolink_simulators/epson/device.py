@@ -17,27 +17,21 @@ from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.device.wire_record import MotionLog
 from robolink_simulators.device.wire_time import late_random
 from robolink_simulators.epson.arm.robots import find_robot
-from robolink_simulators.epson.card import ControllerCard
-from robolink_simulators.epson.companion import Companion
 from robolink_simulators.epson.condition import Condition, Mode
 from robolink_simulators.epson.flash import Flash, moment_of, put_back
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.variables import Variables, project_variables
-from robolink_simulators.epson.mishaps import EpsonMishaps
-from robolink_simulators.epson.options import EpsonOptions, serial_dialect
-from robolink_simulators.epson.panel import EpsonPanel
-from robolink_simulators.epson.remote.client_slot import ClientSlot
+from robolink_simulators.epson.options import ControllerCard, EpsonOptions, serial_dialect
+from robolink_simulators.epson.panel import EpsonMishaps, EpsonPanel
 from robolink_simulators.epson.remote.command_window import SpelWindow
-from robolink_simulators.epson.remote.commands import CommandDesk
-from robolink_simulators.epson.remote.link import EpsonServerLink
-from robolink_simulators.epson.remote.open_links import OpenLinks
-from robolink_simulators.epson.remote.queries import Alarms
-from robolink_simulators.epson.remote.service import Service
+from robolink_simulators.epson.remote.commands import Alarms, CommandDesk
+from robolink_simulators.epson.remote.link import ClientSlot, EpsonServerLink, OpenLinks
+from robolink_simulators.epson.remote.requests import Service
 from robolink_simulators.epson.spel import Interpreter
 from robolink_simulators.epson.spel.programs.loading import load_project
-from robolink_simulators.epson.spel.tasks.channels.ports import Ports
+from robolink_simulators.epson.spel.tasks.ports import Ports
 from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
-from robolink_simulators.epson.time_stepping import TimeStepping
+from robolink_simulators.epson.time_stepping import Companion, TimeStepping
 from robolink_simulators.epson.world import World
 from robolink_simulators.faults import Fault, FaultPlan
 from robolink_simulators.faults.links import EPSON_LINKS
@@ -45,7 +39,7 @@ from robolink_simulators.state_files import StateNotKeptError, drawn_serial
 
 
 class EpsonSimulator(TimeStepping):
-    r"""Implements ``hosting.seam.WireDevice``.
+    r"""Implements ``hosting.addresses.WireDevice``.
 
     Args:
         robot: Name of a model, as in docs/reference/epson-robots.md, "Families"; several, with

@@ -8,21 +8,22 @@ from typing import Any, Generic, TypeVar, overload
 from robolink.model import Pose, ToolOffset
 from robolink_simulators.device.wire_record import MotionLog
 from robolink_simulators.epson.arm.arm import Arm
-from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.motion_parameters import MotionParameters
 from robolink_simulators.epson.arm.robot_settings import RobotSettings
-from robolink_simulators.epson.arm.robots import RobotModel
-from robolink_simulators.epson.definitions.kept import KeptDefinitions
-from robolink_simulators.epson.memory.bits import IO_BITS, MEMORY_BITS, BitBank, IOLabel
-from robolink_simulators.epson.memory.control_points import ControlPoints
-from robolink_simulators.epson.memory.driven_robot import DrivenRobot
-from robolink_simulators.epson.memory.image_calibrations import ImageCalibrations
-from robolink_simulators.epson.memory.input_bits import InputBits
-from robolink_simulators.epson.memory.pallets import PalletTable
-from robolink_simulators.epson.memory.points import LocalTable, Point, PointTable
-from robolink_simulators.epson.memory.timed_bits import TimedBits
+from robolink_simulators.epson.arm.robots import Joints, RobotModel
+from robolink_simulators.epson.camera_calibrations import ImageCalibrations
+from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
+from robolink_simulators.epson.memory.bits import IO_BITS, MEMORY_BITS, BitBank, IOLabel, TimedBits
+from robolink_simulators.epson.memory.inputs import InputBits
+from robolink_simulators.epson.memory.points import (
+    ControlPoints,
+    LocalTable,
+    PalletTable,
+    Point,
+    PointTable,
+)
+from robolink_simulators.epson.memory.robot import DrivenRobot, KeptDefinitions
 from robolink_simulators.epson.memory.tools import ToolMemory
-from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 REMOTE_ETHERNET = 26
 """CtrlDev of a controller run over Remote Ethernet (docs/reference/spel.md 9)."""

@@ -1,4 +1,4 @@
-"""What no document settles about EPSON controllers, as named options.
+"""What no document settles about EPSON controllers, as named options; what one says of itself.
 
 Each default is the likeliest reading; the driver must work with every value (the contract
 tests run with each). Evidence marks: [D] document, [R] transcript of a real controller,
@@ -7,7 +7,7 @@ tests run with each). Evidence marks: [D] document, [R] transcript of a real con
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Final, Literal
@@ -17,6 +17,33 @@ from robolink.files.named import read_named
 from robolink.messages import tr
 from robolink.protocols.epson_binary import Dialect, Letters, NakCode, Numbers
 from robolink_simulators.option_values import require_known, values_from_text
+
+
+@dataclass(slots=True)
+class ControllerCard:
+    """Texts of the extended queries; the values are the simulator's own.
+
+    Source: docs/reference/epson.md 1.8.
+
+    Attributes:
+        name: Its name, ``0`` if none was given.
+        kind: Its type.
+        project: The project in it.
+        robot_name: The name of its robot.
+        camera: The model of the camera of its vision system.
+        force_sensor: The serial number of its force sensor.
+        settings: What GetContSettings tells in place of the preferences, if anything.
+        messages: Texts of error numbers; the others have texts of the simulator's own.
+    """
+
+    name: str = "SIMULATED"
+    kind: str = "SIMULATOR"
+    project: str = "robolink"
+    robot_name: str = "Robot1"
+    camera: str = "0"
+    force_sensor: str = "0"
+    settings: str = ""
+    messages: dict[int, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

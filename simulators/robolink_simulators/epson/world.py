@@ -17,7 +17,6 @@ from robolink_simulators.cell.workplace import MOUNTED_TOOL as MOUNTED_TOOL
 from robolink_simulators.cell.workplace import Workplace, XyzMm, exchanged, pin_beside
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.epson.arm.arm import rest_of
-from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.kinematics import (
     continued,
     forward,
@@ -26,12 +25,11 @@ from robolink_simulators.epson.arm.kinematics import (
     tip_of,
     tip_place,
 )
-from robolink_simulators.epson.arm.robots import RobotModel
+from robolink_simulators.epson.arm.robots import Joints, RobotModel
+from robolink_simulators.epson.condition import OutOfReach
 from robolink_simulators.epson.memory.bits import IO_BITS
-from robolink_simulators.epson.memory.driven_robot import DrivenRobot
-from robolink_simulators.epson.memory.input_bits import InputBits
-from robolink_simulators.epson.memory.tip_input import Nozzle, TipInput
-from robolink_simulators.epson.refusals import OutOfReach
+from robolink_simulators.epson.memory.inputs import InputBits, Nozzle, TipInput
+from robolink_simulators.epson.memory.robot import DrivenRobot
 from robolink_simulators.not_now import NotNowError
 
 STORED: Final = ToolOffset(12.0, -3.5, -20.0)

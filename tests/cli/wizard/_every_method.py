@@ -15,9 +15,7 @@ import click
 from robolink_cli.prompts.operator import AssistedOperator
 from robolink_cli.prompts.present import sitting_at
 from robolink_cli.session.check_before_start import check_before_start
-from robolink_cli.wizard.check_list import CheckSubject, Mark
-from robolink_cli.wizard.desk import Desk
-from robolink_cli.wizard.faces.effects import carry_out
+from robolink_cli.wizard.faces.lines import carry_out
 from robolink_cli.wizard.flow import advance
 from robolink_cli.wizard.glance import ControllerGlance
 from robolink_cli.wizard.happenings import (
@@ -31,8 +29,8 @@ from robolink_cli.wizard.happenings import (
 from robolink_cli.wizard.screens.drawing import screen_of
 from robolink_cli.wizard.screens.ending import ended_of
 from robolink_cli.wizard.screens.told import told_before, told_question
-from robolink_cli.wizard.state import Header, WizardState
-from robolink_cli.wizard.work import Work
+from robolink_cli.wizard.state import CheckSubject, Header, Mark, WizardState
+from robolink_cli.wizard.work import Desk, Work
 from robolink_simulators.assist.port import InProcessEyes
 from wcwidth import wcswidth
 

@@ -2,7 +2,7 @@
 
 from abc import ABC, abstractmethod
 
-from robolink_cli.wizard.key_gate import KeyGate
+from robolink_cli.wizard.keys import KeyGate
 
 
 class KeysInTime(ABC):

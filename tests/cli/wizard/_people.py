@@ -4,7 +4,6 @@ import time
 from dataclasses import replace
 from math import cos, radians, sin
 
-from robolink_cli.wizard.check_list import CheckPoint, CheckSubject, Mark
 from robolink_cli.wizard.flow import advance
 from robolink_cli.wizard.happenings import (
     KeyPressed,
@@ -16,7 +15,7 @@ from robolink_cli.wizard.happenings import (
     WasRead,
     WasRegarded,
 )
-from robolink_cli.wizard.state import Header, WizardState
+from robolink_cli.wizard.state import CheckPoint, CheckSubject, Header, Mark, WizardState
 
 from robolink.calibration import (
     AccuracyFacts,

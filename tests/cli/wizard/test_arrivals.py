@@ -7,7 +7,7 @@ import time
 import pytest
 from prompt_toolkit.input import create_pipe_input
 from robolink_cli.wizard.faces.arrivals import ArrivalReader, TimedInput
-from robolink_cli.wizard.key_gate import KeyGate
+from robolink_cli.wizard.keys import KeyGate
 
 from tests.cli.wizard._keys_in_time import KeysInTime
 from tests.cli.wizard._people import until

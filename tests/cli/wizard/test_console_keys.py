@@ -7,9 +7,8 @@ import time
 import pytest
 from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.keys import Keys
-from robolink_cli.wizard.faces.arrivals import TimedPress
-from robolink_cli.wizard.faces.console_keys import TimedConsole, fine_clock
-from robolink_cli.wizard.key_gate import KeyGate
+from robolink_cli.wizard.faces.arrivals import TimedConsole, TimedPress, fine_clock
+from robolink_cli.wizard.keys import KeyGate
 
 from tests.cli.wizard._keys_in_time import KeysInTime
 

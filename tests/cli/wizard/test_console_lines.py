@@ -3,7 +3,7 @@
 from collections import deque
 
 import pytest
-from robolink_cli.prompts.console_lines import ConsoleLines
+from robolink_cli.prompts.lines import ConsoleLines
 
 
 class KeysOfWindows:

@@ -5,8 +5,6 @@ from dataclasses import replace
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robolink_cli.wizard.check_list import CheckPoint, Mark
-from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.happenings import (
     HasEnded,
     KeyPressed,
@@ -24,7 +22,7 @@ from robolink_cli.wizard.screens.choosing import choice_screen
 from robolink_cli.wizard.screens.drawing import screen_of
 from robolink_cli.wizard.screens.told import told_question
 from robolink_cli.wizard.screens.touching import instruction
-from robolink_cli.wizard.state import STEP_SIZES, LastScreen
+from robolink_cli.wizard.state import STEP_SIZES, CheckPoint, ChoiceSubject, LastScreen, Mark
 
 from robolink.model import Path as Way
 from robolink.model import Pose

@@ -18,13 +18,12 @@ from prompt_toolkit.input.typeahead import get_typeahead, store_typeahead
 from prompt_toolkit.key_binding import KeyPress
 from prompt_toolkit.keys import Keys
 from prompt_toolkit.output.vt100 import Vt100_Output
-from robolink_cli.wizard.desk import Desk
 from robolink_cli.wizard.faces import lines
 from robolink_cli.wizard.faces.arrivals import TimedPress
 from robolink_cli.wizard.faces.full import FullFace
 from robolink_cli.wizard.happenings import Reading, WizardCommand
 from robolink_cli.wizard.state import Header, WizardState
-from robolink_cli.wizard.work import Work
+from robolink_cli.wizard.work import Desk, Work
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.streams.epson import serve_tcp
@@ -230,7 +229,7 @@ def test_what_comes_at_once_never_writes(keys, pasted):
 
 @pytest.mark.parametrize(("keys", "again"), [(("\r", "5"), True), (("\r", "0"), False)])
 def test_the_last_screen_stays_until_it_is_left_and_may_begin_again(keys, again):
-    from robolink_cli.wizard.desk import Desk
+    from robolink_cli.wizard.work import Desk
 
     desk, seen = Desk(), []
 

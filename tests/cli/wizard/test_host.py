@@ -6,10 +6,9 @@ import threading
 import click
 import pytest
 from robolink_cli.prompts.present import present_desk
-from robolink_cli.wizard.desk import Desk
 from robolink_cli.wizard.host import _shown, guided
 from robolink_cli.wizard.state import WizardState
-from robolink_cli.wizard.work import Work
+from robolink_cli.wizard.work import Desk, Work
 
 from robolink.errors import ConfigError, DeclinedError
 from robolink.model import ToolReceipt

@@ -1,7 +1,7 @@
 """Which keys count: those of a hand."""
 
 import pytest
-from robolink_cli.wizard.key_gate import KeyGate, name_of
+from robolink_cli.wizard.keys import KeyGate, name_of
 
 
 def passed(*pressed):

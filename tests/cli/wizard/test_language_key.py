@@ -14,11 +14,10 @@ from prompt_toolkit.key_binding import KeyPress
 from prompt_toolkit.output.vt100 import Vt100_Output
 from robolink_cli.commands.measure.choosing import choose_cell, choose_recipe
 from robolink_cli.console.language import language_now, speaking_for
-from robolink_cli.wizard.choices import CHANGE_LANGUAGE, ChoiceSubject
-from robolink_cli.wizard.desk import Desk
 from robolink_cli.wizard.faces.full import FullFace
 from robolink_cli.wizard.happenings import LineTyped, WasRegarded, WasTold
-from robolink_cli.wizard.state import Header
+from robolink_cli.wizard.state import CHANGE_LANGUAGE, ChoiceSubject, Header
+from robolink_cli.wizard.work import Desk
 
 from robolink.messages import tr
 from robolink.runner import Question

@@ -1,9 +1,9 @@
 """Lines that were typed before there was anything to answer, in the wizard of lines."""
 
 import pytest
-from robolink_cli.wizard.desk import Desk
 from robolink_cli.wizard.faces.lines import LineFace
 from robolink_cli.wizard.happenings import WaitsForAnswer, WasAsked
+from robolink_cli.wizard.work import Desk
 
 from robolink.runner import Question
 from tests.cli.wizard._people import Sitting, touch_subject, write_subject

@@ -15,16 +15,21 @@ from robolink_cli.options.shared import GIVEN, TYPED
 from robolink_cli.prompts.present import sitting_at
 from robolink_cli.session.check_before_start import check_before_start
 from robolink_cli.session.context import context_of_cell
-from robolink_cli.wizard.check_list import CheckPoint, CheckSubject, Mark
-from robolink_cli.wizard.choices import ChoiceSubject
-from robolink_cli.wizard.desk import Desk
 from robolink_cli.wizard.glance import ControllerGlance
 from robolink_cli.wizard.happenings import Reading, WasAsked, WasRegarded, WasTold
-from robolink_cli.wizard.screens.checking import point_rows
+from robolink_cli.wizard.screens.choosing import point_rows
 from robolink_cli.wizard.screens.drawing import screen_of
-from robolink_cli.wizard.screens.rows import JobStep, status_row, title_row
+from robolink_cli.wizard.screens.layout import JobStep, status_row, title_row
 from robolink_cli.wizard.screens.told import told_before
-from robolink_cli.wizard.state import Header, WizardState
+from robolink_cli.wizard.state import (
+    CheckPoint,
+    CheckSubject,
+    ChoiceSubject,
+    Header,
+    Mark,
+    WizardState,
+)
+from robolink_cli.wizard.work import Desk
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp

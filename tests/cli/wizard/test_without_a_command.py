@@ -4,7 +4,7 @@ import re
 import tomllib
 
 import pytest
-from robolink_cli.console.columns import columns, within
+from robolink_cli.console.tables import columns, within
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.streams.epson import serve_tcp

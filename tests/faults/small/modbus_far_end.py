@@ -28,7 +28,7 @@ _UNIT: Final = 255
 
 
 class ModbusFarEnd:
-    """Implements ``hosting.seam.WireDevice`` for functions 3, 4 and 16."""
+    """Implements ``hosting.addresses.WireDevice`` for functions 3, 4 and 16."""
 
     def __init__(self, simulator: SoftMotionSimulator, clock: ManualClock) -> None:
         self._simulator = simulator

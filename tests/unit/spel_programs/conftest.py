@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
-from robolink_simulators.epson.spel.source.faults import ProgramRefused
+from robolink_simulators.epson.spel.source_text import ProgramRefused
 from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
 
 from robolink.errors import ConfigError

@@ -2,7 +2,7 @@
 
 import pytest
 from robolink_simulators.epson.options import EpsonOptions, options_from_text
-from robolink_simulators.epson.remote.queries import preferences_of
+from robolink_simulators.epson.remote.commands import preferences_of
 from robolink_simulators.epson.spel.tasks.task import TaskKind
 
 from robolink.errors import ConfigError

@@ -1,8 +1,8 @@
 """Files of a program, in a folder that nothing leads out of (docs/reference/spel.md 18)."""
 
 import pytest
+from robolink_simulators.epson.spel.file_commands import read_points
 from robolink_simulators.epson.spel.file_folder import FileFolder
-from robolink_simulators.epson.spel.source.point_file import read_points
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import socket
 import threading
 
 import pytest
-from robolink_simulators.epson.spel.tasks.driving import run_to_end
+from robolink_simulators.epson.spel.tasks.runner import run_to_end
 
 
 def drive(cell, most_s=20.0):

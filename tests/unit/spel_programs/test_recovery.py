@@ -3,8 +3,8 @@
 import math
 
 import pytest
-from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.kinematics import forward
+from robolink_simulators.epson.arm.robots import Joints
 
 GUARDED = """
 Function main

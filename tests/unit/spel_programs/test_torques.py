@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 from robolink_simulators.epson import EpsonOptions
+from robolink_simulators.epson.arm.torques import DriveQuantity
 from robolink_simulators.epson.condition import Task
-from robolink_simulators.epson.drives.observer import DriveQuantity
 from robolink_simulators.epson.spel import Interpreter
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 from robolink_simulators.cell.camera import SimulatedBoard
-from robolink_simulators.epson.vision.calibration import VisionCalibration
-from robolink_simulators.epson.vision.project import VisionObject, VisionProject, VisionSequence
-from robolink_simulators.epson.vision.system import VisionSystem
+from robolink_simulators.epson.camera_calibrations import VisionCalibration
+from robolink_simulators.epson.vision_project import VisionObject, VisionProject, VisionSequence
+from robolink_simulators.epson.vision_system import VisionSystem
 
 from robolink.calibration import CameraModel, Sighting, solve_board, solve_up_camera
 from robolink.errors import ConfigError

@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from robolink_simulators.epson.vision.vision_file import install_vision
+from robolink_simulators.epson.vision_file import install_vision
 
 from robolink.errors import ConfigError
 from tests.unit.spel_programs.test_vision import flange_over

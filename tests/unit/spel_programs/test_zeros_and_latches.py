@@ -1,7 +1,7 @@
 """Zeros of joints and brakes in whole programs (docs/reference/spel.md 7.2)."""
 
 import pytest
-from robolink_simulators.epson.spel.source.faults import ProgramRefused
+from robolink_simulators.epson.spel.source_text import ProgramRefused
 
 
 def test_programs_set_zeros_and_open_no_brake(cell):

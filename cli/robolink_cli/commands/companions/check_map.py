@@ -1,15 +1,34 @@
 """plc check-map: whether a map is right, as far as the file, a probe or a person can tell."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.errors import ConfigError, DeclinedError, RobolinkError
+from robolink.messages import joined, tr
+from robolink.register_maps import (
+    COMPONENTS,
+    ComparedValue,
+    MapDiffersError,
+    MapValue,
+    Number,
+    OpenValue,
+    RegisterMap,
+    compare,
+    compare_test,
+    confirm,
+    confirmation_of,
+    revoke,
+    to_compare,
+    values_of,
+)
 from robolink.timing import local_label
 from robolink_cli.console.render import note, say, table
+from robolink_cli.prompts.questions import on_terminal
 from robolink_cli.session.context import CliContext, controller_options
+from robolink_cli.session.operator_identity import signature_of
 
 if TYPE_CHECKING:
     from robolink.controllers import PlcMapController
@@ -73,7 +92,7 @@ def _start(context: CliContext, register_list: Path) -> None:
 
 def _check_file(context: CliContext, file: Path) -> None:
     from robolink.register_maps import load_map
-    from robolink_cli.commands.companions.map_values import place_rows
+    from robolink_cli.commands.companions.check_map import place_rows
 
     found = load_map(file)
     rows = place_rows(found)
@@ -92,8 +111,7 @@ def _check_file(context: CliContext, file: Path) -> None:
 
 def _check_values(context: CliContext, shows: tuple[str, ...]) -> None:
     from robolink.register_maps import confirmation_of
-    from robolink_cli.commands.companions.map_comparison import MapComparison
-    from robolink_cli.commands.companions.map_values import MapValues
+    from robolink_cli.commands.companions.check_map import MapComparison, MapValues
 
     with _opened(context) as controller:
         register_map = controller.register_map
@@ -156,3 +174,281 @@ def _opened(context: CliContext) -> "PlcMapController":
         timeout_s=context.timeout_s,
         compare_probe=False,
     )
+
+
+class MapValues:
+    """What stands in the registers of the tools now; reads only.
+
+    Attributes:
+        found: By value, mm or degrees.
+        unreadable: For each tool that cannot be read, why.
+    """
+
+    def __init__(self, controller: "PlcMapController") -> None:
+        self._map = controller.register_map
+        self.found: dict[MapValue, float] = {}
+        self.unreadable: dict[int, str] = {}
+        for tool in controller.tools.indices():
+            try:
+                offset = controller.tools.read(tool)
+            except RobolinkError as error:
+                self.unreadable[tool] = str(error)
+                continue
+            held = dict(zip(COMPONENTS, offset.components(), strict=True)) if offset else {}
+            mapped = self._map.slots[tool].components
+            self.found |= {MapValue(tool, name): held[name] for name in mapped if held}
+
+    def payload(self) -> dict[str, object]:
+        """Return it as plain JSON; lengths in mm, angles in degrees."""
+        return {
+            "name": self._map.name,
+            "sha256": self._map.sha256,
+            "values": {str(value): found for value, found in self.found.items()},
+            "unreadable": {str(tool): why for tool, why in self.unreadable.items()},
+        }
+
+    def show(self) -> None:
+        """Show it to a person who stands at the HMI."""
+        rows = [
+            [
+                str(value),
+                number.place,
+                number.type,
+                f"{self.found[value]:.4f}" if value in self.found else "-",
+            ]
+            for value, number in values_of(self._map).items()
+        ]
+        columns = (tr("tool"), tr("place"), tr("type"), tr("mm or deg"))
+        table(tr("{name}: what the map finds", name=self._map.name), columns, rows)
+        for why in self.unreadable.values():
+            note(why)
+
+
+def place_rows(register_map: RegisterMap) -> list[list[str]]:
+    """Return what stands where, every number given both ways."""
+    rows = []
+    for slot in register_map.slots.values():
+        for name, number in slot.components.items():
+            rows.append([f"{slot.tool}.{name}", number.place, _form(number)])
+        if slot.defined is not None:
+            rows.append([tr("{tool} defined", tool=slot.tool), slot.defined.place, ""])
+    rows += [[f"flange.{name}", n.place, _form(n)] for name, n in register_map.flange.items()]
+    if register_map.probe is not None:
+        number = register_map.probe.number
+        rows.append([tr("probe"), number.place, f"{register_map.probe.value:g}, {_form(number)}"])
+    commit = register_map.commit
+    named = (
+        (tr("request"), commit.request),
+        (tr("answer"), commit.answer),
+        (tr("busy"), commit.busy),
+        (tr("error"), commit.error),
+        (tr("error code"), commit.error_code),
+        (tr("tool number"), commit.tool_number),
+        (tr("permit"), register_map.permit),
+        (tr("selected tool"), register_map.selected),
+    )
+    rows += [[what, place.place, ""] for what, place in named if place is not None]
+    rows += [
+        [tr("input {number}", number=one.number), one.signal.place, one.name]
+        for one in register_map.inputs.values()
+    ]
+    return rows
+
+
+def _form(number: Number) -> str:
+    words = [str(number.type)]
+    if number.type.words > 1:
+        words.append(tr("low word first") if number.low_word_first else tr("high word first"))
+    if number.swapped_bytes:
+        words.append(tr("bytes swapped"))
+    if number.factor != 1:
+        words.append(tr("times {factor:g}", factor=number.factor))
+    return ", ".join(words)
+
+
+class MapComparison:
+    """The comparison of one map at one PLC. A difference takes all back that was confirmed."""
+
+    def __init__(self, context: CliContext, controller: "PlcMapController") -> None:
+        self._controller = controller
+        self._map = controller.register_map
+        self._name = controller.who().name
+        self._context = context
+        self._left_out: set[MapValue] = set()
+
+    def of_answers(self, values: MapValues, answers: Sequence[str]) -> None:
+        """Compare values with what the HMI shows, all or none of them.
+
+        Raises:
+            MapDiffersError: One differs.
+            ConfigError: An answer cannot be understood, or tells nothing about the map.
+        """
+        try:
+            made = [self._compared(values, answer) for answer in answers]
+        except MapDiffersError as error:
+            raise self._taken_back(error) from error
+        self._keep(made)
+
+    def of_what_is_missing(self, values: MapValues) -> None:
+        """Ask for what is not compared yet; off a terminal, only where nothing is.
+
+        Raises:
+            MapDiffersError: A value differs.
+            DeclinedError: Nobody can be asked and nothing is compared, or the person ended it.
+        """
+        if not on_terminal():
+            if wanted := self._wanted(values):
+                self._require_some(wanted)
+            return
+        while wanted := self._wanted(values):
+            try:
+                made = self._asked(wanted[0], values)
+            except MapDiffersError as error:
+                raise self._taken_back(error) from error
+            except ConfigError as error:  # of the answer: it is asked for again
+                note(str(error))
+            else:
+                self._keep(made)
+            values = MapValues(self._controller)
+
+    def _compared(self, values: MapValues, answer: str) -> ComparedValue:
+        key, _, shown = answer.partition("=")
+        return compare(self._map, values.found, MapValue.named(key, self._map), shown)
+
+    def _wanted(self, values: MapValues) -> list[OpenValue]:
+        held = confirmation_of(self._name, self._map)
+        wanted = to_compare(self._map, values.found, held.compared if held else {})
+        return [one for one in wanted if one.value not in self._left_out]
+
+    def _require_some(self, wanted: Sequence[OpenValue]) -> None:
+        if confirmation_of(self._name, self._map) is not None:
+            return
+        tests = [one for one in wanted if one.why_not]
+        entering = [
+            tr(
+                "First enter a test value at the HMI for {values}, and put the old one back "
+                "afterwards.",
+                values=", ".join(str(one.value) for one in tests),
+            )
+        ]
+        raise DeclinedError(
+            tr("Nobody has compared this map with the HMI, but there is nobody to ask."),
+            remedy=joined(
+                " ",
+                (
+                    tr(
+                        "Run it on a terminal, or give what the HMI shows: {options}.",
+                        options=" ".join(f"--shows {one.value}=..." for one in wanted),
+                    ),
+                    *(entering if tests else ()),
+                ),
+            ),
+        )
+
+    def _asked(self, wanted: OpenValue, values: MapValues) -> list[ComparedValue]:
+        """Ask for one value; return what was compared, nothing where it was left out."""
+        value, test = wanted.value, wanted.test_mm_or_deg
+        if test is None:
+            answer = self._answer(
+                tr("What does the HMI show for {key}? (Enter skips it, q ends)", key=value)
+            )
+            return (
+                [compare(self._map, values.found, value, answer)]
+                if self._given(answer, value)
+                else []
+            )
+        note(wanted.why_not)
+        answer = self._answer(
+            tr(
+                "Enter {test:g} for {key} at the HMI, let the machine accept it, then type here "
+                "what you entered. (Enter skips it, q ends)",
+                key=value,
+                test=test,
+            )
+        )
+        now = MapValues(self._controller).found
+        try:
+            made = []
+            if self._given(answer, value):
+                made = [compare_test(self._map, values.found, now, value, answer)]
+        except MapDiffersError as error:  # where it went to, the map does not tell
+            away = tr("At the HMI, put {key} back to what it was.", key=value)
+            error.remedy = joined(" ", (error.remedy, away))
+            raise
+        except (ConfigError, DeclinedError):
+            self._put_back(value, values.found.get(value), now.get(value))
+            raise
+        self._put_back(value, values.found.get(value), now.get(value))
+        return made
+
+    def _given(self, answer: str, value: MapValue) -> bool:
+        """Whether there is an answer; one that is left out is not asked for again.
+
+        Raises:
+            DeclinedError: The person ended it.
+        """
+        if answer.lower() == "q":
+            raise DeclinedError(
+                tr("Not everything was compared."),
+                remedy=tr(
+                    "What was compared stays on record, and no command changes the rest. Run "
+                    "it again to go on."
+                ),
+            )
+        if not answer:
+            self._left_out.add(value)
+        return bool(answer)
+
+    def _put_back(self, value: MapValue, before: float | None, now: float | None) -> None:
+        """Have a test value taken away again, and look whether it was."""
+        if now == before:
+            return
+        self._answer(
+            tr(
+                "At the HMI, put {key} back to {before}, then press Enter.",
+                key=value,
+                before=before,
+            )
+            if before is not None
+            else tr("At the HMI, clear {key} again, then press Enter.", key=value)
+        )
+        left = MapValues(self._controller).found.get(value)
+        if left != before:
+            note(
+                tr(
+                    "{key} still reads {found}: put it right before production.",
+                    key=value,
+                    found=left,
+                )
+            )
+
+    def _answer(self, question: str) -> str:
+        """Ask at the terminal; the PLC's watchdog is kept quiet meanwhile."""
+        from robolink.runner import POLL_S, Question
+        from robolink_cli.prompts.operator import terminal
+
+        terminal().ask(question, Question.TEXT)
+        while (line := terminal().poll(POLL_S)) is None:
+            self._controller.status()
+        return line.strip()
+
+    def _keep(self, made: Sequence[ComparedValue]) -> None:
+        person = signature_of(self._context.operator, self._context.expected, changes=True)
+        by = person.operator or person.os_user
+        confirm(self._name, self._map, by=by, compared=made)
+
+    def _taken_back(self, error: MapDiffersError) -> MapDiffersError:
+        held = revoke(self._name, self._map)
+        if held is not None:
+            error.remedy = joined(
+                " ",
+                (
+                    tr(
+                        "The confirmation by {by} of {at} is taken back.",
+                        by=held.by,
+                        at=local_label(held.at),
+                    ),
+                    error.remedy,
+                ),
+            )
+        return error

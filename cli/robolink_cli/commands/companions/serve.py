@@ -1,17 +1,24 @@
 """serve: programs that measure and write a tool themselves ask here whether it may stay."""
 
+import json
 from typing import TYPE_CHECKING
 
 import click
 
+from robolink.errors import CalibrationError, RobolinkError
 from robolink.messages import declared, tr
+from robolink.serving import PermitCall, free_machine
+from robolink_cli.commands.simulate.serving import Termination
 from robolink_cli.console.numbers import NumberInside
-from robolink_cli.console.render import note
+from robolink_cli.console.output import hand_over, show
+from robolink_cli.console.render import json_is_on, note
 from robolink_cli.session.context import CliContext, optional_controller
+from robolink_cli.session.opening import open_controller
 
 if TYPE_CHECKING:
     from robolink.errors import RobolinkError
-    from robolink.serving import CallbackLimits, CallbackServer
+    from robolink.model import ToolOffset
+    from robolink.serving import CallbackLimits, CallbackServer, PermitPlan
 
 
 @click.command("serve")
@@ -141,7 +148,7 @@ def serve(
             tr("--plc needs --tool, and --permit-is-contact: without it nothing shows a touch.")
         )
     from robolink.serving import PermitPlan
-    from robolink_cli.commands.companions.serve_plc import serve_plc
+    from robolink_cli.commands.companions.serve import serve_plc
 
     plan = PermitPlan(tool, str(method), touches, proofs)
     serve_plc(context, plan, limits)
@@ -158,7 +165,7 @@ def _serve_programs(
     from robolink import __version__
     from robolink.journal import open_journal, signature_here
     from robolink.serving import CallbackConversation, CallbackServer
-    from robolink_cli.commands.companions.serve_events import ServeEvents
+    from robolink_cli.commands.companions.serve import ServeEvents
     from robolink_cli.commands.simulate.serving import Termination, host_and_port
 
     host, port = host_and_port(address, "--spel")
@@ -202,3 +209,70 @@ def _announce(server: "CallbackServer") -> None:
         hand_over(json.dumps({"schema": "robolink/serve/1", "host": host, "port": port}))
     else:
         show(tr("Programs may call at {host}:{port}. Ctrl-C ends it.", host=host, port=port))
+
+
+class ServeEvents:
+    """Tells each event at once: a line of JSON for a script, a sentence for a person.
+
+    It is made in the thread of the command, which alone knows whether JSON was asked for.
+    """
+
+    def __init__(self) -> None:
+        self._json = json_is_on()
+
+    def tell(self, event: str, sentence: str, **payload: object) -> None:
+        """Tell an event; ``sentence`` may be empty where a person was told already."""
+        if self._json:
+            hand_over(json.dumps({"schema": "robolink/serve-event/1", "event": event, **payload}))
+        elif sentence:
+            show(sentence)
+
+    def refused(self, sentence: str, code: str, error: RobolinkError, **payload: object) -> None:
+        """Tell a refusal: a person reads what to do, a script gets the code as well."""
+        note(sentence)
+        self.tell("refused", "", code=code, what=error.what, remedy=error.remedy, **payload)
+
+
+def serve_plc(context: CliContext, plan: "PermitPlan", limits: "CallbackLimits") -> None:
+    """Answer calls. Each has a session of its own: its end gives the mailbox back.
+
+    Raises:
+        RobolinkError: The PLC is not reached, or a write is in doubt: the machine stays blocked.
+    """
+    events = ServeEvents()
+    with Termination() as termination:
+        with open_controller(context, changes=True) as controller:
+            free_machine(controller)
+            where = controller.identity
+        events.tell(
+            "listening", tr("The program of {where} may call. Ctrl-C ends it.", where=where)
+        )
+        while not termination.came:
+            try:
+                with open_controller(
+                    context, changes=True, usual_change_mm=limits.max_change_mm
+                ) as controller:
+                    call = PermitCall(
+                        controller,
+                        plan,
+                        limits,
+                        ended=lambda: termination.came,
+                        cell=context.cell,
+                    )
+                    kept = call.answer()
+            except CalibrationError as error:
+                events.refused(str(error), error.code, error)
+            else:
+                if kept is not None:
+                    _tell_kept(events, plan.tool, kept)
+
+
+def _tell_kept(events: ServeEvents, tool: int, kept: "ToolOffset") -> None:
+    sentence = tr(
+        "Tool {tool} was tested and kept: X {x:.3f} Y {y:.3f} Z {z:.3f}.",
+        tool=tool,
+        x=kept.x_mm,
+        y=kept.y_mm,
+        z=kept.z_mm,
+    )
+    events.tell("kept", sentence, tool=tool, x_mm=kept.x_mm, y_mm=kept.y_mm, z_mm=kept.z_mm)

@@ -1,13 +1,244 @@
 """spel: programs that run on the controller itself."""
 
+import sys
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
 
 import click
 
+from robolink.errors import ControllerFaultError
 from robolink.messages import tr
-from robolink_cli.commands.companions.spel_programs import check, run
-from robolink_cli.console.render import emit_json, json_is_on, say
+from robolink.timing import NS_PER_S
+from robolink_cli.console.exit_codes import USAGE
+from robolink_cli.console.numbers import NumberInside
+from robolink_cli.console.render import emit_json, json_is_on, note, say
+from robolink_cli.options.program_encoding import encoding_option, tell_encoding
 from robolink_cli.options.shared import json_option
+from robolink_cli.options.simulation import project_options
+
+if TYPE_CHECKING:
+    from robolink_simulators.epson import EpsonSimulator
+    from robolink_simulators.epson.spel.programs.loading import CheckedProject
+    from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
+    from robolink_simulators.epson.spel.tasks.task import TaskFailure
+
+
+LONGEST_RUN_S: Final = 3600.0
+DEFAULT_ROBOT: Final = "T6-602S"
+
+_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+
+
+def programs_argument(function: Any) -> Any:  # noqa: ANN401 - a decorator of click
+    """Add ``FILE...`` and ``--points``."""
+    function = click.option(
+        "--points",
+        multiple=True,
+        type=_FILE,
+        metavar="FILE",
+        help="Point file of the project, for its labels too. May be repeated.",
+    )(function)
+    return click.argument("files", metavar="FILE...", nargs=-1, required=True, type=_FILE)(function)
+
+
+@click.command("check", short_help="Build SPEL+ programs and show every fault.")
+@programs_argument
+@encoding_option
+@json_option
+def check(files: tuple[Path, ...], points: tuple[Path, ...], encoding: str | None) -> int:
+    """Build SPEL+ programs and show every fault with its file, line and column.
+
+    All files together are one project; a .sprj file stands for the files that it lists. Point
+    files, IOLabels.dat and UserErrors.dat that lie beside them are read for the names in them.
+    Nothing runs and no controller is asked.
+    """
+    from robolink_simulators.epson.spel.programs.loading import check_project
+    from robolink_simulators.epson.spel.source_text import ProgramRefused
+
+    checked = check_project(files, points, encoding=encoding)
+    if json_is_on():
+        emit_json("robolink/spel-check/1", _document(checked))
+        return USAGE if checked.faults else 0
+    tell_encoding(checked.data.encoding, named=encoding)
+    for fault in checked.faults:
+        note(str(fault))
+    if checked.faults:
+        raise ProgramRefused(checked.faults)
+    say(tr("{count} functions, no fault found.", count=len(checked.functions)))
+    if checked.data.missing_points:
+        note(
+            tr(
+                "Not beside the project file: {names}. Undeclared names were taken for point "
+                "labels.",
+                names=", ".join(checked.data.missing_points),
+            )
+        )
+    elif not checked.data.known:
+        note(
+            tr(
+                "No point file and no IOLabels.dat lies beside the programs: names that nobody "
+                "declares were taken for labels."
+            )
+        )
+    return 0
+
+
+def _document(checked: "CheckedProject") -> dict[str, object]:
+    return {
+        "files": [str(path) for path in checked.data.programs],
+        "functions": list(checked.functions),
+        "labels_known": checked.data.known,
+        "missing_points": list(checked.data.missing_points),
+        "encoding": checked.data.encoding,
+        "faults": [
+            {
+                "file": fault.place.file,
+                "line": fault.place.line,
+                "column": fault.column or None,
+                "text": fault.text,
+                "expected": list(fault.expected),
+            }
+            for fault in checked.faults
+        ],
+    }
+
+
+@click.command("run", short_help="Run SPEL+ programs on a simulated controller.")
+@programs_argument
+@click.option(
+    "--function",
+    metavar="NAME",
+    help="The function to start; it takes no arguments. Without it main, or none beside background "
+    "tasks.",
+)
+@project_options
+@click.option("--trace", is_flag=True, help="Show each statement before it is carried out.")
+@click.option("--robot", metavar="MODEL", help=f"Model of the robot.  [default: {DEFAULT_ROBOT}]")
+@click.option(
+    "--option",
+    "options",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="A habit of the device; a wrong name lists them all. May be repeated.",
+)
+@click.option(
+    "--for",
+    "most_s",
+    type=NumberInside(min=0.001, max=1e7),
+    default=LONGEST_RUN_S,
+    show_default=True,
+    metavar="SECONDS",
+    help="How long a program may run, in simulated time.",
+)
+@json_option
+def run(
+    *,
+    files: tuple[Path, ...],
+    points: tuple[Path, ...],
+    encoding: str | None,
+    function: str | None,
+    before: str | None,
+    vision: Path | None,
+    lines: tuple[str, ...],
+    folder: Path | None,
+    trace: bool,
+    robot: str | None,
+    options: tuple[str, ...],
+    most_s: float,
+) -> None:
+    """Run SPEL+ programs on a simulated controller and show what they print.
+
+    --option background_tasks=NAME,NAME names functions that begin as background tasks. They go on
+    until --for is over, and may start main themselves (StartMain); nothing else is started then.
+
+    Simulated time does not wait, unless a TCP/IP port is open or Input waits for a line, which is
+    taken from here. Nothing but this machine is reached, and no robot moves.
+    """
+    from robolink_simulators.epson import EpsonSimulator
+
+    from robolink_cli.commands.simulate.kinds.epson import ProjectSurroundings, habits
+
+    simulator = EpsonSimulator(robot or DEFAULT_ROBOT, options=habits(options, None))
+    printed = list[str]()
+    runner = ProjectSurroundings(vision, lines, folder, encoding).load(simulator, files, points)
+    if function is None and not simulator.options.background_tasks:
+        function = "main"
+    ended = True
+    for name in (function,) if before is None else (before, function):
+        ended = _run(simulator, runner, name, most_s, trace=trace, printed=printed)
+        if runner.failure is not None:
+            too_far = runner.failure.number == simulator.options.numbers.out_of_reach
+            raise _failed(runner.failure, DEFAULT_ROBOT if too_far and robot is None else None)
+        if not ended:
+            break
+    if json_is_on():
+        seconds = simulator.now_ns / NS_PER_S
+        document = {"printed": "".join(printed), "ended": ended, "simulated_s": seconds}
+        emit_json("robolink/spel-run/1", document)
+    elif not ended:
+        note(tr("It still ran after {seconds:g} s of simulated time.", seconds=most_s))
+
+
+def _run(
+    simulator: "EpsonSimulator",
+    runner: "ProgramRunner",
+    function: str | None,
+    most_s: float,
+    *,
+    trace: bool,
+    printed: list[str],
+) -> bool:
+    """Run a program to its end; tell whether that came in time."""
+    from robolink_simulators.epson.spel.tasks.runner import run_to_end
+
+    from robolink_cli.commands.simulate.kinds.epson import start_function
+
+    def show(text: str) -> None:
+        printed.append(text)
+        say(text.rstrip("\r\n"))
+
+    runner.on_print = show
+    runner.channels.window.ask = _typed_line
+    if trace:
+        runner.on_statement = lambda task, file, line, text: note(
+            f"{task.now_ns / NS_PER_S:12.6f} {task.task_number:3} {file}:{line}: {text}"
+        )
+    if function is not None:
+        start_function(runner, function, simulator.now_ns)
+    try:
+        return run_to_end(runner, simulator.advance, simulator.next_change, most_s=most_s)
+    finally:
+        runner.forget()
+
+
+def _typed_line() -> str | None:
+    """Return what is typed for Input, ``None`` at the end of what there is."""
+    line = sys.stdin.readline()
+    return line.rstrip("\r\n") if line else None
+
+
+def _failed(failure: "TaskFailure", default_robot: str | None) -> ControllerFaultError:
+    """Return how a program ended; with the robot, where a default one may be the cause."""
+    remedy = tr("Mend that line, or let OnErr deal with the error.")
+    if default_robot is not None:
+        remedy = tr(
+            "No robot was named, so the program ran on {robot}. Name its own robot with --robot, "
+            "or mend that line.",
+            robot=default_robot,
+        )
+    return ControllerFaultError(
+        tr(
+            "Error {number} in {function}, {file}:{line}, task {task}: {text}.",
+            number=failure.number,
+            function=failure.function,
+            file=failure.file,
+            line=failure.line,
+            task=failure.task,
+            text=failure.text,
+        ),
+        code=failure.number,
+        remedy=remedy,
+    )
 
 
 @click.group()

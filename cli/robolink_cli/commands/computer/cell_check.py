@@ -1,27 +1,34 @@
 """cell check: whether cells are as they were left, and whether anything is due. Moves nothing."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
-from robolink.errors import ConfigError, NotReadyError, RobolinkError
+from robolink.config import Cell
+from robolink.errors import ConfigError, DeclinedError, NotReadyError, RobolinkError
+from robolink.inspection import InspectionFinding, measured_findings
 from robolink.messages import declared, tr
+from robolink.model import Controller
+from robolink.recipe import LoadedRecipe, RecipeRun, load_recipe
 from robolink_cli.access.cell import complete_cell
 from robolink_cli.console.exit_codes import DIFFERENT, exit_code
 from robolink_cli.console.render import note, say
 from robolink_cli.options.consent import published_option
+from robolink_cli.prompts.operator import terminal
+from robolink_cli.prompts.questions import on_terminal
 from robolink_cli.session.completing import complete_recipe
 from robolink_cli.session.context import CliContext, context_of_cell, optional_controller
+from robolink_cli.session.motion_consent import agree_to_motion, motion_question
 from robolink_cli.session.opening import open_controller
 
 if TYPE_CHECKING:
     from robolink.backup import ToolState
     from robolink.inspection import Inspection
     from robolink.model import NewEntry
-    from robolink_cli.commands.measure.sensor_check import SensorCheck
 
 
 class CheckScope(NamedTuple):
@@ -94,7 +101,7 @@ def check(
     limits. Each check goes on record as one entry of the journal. Exit code 1 when somebody should
     see to something; when a cell could not be checked, the code of why not.
     """
-    from robolink_cli.commands.measure.sensor_check import SensorCheck
+    from robolink_cli.commands.computer.cell_check import SensorCheck
 
     contexts = _contexts(context, cells)
     sensor = None if recipe is None else SensorCheck.of(recipe, cells=len(contexts))
@@ -150,7 +157,7 @@ def _inspect(context: CliContext, scope: CheckScope, seen: "list[Inspection]") -
         RobolinkError: What keeps it from being looked at, or from being looked at further.
     """
     from robolink.inspection import inspect
-    from robolink_cli.session.tool_source import find_tools
+    from robolink_cli.session.context import find_tools
 
     with open_controller(context, quiet=True, changes=scope.sensor is not None) as controller:
         tools: ToolState | NotReadyError
@@ -247,3 +254,52 @@ def _show(checked: Sequence[CheckedCell]) -> None:
                 say(f"    {found.remedy}")
         if one.error is not None:
             say(f"  {one.error}")
+
+
+@dataclass(frozen=True, slots=True)
+class SensorCheck:
+    """Measures as a recipe says.
+
+    Attributes:
+        loaded: The recipe.
+    """
+
+    loaded: LoadedRecipe
+
+    @classmethod
+    def of(cls, recipe: Path, *, cells: int) -> "SensorCheck":
+        """Return the check by a recipe.
+
+        Raises:
+            ConfigError: The recipe is wrong, or several cells are to be measured at a time.
+            DeclinedError: Nobody is there to say yes; nothing was asked of a controller.
+        """
+        if cells != 1:
+            raise ConfigError(
+                tr("One cell is measured at a time, because somebody has to watch it."),
+                remedy=tr("Name the cell."),
+            )
+        loaded = load_recipe(recipe)
+        if not on_terminal():
+            raise DeclinedError(
+                tr("The robot would move, but there is nobody to ask."),
+                remedy=tr("A check moves nothing without a person: run it on a terminal."),
+            )
+        return cls(loaded)
+
+    def findings(self, controller: Controller, cell: Cell | None) -> tuple[InspectionFinding, ...]:
+        """Ask, measure, compare.
+
+        Raises:
+            DeclinedError: The answer was no; nothing moved.
+            RobolinkError: Nothing can move, or the robot could not finish.
+        """
+        run = RecipeRun(controller, self.loaded, operator=terminal(), cell=cell, measure_only=True)
+        run.preflight()
+        limits = run.plan.limits
+        purpose = tr("to measure as {recipe!r} says; nothing is written", recipe=self.loaded.name)
+        question = motion_question(
+            controller, purpose, speed_mm_s=limits.speed_mm_s, box_mm=limits.box.x_max_mm
+        )
+        agree_to_motion(question, yes=False)
+        return measured_findings(run)

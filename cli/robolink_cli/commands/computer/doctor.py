@@ -17,8 +17,7 @@ def doctor() -> int:
     """
     from dataclasses import asdict
 
-    from robolink_cli.commands.computer.checkup import check_up, in_words
-    from robolink_cli.commands.computer.doctor_finding import Level
+    from robolink_cli.commands.computer.checkup import Level, check_up, in_words
 
     remarks = check_up()
     healthy = all(remark.level is not Level.BAD for remark in remarks)

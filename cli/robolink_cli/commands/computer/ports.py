@@ -22,7 +22,7 @@ def ports() -> int:
     """
     from dataclasses import asdict
 
-    from robolink_cli.commands.computer.doctor_finding import tried
+    from robolink_cli.commands.computer.checkup import tried
     from robolink_cli.commands.computer.lines import devices_of_cells
     from robolink_cli.commands.computer.serial_ports import ports_unknown, serial_ports
 

@@ -147,7 +147,7 @@ def _show(report: "ContractReport") -> None:
 def _of_a_cell(context: CliContext, asked: _Asked, report: "ContractReport") -> None:
     """Check a controller of a cell; what was there stands on its record meanwhile."""
     from robolink.testing import kept_on_site
-    from robolink_cli.commands.controller.contract_trials import TrialConnections
+    from robolink_cli.commands.controller.contract_report import TrialConnections
     from robolink_cli.session.opening import open_controller
 
     trials = TrialConnections(context)
@@ -170,7 +170,7 @@ def _of_a_cell(context: CliContext, asked: _Asked, report: "ContractReport") -> 
 
 def _of_a_driver(driver: str, asked: _Asked, report: "ContractReport") -> None:
     """Check what somebody's own function gives; only the checks put back what they change."""
-    from robolink_cli.commands.controller.contract_trials import driver_named, told_of_the_driver
+    from robolink_cli.commands.controller.contract_report import driver_named, told_of_the_driver
 
     made = driver_named(driver)
     with told_of_the_driver(driver):

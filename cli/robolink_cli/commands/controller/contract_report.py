@@ -1,20 +1,32 @@
 """What the checks of the contract found, told whatever ends them: to a person and to pipelines."""
 
 import re
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from importlib import import_module
 from pathlib import Path
+from sys import path as module_path
 from typing import TYPE_CHECKING, Final
 from xml.etree import ElementTree as Xml
 
-from robolink.errors import ConfigError
+import robolink
+from robolink import ambient
+from robolink.errors import ConfigError, RobolinkError, StoppedError, TransportClosedError
 from robolink.files.named import save_named
 from robolink.messages import tr
+from robolink.model import ControllerStatus
+from robolink.stopping import far_end_of, find_note
+from robolink_cli.access.recording import recording
 from robolink_cli.console.exit_codes import error_body
 from robolink_cli.console.render import note
+from robolink_cli.session.context import CliContext
+from robolink_cli.session.opening import password_of
 
 if TYPE_CHECKING:
+    from robolink.model import Controller, Ledger
     from robolink.testing import Check, CheckOutcome
+    from robolink.transport import TraceSink
+
 
 _NO_XML: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """What no XML document may hold, not even escaped; a driver may say it."""
@@ -147,4 +159,178 @@ def _unwritable(path: Path, cause: str) -> ConfigError:
     return ConfigError(
         tr("{path} cannot be written: {cause}.", path=path, cause=cause),
         remedy=tr("Name another file."),
+    )
+
+
+class TrialConnections:
+    """Connects for each check anew, and lets a second terminal stop what that does.
+
+    The checks open and settle markers on purpose; those go to a record in memory. A stop that
+    somebody else gives ends them all, and is heard between two checks too: a check releases its
+    own stops only.
+
+    Args:
+        context: What the command was told.
+
+    Attributes:
+        ledgers: What each connection did so far, in their order.
+    """
+
+    def __init__(self, context: CliContext) -> None:
+        from robolink.journal import memory_journal
+        from robolink.model import Signature
+
+        self.ledgers: list[Ledger] = []
+        self._context = context
+        self._url, self._password = context.require_url(), password_of(context)
+        self._identity = f"contract-check:{self._url.partition('?')[0]}"
+        self._record = memory_journal(self._identity).log(self._identity, signature=Signature())
+        self._listening = ExitStack()
+        self._trace: TraceSink | None = None
+        self._lock = ambient.lock()
+        self._latest: Controller | None = None
+        self._stopped = False
+        self._stopped_by = ""
+        self._state = ControllerStatus()
+
+    def connect(self) -> "Controller":
+        """Connect for one check.
+
+        Raises:
+            StoppedError: Somebody gave a stop; no further check begins.
+            RobolinkError: The controller is not reached.
+        """
+        with self._lock:
+            self._require_no_stop()
+            if not self.ledgers:
+                far_end = self._url.partition("?")[0]
+                kept = recording(self._context.record, far_end)
+                self._trace = self._listening.enter_context(kept)
+            self._latest = controller = self._connected()
+            self.ledgers.append(controller.ledger)
+            if len(self.ledgers) == 1:
+                self._listen()
+        return controller
+
+    def close(self) -> None:
+        """Listen no longer, and forget what an interrupted check left begun. Idempotent."""
+        from robolink.journal import forget_memory
+
+        self._listening.close()
+        forget_memory(self._identity)
+
+    def stop(self) -> None:
+        """Bring the controller to rest, whether a check has it now or none does; any thread."""
+        self._stopped = True
+        with self._lock:  # a connection that is being made is the one that stops
+            controller = self._latest
+        if controller is not None:
+            with suppress(TransportClosedError):  # that check has ended
+                controller.stop()
+                self._state = controller.status()
+                return
+        with self._lock, self._connected() as own:
+            own.stop()
+            self._state = own.status()
+
+    def status(self) -> ControllerStatus:
+        """Return the state that the stop has shown."""
+        return self._state
+
+    def _require_no_stop(self) -> None:
+        note = find_note(far_end_of(self._url), "")
+        if note is not None:
+            # It came while no check had the controller, and went there by itself.
+            what = note.sentence
+        elif self._stopped_by:
+            what = tr("{who} stopped the checks.", who=self._stopped_by)
+        elif self._stopped:
+            what = tr("The checks were stopped from another terminal.")
+        else:
+            return
+        raise StoppedError(what, remedy=tr("Find out why, then start the checks again."))
+
+    def _connected(self) -> "Controller":
+        return robolink.connect(
+            self._url,
+            password=self._password,
+            timeout_s=self._context.timeout_s,
+            remote_timeout_s=self._context.remote_timeout_s,
+            trace=self._trace,
+            outcomes=self._record,
+        )
+
+    def _listen(self) -> None:
+        from robolink.stopping import StopListener
+
+        if "+sim://" in self._url:
+            return
+        who = tr("the checks of the contract")
+        # Where there is no place to listen, Ctrl-C is left, as the command's page says.
+        with suppress(OSError):
+            self._listening.enter_context(StopListener(self, self._url, who=who, heard=self._hear))
+
+    def _hear(self, who: str) -> None:
+        self._stopped_by = who
+
+
+def driver_named(name: str) -> "Callable[[], Controller]":
+    """Return what makes a controller of somebody's own: ``module:name`` of a class or function.
+
+    Raises:
+        ConfigError: There is no such module or name, or nothing that can be called.
+    """
+    module, colon, attribute = name.partition(":")
+    if not (colon and module and attribute):
+        raise ConfigError(
+            tr("{name!r} is not the name of a driver.", name=name),
+            remedy=tr("Write for example {example}.", example="my_package.driver:connect"),
+        )
+    if str(Path.cwd()) not in module_path:
+        module_path.append(str(Path.cwd()))
+    try:
+        made = getattr(import_module(module), attribute)
+    except (Exception, SystemExit) as error:  # it is somebody else's code that runs here
+        ours = isinstance(error, (ImportError, AttributeError))
+        cause = str(error) if ours else f"{type(error).__name__}: {error}"
+        raise ConfigError(
+            tr("The driver {name!r} cannot be loaded: {cause}.", name=name, cause=cause),
+            remedy=tr("It is looked for in the present folder and among installed packages."),
+        ) from error
+    if not callable(made):
+        raise ConfigError(
+            tr("{name!r} cannot be called.", name=name),
+            remedy=tr("Name a class or a function that takes nothing and gives a controller."),
+        )
+
+    def connect() -> "Controller":
+        with told_of_the_driver(name):
+            controller: Controller = made()
+        missing = {"__enter__", "capabilities", "status", "tools"}.difference(dir(controller))
+        if missing:
+            raise _no_controller(name, f"{type(controller).__name__} has no {min(missing)}")
+        return controller
+
+    return connect
+
+
+@contextmanager
+def told_of_the_driver(name: str) -> Iterator[None]:
+    """Tell an error that is not one of robolink's as the driver's, before any check is made.
+
+    Raises:
+        ConfigError: There was one.
+    """
+    try:
+        yield
+    except RobolinkError:
+        raise
+    except (Exception, SystemExit) as error:
+        raise _no_controller(name, f"{type(error).__name__}: {error}") from error
+
+
+def _no_controller(name: str, cause: str) -> ConfigError:
+    return ConfigError(
+        tr("The driver {name!r} gives no controller: {cause}.", name=name, cause=cause),
+        remedy=tr("Name a class or a function that takes nothing and gives a controller."),
     )

@@ -8,8 +8,8 @@ import click
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli.access.capabilities import io_of, require_epson
-from robolink_cli.console.machine_words import io_words
 from robolink_cli.console.render import say
+from robolink_cli.console.ways import io_words
 from robolink_cli.options.consent import dry_run_option, yes_option
 from robolink_cli.prompts.questions import agree
 from robolink_cli.session.context import CliContext, controller_options

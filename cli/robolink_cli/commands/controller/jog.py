@@ -10,10 +10,9 @@ from robolink.errors import ConfigError
 from robolink.messages import declared, tr
 from robolink_cli.access.cell import with_cell_limits
 from robolink_cli.console.numbers import DECIMAL, NumberInside
-from robolink_cli.console.tolerance import may_be_guided
+from robolink_cli.console.output import may_be_guided
 from robolink_cli.options.consent import dry_run_option, plain_option, yes_option
-from robolink_cli.session.context import CliContext, controller_options
-from robolink_cli.session.guidance import guided_if_alone
+from robolink_cli.session.context import CliContext, controller_options, guided_if_alone
 from robolink_cli.session.motion_consent import agree_to_motion, motion_question
 from robolink_cli.session.opening import open_controller
 

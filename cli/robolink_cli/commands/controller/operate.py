@@ -9,8 +9,8 @@ from robolink.messages import tr
 from robolink.model import Act
 from robolink_cli.access.capabilities import preferences_of, require_epson, require_softmotion
 from robolink_cli.access.warnings import note_unsettled
-from robolink_cli.console.machine_words import state_word
 from robolink_cli.console.render import note, say
+from robolink_cli.console.ways import state_word
 from robolink_cli.options.consent import dry_run_option, yes_option
 from robolink_cli.options.shared import shared_options
 from robolink_cli.prompts.questions import agree, on_terminal
@@ -39,8 +39,8 @@ def status(context: CliContext) -> None:
     A controller that serves one client is not asked while another robolink of this computer has
     it: who that is, and what it saw last, is shown instead.
     """
-    from robolink_cli.session.looking_on import seen_by_another
-    from robolink_cli.session.selected_tool import note_doubts
+    from robolink_cli.session.motion_consent import note_doubts
+    from robolink_cli.session.stop_listening import seen_by_another
     from robolink_cli.views.documents import status_payload
     from robolink_cli.views.tables import show_seen, show_status
 

@@ -19,8 +19,7 @@ from robolink_cli.options.consent import (
     then_select_option,
     yes_option,
 )
-from robolink_cli.prompts.jumps import accept_jump_options, accepted_jump
-from robolink_cli.prompts.questions import agree
+from robolink_cli.prompts.questions import accept_jump_options, accepted_jump, agree
 from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
@@ -62,7 +61,7 @@ def tool() -> None:
 @controller_options
 def list_tools(context: CliContext, published: bool) -> None:
     """Show all tools and which one is selected."""
-    from robolink_cli.session.tool_source import find_tools
+    from robolink_cli.session.context import find_tools
     from robolink_cli.views.documents import offset_payload
     from robolink_cli.views.tables import show_tools
 

@@ -1,16 +1,43 @@
 """cell accuracy: what a cell knows of its accuracy, and measuring a row of it."""
 
-from datetime import datetime
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from math import isfinite
 from pathlib import Path
+from typing import Final
 
 import click
 
-from robolink.messages import declared
-from robolink_cli.console.numbers import NumberInside
+from robolink.accuracy import (
+    MeasuredRow,
+    MeasuredTip,
+    artefact_row,
+    measured_entry,
+    measured_tips,
+    measuring_step,
+    mm_per_px,
+    study_row,
+    tip_image_row,
+    turned_pairs,
+)
+from robolink.calibration import ACCURACY_ROWS, gauge_study
+from robolink.errors import ConfigError
+from robolink.messages import declared, spoken, tr
+from robolink.model import Controller, EntryKind, require_engineer
+from robolink.stations import StationKind, find_station
+from robolink.timing import wall_time
+from robolink_cli.commands.measure.solve.solving import load
+from robolink_cli.commands.measure.solve.study_methods import study_values
+from robolink_cli.console.numbers import NumberInside, decimal
+from robolink_cli.console.render import note
 from robolink_cli.options.consent import yes_option
-from robolink_cli.options.line import LINE
+from robolink_cli.options.shared import LINE
+from robolink_cli.prompts.questions import agree
 from robolink_cli.session.completing import complete_station, complete_tool
 from robolink_cli.session.context import CliContext, controller_options
+from robolink_cli.session.opening import open_controller
+from robolink_cli.views.accuracy import show_tips
 
 _ROWS = (
     *("touch_mm", "place_mm", "camera_turn_deg", "camera_scale_percent"),
@@ -111,7 +138,7 @@ def measure(
 
     Other rows are learnt without this command, or stated; it says how.
     """
-    from robolink_cli.commands.measure.accuracy_measuring import Asked, measure_row
+    from robolink_cli.commands.measure.accuracy import Asked, measure_row
 
     asked = Asked(
         tool=tool,
@@ -123,3 +150,188 @@ def measure(
         since=since,
     )
     measure_row(context, row, asked, yes=yes)
+
+
+_USUAL: Final = timedelta(hours=24)
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """Which measurements count, and what is known of them.
+
+    Attributes:
+        tool: The tool; ``None`` for any.
+        true: X,Y of the gauge tip, as typed.
+        true_sigma_mm: Standard deviation of that.
+        study: File of a gauge study.
+        station: Name of the station; empty for any.
+        nozzle: Id of the nozzle; empty for any.
+        since: From when on, by the clock on the wall; ``None`` for the last 24 hours.
+    """
+
+    tool: int | None
+    true: str | None
+    true_sigma_mm: float | None
+    study: Path | None
+    station: str
+    nozzle: str
+    since: datetime | None
+
+    @property
+    def begin(self) -> str:
+        """From when on measurements count, as entries are labelled: ISO 8601 UTC."""
+        begin = wall_time() - _USUAL if self.since is None else self.since.astimezone(UTC)
+        return begin.astimezone(UTC).isoformat(timespec="milliseconds")
+
+
+def measure_row(context: CliContext, row: str, asked: Asked, *, yes: bool) -> None:
+    """Calculate a row, show it, ask, and put it on record; no tool is written, nothing moves.
+
+    Raises:
+        CalibrationError: Too few measurements count.
+        ConfigError: Options are missing or do not go together, or the row is not measured so.
+        DeclinedError: A person said no.
+        NotAllowedError: The person is an operator.
+    """
+    known_mm = _checked(row, asked)
+    job = tr("record a row of the budget")
+    with open_controller(context, changes=True, job=job) as controller:
+        if row == "tip_image_px":
+            found = _tip_image(controller, context, asked)
+        elif asked.study is not None:
+            found = _study(asked.study, asked.station)
+        else:
+            assert known_mm is not None  # noqa: S101 - it was checked
+            found = _artefact(controller, asked, known_mm)
+        _show(found)
+        agree(tr("Use this from now on?"), yes=yes)
+        require_engineer(
+            controller.outcomes,
+            job,
+            row=found.row,
+            half_width=found.half_width,
+        )
+        controller.outcomes.append(measured_entry(found))
+    context.emit("cell-accuracy-row", row_payload(found), lambda: note(tr("It is on record.")))
+
+
+def row_payload(found: MeasuredRow) -> dict[str, object]:
+    """Return a measured row for a document."""
+    return {
+        "row": found.row,
+        "half_width": found.half_width,
+        "unit": ACCURACY_ROWS[found.row].unit,
+        "by": found.by,
+        "station": found.station or None,
+        "count": found.count,
+        "records": list(found.records),
+        **found.details,
+    }
+
+
+def _checked(row: str, asked: Asked) -> tuple[float, float] | None:
+    """Return where the gauge tip truly is, ``None`` where none is used.
+
+    Raises:
+        ConfigError: See :func:`measure_row`.
+    """
+    if row not in ("touch_mm", "tip_image_px"):
+        raise ConfigError(
+            tr("{row} is not measured by this command.", row=row),
+            remedy=measuring_step(row, station=asked.station, tool=asked.tool),
+        )
+    touching = asked.true is not None or asked.true_sigma_mm is not None
+    if row == "tip_image_px":
+        if touching or asked.study is not None or not asked.station:
+            raise ConfigError(
+                tr("tip_image_px is measured by one camera."),
+                remedy=tr("Name the camera with --station; --true and --study belong to touch_mm."),
+            )
+        return None
+    if asked.study is not None:
+        if touching or asked.tool is not None or asked.nozzle or asked.since is not None:
+            raise ConfigError(
+                tr("A gauge study stands in its file alone."),
+                remedy=tr("Leave --tool, --true, --nozzle and --since out."),
+            )
+        return None
+    if asked.true is None or asked.tool is None:
+        raise ConfigError(
+            tr("touch_mm needs a gauge tip whose offset is known, or a gauge study."),
+            remedy=measuring_step(row, station=asked.station, tool=asked.tool),
+        )
+    return _two(asked.true)
+
+
+def _artefact(controller: Controller, asked: Asked, known_mm: tuple[float, float]) -> MeasuredRow:
+    tips = _tips(controller, asked, by_camera=False)
+    show_tips(tips, known_mm)
+    sigma_mm = asked.true_sigma_mm or 0.0
+    return artefact_row(tips, known_mm, known_u_mm=sigma_mm, station=asked.station)
+
+
+def _study(file: Path, station: str) -> MeasuredRow:
+    values = study_values(load(file))
+    return study_row(gauge_study(values), persons=len(values[0]), station=station)
+
+
+def _tip_image(controller: Controller, context: CliContext, asked: Asked) -> MeasuredRow:
+    entries = controller.outcomes.recorded(kinds=(EntryKind.STATION,))
+    camera = find_station(context.cell, entries, asked.station, kind=StationKind.CAMERA)
+    pixel_mm = mm_per_px(camera)
+    if pixel_mm is None:
+        raise ConfigError(
+            tr("What a pixel of {station} means is not known.", station=asked.station),
+            remedy=measuring_step("camera_scale_percent", station=asked.station, tool=asked.tool),
+        )
+    pairs = turned_pairs(_tips(controller, asked, by_camera=True))
+    show_tips([tip for pair in pairs for tip in pair])
+    note(tr("Each nozzle has to be turned by half a turn in its mount between its two."))
+    return tip_image_row(pairs, mm_per_px=pixel_mm, station=asked.station)
+
+
+def _tips(controller: Controller, asked: Asked, *, by_camera: bool) -> Sequence[MeasuredTip]:
+    """Return the measurements that count, oldest first."""
+    entries = controller.outcomes.recorded(kinds=(EntryKind.CALIBRATION,))
+    found = [
+        tip
+        for tip in measured_tips(entries)
+        if tip.by_camera is by_camera
+        and tip.at >= asked.begin
+        and asked.tool in (None, tip.tool)
+        and asked.station in ("", tip.station)
+        and asked.nozzle in ("", tip.nozzle)
+    ]
+    return found[::-1]
+
+
+def _show(found: MeasuredRow) -> None:
+    row = ACCURACY_ROWS[found.row]
+    note(
+        tr(
+            "{title}: half width {half_width:.4f} {unit}, by {how} of {count}.",
+            title=spoken(row.title),
+            half_width=found.half_width,
+            unit=row.unit,
+            how=found.how,
+            count=found.count,
+        )
+    )
+    note(tr("The default is {default:g} {unit}.", default=row.default, unit=row.unit))
+
+
+def _two(text: str) -> tuple[float, float]:
+    try:
+        x_mm, y_mm = (decimal(part.strip()) for part in text.split(","))
+    except ValueError as error:
+        raise _no_place(text) from error
+    if not (isfinite(x_mm) and isfinite(y_mm)):
+        raise _no_place(text)
+    return x_mm, y_mm
+
+
+def _no_place(text: str) -> ConfigError:
+    return ConfigError(
+        tr("{text!r} is not an offset.", text=text),
+        remedy=tr("Write X,Y in mm, for example --true 12.000,-4.000."),
+    )

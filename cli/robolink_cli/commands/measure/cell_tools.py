@@ -25,8 +25,8 @@ def cell_tools(context: CliContext) -> None:
 
     Reads only. What is due comes from the recipes beside the cell file and from the record.
     """
-    from robolink_cli.session.tool_source import find_tools
-    from robolink_cli.views.cell_tools import show_cell_tools
+    from robolink_cli.session.context import find_tools
+    from robolink_cli.views.cells import show_cell_tools
 
     with open_controller(context, looks=True) as controller:
         found = find_tools(controller, published=False)

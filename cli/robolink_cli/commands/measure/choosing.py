@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Final
 
 from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import spoken, tr
-from robolink_cli.console.columns import columns, padded
+from robolink_cli.console.tables import columns, padded
 from robolink_cli.prompts.present import AskingDesk, present_desk
 from robolink_cli.session.completing import address_of, is_recipe
-from robolink_cli.wizard.choices import ChoiceSubject, choose_in_either_language
+from robolink_cli.wizard.state import ChoiceSubject, choose_in_either_language
 
 if TYPE_CHECKING:
     from robolink.config import Cell
@@ -45,8 +45,7 @@ def context_at_desk(context: "CliContext", job: str, *, steps: int = 0) -> "CliC
         ConfigError: There is no cell, or a cell file is wrong.
         DeclinedError: The person leaves.
     """
-    from robolink_cli.session.context import context_of_cell
-    from robolink_cli.session.guidance import header_of
+    from robolink_cli.session.context import context_of_cell, header_of
 
     desk = present_desk()
     if context.url is not None or desk is None:
@@ -177,7 +176,7 @@ def _copied(
         DeclinedError: The person leaves.
     """
     from robolink.recipe import load_recipe
-    from robolink_cli.commands.shipped.recipe_copies import copy_recipe, models, purpose_of
+    from robolink_cli.commands.shipped.recipe import copy_recipe, models, purpose_of
 
     axes = _axes(cell)
     fitting = _of_this_kind([load_recipe(path) for path in models().values()], url, axes)

@@ -7,7 +7,7 @@ import click
 
 from robolink.messages import tr
 from robolink_cli.console.render import emit_json, json_is_on, say, table
-from robolink_cli.options.pose_reading import reading_options
+from robolink_cli.options.pose_source import reading_options
 from robolink_cli.options.shared import json_option
 
 if TYPE_CHECKING:

@@ -88,10 +88,10 @@ def recalibrate(
     from robolink_cli.commands.measure.choosing import nobody_to_ask
     from robolink_cli.commands.measure.recalibration import Recalibration
     from robolink_cli.commands.measure.recipe_events import EventStream
+    from robolink_cli.console.output import may_be_guided
     from robolink_cli.console.render import note
-    from robolink_cli.console.tolerance import may_be_guided
     from robolink_cli.options.recipe_answers import answers_from
-    from robolink_cli.session.guidance import guided_if_alone
+    from robolink_cli.session.context import guided_if_alone
 
     if recipe is None and not may_be_guided():
         raise nobody_to_ask()
@@ -150,7 +150,7 @@ def _chosen(context: CliContext, recipe: Path | None) -> "tuple[CliContext, Load
     from robolink.recipe import load_recipe
     from robolink_cli.commands.measure.choosing import choose_recipe, context_at_desk
     from robolink_cli.prompts.present import present_desk
-    from robolink_cli.session.guidance import header_of
+    from robolink_cli.session.context import header_of
 
     named = None if recipe is None else load_recipe(recipe)
     at = context_at_desk(context, declared("Change needle"), steps=_STEPS)
@@ -173,8 +173,7 @@ def _chosen_anew(before: CliContext) -> "tuple[CliContext, LoadedRecipe]":
     """Have cell and recipe chosen for the next tool, the cell of the one before marked."""
     from robolink_cli.commands.measure.choosing import choose_cell, choose_recipe
     from robolink_cli.prompts.present import present_desk
-    from robolink_cli.session.context import context_of_cell
-    from robolink_cli.session.guidance import header_of
+    from robolink_cli.session.context import context_of_cell, header_of
 
     desk = present_desk()
     assert desk is not None  # noqa: S101 - it is offered at a desk alone

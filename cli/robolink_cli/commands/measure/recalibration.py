@@ -20,7 +20,7 @@ from robolink_cli.session.context import CliContext
 from robolink_cli.session.motion_consent import agree_to_motion, motion_question
 from robolink_cli.session.opening import open_controller
 from robolink_cli.session.ordering import ordered, show_done, with_order
-from robolink_cli.views.calibration import report_payload, show_report
+from robolink_cli.views.fit import report_payload, show_report
 from robolink_cli.views.planned_steps import steps_payload
 
 _Show = Callable[[dict[str, object]], None]
@@ -291,7 +291,7 @@ def _nothing(_payload: dict[str, object]) -> None:
 
 
 def _shown_plan(payload: dict[str, object]) -> None:
-    from robolink_cli.views.calibration import show_steps
+    from robolink_cli.views.fit import show_steps
 
     say(tr("Dry run; nothing is sent. The recipe {recipe!r}:", recipe=payload["recipe"]))
     prompts, outputs = payload["prompts"], payload["outputs"]

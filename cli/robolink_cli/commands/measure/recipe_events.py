@@ -99,7 +99,7 @@ class Progress(Listener):
 
     def proposed(self, proposals: Sequence[Proposal]) -> None:
         """Show what was measured, next to what is stored."""
-        from robolink_cli.views.calibration import show_proposal
+        from robolink_cli.views.fit import show_proposal
 
         for proposal in proposals:
             show_proposal(proposal)
@@ -107,7 +107,7 @@ class Progress(Listener):
 
     def wrote(self, receipt: ToolReceipt) -> None:
         """Tell of a write."""
-        from robolink_cli.views.calibration import tell_written
+        from robolink_cli.views.fit import tell_written
 
         tell_written(receipt)
         self.tool = receipt.tool

@@ -175,7 +175,7 @@ def show(name: str) -> None:
 @json_option
 def diff(a: str, b: str) -> None:
     """Show what differs between two entries or changes: value, poses, tolerance, people."""
-    from robolink_cli.views.journal_diff import diff_payload, show_diff
+    from robolink_cli.views.journal import diff_payload, show_diff
 
     opened = journal_to_read()
     sides = entries_named(opened, a), entries_named(opened, b)

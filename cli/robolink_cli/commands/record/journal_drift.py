@@ -1,12 +1,15 @@
 """journal drift: how the tools of cells went over their changes. Reads only, no controller."""
 
 import datetime
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import click
 
+from robolink.drift import CellDrift, Chart, ChartPoint, last_statements
 from robolink.messages import declared, tr
+from robolink.report import chart_title
 from robolink_cli.access.cell import complete_cell
 from robolink_cli.commands.record.journal_lookup import (
     cell_meant,
@@ -14,7 +17,7 @@ from robolink_cli.commands.record.journal_lookup import (
     journal_to_read,
 )
 from robolink_cli.console.exit_codes import DIFFERENT
-from robolink_cli.console.render import emit_json, json_is_on, say
+from robolink_cli.console.render import emit_json, json_is_on, say, table
 from robolink_cli.options.shared import json_option
 from robolink_cli.session.completing import complete_tool
 
@@ -76,7 +79,7 @@ def drift(
     changes that were measured and kept count. Exit code 1 when something stands out.
     """
     from robolink.journal import default_location, may_exist
-    from robolink_cli.commands.record.drift_views import drift_payload, show_drift
+    from robolink_cli.commands.record.journal_drift import drift_payload, show_drift
 
     if page is not None:
         from robolink.files.named import require_free
@@ -140,3 +143,189 @@ def _write(cells: "list[CellDrift]", page: Path, *, replace: bool) -> None:
 
     made_at = wall_time().astimezone(datetime.UTC).isoformat(timespec="seconds")
     save_drift(cells, page, made_at=made_at, robolink_version=__version__, replace=replace)
+
+
+_ROWS: Final = 9
+_COLUMNS: Final = 60
+_LEAST_REACH_MM: Final = 0.005
+
+
+def show_drift(cells: Sequence[CellDrift], *, all_plots: bool, called: str = "") -> None:
+    """Print a table a controller, the charts of what stands out, and what that means.
+
+    Args:
+        cells: The controllers.
+        all_plots: Whether every chart is drawn.
+        called: What a person calls the only one; empty where nobody named it.
+    """
+    for number, cell in enumerate(cells):
+        if number:
+            say("")
+        _show_cell(cell, called if len(cells) == 1 else "", all_plots=all_plots)
+    if not any(cell.findings for cell in cells):
+        say(tr("Nothing stands out."))
+
+
+def _show_cell(cell: CellDrift, called: str, *, all_plots: bool) -> None:
+    first, last = cell.changes[0].at[:10], cell.changes[-1].at[:10]
+    title = tr(
+        "{controller}: measured changes: {count}, {first} to {last}",
+        controller=_named(cell, called),
+        count=len(cell.changes),
+        first=first,
+        last=last,
+    )
+    if cell.charts:
+        columns = (tr("what"), tr("values"), tr("mean mm"), tr("last mm"), tr("limits mm"), "")
+        table(title, columns, [_row(chart) for chart in cell.charts])
+    else:
+        say(title)
+        say(tr("A course shows from the second measured change of a tool on."))
+    for sentence in last_statements(cell.changes):
+        say(sentence)
+    for chart in cell.charts:
+        if chart.limits_mm is None:
+            say(
+                tr(
+                    "Limits are drawn from 20 changes on; until then nothing is judged, except a "
+                    "nozzle that is measured again and again."
+                )
+            )
+            break
+    for chart in cell.charts:
+        if all_plots or _stands_out(cell, chart):
+            say(f"\n{chart_title(chart)}")
+            for line in plot_lines(chart):
+                say(line)
+            if told := mean_line(chart):
+                say(told)
+    for finding in cell.findings:
+        say(f"\n{finding.sentence}\n  {finding.remedy}")
+
+
+def _row(chart: Chart) -> tuple[str, ...]:
+    limits = chart.limits_mm
+    return (
+        chart_title(chart),
+        str(len(chart.points)),
+        f"{chart.centre_mm:.3f}",
+        f"{chart.points[-1].value_mm:.3f}",
+        f"{limits[0]:.3f} .. {limits[1]:.3f}" if limits else tr("none yet"),
+        _state(chart),
+    )
+
+
+def _state(chart: Chart) -> str:
+    if chart.limits_mm is None:
+        return ""
+    if chart.last.mean_outside:
+        return tr("shifting")
+    return tr("last one outside") if chart.last.outside else tr("as usual")
+
+
+def _stands_out(cell: CellDrift, chart: Chart) -> bool:
+    return any(
+        chart.subject in finding.subject and chart.axis in finding.shift_mm
+        for finding in cell.findings
+    )
+
+
+def plot_lines(chart: Chart) -> Iterator[str]:
+    """Yield the chart of the newest values, one character a value, oldest at the left.
+
+    ``o`` is a value, ``X`` one outside the limits, ``+`` the same nozzle measured again; a row of
+    dashes is a limit, one of dots the mean.
+    """
+    points = chart.points[-_COLUMNS:]
+    limits = chart.limits_mm or ()
+    shown = [point.value_mm for point in points] + list(limits)
+    reach = max(_LEAST_REACH_MM, *(abs(value - chart.centre_mm) for value in shown))
+
+    def row_of(value: float) -> int:
+        return round((_ROWS - 1) / 2 * (1 - (value - chart.centre_mm) / reach))
+
+    ruled = {row_of(chart.centre_mm): ".", **{row_of(limit): "-" for limit in limits}}
+    named = {row_of(chart.centre_mm): chart.centre_mm, **{row_of(limit): limit for limit in limits}}
+    for row in range(_ROWS):
+        ground = ruled.get(row, " ")
+        cells = (_mark(p) if row_of(p.value_mm) == row else ground for p in points)
+        label = f"{named[row]:9.3f} " if row in named else " " * 10
+        yield (label + "".join(cells)).rstrip()
+
+
+def mean_line(chart: Chart) -> str:
+    """Return the weighted mean and its limits; empty where there is none."""
+    last, limits = chart.last, chart.mean_limits_mm
+    if last.mean_mm is None or limits is None:
+        return ""
+    facts = {"mean": f"{last.mean_mm:.3f}", "low": f"{limits[0]:.3f}", "high": f"{limits[1]:.3f}"}
+    if last.mean_outside:
+        return tr("Weighted mean {mean} mm, outside its limits {low} to {high} mm.", **facts)
+    return tr("Weighted mean {mean} mm, within its limits {low} to {high} mm.", **facts)
+
+
+def _mark(point: ChartPoint) -> str:
+    if point.outside:
+        return "X"
+    return "+" if point.repeat else "o"
+
+
+def drift_payload(cells: Sequence[CellDrift]) -> dict[str, object]:
+    """Return charts and findings as plain JSON values."""
+    return {
+        "controllers": [
+            {
+                "controller": cell.controller,
+                "simulated": cell.simulated,
+                "change_count": len(cell.changes),
+                "charts": [_chart(chart) for chart in cell.charts],
+                "findings": [
+                    {
+                        "code": str(finding.code),
+                        "subject": list(finding.subject),
+                        "since": finding.since,
+                        "change": finding.change,
+                        "shift_mm": dict(finding.shift_mm),
+                        "text": finding.sentence,
+                        "remedy": finding.remedy,
+                    }
+                    for finding in cell.findings
+                ],
+            }
+            for cell in cells
+        ]
+    }
+
+
+def _chart(chart: Chart) -> dict[str, object]:
+    return {
+        "quantity": chart.quantity,
+        "subject": chart.subject,
+        "axis": chart.axis or None,
+        "baseline_count": chart.baseline,
+        "centre_mm": chart.centre_mm,
+        "sigma_mm": chart.sigma_mm,
+        "limits_mm": chart.limits_mm and list(chart.limits_mm),
+        "mean_limits_mm": chart.mean_limits_mm and list(chart.mean_limits_mm),
+        "points": [
+            {
+                "at": point.change.at,
+                "change": point.change.change,
+                "nozzle": point.change.nozzle or None,
+                "value_mm": point.value_mm,
+                "repeat": point.repeat,
+                "outside": point.outside,
+                "mean_mm": point.mean_mm,
+                "mean_outside": point.mean_outside,
+                "repeatable_to_mm": point.change.repeatable_to_mm,
+                "accurate_to_mm": point.change.accurate_to_mm,
+            }
+            for point in chart.points
+        ],
+    }
+
+
+def _named(cell: CellDrift, called: str) -> str:
+    """Return a cell by its name and its controller, and whether that is simulated."""
+    name = f"{called} ({cell.controller})" if called else cell.controller
+    return f"{name} ({tr('SIMULATED')})" if cell.simulated else name

@@ -1,22 +1,112 @@
 """recover: the one way to settle what was begun and not proved finished."""
 
+from typing import Final
+
 import click
 
 from robolink.errors import ConfigError
 from robolink.messages import declared, tr
-from robolink.model import AnsweredBy
-from robolink.transaction import Recovery
+from robolink.model import AnsweredBy, Controller, Finding, MarkerKind, Verdict, begun_in_words
+from robolink.timing import local_label
+from robolink.transaction import Recovery, look
 from robolink_cli.commands.measure.choosing import context_at_desk
-from robolink_cli.commands.record.recovery_choice import BLOCKED, NEW, OLD, chosen_at_desk
 from robolink_cli.commands.record.recovery_guide import Guide, show_end
 from robolink_cli.console.render import json_is_on
 from robolink_cli.options.consent import dry_run_option, plain_option, yes_option
 from robolink_cli.prompts.present import present_desk
 from robolink_cli.prompts.questions import on_terminal
-from robolink_cli.session.context import CliContext, controller_options, emit, optional_controller
-from robolink_cli.session.guidance import guided_if_alone
+from robolink_cli.session.context import (
+    CliContext,
+    controller_options,
+    emit,
+    guided_if_alone,
+    optional_controller,
+)
 from robolink_cli.session.opening import open_controller
 from robolink_cli.views.documents import finding_payload
+from robolink_cli.wizard.state import ChoiceSubject, choose
+
+OLD: Final = "old"
+NEW: Final = "new"
+BLOCKED: Final = "blocked"
+
+
+def chosen_at_desk(controller: Controller) -> str | None:
+    """Have the person at the desk choose, where reading alone decides nothing.
+
+    Returns ``old``, ``new`` or ``blocked``; ``None`` where nobody is to be asked, or nothing that
+    is open takes a person. A recovery is then what reading makes of it.
+
+    Raises:
+        DeclinedError: The person leaves; everything stays as it is.
+    """
+    from robolink.nozzle_change import open_turn_tests, untested_sentences
+
+    desk = present_desk()
+    if desk is None:
+        return None
+    findings = look(controller)
+    written = [one for one in findings if _is_untested_write(one)]
+    if not written and not any(one.verdict.needs_a_person for one in findings):
+        return None
+    answers = (OLD, NEW, BLOCKED) if written else (OLD, BLOCKED)
+    subject = ChoiceSubject(
+        tr("Recover"),
+        (
+            *(row for one in findings for row in _rows(one)),
+            *untested_sentences(controller),
+            *_selected(controller),
+        ),
+        tuple(
+            _option(answer, written=bool(written), tests=bool(open_turn_tests(controller)))
+            for answer in answers
+        ),
+        marked=None,
+        does=tr("Do it"),
+        leaves=tr("Leave it blocked"),
+        enters=False,
+    )
+    question = (
+        tr("Look at the robot: which needle is mounted?")
+        if written
+        else tr("Look at the robot: is all as it should be?")
+    )
+    return answers[choose(desk, question, subject, controller.status)]
+
+
+def _is_untested_write(finding: Finding) -> bool:
+    return finding.marker.kind is MarkerKind.CHANGE and finding.verdict in (
+        Verdict.NOT_FINISHED,
+        Verdict.CONFLICT,
+    )
+
+
+def _rows(finding: Finding) -> list[str]:
+    return [
+        tr(
+            "What happened: {when}  {request}",
+            when=local_label(finding.marker.begun_at),
+            request=begun_in_words(finding.marker),
+        ),
+        tr("What we read: {sentence}", sentence=finding.sentence),
+    ]
+
+
+def _selected(controller: Controller) -> list[str]:
+    selected = controller.tools.selected()
+    return [] if selected is None else [tr("Tool {t} is selected.", t=selected)]
+
+
+def _option(answer: str, *, written: bool, tests: bool) -> str:
+    if answer == BLOCKED:
+        return tr("I cannot tell. Stay blocked; call an engineer.")
+    if not written:
+        return tr("All is as it should be. Work may go on.")
+    if answer == OLD:
+        return tr("The old one. Put the old value back.")
+    if tests:
+        return tr("The new one. Make the turn test, then keep the new value.")
+    return tr("The new one. Keep the new value; nobody has tested it.")
 
 
 @click.command("recover")

@@ -1,14 +1,25 @@
 """report: one page about one tool change, from the journal."""
 
+from collections.abc import Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import click
 
+from robolink.errors import ConfigError
+from robolink.journal import Journal
 from robolink.messages import declared, tr
+from robolink.model import EntryKind, Recorded
+from robolink.report import Report
+from robolink.transaction import id_of_change
+from robolink_cli.commands.record.journal_lookup import controller_meant, entries_of_change
 from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.render import note, say
+from robolink_cli.options.impact import ImpactRequest, judge
 from robolink_cli.options.pose_source import point_numbers
 from robolink_cli.session.context import CliContext, optional_controller
+from robolink_cli.session.opening import open_controller
+from robolink_cli.views.documents import offset_payload, verification_payload
 
 _ENDINGS = (".html", ".htm")
 
@@ -43,7 +54,7 @@ def report(
     from robolink.transaction import id_of_change
     from robolink_cli.access.change_page import free_page, reports_from
     from robolink_cli.commands.record.journal_lookup import journal_to_read
-    from robolink_cli.commands.record.recorded_change import (
+    from robolink_cli.commands.record.report import (
         find_change,
         report_payload,
         with_points,
@@ -68,3 +79,106 @@ def report(
     payload = report_payload(reports, path)
     context.emit("report", payload, lambda: say(tr("Report: {path}", path=path)))
     return DIFFERENT if problems else 0
+
+
+_OF_A_CHANGE = (
+    EntryKind.CALIBRATION,
+    EntryKind.REFUSED,
+    EntryKind.INTENT,
+    EntryKind.DONE,
+    EntryKind.ROLLED_BACK,
+    EntryKind.CONFLICT,
+)
+
+
+def find_change(journal: Journal, name: str | None, *, controller: str | None) -> list[Recorded]:
+    """Return the entries of a change in the order in which they were stored.
+
+    Args:
+        journal: Where to look.
+        name: The beginning of its id, or the number of an entry; ``None`` for the newest.
+        controller: URL of the controller that must be meant, ``None`` for any.
+
+    Raises:
+        ConfigError: There is no such change.
+        JournalError: The journal cannot be read.
+    """
+    meant = controller_meant(controller)
+    if name is None:
+        newest = next(journal.entries(controller=meant, kinds=_OF_A_CHANGE), None)
+        if newest is None:
+            raise ConfigError(
+                tr("No tool change is on record."),
+                remedy=tr("'robolink journal list' shows what is; -c names another cell."),
+            )
+        name = id_of_change(newest)
+    return entries_of_change(journal, name, controller=meant)
+
+
+def with_points(
+    context: CliContext, reports: Sequence[Report], request: ImpactRequest
+) -> tuple[Report, ...]:
+    """Add what the controller says now: which it is, and where taught points lead.
+
+    Raises:
+        ConfigError: It has no taught points.
+    """
+    with open_controller(context) as controller:
+        facts, taught = controller.facts(), request.read(controller)
+    return tuple(
+        replace(report, facts=facts, impact=judge(taught, old=report.before, new=report.after))
+        if report.after is not None
+        else replace(report, facts=facts)
+        for report in reports
+    )
+
+
+def report_payload(reports: Sequence[Report], path: Path) -> dict[str, object]:
+    """Return the document of a page that was written."""
+    record = reports[0].record
+    assert record is not None  # noqa: S101 - made from the journal
+    return {
+        "file": str(path),
+        "change": record.change,
+        "done_by": list(record.people),
+        "began_at": record.entries[0].at,
+        "ended_at": record.entries[-1].at,
+        "tools": [_tool_payload(one) for one in reports],
+        "entries": [entry.number for entry in record.entries],
+        "problems": list(record.problems),
+    }
+
+
+def _tool_payload(report: Report) -> dict[str, object]:
+    """Return what an auditor's program wants of one tool; ``null`` for what is not on record."""
+    fit, proof = report.fit, report.verification
+    return {
+        "tool": report.tool,
+        "outcome": str(report.outcome),
+        "simulated": report.simulated,
+        "method": report.method,
+        "local_time": report.local_time or None,
+        "machine": {name: value or None for name, value in asdict(report.facts).items()},
+        "gauges": [asdict(gauge) for gauge in report.gauges],
+        "before": offset_payload(report.before),
+        "after": offset_payload(report.after),
+        "measured": [name for name in report.determined if not fit or name not in fit.changed],
+        "changed": list(fit.changed) if fit else [],
+        "repeatable_to_mm": fit.repeatable_to_mm if fit else None,
+        "accurate_to_mm": _accurate_to_mm(report),
+        "accuracy": fit.accuracy.as_json(fit.measured) if fit and fit.accuracy else None,
+        "seating": dict(report.seating) if report.seating else None,
+        "half_width95": dict(zip(fit.measured, fit.half_width95, strict=False)) if fit else {},
+        "interval_from": fit.interval_from or None if fit else None,
+        "region95_radius_mm": fit.region95_radius_mm if fit else None,
+        "budget": fit.budget.as_json() if fit and fit.budget else None,
+        "warnings": list(fit.warnings) if fit else [],
+        "verification": verification_payload(proof) if proof else None,
+    }
+
+
+def _accurate_to_mm(report: Report) -> float | None:
+    """Return what the tip is accurate to by the statement that stands, a wider one included."""
+    if report.widened_mm is not None:
+        return report.widened_mm
+    return None if report.fit is None else report.fit.accurate_to_mm

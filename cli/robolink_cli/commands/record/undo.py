@@ -2,13 +2,20 @@
 
 import click
 
+from robolink.backup import keep_first_backup
 from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import declared, tr
+from robolink.model import Controller
+from robolink.transaction import Undone, UndoPlan
+from robolink.transaction import undo as take_back
+from robolink_cli.console.render import note, say
 from robolink_cli.options.consent import dry_run_option, then_select_option, yes_option
 from robolink_cli.prompts.questions import agree, on_terminal
 from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
+from robolink_cli.views.documents import offset_payload, receipt_payload
+from robolink_cli.views.tables import show_change
 
 
 @click.command()
@@ -48,7 +55,7 @@ def undo(
     """
     from robolink.transaction import plan_undo
     from robolink_cli.commands.record.journal_lookup import change_named
-    from robolink_cli.commands.record.undo_on_terminal import Undoing
+    from robolink_cli.commands.record.undo import Undoing
 
     if change is not None and to is not None:
         raise ConfigError(
@@ -85,3 +92,82 @@ def _agree(context: CliContext, *, yes: bool) -> None:
             remedy=tr("Nothing was written. Look at it with --dry-run, then add --yes."),
         )
     agree(tr("Write the old values back?"), yes=yes)
+
+
+class Undoing:
+    """One undo on one controller.
+
+    Args:
+        controller: The controller, connected.
+        plan: What to do.
+        then_select: The tool to put in force in place of one that becomes undefined.
+    """
+
+    def __init__(
+        self, controller: Controller, plan: UndoPlan, *, then_select: int | None = None
+    ) -> None:
+        self._controller = controller
+        self._plan = plan
+        self._then_select = then_select
+        self._done = Undone("", ())
+
+    def requests(self) -> list[str]:
+        """Return what would be sent besides reads.
+
+        Raises:
+            ToolError: A value does not fit this robot, or the tool in force would become
+                undefined.
+            NotReadyError: The state forbids a write.
+        """
+        tools = self._controller.tools
+        requests: list[str] = []
+        for step in self._plan.steps:
+            if step.requested is None:
+                requests += tools.preview_clear(step.tool, then_select=self._then_select)
+            else:
+                requests += tools.preview_write(step.tool, step.requested)
+        return requests
+
+    def show(self) -> None:
+        """Show what would change."""
+        say(self._plan.sentence)
+        for remark in self._plan.remarks:
+            say(f"  {remark}")
+        for step in self._plan.steps:
+            shown = offset_payload(step.before), offset_payload(step.requested)
+            show_change(step.tool, *shown, after_name=tr("restored"))
+
+    def run(self) -> dict[str, object]:
+        """Carry it out and return the document; nothing is sent when nothing differs."""
+        if self._plan.steps:
+            keep_first_backup(self._controller, tell=note)
+            self._done = take_back(
+                self._controller, self._plan, then_select=self._then_select, tell=note
+            )
+        return {
+            "sentence": self._plan.sentence,
+            "remarks": list(self._plan.remarks),
+            **self._plan.details,
+            "change": self._done.change or None,
+            "unchanged": list(self._plan.unchanged),
+            "restored": [receipt_payload(receipt) for receipt in self._done.receipts],
+        }
+
+    def show_end(self, cell: str) -> None:
+        """Say how it ended, and how it is undone.
+
+        Args:
+            cell: How a person names the controller.
+        """
+        if not self._done.receipts:
+            say(tr("The controller has the old values already. Nothing was written."))
+            return
+        numbers = ", ".join(str(receipt.tool) for receipt in self._done.receipts)
+        say(tr("Old values written and read back: tool {numbers}.", numbers=numbers))
+        say(
+            tr(
+                'To take it back: robolink -c "{cell}" undo {id}',
+                cell=cell,
+                id=self._done.change[:8],
+            )
+        )

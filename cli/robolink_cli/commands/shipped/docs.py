@@ -3,14 +3,16 @@
 import re
 import shutil
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Final
 
 import click
 
 from robolink.messages import tr
+from robolink_cli.console.output import is_terminal
 from robolink_cli.console.render import emit_json, json_is_on, say, say_listed
-from robolink_cli.console.tolerance import is_terminal
+from robolink_cli.console.tables import filled, has_wide, within
 from robolink_cli.options.shared import json_option
 
 _COMMENT: Final = re.compile(r"<!--.*?-->\n*", re.DOTALL)
@@ -89,8 +91,54 @@ def _list(titles: dict[str, str]) -> None:
 def _show(text: str) -> None:
     """Show a page: through the pager on a terminal, as it stands to a program."""
     if is_terminal(sys.stdout) and is_terminal(sys.stdin):
-        from robolink_cli.commands.shipped.page_lines import page_lines
+        from robolink_cli.commands.shipped.docs import page_lines
 
         click.echo_via_pager(page_lines(_COMMENT.sub("", text), shutil.get_terminal_size().columns))
     else:
         say(text.rstrip("\n"))
+
+
+_AS_IT_STANDS: Final = re.compile(r"\s{4,}|[|#<>!]|```|\s*$")
+_ITEM: Final = re.compile(r"\s*([*-]|\d+\.)\s")
+
+
+def page_lines(text: str, width: int) -> str:
+    """Return a page of Markdown for a terminal.
+
+    The pages are wider than a terminal of 80 columns, which would break their lines in the middle
+    of a word. Paragraphs and items of lists are filled anew; lines of tables, headings and code
+    that are too long are broken at a blank.
+
+    Args:
+        text: The page.
+        width: Columns of the terminal.
+    """
+    return "\n".join(
+        filled(part, width, indent=part[: len(part) - len(part.lstrip())])
+        if is_prose
+        else within(part, width)
+        for is_prose, part in _parts(text)
+    )
+
+
+def _parts(text: str) -> Iterator[tuple[bool, str]]:
+    """Yield paragraphs and items, each joined to one line, and the other lines; and which it is."""
+    prose, in_code = "", False
+    for line in text.split("\n"):
+        fence = line.startswith("```")
+        stands = in_code or fence or _AS_IT_STANDS.match(line) is not None
+        if prose and (stands or _ITEM.match(line)):
+            yield True, prose
+            prose = ""
+        if stands:
+            yield False, line
+        else:
+            prose = _joined(prose, line.strip()) if prose else line
+        in_code ^= fence
+    if prose:
+        yield True, prose
+
+
+def _joined(line: str, following: str) -> str:
+    """Return two lines as one; Chinese has no blank between words."""
+    return line + following if has_wide(line[-1]) else f"{line} {following}"

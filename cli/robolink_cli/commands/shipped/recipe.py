@@ -1,14 +1,86 @@
 """recipe list, new, check: recipes to begin with, and whether one is right."""
 
+import re
 from pathlib import Path
+from typing import Final
 
 import click
 
-from robolink.messages import spoken, tr
-from robolink_cli.commands.shipped.recipe_copies import copy_recipe, models, purpose_of
+from robolink.files.durable import write_whole
+from robolink.files.named import require_free
+from robolink.messages import declared, spoken, tr
+from robolink_cli.commands.shipped.shipped_files import (
+    recipe_schema,
+    recipes_folder,
+    require_one_of,
+)
 from robolink_cli.console.render import emit_json, json_is_on, say, say_listed
 from robolink_cli.options.shared import json_option
 from robolink_cli.session.completing import complete_recipe
+
+_OF_THE_CELL: Final = re.compile(
+    r"^[^#]*\b([xyz]_mm|origin_mm|mm_per_px|direction_deg|points|input|sideways_mm|down_mm|up_mm"
+    r"|jump_mm)\b *="
+)
+"""Lines with numbers that depend on the cell."""
+
+_MARK: Final = "# SIMULATED"
+
+_NUMBERS: Final = (
+    'numbers = "simulated"          # marked lines are of a simulated cell: put in yours, then '
+    "delete this line"
+)
+
+
+def models() -> dict[str, Path]:
+    """Return the recipes that come along, by name."""
+    return {path.stem: path for path in sorted(recipes_folder().glob("*.toml"))}
+
+
+def purpose_of(path: Path) -> str:
+    """Return what a recipe is for, a sentence.
+
+    Args:
+        path: One that comes along.
+    """
+    from robolink_cli.commands.shipped.recipe import PURPOSES
+
+    return PURPOSES.get(path.stem) or first_comment(path)
+
+
+def copy_recipe(name: str, path: Path, *, replace: bool = False) -> None:
+    """Copy a recipe that comes along; the copy runs on simulated controllers alone.
+
+    Args:
+        name: Its name.
+        path: Where to.
+        replace: Whether a file that is there may be overwritten.
+
+    Raises:
+        ConfigError: There is no such recipe, or the file is there or cannot be written.
+    """
+    found = models()
+    require_one_of(name, list(found), remedy=tr("'robolink recipe list' lists them."))
+    require_free(path, replace=replace)
+    first, *lines = found[name].read_text(encoding="utf-8").splitlines()
+    if not first.startswith("#:schema "):
+        lines.insert(0, first)
+    lines = [f"{line}  {_MARK}" if _OF_THE_CELL.match(line) else line for line in lines]
+    named = next(at for at, line in enumerate(lines) if line.startswith("name ="))
+    lines.insert(named + 1, _NUMBERS)
+    text = "\n".join([f"#:schema {recipe_schema().resolve().as_uri()}", *lines, ""])
+    write_whole(path, text.encode(), mode=0o666)
+
+
+def first_comment(path: Path) -> str:
+    """Return what a recipe says of itself first, in English; empty for nothing.
+
+    Args:
+        path: The recipe.
+    """
+    with path.open(encoding="utf-8") as lines:
+        comments = (line[1:].strip() for line in lines if line.startswith("# "))
+        return next(comments, "")
 
 
 @click.group()
@@ -76,3 +148,40 @@ def check(file: Path) -> int:
     else:
         say(tr("The recipe {path} is right.", path=file))
     return 2 if problems else 0
+
+
+PURPOSES: Final = {
+    "five-axes-pivot": declared(
+        "A robot that can tilt its tool, a pin and a person: X, Y and Z in one measurement."
+    ),
+    "gantry-touch-probe": declared(
+        "The length of a nozzle on a gantry (Kin_Gantry3), by a touch probe; nobody touches "
+        "anything."
+    ),
+    "held-board": declared(
+        "A board that the gripper holds, and an up-looking camera; nobody touches anything."
+    ),
+    "leaning-plate": declared(
+        "A robot that can tilt its tool, a flat plate that leans, and a person: X, Y and Z "
+        "without a pin."
+    ),
+    "needle-beams": declared(
+        "A dispensing needle and two crossed light beams; nobody touches anything."
+    ),
+    "needle-one-touch": declared("The change of a dispensing needle with one touch: X, Y and Z."),
+    "nozzle-and-camera": declared(
+        "A nozzle and an up-looking camera that nobody has calibrated; both are found in one "
+        "pattern."
+    ),
+    "pendant-points": declared("Points that were taught on the pendant; nothing moves."),
+    "pick-nozzle-camera": declared(
+        "A pick nozzle and an up-looking camera; nobody touches anything."
+    ),
+    "scara-pin": declared("A SCARA, a pin and a person."),
+    "sphere": declared(
+        "A robot that can tilt its tool, a ball, and a person: X, Y and Z without a pin."
+    ),
+    "two-nozzles": declared(
+        "Two nozzles on one head: both are measured before one is written; all are written or none."
+    ),
+}

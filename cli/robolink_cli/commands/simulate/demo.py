@@ -1,9 +1,39 @@
 """demo: a whole nozzle change on each kind of simulated controller."""
 
-import click
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
 
+import click
+from robolink_simulators.assist.port import LEAST_THINKING_S, InProcessEyes
+from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.cell.world_parameters import WorldParameters
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.hosting.in_process.softmotion import simulator_named
+from robolink_simulators.hosting.streams.epson import serve_tcp
+from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
+
+import robolink
+from robolink.errors import CalibrationError, VerifyError
+from robolink.journal import memory_journal
+from robolink.messages import tr
+from robolink.model import Controller, ToolOffset
+from robolink.nozzle_change import (
+    ChangePlan,
+    Listener,
+    NozzleChange,
+    Proposal,
+    ToolPlan,
+    ToolReport,
+)
 from robolink_cli.console.numbers import NumberInside
+from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.options.shared import json_option
+from robolink_cli.prompts.operator import AssistedOperator
+from robolink_cli.views.documents import offset_payload
+from robolink_cli.views.fit import report_payload, show_proposal, show_report
 
 
 @click.command()
@@ -32,6 +62,305 @@ def demo(seed: int, speed: float, operator: str) -> None:
     The SCARA is reached over a TCP connection on this machine's loopback, the PLC through its
     mailbox inside this process. No machine is touched.
     """
-    from robolink_cli.commands.simulate.demonstration import DemoOperator, demonstrate
+    from robolink_cli.commands.simulate.demo import DemoOperator, demonstrate
 
     demonstrate(seed=seed, speed=speed, operator=DemoOperator(operator))
+
+
+TOOL = 1
+"""Whose nozzle is changed."""
+
+
+@dataclass(frozen=True, slots=True)
+class DemonstratedChange(ABC):
+    """A nozzle change on one simulated controller.
+
+    Attributes:
+        kind: Kind of controller.
+        robot: What moves.
+        truth: Where the tip really is.
+        exchanges: Requests that it took.
+    """
+
+    kind: str
+    robot: str
+    truth: ToolOffset
+    exchanges: int
+
+    def payload(self) -> dict[str, object]:
+        """Return it as plain JSON."""
+        return {
+            "kind": self.kind,
+            "robot": self.robot,
+            "truth": offset_payload(self.truth),
+            "exchanges": self.exchanges,
+            **self.end(),
+        }
+
+    @abstractmethod
+    def end(self) -> dict[str, object]:
+        """Return how it ended, as plain JSON."""
+
+    @abstractmethod
+    def show(self) -> None:
+        """Say how it ended."""
+
+
+@dataclass(frozen=True, slots=True)
+class AcceptedChange(DemonstratedChange):
+    """A nozzle change that was written and proved.
+
+    Attributes:
+        report: What was measured, written and verified.
+    """
+
+    report: ToolReport
+
+    @property
+    def error_mm(self) -> float:
+        """How far from the truth the tip was found, in the plane."""
+        found, true = self.report.proposal.offset, self.truth
+        return math.dist(found.components()[:2], true.components()[:2])
+
+    @property
+    def drift_mm(self) -> float:
+        """The largest drift about the new tip."""
+        if self.report.verification is None:
+            raise VerifyError(tr("The demonstration did not pass its test."))
+        return self.report.verification.max_drift_mm
+
+    def end(self) -> dict[str, object]:
+        """Return how it ended, as plain JSON."""
+        return {
+            "refused": None,
+            "recovered": offset_payload(self.report.proposal.offset),
+            "error_mm": self.error_mm,
+            "drift_mm": self.drift_mm,
+            **report_payload(self.report),
+        }
+
+    def show(self) -> None:
+        """Say how it ended, and how far off it was."""
+        say()
+        show_report(self.report)
+        say(
+            tr(
+                "The true tip is at X {x:.3f} Y {y:.3f}; the result is {error:.3f} mm off, after "
+                "{exchanges} exchanges. Checked against the simulator, not a robot.",
+                x=self.truth.x_mm,
+                y=self.truth.y_mm,
+                error=self.error_mm,
+                exchanges=self.exchanges,
+            )
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class RefusedChange(DemonstratedChange):
+    """A nozzle change that the procedures did not believe.
+
+    Attributes:
+        error: Why not.
+        in_force: What the controller holds after it; it held the same before.
+    """
+
+    error: CalibrationError | VerifyError
+    in_force: ToolOffset
+
+    def end(self) -> dict[str, object]:
+        """Return how it ended, as plain JSON."""
+        error = self.error
+        code = error.code if isinstance(error, CalibrationError) else "large_drift"
+        return {
+            "refused": {"code": code, "what": error.what, "remedy": error.remedy},
+            "in_force": offset_payload(self.in_force),
+        }
+
+    def show(self) -> None:
+        """Say what was refused, and which tool is in force."""
+        say()
+        say(tr("Refused: {what}", what=self.error.what))
+        if self.error.remedy:
+            say(f"  {self.error.remedy}")
+        say(
+            tr(
+                "Tool {tool} still holds X {x:.3f} Y {y:.3f} Z {z:.3f}, as before; the true tip is "
+                "at X {true_x:.3f} Y {true_y:.3f}. Checked against the simulator, not a robot.",
+                tool=TOOL,
+                x=self.in_force.x_mm,
+                y=self.in_force.y_mm,
+                z=self.in_force.z_mm,
+                true_x=self.truth.x_mm,
+                true_y=self.truth.y_mm,
+            )
+        )
+
+
+_KINEMATICS = "Kin_Scara3_Z"
+
+_OF_INTEREST = tuple(f'> $Execute,"{word} ' for word in ("Tool", "TLSet", "Move", "Go"))
+
+
+class DemoOperator(StrEnum):
+    """Who stands at the demonstrated cells."""
+
+    CAREFUL = "careful"
+    """Jogs the tip onto the pin whenever asked to."""
+
+    CARELESS = "careless"
+    """Only presses ENTER."""
+
+
+class WireLog:
+    """Collects what crossed the wire, the login excepted."""
+
+    def __init__(self) -> None:
+        self.lines: list[str] = []
+
+    def __call__(self, _time_ns: int, direction: str, data: bytes) -> None:
+        """Note one piece of traffic."""
+        mark = ">" if direction == "sent" else "<"
+        self.lines.extend(f"{mark} {line}" for line in data.decode("ascii").splitlines() if line)
+
+    def of_writes(self) -> list[str]:
+        """Return the requests that selected, moved or wrote something, with their answers.
+
+        Left out are reads, and the power mode and speeds that go before each move.
+        """
+        shown = []
+        waiting = ""
+        for line in self.lines:
+            if line.startswith(_OF_INTEREST):
+                waiting = line
+            elif waiting and line.startswith(("< #Execute", "< !Execute")):
+                shown.append(f"{waiting:<66}{line}")
+                waiting = ""
+        return shown
+
+
+def demonstrate(*, seed: int, speed: float, operator: DemoOperator) -> None:
+    """Run the demonstration and show it, or hand over its document.
+
+    Raises:
+        CalibrationError, VerifyError: A careful person was refused.
+        RuntimeError: A careless one was believed, which is a defect, or a refusal left another tool
+            in force.
+    """
+    epson = _on_epson(seed, speed, operator)
+    say()
+    plc = _on_plc(seed, operator)
+    both = (epson, plc)
+    if operator is DemoOperator.CARELESS:
+        require_refused(both)
+    if json_is_on():
+        document = {
+            "simulated": True,
+            "operator": operator.value,
+            "controllers": [one.payload() for one in both],
+        }
+        emit_json("robolink/demo/2", document)
+
+
+def require_refused(changes: Sequence[DemonstratedChange]) -> None:
+    """Raise unless every one of some changes by a careless person was refused.
+
+    Raises:
+        RuntimeError: Names where the person was believed.
+    """
+    believed = [one.robot for one in changes if isinstance(one, AcceptedChange)]
+    if believed:
+        raise RuntimeError(
+            tr("The careless person was believed, on {robots}.", robots=", ".join(believed))
+        )
+
+
+def _on_epson(seed: int, speed: float, operator: DemoOperator) -> DemonstratedChange:
+    """Change a nozzle on a simulated EPSON SCARA, over a real TCP connection."""
+    # The driver has the clock that really passes, and so has the person whom it asks.
+    share, thinks_s = _stays_share(operator), LEAST_THINKING_S
+    world = WorldParameters(person_stays_share=share, person_thinks_s=thinks_s)
+    simulator = EpsonSimulator("T6-602S", seed=seed, world=world)
+    wire = WireLog()
+    with serve_tcp(simulator, clock=ScaledClock(speed)) as host:
+        _announce(tr("SIMULATED EPSON T6-602S, served at {url}", url=host.url), operator)
+        outcomes = memory_journal(host.url).log(host.url)
+        with robolink.connect(host.url, outcomes=outcomes, trace=wire) as controller:
+            done = _Cell("epson", "T6-602S", simulator, operator).change(controller)
+    done.show()
+    say()
+    say(tr("sent on the wire (left out: reads, and low power and speed before each move):"))
+    for line in wire.of_writes():
+        say(f"  {line}")
+    return done
+
+
+def _on_plc(seed: int, operator: DemoOperator) -> DemonstratedChange:
+    """Change a nozzle on a simulated SoftMotion PLC, in this process and in simulated time."""
+    name = f"demo-{seed}-{operator}"
+    url = f"softmotion+sim://{name}?kinematics={_KINEMATICS}&seed={seed}"
+    if operator is DemoOperator.CARELESS:
+        url += f"&world.person_stays_share={_stays_share(operator):g}"
+    _announce(tr("SIMULATED CODESYS SoftMotion PLC, {url}", url=url), operator)
+    with robolink.connect(url) as controller:
+        cell = _Cell("softmotion", _KINEMATICS, simulator_named(name), operator)
+        done = cell.change(controller)
+    done.show()
+    return done
+
+
+def _stays_share(operator: DemoOperator) -> float:
+    return 1.0 if operator is DemoOperator.CARELESS else 0.0
+
+
+def _announce(simulated: str, operator: DemoOperator) -> None:
+    say(simulated)
+    say(tr("The nozzle was changed; tool {tool} still holds the old tip.", tool=TOOL))
+    if operator is DemoOperator.CARELESS:
+        say(tr("The person at this cell only presses Enter: the tip never comes onto the pin."))
+    say()
+
+
+@dataclass(frozen=True, slots=True)
+class _Cell:
+    """A simulated cell, with the person at it."""
+
+    kind: str
+    robot: str
+    simulator: EpsonSimulator | SoftMotionSimulator
+    operator: DemoOperator
+
+    def change(self, controller: Controller) -> DemonstratedChange:
+        """Change the nozzle, and return how it ended; a careless person may be refused."""
+        before = controller.tools.read(TOOL)
+        truth = self.simulator.world.tips[TOOL]
+        try:
+            report = self._report(controller)
+        except (CalibrationError, VerifyError) as error:
+            if self.operator is not DemoOperator.CARELESS:
+                raise
+            held = controller.tools.read(TOOL)
+            if held is None or not controller.tools.same(held, before):
+                raise RuntimeError(tr("The refusal left another tool selected.")) from error
+            return RefusedChange(
+                self.kind, self.robot, truth, controller.exchanges, error, in_force=held
+            )
+        return AcceptedChange(self.kind, self.robot, truth, controller.exchanges, report)
+
+    def _report(self, controller: Controller) -> ToolReport:
+        controller.motors(True)
+        person = AssistedOperator.with_eyes(
+            InProcessEyes(self.simulator),
+            lambda text: say(f"  {text}"),
+            tool=lambda: TOOL,
+            clock=controller.clock,
+        )
+        plan = ChangePlan((ToolPlan(TOOL),), ask_before_write=False)
+        change = NozzleChange(controller, plan, operator=person, listener=_Shown())
+        (report,) = change.run().tools
+        return report
+
+
+class _Shown(Listener):
+    def proposed(self, proposals: Sequence[Proposal]) -> None:
+        for proposal in proposals:
+            show_proposal(proposal)

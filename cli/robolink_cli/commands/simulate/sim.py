@@ -9,7 +9,7 @@ from robolink.messages import declared
 from robolink_cli.commands.simulate.run.sim_run import sim_run
 from robolink_cli.commands.simulate.sim_plc import sim_plc
 from robolink_cli.commands.simulate.sim_softmotion import softmotion
-from robolink_cli.console.help_sections import SectionedCommand
+from robolink_cli.console.help_pages import SectionedCommand
 from robolink_cli.options.shared import json_option
 from robolink_cli.options.simulation import (
     SECTIONS,

@@ -5,7 +5,7 @@ from typing import Any
 
 import click
 
-from robolink_cli.console.help_sections import SectionedCommand
+from robolink_cli.console.help_pages import SectionedCommand
 from robolink_cli.options.shared import json_option
 from robolink_cli.options.simulation import (
     SECTIONS,

@@ -1,7 +1,7 @@
 """Keys with the time at which they came to the terminal, however busy this process is.
 
 Whether a key was pressed by a hand is told by what came just before and after it
-(:mod:`robolink_cli.wizard.key_gate`). On a busy computer a screen is drawn for longer than a hand
+(:mod:`robolink_cli.wizard.keys`). On a busy computer a screen is drawn for longer than a hand
 needs for two keys, so the loop that draws cannot tell. A thread of its own reads each key as it
 comes. It notes when, and the last time before at which surely nothing was there to be read: where
 even that thread came late, two keys are no further apart than it can show.
@@ -17,13 +17,13 @@ from asyncio import get_running_loop
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from prompt_toolkit.input import Input
 from prompt_toolkit.input.vt100_parser import Vt100Parser
 from prompt_toolkit.key_binding import KeyPress
 
-from robolink_cli.wizard.key_gate import ALONE_S
+from robolink_cli.wizard.keys import ALONE_S
 
 TICK_S: Final = 0.005
 """So often it is looked whether nothing follows, until that is known."""
@@ -245,3 +245,128 @@ def _readable(*descriptors: int, wait_s: float | None = 0.0) -> list[int]:
         return select.select(descriptors, [], [], wait_s)[0]
     except (OSError, ValueError):
         return [descriptors[0]]
+
+
+class TimedConsole(TimedKeys):
+    """The keys of a console, each with its time.
+
+    Args:
+        source: Reads the queue of the console, without waiting.
+        waits: Tells whether there is anything in that queue.
+        now_s: The time, monotonic and fine: see :func:`fine_clock`.
+    """
+
+    def __init__(
+        self,
+        source: Input,
+        waits: Callable[[], bool],
+        now_s: Callable[[], float],
+    ) -> None:
+        super().__init__(source)
+        self._waits, self._now_s = waits, now_s
+        self._lock = threading.Lock()
+        self._came: list[KeyPress] = []
+        self._quiet_s = now_s()
+        self._last = (self._quiet_s, self._quiet_s)
+
+    def look(self) -> bool:
+        """Take what is there; tell whether there was anything. Any thread may look.
+
+        A lone Esc is no key yet: only when the loop has been told does it ask for what is left.
+        """
+        with self._lock:
+            before_s = self._now_s()
+            if not self._waits():
+                self._quiet_s = before_s
+                return False
+            keys = self._source.read_keys()
+            self._last = (self._now_s(), self._quiet_s)
+            self._keep(keys)
+            return True
+
+    def quiet(self) -> float | None:
+        """See :meth:`~robolink_cli.wizard.faces.arrivals.ArrivalReader.quiet`."""
+        with self._lock:
+            before_s = self._now_s()
+            if self._came or self._waits():
+                return None
+            self._quiet_s = before_s
+            return before_s
+
+    def read_keys(self) -> list[KeyPress]:
+        """Return the keys that came."""
+        with self._lock:
+            came, self._came = self._came, []
+            return came
+
+    def flush_keys(self) -> list[KeyPress]:
+        """Return what is no longer taken for the beginning of a longer key."""
+        with self._lock:
+            self._keep(self._source.flush_keys())
+        return self.read_keys()
+
+    @contextmanager
+    def attach(self, input_ready_callback: Callable[[], None]) -> Iterator[None]:
+        """Have the loop that runs told when there are keys."""
+        loop, over = get_running_loop(), threading.Event()
+
+        def follow() -> None:
+            while not over.is_set():
+                # An Event would wait 16 ms here; since Python 3.11 this is as fine as it says.
+                time.sleep(TICK_S)
+                if self.look():
+                    with suppress(RuntimeError):  # the loop is over
+                        loop.call_soon_threadsafe(input_ready_callback)
+
+        thread = threading.Thread(target=follow, name="keys", daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            over.set()
+            thread.join()
+
+    def _keep(self, keys: list[KeyPress]) -> None:
+        """Keep keys with the time at which the last of them came."""
+        self._came += [TimedPress(one, *self._last) for one in keys]
+
+
+def fine_clock() -> Callable[[], float]:
+    """Return a clock that is finer than two keys of a scanner are apart.
+
+    Up to Python 3.12 ``time.monotonic`` goes in steps of 16 ms on Windows (``GetTickCount64``),
+    ``time.perf_counter`` never does. Where the two have drifted apart, the coarse one is right.
+    """
+    step_s = 2 * time.get_clock_info("monotonic").resolution
+    apart_s = time.monotonic() - time.perf_counter()
+
+    def now_s() -> float:
+        nonlocal apart_s
+        fine_s, coarse_s = time.perf_counter() + apart_s, time.monotonic()
+        if abs(fine_s - coarse_s) > max(step_s, 1e-3):
+            apart_s += coarse_s - fine_s
+            return coarse_s
+        return fine_s
+
+    return now_s
+
+
+def timed(source: Input) -> TimedKeys:
+    """Return an input whose keys have their time."""
+    if os.name == "posix":
+        return TimedInput(source)
+    return TimedConsole(source, _queue_of(source), fine_clock())
+
+
+def _queue_of(source: Any) -> Callable[[], bool]:  # noqa: ANN401 - its class exists on Windows only
+    """Return what tells whether the queue of a console holds anything."""
+    import ctypes
+
+    console: Any = ctypes.WinDLL("kernel32")  # type: ignore[attr-defined,unused-ignore]
+    count = ctypes.c_ulong()
+
+    def waits() -> bool:
+        console.GetNumberOfConsoleInputEvents(source.handle, ctypes.byref(count))
+        return count.value > 0
+
+    return waits

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
-from robolink_cli.console.tolerance import PLAIN
+from robolink_cli.console.output import PLAIN
 
 if TYPE_CHECKING:
     from robolink_cli.wizard.work import Face

@@ -6,30 +6,50 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
-from robolink.interrupts import ended_by
+from robolink.interrupts import EndedBy, end, ended_by
 from robolink.messages import tr
 from robolink.runner import Question
 from robolink_cli.console.output import draw, sentences, terminal_width
 from robolink_cli.prompts.lines import QUIET_S, Lines, open_lines
-from robolink_cli.wizard.desk import Desk
-from robolink_cli.wizard.faces.effects import carry_out, leaves
 from robolink_cli.wizard.flow import advance
 from robolink_cli.wizard.happenings import (
+    Effect,
     Happening,
     HasEnded,
     LineTyped,
+    SendAnswer,
     WaitsForAnswer,
     WasAsked,
     WasRegarded,
     WasTold,
+    WizardCommand,
 )
 from robolink_cli.wizard.screens.ending import ended_of, told_end
 from robolink_cli.wizard.screens.layout import WIDTH
 from robolink_cli.wizard.screens.told import told_after_jog, told_before, told_question
 from robolink_cli.wizard.state import WizardState
+from robolink_cli.wizard.work import Desk
 
 if TYPE_CHECKING:
     from robolink_cli.wizard.work import Work
+
+
+_END: Final = WizardCommand.END_WORK
+
+
+def carry_out(desk: Desk, effects: list[Effect]) -> None:
+    """Send answers, or end the work."""
+    for effect in effects:
+        if isinstance(effect, SendAnswer):
+            desk.answer(effect)
+        elif effect is _END:
+            end(EndedBy.CTRL_C)
+
+
+def leaves(effects: list[Effect]) -> bool:
+    """Tell whether the last screen is left, for good or for what was chosen there."""
+    return any(isinstance(one, WizardCommand) for one in effects if one is not _END)
+
 
 _TURN_S: Final = 0.05
 _STEADY_S: Final = 0.5

@@ -5,18 +5,14 @@ from dataclasses import replace
 from robolink.messages import tr
 from robolink.nozzle_change import WriteSubject
 from robolink.runner import FitSubject, Question
-from robolink_cli.wizard.check_list import CheckSubject
-from robolink_cli.wizard.choices import ChoiceSubject
-from robolink_cli.wizard.screens.checking import check_screen
-from robolink_cli.wizard.screens.choosing import choice_screen
+from robolink_cli.wizard.screens.choosing import check_screen, choice_screen
 from robolink_cli.wizard.screens.ending import ended_screen
 from robolink_cli.wizard.screens.fitting import fit_screen
-from robolink_cli.wizard.screens.layout import BODY, Screen, broken
+from robolink_cli.wizard.screens.layout import BODY, Screen, broken, status_row, title_row
 from robolink_cli.wizard.screens.moving import moving_screen
-from robolink_cli.wizard.screens.rows import status_row, title_row
 from robolink_cli.wizard.screens.touching import touch_screen
 from robolink_cli.wizard.screens.values import values_screen
-from robolink_cli.wizard.state import WizardState
+from robolink_cli.wizard.state import CheckSubject, ChoiceSubject, WizardState
 
 
 def screen_of(state: WizardState, now_s: float) -> Screen:

@@ -19,15 +19,12 @@ from robolink.model import PersonRole, describe_offset, describe_standing
 from robolink.nozzle_change import ChangeReport, ToolReport, next_steps
 from robolink.standing import UNTOUCHED, standing_after
 from robolink_cli.access.warnings import way_back
-from robolink_cli.console.next_command import next_of, was_refused
+from robolink_cli.console.exit_codes import next_of, was_refused
 from robolink_cli.console.render import next_lines
-from robolink_cli.wizard.check_list import CheckSubject
-from robolink_cli.wizard.choices import ChoiceSubject
 from robolink_cli.wizard.happenings import WizardCommand
-from robolink_cli.wizard.screens.layout import Screen
-from robolink_cli.wizard.screens.rows import title_row
+from robolink_cli.wizard.screens.layout import Screen, title_row
 from robolink_cli.wizard.screens.touching import touch_title
-from robolink_cli.wizard.state import LastScreen, WizardState
+from robolink_cli.wizard.state import CheckSubject, ChoiceSubject, LastScreen, WizardState
 
 
 def done_lines(state: WizardState, report: ChangeReport) -> list[str]:

@@ -7,10 +7,9 @@ from typing import Final
 from robolink.calibration import stated_mm
 from robolink.messages import tr
 from robolink.runner import FitRow, FitSubject
-from robolink_cli.console.columns import columns, padded
+from robolink_cli.console.tables import columns, padded
 from robolink_cli.wizard.questions_flow import worst_first
-from robolink_cli.wizard.screens.layout import WIDTH, Screen
-from robolink_cli.wizard.screens.rows import JobStep, mm, title_row
+from robolink_cli.wizard.screens.layout import WIDTH, JobStep, Screen, mm, title_row
 from robolink_cli.wizard.state import WizardState
 
 _BAR: Final = 20

@@ -7,16 +7,12 @@ from robolink.messages import joined, tr
 from robolink.model import describe_pose
 from robolink.nozzle_change import WriteSubject
 from robolink.runner import FitSubject, Question, TouchSubject
-from robolink_cli.wizard.check_list import CheckSubject
-from robolink_cli.wizard.choices import ChoiceSubject
-from robolink_cli.wizard.screens.checking import mark_of
-from robolink_cli.wizard.screens.choosing import language_label
+from robolink_cli.wizard.screens.choosing import language_label, mark_of
 from robolink_cli.wizard.screens.fitting import fit_lines
-from robolink_cli.wizard.screens.layout import WIDTH
-from robolink_cli.wizard.screens.rows import mm
+from robolink_cli.wizard.screens.layout import WIDTH, mm
 from robolink_cli.wizard.screens.touching import angle_word, instruction, touch_title
 from robolink_cli.wizard.screens.values import taught_lines
-from robolink_cli.wizard.state import WizardState
+from robolink_cli.wizard.state import CheckSubject, ChoiceSubject, WizardState
 
 
 def told_before(state: WizardState, width: int = WIDTH) -> list[str]:

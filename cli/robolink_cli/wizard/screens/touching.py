@@ -5,13 +5,14 @@ import math
 from robolink.messages import tr
 from robolink.model import angle_difference_deg
 from robolink.runner import AngleShown, JogRange, Question, TouchSubject
-from robolink_cli.console.columns import padded
-from robolink_cli.wizard.screens.layout import Screen, row_of
-from robolink_cli.wizard.screens.rows import (
+from robolink_cli.console.tables import padded
+from robolink_cli.wizard.screens.layout import (
     UPRIGHT,
     JobStep,
+    Screen,
     coordinate_names,
     mm,
+    row_of,
     signed,
     status_row,
     title_row,

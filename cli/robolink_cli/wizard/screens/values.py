@@ -7,13 +7,16 @@ from typing import TYPE_CHECKING
 from robolink.messages import tr
 from robolink.model import ToolOffset, angle_difference_deg
 from robolink.nozzle_change import LimitVerdict, Proposal, WriteSubject
-from robolink_cli.console.columns import padded
-from robolink_cli.wizard.screens.layout import BODY, Screen, broken, row_of
-from robolink_cli.wizard.screens.rows import (
+from robolink_cli.console.tables import padded
+from robolink_cli.wizard.screens.layout import (
+    BODY,
     UPRIGHT,
     JobStep,
+    Screen,
+    broken,
     coordinate_names,
     mm,
+    row_of,
     signed,
     title_row,
 )

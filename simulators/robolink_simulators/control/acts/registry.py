@@ -19,9 +19,9 @@ from robolink_simulators.control.acts.declared import (
 from robolink_simulators.control.acts.wire import KEEPING_ACTS, WIRE_ACTS
 from robolink_simulators.control.acts.world import WORLD_ACTS
 from robolink_simulators.control.cell import ControlledCell
+from robolink_simulators.epson.condition import SpelRefusal
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.panel import EpsonPanel
-from robolink_simulators.epson.refusals import SpelRefusal
 from robolink_simulators.faults.fieldbus import Order
 from robolink_simulators.faults.links import LinkKind
 from robolink_simulators.not_now import NotNowError

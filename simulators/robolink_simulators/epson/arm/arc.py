@@ -14,12 +14,10 @@ from dataclasses import dataclass, replace
 from robolink.model import Hand, Pose, Posture, ToolOffset
 from robolink.timing import NS_PER_S
 from robolink_simulators.cell.frames import Vector, add, cross, dot, scale, subtract
-from robolink_simulators.epson.arm.joints import Joints, check_ranges
 from robolink_simulators.epson.arm.kinematics import flange_of, hand_of, posture_of, solve
-from robolink_simulators.epson.arm.ramps import BrakedRamp, Ramp, TimeLaw
-from robolink_simulators.epson.arm.robots import RobotModel
-from robolink_simulators.epson.arm.trajectory import LinePace
-from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.arm.robots import Joints, RobotModel, check_ranges
+from robolink_simulators.epson.arm.trajectory import BrakedRamp, LinePace, Ramp, TimeLaw
+from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 
 _CHECKS = 90
 _STRAIGHT = 1e-6

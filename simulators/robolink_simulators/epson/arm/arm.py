@@ -13,9 +13,8 @@ from typing import Final
 
 from robolink.model import Hand, Pose, Posture, ToolOffset
 from robolink_simulators.device.wire_record import Place
-from robolink_simulators.epson.arm.joints import Joints, check_ranges
 from robolink_simulators.epson.arm.kinematics import forward, hand_of, posture_of, tip_of
-from robolink_simulators.epson.arm.robots import Mechanism, RobotModel
+from robolink_simulators.epson.arm.robots import Joints, Mechanism, RobotModel, check_ranges
 from robolink_simulators.epson.arm.tilted_legs import plan_line
 from robolink_simulators.epson.arm.trajectory import (
     JointLeg,

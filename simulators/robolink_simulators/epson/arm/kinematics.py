@@ -1,7 +1,16 @@
 """From joints to the pose of the flange and back, of whichever robot, and a tool's tip.
 
-How each kind of robot is built stands in :mod:`~robolink_simulators.epson.arm.scara` and
-:mod:`~robolink_simulators.epson.arm.six_axes`.
+A robot of six axes is built as :mod:`~robolink_simulators.epson.arm.six_axes` says.
+
+Conventions of a SCARA, stretched or folded where joint 2 is 0: joint 1 at 0 has the first arm
+along the robot's +X, counter-clockwise is positive (documented, docs/reference/epson.md 4).
+With the sum of joints 1, 2 and 4 at 0 the flange axes are parallel to the robot axes, hence ``U =
+J1 + J2 + J4``; that U is printed and taken literally, not brought into -180..180, is assumed (a
+SCARA has no flag that could tell 270 from -90). Z is joint 3's travel, 0 at the top, negative
+downwards (documented). An RS has arm 2 under arm 1 where joint 2 is 0: its second arm points
+against ``J1 + J2``. Sources: docs/reference/epson-robots.md, "Arms that fold". With an added arm
+the second arm has another length and direction, U another axis, height and zero:
+:class:`~robolink_simulators.epson.arm.robots.ArmOffsets`.
 """
 
 import math
@@ -10,9 +19,112 @@ from typing import Final
 
 from robolink.model import Hand, Pose, Posture, ToolOffset, rotate_xy
 from robolink_simulators.cell.frames import ORIGIN, Frame, Vector, printed_angles, zyx
-from robolink_simulators.epson.arm import scara, six_axes
-from robolink_simulators.epson.arm.joints import Joints, check_depth, check_ranges, nearest_turn
-from robolink_simulators.epson.arm.robots import RobotModel
+from robolink_simulators.epson.arm import six_axes
+from robolink_simulators.epson.arm.robots import (
+    Joints,
+    Mechanism,
+    RobotModel,
+    check_depth,
+    check_ranges,
+    nearest_turn,
+    within,
+    wrapped,
+)
+from robolink_simulators.epson.condition import OutOfReach
+
+_ROUNDING = 1e-9
+_ON_THE_AXIS_MM = 1e-6
+"""Nearer to the axis of joint 1 the flange of an RS leaves joint 1 free; a point that prints 0.000
+for X and Y is there."""
+_FIRST_TURN_MIDDLE_DEG = 90.0
+_HALF = 180.0
+
+
+def _scara_hand(model: RobotModel, joints: Joints) -> Hand:
+    """Return the hand; a stretched arm counts as right.
+
+    Righty is the arm whose elbow lies to the right of the line from base to flange, as a person's
+    right elbow does (inferred).
+    """
+    bend_deg = joints[1] + model.offsets.j2_deg
+    if model.mechanism is Mechanism.FOLDED_SCARA:
+        bend_deg = wrapped(bend_deg + _HALF)
+    return Hand.RIGHT if bend_deg >= 0 else Hand.LEFT
+
+
+def _scara_posture(model: RobotModel, joints: Joints) -> Posture | None:
+    """Return the joint flags of an RS, ``None`` for other SCARAs, which have none."""
+    if model.mechanism is not Mechanism.FOLDED_SCARA:
+        return None
+    first = -_HALF <= joints[0] - _FIRST_TURN_MIDDLE_DEG <= _HALF
+    away_mm = 2 * model.lengths_mm[0] * abs(math.sin(math.radians(joints[1]) / 2))
+    return Posture(
+        j1_flag=int(not first),
+        j2_flag=int(abs(joints[1]) > _HALF),
+        j1_angle_deg=joints[0] if away_mm < _ON_THE_AXIS_MM else None,
+    )
+
+
+def _scara_forward(model: RobotModel, joints: Joints) -> Pose:
+    """Return the pose of the flange (Tool 0) in the robot's base frame."""
+    j1_deg, j2_deg, j3_mm, j4_deg = joints
+    added = model.offsets
+    inner, outer = math.radians(j1_deg), math.radians(j1_deg + j2_deg + added.j2_deg)
+    a1_mm, a2_mm = model.lengths_mm
+    if model.mechanism is Mechanism.FOLDED_SCARA:
+        a2_mm = -a2_mm
+    return Pose(
+        x_mm=a1_mm * math.cos(inner) + a2_mm * math.cos(outer),
+        y_mm=a1_mm * math.sin(inner) + a2_mm * math.sin(outer),
+        z_mm=j3_mm + added.z_mm,
+        u_deg=j1_deg + j2_deg + j4_deg + added.u_deg,
+        hand=_scara_hand(model, joints),
+        tool=0,
+        posture=_scara_posture(model, joints),
+    )
+
+
+def _scara_solve(model: RobotModel, flange: Pose, hand: Hand, posture: Posture) -> Joints:
+    """Return the joints that put the flange at ``flange``, whatever their ranges.
+
+    Joint 1 is taken within half a turn of the middle of its range, or in the turn of its flag. An
+    RS whose flange is on the axis of joint 1 takes J1Angle, 0 where the point has none (documented
+    that it counts there; docs/reference/epson-robots.md, "Singularities").
+
+    Raises:
+        OutOfReach: The position is too far out or too far in for the two arms.
+    """
+    a1_mm, a2_mm = model.lengths_mm
+    distance_sq = flange.x_mm * flange.x_mm + flange.y_mm * flange.y_mm
+    cosine = (distance_sq - a1_mm**2 - a2_mm**2) / (2 * a1_mm * a2_mm)
+    if not abs(cosine) <= 1 + _ROUNDING:
+        raise OutOfReach(
+            f"Point outside the arm's reach: {math.sqrt(distance_sq):.3f} mm from joint 1"
+        )
+    bend = math.acos(max(-1.0, min(1.0, cosine)))
+    if hand is Hand.LEFT:
+        bend = -bend
+    across, along = a2_mm * math.sin(bend), a1_mm + a2_mm * math.cos(bend)
+    j1_deg = math.degrees(math.atan2(flange.y_mm, flange.x_mm) - math.atan2(across, along))
+    j2_deg = math.degrees(bend)
+    low, high = model.ranges[0]
+    if model.mechanism is Mechanism.FOLDED_SCARA:
+        if distance_sq < _ON_THE_AXIS_MM**2:
+            j1_deg, j2_deg = posture.j1_angle_deg or 0.0, _HALF
+        else:
+            j1_deg = within(-90.0, 270.0, j1_deg)
+            if posture.j1_flag:
+                j1_deg += -360.0 if j1_deg - 360.0 >= low - _ROUNDING else 360.0
+        j2_deg = wrapped(j2_deg - _HALF)
+        if posture.j2_flag:
+            j2_deg += 360.0 if j2_deg < 0 else -360.0
+    else:
+        j1_deg = within(low, high, j1_deg)
+    added = model.offsets
+    j2_deg -= added.j2_deg
+    j4_deg = flange.u_deg - added.u_deg - j1_deg - j2_deg
+    return Joints(j1_deg, j2_deg, flange.z_mm - added.z_mm, j4_deg)
+
 
 PLAIN: Final = Posture()
 """The posture of a point without flags (inferred): elbow above, wrist not flipped, first turns."""
@@ -20,19 +132,19 @@ PLAIN: Final = Posture()
 
 def forward(model: RobotModel, joints: Joints) -> Pose:
     """Return the pose of the flange (Tool 0) in the robot's base frame."""
-    return six_axes.forward(model, joints) if model.six_axes else scara.forward(model, joints)
+    return six_axes.forward(model, joints) if model.six_axes else _scara_forward(model, joints)
 
 
 def hand_of(model: RobotModel, joints: Joints) -> Hand:
     """Return the hand of an arm that stands so."""
-    return six_axes.hand_of(model, joints) if model.six_axes else scara.hand_of(model, joints)
+    return six_axes.hand_of(model, joints) if model.six_axes else _scara_hand(model, joints)
 
 
 def posture_of(model: RobotModel, joints: Joints) -> Posture | None:
     """Return elbow, wrist and joint flags, ``None`` for a robot that has none of them."""
     if model.six_axes:
         return six_axes.posture_of(model, joints)
-    return scara.posture_of(model, joints)
+    return _scara_posture(model, joints)
 
 
 def solve(model: RobotModel, flange: Pose, hand: Hand, posture: Posture | None = None) -> Joints:
@@ -50,7 +162,7 @@ def solve(model: RobotModel, flange: Pose, hand: Hand, posture: Posture | None =
     posture = posture or PLAIN
     if model.six_axes:
         return six_axes.solve(model, flange, hand, posture)
-    return scara.solve(model, flange, hand, posture)
+    return _scara_solve(model, flange, hand, posture)
 
 
 def inverse(model: RobotModel, flange: Pose, hand: Hand, posture: Posture | None = None) -> Joints:
@@ -76,7 +188,7 @@ def continued(model: RobotModel, flange: Pose, near: Joints) -> Joints:
     if model.six_axes:
         joints = six_axes.solve_near(model, frame_of(flange), near)
     else:
-        joints = scara.solve(model, flange, hand_of(model, near), _kept(model, near))
+        joints = _scara_solve(model, flange, hand_of(model, near), _kept(model, near))
     check_ranges(model, joints)
     check_depth(model, joints)
     return joints

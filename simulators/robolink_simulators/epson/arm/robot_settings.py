@@ -6,7 +6,7 @@ Source: docs/reference/spel.md 6.2, 6.3, 7.2.
 from dataclasses import dataclass, field
 from typing import Final
 
-from robolink_simulators.epson.definitions.joint_origins import joint_order
+from robolink_simulators.epson.arm.joint_settings import joint_order
 
 FINE_PULSES: Final = 10
 """Default of Fine; per model in the reference, 10 in its sample (docs/reference/spel.md 7.3)."""

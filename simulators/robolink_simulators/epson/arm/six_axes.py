@@ -13,10 +13,9 @@ from typing import Final, NamedTuple
 
 from robolink.model import Elbow, Hand, Pose, Posture, Wrist
 from robolink_simulators.cell.frames import Frame, Matrix, Vector, printed_angles, zyx
-from robolink_simulators.epson.arm.joints import Joints, nearest_turn, within, wrapped
 from robolink_simulators.epson.arm.robot_settings import SingularSurroundings
-from robolink_simulators.epson.arm.robots import RobotModel
-from robolink_simulators.epson.refusals import OutOfReach
+from robolink_simulators.epson.arm.robots import Joints, RobotModel, nearest_turn, within, wrapped
+from robolink_simulators.epson.condition import OutOfReach
 
 NOT_FLIPPED_SIGN: Final = -1.0
 """Sign of joint 5 of a wrist that is not flipped (inferred from EPSON's own poses with the tool

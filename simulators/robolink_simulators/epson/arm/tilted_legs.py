@@ -28,7 +28,6 @@ from robolink_simulators.cell.frames import (
     transposed,
 )
 from robolink_simulators.epson.arm.arc import MeasuredWay, Way, plan_level_way
-from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.kinematics import (
     continued_frame,
     forward,
@@ -38,12 +37,18 @@ from robolink_simulators.epson.arm.kinematics import (
     posture_of,
     tool_frame,
 )
-from robolink_simulators.epson.arm.ramps import BrakedRamp, Ramp, TimeLaw
 from robolink_simulators.epson.arm.robot_settings import SingularSurroundings
-from robolink_simulators.epson.arm.robots import RobotModel
+from robolink_simulators.epson.arm.robots import Joints, RobotModel
 from robolink_simulators.epson.arm.six_axes import singular_stretches
-from robolink_simulators.epson.arm.trajectory import Leg, LinePace, plan_move
-from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.arm.trajectory import (
+    BrakedRamp,
+    Leg,
+    LinePace,
+    Ramp,
+    TimeLaw,
+    plan_move,
+)
+from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 
 _STILL = 1e-9
 _USUAL = SingularSurroundings()

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Final, Literal, TypeAlias
 
 from robolink.model import ToolOffset
-from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 
 HIGHEST_TOOL: Final = 15
 

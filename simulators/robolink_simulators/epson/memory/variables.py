@@ -11,7 +11,7 @@ from typing import Any, Final
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.protocols.epson_text import ErrorCode, VariableType
-from robolink_simulators.epson.refusals import RequestRefused, malformed
+from robolink_simulators.epson.condition import RequestRefused, malformed
 
 Value = bool | int | float | str
 

@@ -2,7 +2,7 @@
 
 from robolink_simulators.epson.condition import Condition
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.epson.remote.exchange import PendingRequest
+from robolink_simulators.epson.remote.link import PendingRequest
 from robolink_simulators.epson.spel import Interpreter, SpelError, StatementExecution
 from robolink_simulators.faults import FaultAction
 

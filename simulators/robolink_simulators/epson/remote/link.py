@@ -1,9 +1,12 @@
-"""One client's connection to the simulated controller: codec, login, what leaves and when.
+"""Connections of clients to the simulated controller: codec, login, what leaves and when.
+
+Who is logged in, and for how long silence is tolerated (docs/reference/epson.md 1.1).
 
 On a serial line nothing is connected: EOT begins, and silence ends a request that was cut short.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Final, Protocol
 
 from robolink.errors import LocalProtocolError, RemoteProtocolError
@@ -21,9 +24,153 @@ from robolink.protocols.epson_text import (
 from robolink.timing import NS_PER_S
 from robolink_simulators.device.wire_time import WireTime
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.epson.remote.exchange import PendingRequest
-from robolink_simulators.faults import Departure
+from robolink_simulators.faults import Departure, Fault, FaultAction
 from robolink_simulators.faults.departing import DepartingReplies
+
+
+def shown_request(event: Request | BadRequest) -> str:
+    """Return a request in one line."""
+    name = event.name
+    if isinstance(event, BadRequest):
+        return "***" if "login" in name.lower() else name
+    match name.lower():
+        case "login":
+            return f"${name},***"
+        case "execute":
+            return f'${name},"{event.parameters[0]}"'  # quotes inside stand as they came
+        case _:
+            return ",".join((f"${name}", *event.parameters))
+
+
+def shown_reply(reply: bytes) -> str:
+    """Return a reply without its terminator."""
+    text = reply.decode("latin-1").rstrip("\r\n")
+    if text[:1] != "!":
+        return text
+    # The refusal of a login that could not be read repeats it, password and all.
+    mistyped = "login" in text.lower() and text[1:6].lower() + text[6:7] != "login,"
+    return "***" if mistyped else text
+
+
+class Client(Protocol):
+    """A connection that may log in."""
+
+    def cut(self) -> None:
+        """End the connection from the controller's side."""
+
+
+class ClientSlot:
+    """The one place for a logged-in client, watched by the remote time-out.
+
+    When a client vanishes without a logout while something runs, its silence goes on being
+    counted: that a finite time-out also ends what runs is inferred (docs/reference/epson.md 1.7).
+
+    Args:
+        remote_timeout_s: Longest silence; 0 for any.
+        wire_time: By which it is counted.
+    """
+
+    __slots__ = (
+        "_heard_ns",
+        "_timeout_ns",
+        "_wire_time",
+        "client",
+    )
+
+    def __init__(self, remote_timeout_s: float, wire_time: WireTime) -> None:
+        self._timeout_ns = round(remote_timeout_s * NS_PER_S)
+        self._wire_time = wire_time
+        self._heard_ns: int | None = None
+        self.client: Client | None = None
+
+    def admit(self, client: Client, now_ns: int) -> None:
+        """Log a client in."""
+        self.client = client
+        self.heard(now_ns)
+
+    def hears(self, link: Client, *, cuts: bool) -> bool:
+        """Tell whether a connection is listened to; whoever comes second may be cut off."""
+        if self.client in (None, link):
+            return True
+        if cuts:
+            link.cut()
+        return False
+
+    def heard(self, now_ns: int) -> None:
+        """The client sent a request."""
+        self._heard_ns = self._wire_time.at(now_ns)
+
+    def free(self) -> None:
+        """The client logged out."""
+        self.client = self._heard_ns = None
+
+    def lost(self, *, unfinished: bool) -> None:
+        """The client is gone; keep counting its silence while something is unfinished."""
+        self.client = None
+        self.settle(unfinished=unfinished)
+
+    def settle(self, *, unfinished: bool) -> None:
+        """Forget the silence of a client that is gone once nothing of its is unfinished."""
+        if self.client is None and not unfinished:
+            self._heard_ns = None
+
+    def deadline(self, *, unfinished: bool) -> int | None:
+        """Return when the silence will have lasted too long, if it is counted."""
+        counted = self.client is not None or unfinished
+        if self._heard_ns is None or not self._timeout_ns or not counted:
+            return None
+        return self._wire_time.simulated_at(self._heard_ns + self._timeout_ns)
+
+    def overdue(self, now_ns: int, *, unfinished: bool) -> tuple[bool, Client | None]:
+        """Return whether the silence has lasted too long, and whose it was; its place is free."""
+        self.settle(unfinished=unfinished)
+        deadline = self.deadline(unfinished=unfinished)
+        if deadline is None or now_ns < deadline:
+            return False, None
+        client = self.client
+        self.free()
+        return True, client
+
+
+class Answering(Protocol):
+    """Takes the answer to the client, if it is still there."""
+
+    def answer(self, exchange: "PendingRequest", event: Reply | Refusal) -> None:
+        """Let the answer leave."""
+
+
+@dataclass(frozen=True, slots=True)
+class PendingRequest:
+    """A request that came in.
+
+    Attributes:
+        number: Running number over all clients, from 1.
+        name: The command in the case in which the client wrote it; the answer echoes it.
+        faults: What is planned to go wrong with it.
+        link: Where the answer goes.
+    """
+
+    number: int
+    name: str
+    faults: tuple[Fault, ...]
+    link: Answering
+
+    def reply(self, *fields: str) -> None:
+        """Answer with fields, ``0`` when there are none."""
+        self.link.answer(self, Reply(self.name, fields or ("0",)))
+
+    def reply_text(self, text: str) -> None:
+        """Answer with what a statement printed."""
+        self.link.answer(self, Reply(self.name, text=text))
+
+    def refuse(self, code: int) -> None:
+        """Answer with an error code."""
+        self.link.answer(self, Refusal(self.name, int(code)))
+
+    def meets(self, action: FaultAction) -> bool:
+        """Tell whether a fault of this kind is planned for it."""
+        return any(fault.action is action for fault in self.faults)
+
 
 _SILENCE_NS: Final = 100_000_000
 """How long nothing must come for a request without a line end to be whole (inferred)."""
@@ -278,3 +425,49 @@ class EpsonServerLink:
         if self._silent_since_ns is None:
             return None
         return self._wire_time.simulated_at(self._silent_since_ns + _SILENCE_NS)
+
+
+class OpenLinks:
+    """Holds connections until nothing will happen on them any more."""
+
+    __slots__ = ("_links",)
+
+    def __init__(self) -> None:
+        self._links: list[EpsonServerLink] = []
+
+    @property
+    def settled(self) -> bool:
+        """Whether none has ended, of which something may still be on its way."""
+        for link in self._links:  # noqa: SIM110 - asked in every exchange: a generator costs more
+            if link.over:
+                return False
+        return True
+
+    def add(self, link: EpsonServerLink) -> None:
+        """Hold one more."""
+        self._links.append(link)
+
+    def next_change(self) -> int | None:
+        """Return when something happens on one of them by itself, if ever."""
+        first = None
+        for link in self._links:
+            change = link.next_change()
+            if change is not None and (first is None or change < first):
+                first = change
+        return first
+
+    def supervise(self, now_ns: int) -> None:
+        """Keep their time-outs, and forget those that have ended."""
+        for link in self._links:
+            link.supervise(now_ns)
+        self._links = [link for link in self._links if not link.drained]
+
+    def cut(self) -> None:
+        """End all of them from the controller's side."""
+        for link in self._links:
+            link.cut()
+
+    def push(self, data: bytes) -> None:
+        """Send every client bytes that nobody asked for (F10)."""
+        for link in self._links:
+            link.push(data)

@@ -1,23 +1,256 @@
-"""What a controller does with a request: faults, log and hooks around what it is served with."""
+"""What a controller does with a request: faults, log, hooks, and where it goes.
+
+Where a request goes: login, logout, the command window, or the desk.
+
+Source: docs/reference/epson.md 1.1, 1.2.
+"""
 
 from abc import ABC
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Protocol
 
-from robolink.protocols.epson_text import BadRequest, Request
+from robolink.protocols import NEED_DATA, Role
+from robolink.protocols.epson_binary import Dialect, EpsonBinaryCodec
+from robolink.protocols.epson_text import (
+    BadRequest,
+    EpsonTextCodec,
+    ErrorCode,
+    RemoteCommand,
+    Request,
+    find_command,
+)
 from robolink_simulators.device.hosted import HostedDevice
-from robolink_simulators.epson.condition import Condition
+from robolink_simulators.epson.condition import Condition, RequestRefused, Task
 from robolink_simulators.epson.flash import Flash
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.epson.remote.bent_requests import arriving
-from robolink_simulators.epson.remote.client_slot import ClientSlot
 from robolink_simulators.epson.remote.command_window import SpelWindow
-from robolink_simulators.epson.remote.exchange import PendingRequest
-from robolink_simulators.epson.remote.link import EpsonServerLink
-from robolink_simulators.epson.remote.service import Service
-from robolink_simulators.epson.remote.wire_text import shown_reply, shown_request
+from robolink_simulators.epson.remote.commands import CommandDesk
+from robolink_simulators.epson.remote.link import (
+    ClientSlot,
+    EpsonServerLink,
+    PendingRequest,
+    shown_reply,
+    shown_request,
+)
 from robolink_simulators.faults import Departure, Fault, FaultAction, FaultPlan, LinkKind
+
+
+class Carrier(Protocol):
+    """The link that a request came over."""
+
+    @property
+    def dialect(self) -> Dialect | None:
+        """How its frames are written; ``None`` for Remote Ethernet."""
+
+    def cut(self) -> None:
+        """End it."""
+
+    def stall(self, event: Request | BadRequest, seconds: float) -> None:
+        """Let nothing pass for a while, and the request after that."""
+
+
+def arriving(
+    link: Carrier,
+    event: Request | BadRequest,
+    faults: Sequence[Fault],
+    plan: FaultPlan,
+    *,
+    unterminated: bool,
+) -> Request | BadRequest | None:
+    """Return the request that the controller hears now.
+
+    Args:
+        link: Where it came over.
+        event: The request that was sent.
+        faults: Those that it meets.
+        plan: Draws what a fault leaves open.
+        unterminated: Whether a request may lack its line end.
+
+    Returns:
+        ``None`` when nothing of use arrives.
+
+    Raises:
+        RemoteProtocolError: What arrives makes no sense.
+    """
+    heard: Request | BadRequest | None = event
+    for fault in faults:
+        match fault.action:
+            case FaultAction.DISCONNECT_BEFORE:
+                link.cut()
+                return None
+            case FaultAction.DROP_REQUEST:
+                return None
+            case FaultAction.STALL:
+                link.stall(event, fault.seconds)
+                return None
+            case FaultAction.GARBLE_REQUEST | FaultAction.TRUNCATE_REQUEST if heard:
+                if link.dialect is None:
+                    heard = _bent_text(heard, fault, plan, unterminated=unterminated)
+                else:
+                    heard = _bent_frame(heard, fault, plan, link.dialect)
+    return heard
+
+
+def _bent_text(
+    event: Request | BadRequest, fault: Fault, plan: FaultPlan, *, unterminated: bool
+) -> Request | BadRequest | None:
+    sent = _on_the_wire(event)
+    codec = EpsonTextCodec(Role.DEVICE, unterminated=unterminated)
+    if fault.action is FaultAction.TRUNCATE_REQUEST:
+        codec.receive_data(sent[: _cut_at(fault, sent)] or b" ")
+        if unterminated:
+            codec.end_of_request()
+    else:
+        codec.receive_data(plan.bent(sent, fault) + b"\r\n")
+    return _heard(codec.next_event())
+
+
+def _bent_frame(
+    event: Request | BadRequest, fault: Fault, plan: FaultPlan, dialect: Dialect
+) -> Request | BadRequest | None:
+    """Behind a frame that is cut short the line is silent, and so ends it."""
+    if isinstance(event, BadRequest):
+        return event
+    sent = EpsonBinaryCodec(Role.HOST, dialect).send(event)
+    cut = fault.action is FaultAction.TRUNCATE_REQUEST
+    codec = EpsonBinaryCodec(Role.DEVICE, dialect)
+    codec.receive_data(sent[: _cut_at(fault, sent)] or b" " if cut else plan.bent(sent, fault))
+    return _heard(codec.next_event()) or _heard(codec.end_of_request())
+
+
+def _cut_at(fault: Fault, sent: bytes) -> int:
+    return len(sent) // 2 if fault.position is None else fault.position % len(sent)
+
+
+def _heard(event: object) -> Request | BadRequest | None:
+    return event if event is not NEED_DATA and isinstance(event, (Request, BadRequest)) else None
+
+
+def _on_the_wire(event: Request | BadRequest) -> bytes:
+    """Return a request without its line end, as its client wrote it."""
+    if isinstance(event, BadRequest):
+        return f"${event.name}".encode("latin-1", "replace")
+    if event.name.lower() == "execute":
+        return f'${event.name},"{event.parameters[0]}"'.encode("latin-1", "replace")
+    return ",".join((f"${event.name}", *event.parameters)).encode("latin-1", "replace")
+
+
+class Service:
+    """Carries requests out, and answers all but an Execute at once.
+
+    Args:
+        desk: Serves what is done at once.
+        window: Runs statements.
+        slot: Who is logged in.
+        condition: The state that a bad logout changes.
+        options: The controller's habits.
+        password: What Login must carry; empty for none.
+    """
+
+    __slots__ = (
+        "_condition",
+        "_desk",
+        "_options",
+        "_password",
+        "_slot",
+        "_window",
+    )
+
+    def __init__(
+        self,
+        desk: CommandDesk,
+        window: SpelWindow,
+        slot: ClientSlot,
+        condition: Condition,
+        *,
+        options: EpsonOptions,
+        password: str,
+    ) -> None:
+        self._desk = desk
+        self._window = window
+        self._slot = slot
+        self._condition = condition
+        self._options = options
+        self._password = password
+
+    @property
+    def unfinished(self) -> bool:
+        """Whether a statement or a task runs."""
+        return self._window.busy or self._condition.task is not Task.NONE
+
+    def carry_out(
+        self,
+        link: EpsonServerLink,
+        exchange: PendingRequest,
+        event: Request | BadRequest,
+        now_ns: int,
+    ) -> None:
+        """Do what a request asks, or refuse it."""
+        logged_in = self._slot.client is link
+        if logged_in:
+            self._slot.heard(now_ns)
+        try:
+            if isinstance(event, BadRequest):
+                raise RequestRefused(event.code)
+            command = find_command(event.name)
+            if command is None:
+                raise RequestRefused(ErrorCode.UNKNOWN_COMMAND)
+            self._desk.admit(command, logged_in=logged_in, executing=self._window.busy)
+            self._dispatch(link, exchange, command, event, now_ns=now_ns)
+        except RequestRefused as refused:
+            exchange.refuse(refused.code)
+
+    def _dispatch(
+        self,
+        link: EpsonServerLink,
+        exchange: PendingRequest,
+        command: RemoteCommand,
+        request: Request,
+        *,
+        now_ns: int,
+    ) -> None:
+        match command.name:
+            case "GetStatus":
+                exchange.reply(*self._desk.status(executing=self._window.busy))
+            case "Execute":
+                self._window.start(request.parameters[0], exchange, now_ns)
+            case "Home":
+                # It answers when the arm is there, as a motion of Execute does (assumed).
+                self._desk.check_home(request.parameters)
+                self._window.start("Home", exchange, now_ns)
+            case "Abort":
+                self._window.abort(exchange, now_ns)
+            case "Login":
+                self._login(link, request, now_ns)
+                exchange.reply()
+            case "Logout":
+                self._logout(link, now_ns)
+                exchange.reply()
+            case _:
+                exchange.reply(*self._desk.serve(request))
+
+    def _login(self, link: EpsonServerLink, request: Request, now_ns: int) -> None:
+        bare = not request.parameters
+        if bare and self._options.login_without_parameter == "error_12":
+            raise RequestRefused(ErrorCode.MALFORMED)
+        password = "" if bare else request.parameters[0]
+        # That a controller without a password takes an empty one only is assumed.
+        if password != self._password:
+            raise RequestRefused(ErrorCode.WRONG_PASSWORD)
+        self._slot.admit(link, now_ns)
+        link.logged_in(True, now_ns)
+
+    def _logout(self, link: EpsonServerLink, now_ns: int) -> None:
+        if self.unfinished:
+            # Logging out while a task runs raises an error (documented,
+            # docs/reference/epson.md 1.1); that the error ends what runs, as errors do, is assumed.
+            self._window.interrupt(now_ns)
+            self._condition.raise_error(self._options.numbers.logged_out_in_task)
+            if self._options.logout_while_running == "refused":
+                raise RequestRefused(ErrorCode.NOT_READY)
+        self._slot.free()
+        link.logged_in(False, now_ns)
 
 
 class PlannedMishaps(Protocol):

@@ -13,7 +13,7 @@ from tempfile import mkdtemp
 from typing import Final
 from weakref import finalize
 
-from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 
 FIRST_DRIVE: Final = "c"
 _DRIVE: Final = re.compile(r"([A-Za-z]):(.*)$", re.DOTALL)

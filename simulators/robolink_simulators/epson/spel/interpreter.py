@@ -3,13 +3,12 @@
 import random
 from collections.abc import Mapping
 
-from robolink_simulators.epson.condition import Condition
+from robolink_simulators.epson.condition import Condition, SpelRefusal
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.variables import Variables
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.epson.refusals import SpelRefusal
-from robolink_simulators.epson.spel.execution.statement_execution import SpelError as SpelError
-from robolink_simulators.epson.spel.execution.statement_execution import (
+from robolink_simulators.epson.spel.execution import SpelError as SpelError
+from robolink_simulators.epson.spel.execution import (
     StatementExecution as StatementExecution,
 )
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator

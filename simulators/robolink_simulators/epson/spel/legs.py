@@ -6,14 +6,20 @@ from dataclasses import replace
 from robolink.model import Pose
 from robolink_simulators.cell.frames import Frame
 from robolink_simulators.epson.arm.arc import MeasuredWay
-from robolink_simulators.epson.arm.joints import Joints
 from robolink_simulators.epson.arm.kinematics import frame_of
 from robolink_simulators.epson.arm.motion_parameters import HIGHEST_SPEED_S, MotionPhase
-from robolink_simulators.epson.arm.ramps import Ramp
+from robolink_simulators.epson.arm.robots import Joints
 from robolink_simulators.epson.arm.tilted_legs import plan_about_point, plan_line, plan_way
-from robolink_simulators.epson.arm.trajectory import JointLeg, JointPace, Leg, LinePace, plan_go
+from robolink_simulators.epson.arm.trajectory import (
+    JointLeg,
+    JointPace,
+    Leg,
+    LinePace,
+    Ramp,
+    plan_go,
+)
+from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 
 _PERCENT = 100
 

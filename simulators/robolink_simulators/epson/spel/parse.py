@@ -1,20 +1,93 @@
-"""Text to statements. The parser is built on first use, parsed texts are remembered."""
+"""Text to statements: lines of the command window and of programs.
+
+Lines that differ in their numbers alone: read once, then filled with each other's numbers.
+
+A client sends the same few lines with another place in each, and reading a line takes a millisecond
+of the processor, filling it some microseconds.
+"""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import fields, is_dataclass
 from functools import lru_cache
 from importlib.resources import files
-from typing import Final
+from typing import Any, Final, cast
 
 from lark import Lark, Token
-from lark.exceptions import LarkError, UnexpectedInput
+from lark.exceptions import LarkError, UnexpectedCharacters, UnexpectedInput, UnexpectedToken
 
-from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink.messages import tr
+from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.values import number_value
 from robolink_simulators.epson.spel.line_build import ProgramBuilder
 from robolink_simulators.epson.spel.line_tree import LineNode
-from robolink_simulators.epson.spel.shapes import Filler, filler, marked
+from robolink_simulators.epson.spel.source_text import ProgramFault, SourceLine
 from robolink_simulators.epson.spel.tree import Literal, Statement
+
+_NUMBER: Final = re.compile(r"(?<![\w.&$])\d{1,9}\.\d{1,9}(?![\w.])")
+_QUOTES: Final = frozenset("\"'")
+
+Filler = Callable[[Sequence[Literal]], Any]
+"""Returns a part of a tree with numbers in the places of the marks."""
+
+
+def marked(line: str) -> tuple[str, list[str]]:
+    """Return a line with a mark for each number with decimals, and those numbers.
+
+    A line with a text or a comment in it has none: what stands there is no number.
+
+    Example:
+        >>> from robolink_simulators.epson.spel.parse import marked
+        >>> marked("Go XY(300.5, -12.25, 7, 0)")
+        ('Go XY(0.987654321, -1.987654321, 7, 0)', ['300.5', '12.25'])
+    """
+    if not _QUOTES.isdisjoint(line):
+        return line, []
+    numbers = list[str]()
+
+    def mark(found: re.Match[str]) -> str:
+        numbers.append(found[0])
+        return _mark(len(numbers) - 1)
+
+    return _NUMBER.sub(mark, line), numbers
+
+
+def filler(tree: tuple[Any, ...], count: int) -> Filler | None:
+    """Return what fills the tree of a marked line; ``None`` where a mark is not there just once."""
+    marks, found = {number_value(_mark(place)): place for place in range(count)}, list[int]()
+    fill = _filler(tree, marks, found)
+    return fill if sorted(found) == list(range(count)) else None
+
+
+def _mark(place: int) -> str:
+    return f"{place}.987654321"
+
+
+def _tuple_of(*parts: object) -> tuple[object, ...]:
+    return parts
+
+
+def _filler(node: object, marks: dict[Any, int], found: list[int]) -> Filler | None:
+    """Return what fills a part of a tree, ``None`` where there is nothing to fill."""
+    if isinstance(node, Literal):
+        place = marks.get(node.value)
+        if place is None:
+            return None
+        found.append(place)
+        return lambda numbers: numbers[place]
+    if isinstance(node, tuple):
+        parts, make = node, _tuple_of
+    elif is_dataclass(node) and not isinstance(node, type):
+        parts = tuple(getattr(node, part.name) for part in fields(node))
+        make = cast(Callable[..., Any], type(node))
+    else:
+        return None
+    fillers = [_filler(part, marks, found) for part in parts]
+    if not any(fillers):
+        return None
+    both = tuple(zip(parts, fillers, strict=True))
+    return lambda numbers: make(*(part if fill is None else fill(numbers) for part, fill in both))
+
 
 _PROGRAM_WORDS = """
     if elseif else endif select case default send for next do loop while until goto gosub return
@@ -212,3 +285,82 @@ def _refusal(text: str, error: LarkError) -> SpelRefusal:
         RefusalKind.SYNTAX,
         f"Syntax error near {str(near)!r}",
     )
+
+
+_LABEL: Final = re.compile(r"\s*([a-z][a-z0-9_]*)\s*:\s*$", re.IGNORECASE)
+_MOST_EXPECTED: Final = 8
+
+_WORDS: Final = {
+    "THEN": "Then",
+    "TO": "To",
+    "AS": "As",
+    "TYPE": "Integer",
+    "GOTO": "GoTo",
+    "NAME": "NAME",
+    "NAME_PAREN": "NAME(",
+    "NUMBER": "NUMBER",
+    "STRING": "STRING",
+    "LPAR": "(",
+    "RPAR": ")",
+    "COMMA": ",",
+    "COLON": ":",
+    "HASH": "#",
+    "BANG": "!",
+    "POINT": "P1",
+    "P_PAREN": "P(",
+    "POINT_FUNCTION": "XY(",
+    "SIGN": "+",
+    "TIMES": "*",
+    "SLASH": "/",
+    "POWER": "**",
+    "STEP": "Step",
+    "SEMICOLON": ";",
+    "$END": "end of line",
+    "__EQUAL": "=",
+    "COMPARE": "=",
+    "AND": "And",
+    "OR": "Or",
+    "MOD": "Mod",
+    "LOOP_TEST": "While",
+    "NEXT": "Next",
+    "TRAILING": ",",
+}
+"""What a person calls a terminal of the grammar; the others are left out of what is expected."""
+
+_ORDER: Final = tuple(_WORDS)
+
+
+def label_of(line: SourceLine) -> str | None:
+    """Return the label that stands alone in a line, in lower case."""
+    match = _LABEL.match(line.text)
+    return None if match is None else match[1].lower()
+
+
+def parsed(line: SourceLine) -> tuple[LineNode, ...]:
+    """Return the statements of a line that is no label.
+
+    Raises:
+        ProgramFault: It is not SPEL+.
+    """
+    try:
+        return parse_program_line(line.text)
+    except UnexpectedToken as error:
+        raise _fault(line, error, str(error.token), set(error.expected)) from error
+    except UnexpectedCharacters as error:
+        raise _fault(line, error, error.char, set(error.allowed or ())) from error
+    except SpelRefusal as refusal:
+        raise ProgramFault(line.place, refusal.text) from refusal
+    except RecursionError as error:
+        raise ProgramFault(line.place, tr("The line is too deeply nested.")) from error
+
+
+def _fault(
+    line: SourceLine, error: UnexpectedInput, found: str, expected: set[str]
+) -> ProgramFault:
+    words = list(dict.fromkeys(_WORDS[name] for name in _ORDER if name in expected))
+    at_end = getattr(getattr(error, "token", None), "type", "") == "$END"
+    text = (
+        tr("the line ends too early") if at_end else tr("this cannot be here: {found}", found=found)
+    )
+    column = len(line.text) + 1 if at_end else error.column
+    return ProgramFault(line.place, text, column=column, expected=tuple(words[:_MOST_EXPECTED]))

@@ -169,7 +169,7 @@ class InProcessTransport:
 
 
 class LinePort:
-    """A device at the far end of a serial line; see ``hosting.seam.WireDevice``.
+    """A device at the far end of a serial line; see ``hosting.addresses.WireDevice``.
 
     The line outlives whoever opens it: the device does not notice that a client is gone, and what
     it sends later reaches the next one. What it sends while nobody has the port open is lost.

@@ -38,7 +38,7 @@ def serve_serial(
 
 
 class SerialFace:
-    """A controller as its serial port shows it; see ``hosting.seam.WireDevice``."""
+    """A controller as its serial port shows it; see ``hosting.addresses.WireDevice``."""
 
     def __init__(self, simulator: EpsonSimulator) -> None:
         self._simulator = simulator

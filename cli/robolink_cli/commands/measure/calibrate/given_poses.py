@@ -35,7 +35,7 @@ from robolink_cli.prompts.questions import agree, on_terminal
 from robolink_cli.session.context import CliContext
 from robolink_cli.session.opening import open_controller
 from robolink_cli.session.ordering import ordered, show_done, with_order
-from robolink_cli.views.calibration import judged_payload, report_payload
+from robolink_cli.views.fit import judged_payload, report_payload
 
 
 class _PosesListener(CalibrationListener):

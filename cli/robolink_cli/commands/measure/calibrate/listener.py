@@ -6,7 +6,7 @@ from robolink.nozzle_change import AcceptanceCriteria, ChangeReport, Listener, P
 from robolink_cli.options.impact import ImpactRequest, judge
 from robolink_cli.options.report import ReportDraft
 from robolink_cli.prompts.present import present_desk
-from robolink_cli.views.calibration import show_proposal, show_verdicts, tell_written
+from robolink_cli.views.fit import show_proposal, show_verdicts, tell_written
 
 
 class CalibrationListener(Listener):

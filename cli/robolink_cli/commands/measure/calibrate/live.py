@@ -30,10 +30,10 @@ from robolink_cli.options.report import ReportDraft, reporting
 from robolink_cli.prompts.operator import operator_at
 from robolink_cli.prompts.present import present_desk
 from robolink_cli.session.check_before_start import agree_to_procedure
-from robolink_cli.session.guidance import guided_if_alone
+from robolink_cli.session.context import guided_if_alone
 from robolink_cli.session.opening import open_controller
 from robolink_cli.session.ordering import ordered, show_done, with_order
-from robolink_cli.views.calibration import (
+from robolink_cli.views.fit import (
     report_payload,
     show_course,
     show_plan,

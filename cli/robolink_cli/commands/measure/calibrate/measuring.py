@@ -15,7 +15,7 @@ from robolink_cli.commands.measure.calibrate.live import calibrate_live
 from robolink_cli.commands.measure.calibrate.request import CalibrationRequest
 from robolink_cli.commands.measure.calibrate.stations import station_at
 from robolink_cli.console.numbers import decimal
-from robolink_cli.options.motion import refuse_motion_options
+from robolink_cli.options.consent import refuse_motion_options
 from robolink_cli.options.pose_source import PoseSource
 
 

@@ -21,7 +21,7 @@ from robolink.stations import StationKind
 from robolink_cli.commands.measure.calibrate.options import calibration_options, sigma_option
 from robolink_cli.commands.measure.calibrate.request import CalibrationRequest
 from robolink_cli.commands.measure.calibrate.values import as_typed, is_repeated, type_of
-from robolink_cli.options.motion import MotionOption, motion_option
+from robolink_cli.options.consent import MotionOption, motion_option
 from robolink_cli.options.pose_source import PoseSource, pose_source_options, taught_points_option
 from robolink_cli.session.completing import complete_station
 

@@ -11,9 +11,8 @@ from robolink.messages import declared
 from robolink_cli.access.cell import with_cell_limits
 from robolink_cli.commands.measure.calibrate.request import request_from
 from robolink_cli.console.numbers import NumberInside
-from robolink_cli.options.consent import dry_run_option, plain_option, yes_option
+from robolink_cli.options.consent import dry_run_option, motion_option, plain_option, yes_option
 from robolink_cli.options.impact import impact_options
-from robolink_cli.options.motion import motion_option
 from robolink_cli.options.report import report_options
 from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options

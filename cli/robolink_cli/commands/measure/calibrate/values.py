@@ -9,7 +9,7 @@ from annotated_types import Ge, Gt, Le
 
 from robolink.messages import tr
 from robolink.methods import ParameterField, fields_of
-from robolink.methods.declaration.fields import bare, refusals
+from robolink.methods.parameter_checks import bare, refusals
 from robolink_cli.console.numbers import DECIMAL, NumberInside, decimal
 
 _NUMBERS = (float, int)

@@ -9,7 +9,7 @@ from robolink.messages import tr
 from robolink.pose_tables import NOTHING_SAID, ReadingChoices
 from robolink_cli.console.numbers import DECIMAL
 from robolink_cli.console.render import emit_json, json_is_on
-from robolink_cli.options.pose_reading import reading_options
+from robolink_cli.options.pose_source import reading_options
 from robolink_cli.options.shared import json_option
 
 

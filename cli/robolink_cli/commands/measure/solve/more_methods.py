@@ -61,7 +61,7 @@ def one_touch(node: Node) -> Payload:
 
 def crossed_beams(node: Node) -> Payload:
     """Travels through two beams whose places are known."""
-    from robolink.methods.beams.solving import require_straight  # numpy, late
+    from robolink.methods.beams.crossings import require_straight  # numpy, late
 
     beams = [_beam(child) for child in node.children("beams")]
     if len(beams) != 2:

@@ -10,20 +10,18 @@ from typing import Any, Final
 import click
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
+from robolink_simulators.epson.condition import SpelRefusal
 from robolink_simulators.epson.options import options_from_text, read_profile
-from robolink_simulators.epson.refusals import SpelRefusal
-from robolink_simulators.epson.spel.tasks.channels.serial_link import COM_NUMBERS
-from robolink_simulators.epson.spel.tasks.driving import run_to_end
-from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
-from robolink_simulators.epson.vision.vision_file import install_vision
+from robolink_simulators.epson.spel.tasks.ports import COM_NUMBERS
+from robolink_simulators.epson.spel.tasks.runner import ProgramRunner, run_to_end
+from robolink_simulators.epson.vision_file import install_vision
 from robolink_simulators.faults import LinkKind
 from robolink_simulators.hosting.streams.epson import serve_serial, serve_tcp
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Secret
-from robolink_cli.commands.simulate.kinds.planned_faults import plan_faults
-from robolink_cli.commands.simulate.kinds.simulated_kind import SimulatedKind
+from robolink_cli.commands.simulate.kinds.simulated_kind import SimulatedKind, plan_faults
 from robolink_cli.commands.simulate.serving import host_and_port, named_values, world_from
 from robolink_cli.console.render import note
 from robolink_cli.options.program_encoding import tell_encoding

@@ -1,21 +1,28 @@
 """One kind of simulator: how it is made and served from the options of its command."""
 
-from collections.abc import Callable, Mapping
+import json
+from collections.abc import Callable, Collection, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robolink_simulators.cell.clock import EXCHANGE_S, SteeredClock
 from robolink_simulators.control.cell import AnySimulator, ControlledCell
+from robolink_simulators.faults import LinkKind, fault_as_keys, read_fault_file
 from robolink_simulators.hosting.garbage import RareFullCollections
 from robolink_simulators.plc import PlcSimulator
 
 from robolink.messages import tr
+from robolink.timing import NS_PER_S
 from robolink_cli.commands.simulate.serving import Termination, announce, controlled
+from robolink_cli.console.output import hand_over, show
+from robolink_cli.console.render import json_is_on
 from robolink_cli.options.simulation import ServedLife
 
 if TYPE_CHECKING:
     from robolink_simulators.assist.port import AssistHost
+
 
 Options = Mapping[str, Any]
 """The values of a command's options, by the names of its parameters."""
@@ -131,3 +138,40 @@ def _told(served: ServedCell, document: Mapping[str, object]) -> list[str]:
     if served.assist is not None:
         lines.append(tr("From the tip to the pin, seen now: robolink sim assist ASSIST look"))
     return [*lines, tr("Ctrl-C ends it.")]
+
+
+def plan_faults(
+    simulator: Any,  # noqa: ANN401 - any simulator with faults
+    file: Path | None,
+    served: Collection[LinkKind],
+    *,
+    cell: str = "",
+) -> None:
+    """Plan what a file says; each fault that fires is told then, in one line on stdout.
+
+    Args:
+        simulator: For which.
+        file: The file, if any.
+        served: The links that it will be served on.
+        cell: Its name among several, which is told with each fault.
+
+    Raises:
+        ConfigError: The file is wrong, or a fault cannot happen on any link that is served.
+    """
+    if file is None:
+        return
+    plan = read_fault_file(file)
+    simulator.faults.plan(plan.faults, plan.seed, served)
+    as_json = json_is_on()
+
+    def tell(fault: Any, request: str) -> None:  # noqa: ANN401 - of any simulator
+        keys = fault_as_keys(fault)
+        if as_json:
+            named = {"cell": cell} if cell else {}
+            document = {"schema": "robolink/fault/1", **named, "fault": keys, "request": request}
+            hand_over(json.dumps({**document, "simulated_s": simulator.now_ns / NS_PER_S}))
+        else:
+            told = tr("FAULT {action}: {request}", action=keys["action"], request=request)
+            show(f"{cell}: {told}" if cell else told)
+
+    simulator.faults.on_fired = tell

@@ -6,12 +6,11 @@ from typing import Any, Final
 
 from robolink.model import Elbow, Hand, Wrist, rotate_xy
 from robolink_simulators.cell.frames import X_AXIS, Y_AXIS, Z_AXIS, Frame, about, product
+from robolink_simulators.epson.arm.coordinate_systems import coordinates_of_frame, frame_at
 from robolink_simulators.epson.arm.kinematics import PLAIN
-from robolink_simulators.epson.definitions.local_frames import coordinates_of_frame, frame_at
+from robolink_simulators.epson.condition import RefusalKind, RequestRefused, SpelRefusal
 from robolink_simulators.epson.memory.points import AXES, HIGHEST_LOCAL, Point
-from robolink_simulators.epson.refusals import RefusalKind, RequestRefused, SpelRefusal
 from robolink_simulators.epson.spel.expressions.closures import Run, Scope, check_count, closure
-from robolink_simulators.epson.spel.expressions.data_types import Variable
 from robolink_simulators.epson.spel.expressions.joint_functions import (
     printed_pulses,
     require_singular_angle,
@@ -24,6 +23,7 @@ from robolink_simulators.epson.spel.expressions.machine_functions import (
 from robolink_simulators.epson.spel.expressions.values import (
     Number,
     Value,
+    Variable,
     as_integer,
     as_number,
     as_point,

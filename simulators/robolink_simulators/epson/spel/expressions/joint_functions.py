@@ -9,7 +9,6 @@ from itertools import product
 from typing import Any, Final
 
 from robolink.model import Elbow, Hand, Posture, Wrist
-from robolink_simulators.epson.arm.joints import Joints, check_ranges
 from robolink_simulators.epson.arm.kinematics import (
     PLAIN,
     flange_of,
@@ -17,11 +16,11 @@ from robolink_simulators.epson.arm.kinematics import (
     hand_of,
     posture_of,
 )
-from robolink_simulators.epson.arm.robots import Mechanism, RobotModel
+from robolink_simulators.epson.arm.robots import Joints, Mechanism, RobotModel, check_ranges
 from robolink_simulators.epson.arm.six_axes import solve_near, wrist_of
+from robolink_simulators.epson.condition import OutOfReach, RefusalKind, SpelRefusal
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.points import Point
-from robolink_simulators.epson.refusals import OutOfReach, RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.values import (
     Value,
     as_integer,

@@ -8,41 +8,10 @@ from typing import Final
 
 from robolink.model import ToolOffset
 from robolink_simulators.epson.arm.kinematics import forward
+from robolink_simulators.epson.condition import OutOfReach, RefusalKind, SpelRefusal
 from robolink_simulators.epson.memory.bits import BitBank
-from robolink_simulators.epson.memory.driven_robot import DrivenRobot
 from robolink_simulators.epson.memory.points import AXES, Point, PointTable
-from robolink_simulators.epson.refusals import OutOfReach, RefusalKind, SpelRefusal
-from robolink_simulators.epson.spel.expressions.defined.added_arms import ARM_FUNCTIONS
-from robolink_simulators.epson.spel.expressions.defined.arches import ARCH_FUNCTIONS
-from robolink_simulators.epson.spel.expressions.defined.areas import (
-    AREA_FUNCTIONS,
-    corner_of_box,
-    plane_as_point,
-)
-from robolink_simulators.epson.spel.expressions.defined.differences import (
-    point_seen_from,
-    turned_tool,
-)
-from robolink_simulators.epson.spel.expressions.defined.drive_settings import DRIVE_FUNCTIONS
-from robolink_simulators.epson.spel.expressions.defined.orientations import (
-    ORIENTATION_FUNCTIONS,
-    aligned,
-)
-from robolink_simulators.epson.spel.expressions.defined.origins import (
-    NS_PER_HOUR,
-    ORIGIN_FUNCTIONS,
-)
-from robolink_simulators.epson.spel.expressions.defined.torques import TORQUE_FUNCTIONS
-from robolink_simulators.epson.spel.expressions.defined.travel_times import TRAVEL_FUNCTIONS
-from robolink_simulators.epson.spel.expressions.defined.unfinished import (
-    UNFINISHED_FUNCTIONS,
-    place_to_recover,
-)
-from robolink_simulators.epson.spel.expressions.defined.xy_limits import (
-    LIMIT_FUNCTIONS,
-    corner_of_limits,
-    outside_limits_mm,
-)
+from robolink_simulators.epson.memory.robot import DrivenRobot
 from robolink_simulators.epson.spel.expressions.joint_functions import (
     FLAG_FUNCTIONS,
     angles_to_pulses,
@@ -52,6 +21,29 @@ from robolink_simulators.epson.spel.expressions.joint_functions import (
     pulses_of,
     pulses_of_point,
     with_least_motion,
+)
+from robolink_simulators.epson.spel.expressions.motion_functions import (
+    ORIENTATION_FUNCTIONS,
+    TORQUE_FUNCTIONS,
+    TRAVEL_FUNCTIONS,
+    UNFINISHED_FUNCTIONS,
+    aligned,
+    place_to_recover,
+    point_seen_from,
+    turned_tool,
+)
+from robolink_simulators.epson.spel.expressions.setting_functions import (
+    ARCH_FUNCTIONS,
+    AREA_FUNCTIONS,
+    ARM_FUNCTIONS,
+    DRIVE_FUNCTIONS,
+    LIMIT_FUNCTIONS,
+    NS_PER_HOUR,
+    ORIGIN_FUNCTIONS,
+    corner_of_box,
+    corner_of_limits,
+    outside_limits_mm,
+    plane_as_point,
 )
 from robolink_simulators.epson.spel.expressions.values import (
     Value,

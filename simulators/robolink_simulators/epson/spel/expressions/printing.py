@@ -10,9 +10,9 @@ from typing import Final, Literal
 from robolink.protocols.spel import PrintedPoint, decimal, format_point
 from robolink_simulators.epson.arm.kinematics import PLAIN
 from robolink_simulators.epson.arm.robots import Mechanism, RobotModel
+from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.values import Number, Value, out_of_range
 
 CRLF: Final = "\r\n"

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Final
 
 from robolink_simulators.epson.condition import Mode, Task
-from robolink_simulators.epson.memory.driven_robot import DrivenRobot
+from robolink_simulators.epson.memory.robot import DrivenRobot
 from robolink_simulators.epson.spel.expressions.values import (
     Value,
     as_integer,

@@ -23,7 +23,7 @@ from robolink_simulators.epson.spel.programs.operations import (
     keep,
     repeat,
 )
-from robolink_simulators.epson.spel.source.faults import ProgramFault, SourcePlace
+from robolink_simulators.epson.spel.source_text import ProgramFault, SourcePlace
 from robolink_simulators.epson.spel.tasks.compiled import JumpTarget
 from robolink_simulators.epson.spel.tree import Expression
 

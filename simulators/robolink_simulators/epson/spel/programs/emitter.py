@@ -5,13 +5,13 @@ from dataclasses import fields, is_dataclass, replace
 from typing import Any, Final, TypeVar
 
 from robolink.messages import tr
+from robolink_simulators.epson.condition import SpelRefusal
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.epson.refusals import SpelRefusal
 from robolink_simulators.epson.spel.expressions.closures import Run, closure
-from robolink_simulators.epson.spel.expressions.data_types import DataType, Variable
+from robolink_simulators.epson.spel.expressions.values import DataType, Variable
 from robolink_simulators.epson.spel.programs.operations import enter
 from robolink_simulators.epson.spel.programs.scope import Reference
-from robolink_simulators.epson.spel.source.faults import ProgramFault, SourcePlace
+from robolink_simulators.epson.spel.source_text import ProgramFault, SourcePlace
 from robolink_simulators.epson.spel.tasks.compiled import (
     CompiledFunction,
     JumpTarget,

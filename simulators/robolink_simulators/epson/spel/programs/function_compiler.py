@@ -1,12 +1,12 @@
-"""The lines of a function to its operations."""
+"""The lines of a function to its operations, by the family of each statement."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Final
 
 from robolink.messages import tr
-from robolink_simulators.epson.refusals import RefusalKind
-from robolink_simulators.epson.spel.expressions.data_types import (
+from robolink_simulators.epson.condition import RefusalKind
+from robolink_simulators.epson.spel.expressions.values import (
     DataType,
     elements,
     most_elements,
@@ -30,8 +30,11 @@ from robolink_simulators.epson.spel.line_tree import (
 )
 from robolink_simulators.epson.spel.parse import WINDOW_ONLY
 from robolink_simulators.epson.spel.programs.blocks import BlockCompiler
+from robolink_simulators.epson.spel.programs.channel_statements import (
+    CHANNEL_STATEMENTS,
+    FILE_STATEMENTS,
+)
 from robolink_simulators.epson.spel.programs.emitter import Emitter
-from robolink_simulators.epson.spel.programs.families.registry import compile_family
 from robolink_simulators.epson.spel.programs.operations import (
     assign_element,
     assign_local,
@@ -46,10 +49,21 @@ from robolink_simulators.epson.spel.programs.operations import (
     redim,
     refuse,
 )
-from robolink_simulators.epson.spel.source.faults import ProgramFault, SourcePlace
+from robolink_simulators.epson.spel.programs.task_statements import (
+    TASK_STATEMENTS,
+    TIMERS,
+    compile_trap,
+)
+from robolink_simulators.epson.spel.programs.text_statements import PROCEDURES
+from robolink_simulators.epson.spel.programs.vision_statements import (
+    VISION_STATEMENTS,
+    compile_access,
+    compile_run,
+)
+from robolink_simulators.epson.spel.source_text import ProgramFault, SourcePlace
 from robolink_simulators.epson.spel.tasks.compiled import JumpTarget, LocalSlot, Operation
-from robolink_simulators.epson.spel.tasks.permissions import require_advanced
 from robolink_simulators.epson.spel.tasks.task import SpelTask
+from robolink_simulators.epson.spel.tasks.task_steps import require_advanced
 from robolink_simulators.epson.spel.tree import (
     AssignPoint,
     AssignVariable,
@@ -65,6 +79,54 @@ from robolink_simulators.epson.spel.tree import (
     label_in,
     modified,
 )
+
+FamilyStatement = (
+    TaskStatement
+    | ChannelStatement
+    | Trap
+    | Call
+    | AssignElement
+    | VisionRun
+    | VisionAccess
+    | VisionStatement
+)
+
+PROCEDURE_TABLES: Final = (PROCEDURES, TIMERS)
+"""Statements written as a call; the first table that knows a name compiles it."""
+
+_Compiler = Callable[[Emitter, Call], Operation]
+
+
+def compile_family(
+    emitter: Emitter, node: FamilyStatement, target: JumpTarget | None = None
+) -> Operation:
+    """Return the operation of a statement that only programs know.
+
+    Raises:
+        ProgramFault: It is not known, or makes no sense.
+    """
+    match node:
+        case Trap():
+            return compile_trap(emitter, node, target)
+        case VisionRun():
+            return compile_run(emitter, node)
+        case VisionAccess():
+            return compile_access(emitter, node)
+        case VisionStatement(word):
+            return VISION_STATEMENTS[word](emitter, node)
+        case TaskStatement(word):
+            return TASK_STATEMENTS[word](emitter, node)
+        case ChannelStatement(word):
+            table = FILE_STATEMENTS if word in FILE_STATEMENTS else CHANNEL_STATEMENTS
+            return table[word](emitter, node)
+        case Call(name):
+            for procedures in PROCEDURE_TABLES:
+                if name in procedures:
+                    return procedures[name](emitter, node)
+            raise emitter.fault(tr("there is no statement and no function {name}", name=name))
+        case AssignElement(name):
+            raise emitter.fault(tr("nothing is called {name}", name=name))
+
 
 Line = tuple[SourcePlace, str | None, Sequence[LineNode]]
 """A line: where it is, its label, its statements."""

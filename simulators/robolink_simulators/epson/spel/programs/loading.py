@@ -10,16 +10,18 @@ from robolink.messages import tr
 from robolink_simulators.epson.memory.bits import IOLabel
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.epson.spel.programs.io_label_file import read_io_labels
-from robolink_simulators.epson.spel.programs.project import build_project
-from robolink_simulators.epson.spel.programs.project_file import PROJECT_SUFFIX, project_files
-from robolink_simulators.epson.spel.programs.user_error_file import read_user_errors
+from robolink_simulators.epson.spel.file_commands import read_points
+from robolink_simulators.epson.spel.programs.project import (
+    PROJECT_SUFFIX,
+    build_project,
+    project_files,
+    read_io_labels,
+    read_user_errors,
+)
 from robolink_simulators.epson.spel.session import PointFile, Session, UserError
-from robolink_simulators.epson.spel.source.faults import ProgramFault, ProgramRefused
-from robolink_simulators.epson.spel.source.point_file import read_points
-from robolink_simulators.epson.spel.source.source_text import encoding_of
+from robolink_simulators.epson.spel.source_text import ProgramFault, ProgramRefused, encoding_of
 from robolink_simulators.epson.spel.tasks.compiled import CompiledFunction, SpelProject
-from robolink_simulators.epson.spel.tasks.task_table import MOST_IN_BACKGROUND
+from robolink_simulators.epson.spel.tasks.runner import MOST_IN_BACKGROUND
 
 IO_LABELS: Final = "IOLabels.dat"
 USER_ERRORS: Final = "UserErrors.dat"

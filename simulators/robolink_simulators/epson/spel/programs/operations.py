@@ -7,11 +7,16 @@ import operator
 from collections.abc import Callable, Sequence
 from typing import Any, Final
 
-from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
-from robolink_simulators.epson.spel.expressions.closures import Run
-from robolink_simulators.epson.spel.expressions.data_types import DataType, Variable
-from robolink_simulators.epson.spel.expressions.operators import binary
-from robolink_simulators.epson.spel.expressions.values import Value, as_number, as_text, truth
+from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
+from robolink_simulators.epson.spel.expressions.closures import Run, binary
+from robolink_simulators.epson.spel.expressions.values import (
+    DataType,
+    Value,
+    Variable,
+    as_number,
+    as_text,
+    truth,
+)
 from robolink_simulators.epson.spel.programs.scope import Reference
 from robolink_simulators.epson.spel.tasks.compiled import (
     CompiledFunction,

@@ -1,4 +1,11 @@
-"""Files to a project: every function compiled, or every fault told (docs/reference/spel.md 16)."""
+"""Files to a project: every function compiled, or every fault told (docs/reference/spel.md 16).
+
+The list of files of a project, as RC+ writes it in a .sprj file (docs/reference/spel.md 16).
+
+Labels of inputs and outputs of a project, as RC+ writes them (docs/reference/spel.md 16).
+
+Errors that a project defines: UserErrors.dat, as RC+ writes it (docs/reference/spel.md 16).
+"""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -6,41 +13,164 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
+from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink_simulators.epson.memory.bits import (
+    BIT,
+    BYTE,
+    INPUT,
+    MEMORY,
+    OUTPUT,
+    WORD,
+    IOLabel,
+)
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.epson.spel.expressions.data_types import (
+from robolink_simulators.epson.spel.expressions.values import (
     DataType,
     Variable,
     data_types,
     most_elements,
 )
+from robolink_simulators.epson.spel.file_commands import blocks, project_text
 from robolink_simulators.epson.spel.line_tree import (
     BlockWord,
     Declaration,
     FunctionHeader,
     LineNode,
 )
+from robolink_simulators.epson.spel.parse import label_of, parsed
 from robolink_simulators.epson.spel.programs.emitter import Emitter
-from robolink_simulators.epson.spel.programs.families.texts import FUNCTIONS_OF_ARRAYS
 from robolink_simulators.epson.spel.programs.function_compiler import (
     FunctionCompiler,
     Line,
     bounds_of,
 )
 from robolink_simulators.epson.spel.programs.scope import FunctionScope
-from robolink_simulators.epson.spel.source.faults import (
+from robolink_simulators.epson.spel.programs.text_statements import FUNCTIONS_OF_ARRAYS
+from robolink_simulators.epson.spel.session import UserError
+from robolink_simulators.epson.spel.source_text import (
+    Preprocessor,
     ProgramFault,
     ProgramRefused,
+    SourceLine,
     SourcePlace,
 )
-from robolink_simulators.epson.spel.source.line_parser import label_of, parsed
-from robolink_simulators.epson.spel.source.source_text import Preprocessor, SourceLine
 from robolink_simulators.epson.spel.tasks.compiled import (
     CompiledFunction,
     LocalSlot,
     SpelProject,
 )
 from robolink_simulators.epson.spel.tree import OLD_HERE, names_in
+
+PROJECT_SUFFIX: Final = ".sprj"
+
+
+@dataclass(frozen=True, slots=True)
+class ProjectFiles:
+    """Files of a project.
+
+    Attributes:
+        programs: Its .prg files, in their order.
+        points: Its .pts files whose points are there when a program starts.
+        further_points: Those that only LoadPoints brings.
+        missing_points: Names of those that are listed and not there.
+    """
+
+    programs: tuple[Path, ...]
+    points: tuple[Path, ...] = ()
+    further_points: tuple[Path, ...] = ()
+    missing_points: tuple[str, ...] = ()
+
+
+def project_files(programs: Sequence[Path], points: Sequence[Path] = ()) -> ProjectFiles:
+    """Return the files that are named; in place of a .sprj file, those that it lists.
+
+    Raises:
+        ConfigError: It cannot be read, lists no program or one that is not there, or is not alone.
+            A point file that is not there is told with the result: programs can be looked at
+            without it.
+    """
+    if not any(path.suffix.lower() == PROJECT_SUFFIX for path in programs):
+        return ProjectFiles(tuple(programs), tuple(points))
+    if len(programs) > 1:
+        raise ConfigError(
+            tr("A project file lists its own programs: no other file goes with it."),
+            remedy=tr("Give the .sprj file, or the .prg files."),
+        )
+    (project,) = programs
+    listed, at_start, later, missing = list[Path](), list[Path](), list[Path](), list[str]()
+    for names, pairs in blocks(project_text(project, None)):
+        name = pairs.get("sName", "")
+        if names == ("ProgramFile",) and name:
+            path = _beside(project, name)
+            if path is None:
+                raise ConfigError(
+                    tr("{path} lists {name}, which is not beside it.", path=project, name=name),
+                    remedy=tr("Copy the whole project folder."),
+                )
+            listed.append(path)
+        elif names == ("PointFile",) and name:
+            default = pairs.get("bDefault") == "True" and pairs.get("nRobot", "1") == "1"
+            path = _beside(project, name)
+            if path is None:
+                missing.append(name)
+            else:
+                (at_start if default else later).append(path)
+    if not listed:
+        raise ConfigError(
+            tr("{path} lists no program.", path=project),
+            remedy=tr("Give a project file that RC+ has saved, or the .prg files."),
+        )
+    return ProjectFiles(tuple(listed), (*at_start, *points), tuple(later), tuple(missing))
+
+
+def _beside(project: Path, name: str) -> Path | None:
+    """Return a file of the project's folder; RC+ does not tell capitals from small letters."""
+    for path in sorted(project.parent.iterdir()):
+        if path.name.lower() == name.lower():
+            return path
+    return None
+
+
+_KINDS: Final = {"Input": INPUT, "Output": OUTPUT, "Memory": MEMORY}
+_WIDTHS: Final = {"Bit": BIT, "Byte": BYTE, "Word": WORD}
+_LABELS: Final = re.compile(r"(Input|Output|Memory)(Bit|Byte|Word)Labels$")
+
+
+def read_io_labels(path: Path, encoding: str | None = None) -> dict[str, IOLabel]:
+    """Return the labels of inputs, outputs and memory bits, by their names in lower case.
+
+    Raises:
+        ConfigError: It cannot be read.
+    """
+    labels = dict[str, IOLabel]()
+    for names, pairs in blocks(project_text(path, encoding)):
+        kind = _LABELS.match(names[-2]) if len(names) > 1 else None
+        number = next((v for k, v in pairs.items() if k in ("nBit", "nByte", "nWord", "nPort")), "")
+        name = pairs.get("sLabel", "")
+        if kind is None or not name or not number.isdecimal():
+            continue
+        labels[name.lower()] = IOLabel(_KINDS[kind[1]], _WIDTHS[kind[2]], int(number), name)
+    return labels
+
+
+_FIRST: Final = 8000
+_LAST: Final = 8999
+
+
+def read_user_errors(path: Path, encoding: str | None = None) -> dict[str, UserError]:
+    """Return the errors by their labels in lower case; one with no label or number is left out.
+
+    Raises:
+        ConfigError: It cannot be read.
+    """
+    errors = dict[str, UserError]()
+    for _, pairs in blocks(project_text(path, encoding)):
+        number, label = pairs.get("nError", ""), pairs.get("sLabel", "")
+        if label and number.isdecimal() and _FIRST <= int(number) <= _LAST:
+            errors[label.lower()] = UserError(int(number), pairs.get("sMessage", ""))
+    return errors
+
 
 LONGEST_FUNCTION_NAME: Final = 64
 LONGEST_NAME: Final = 32

@@ -7,13 +7,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
-from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.closures import Run, Surroundings, closure
-from robolink_simulators.epson.spel.expressions.data_types import DataType, Variable
-from robolink_simulators.epson.spel.expressions.values import Value
+from robolink_simulators.epson.spel.expressions.values import DataType, Value, Variable
 from robolink_simulators.epson.spel.parse import UNSIMULATED_FAMILIES, UNSIMULATED_FUNCTIONS
 from robolink_simulators.epson.spel.tasks.compiled import LocalSlot, SpelProject
-from robolink_simulators.epson.spel.tasks.functions import task_function
+from robolink_simulators.epson.spel.tasks.task_functions import task_function
 from robolink_simulators.epson.spel.tree import Expression
 
 ENUMERATED: Final = frozenset({"forced", "merge", "error", "all", "none", "outside"})

@@ -9,10 +9,10 @@ from typing import Final, NamedTuple
 from robolink.model import ToolOffset
 from robolink.protocols.spel import PrintedWhere, format_tool_listing, format_where
 from robolink.timing import NS_PER_S
-from robolink_simulators.epson.arm.joints import Joints
+from robolink_simulators.epson.arm.robots import Joints
 from robolink_simulators.epson.arm.trajectory import Leg
+from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 from robolink_simulators.epson.memory.bits import BitBank
-from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.joint_functions import (
     JOINT_COUNTS,
@@ -23,27 +23,23 @@ from robolink_simulators.epson.spel.expressions.joint_functions import (
 from robolink_simulators.epson.spel.expressions.machine_functions import clock_of, hours_of
 from robolink_simulators.epson.spel.expressions.printing import CRLF, number_text
 from robolink_simulators.epson.spel.expressions.values import out_of_range
-from robolink_simulators.epson.spel.file_commands import FILE_COMMANDS
+from robolink_simulators.epson.spel.file_commands import FILE_COMMANDS, POINT_FILE_COMMANDS
 from robolink_simulators.epson.spel.legs import go_leg
-from robolink_simulators.epson.spel.point_file_commands import POINT_FILE_COMMANDS
-from robolink_simulators.epson.spel.statements.defined.areas import AREA_STATEMENTS
-from robolink_simulators.epson.spel.statements.defined.base import BASE_STATEMENTS
-from robolink_simulators.epson.spel.statements.defined.locals_and_pallets import (
-    PLACE_STATEMENTS,
-)
-from robolink_simulators.epson.spel.statements.defined.sync import SYNC_STATEMENTS
-from robolink_simulators.epson.spel.statements.defined.xy_limits import require_within_limits
-from robolink_simulators.epson.spel.statements.motion import require_drives
-from robolink_simulators.epson.spel.statements.points import POINT_STATEMENTS, point_argument
-from robolink_simulators.epson.spel.statements.ports_and_bits import BIT_STATEMENTS, set_latch
-from robolink_simulators.epson.spel.statements.robot import ROBOT_SETTINGS
-from robolink_simulators.epson.spel.statements.settings import SETTINGS, accel
-from robolink_simulators.epson.spel.statements.waiting import (
+from robolink_simulators.epson.spel.statements.areas import AREA_STATEMENTS, require_within_limits
+from robolink_simulators.epson.spel.statements.conditions import (
     is_condition,
     seconds_of,
     shown_condition,
 )
-from robolink_simulators.epson.spel.system_listing import SYSTEM_COMMANDS
+from robolink_simulators.epson.spel.statements.coordinate_systems import (
+    BASE_STATEMENTS,
+    PLACE_STATEMENTS,
+)
+from robolink_simulators.epson.spel.statements.motion import SYNC_STATEMENTS, require_drives
+from robolink_simulators.epson.spel.statements.points import POINT_STATEMENTS, point_argument
+from robolink_simulators.epson.spel.statements.ports_and_bits import BIT_STATEMENTS, set_latch
+from robolink_simulators.epson.spel.statements.robot import ROBOT_SETTINGS
+from robolink_simulators.epson.spel.statements.settings import SETTINGS, SYSTEM_COMMANDS, accel
 from robolink_simulators.epson.spel.tree import Expression, KeywordStatement, Name
 
 LATCH_SETTING_NS: Final = 40_000_000

@@ -1,40 +1,191 @@
-"""Go, Move, Jump, Arc and their relatives (docs/reference/spel.md 7.1)."""
+"""Go, Move, Jump and their relatives; CP and SyncRobots.
+
+CP: the statement behind a motion begins as soon as the motion slows down.
+
+Source: docs/reference/spel.md 7.1. The way itself is not rounded: the next motion begins when
+this one has ended (assumed simplification), what stands between them does not wait.
+
+SyncRobots: robots whose motions were reserved with SYNC start at one instant.
+
+Source: docs/reference/spel.md 7.1.
+
+Jump and Jump3: up, across, down (docs/reference/spel.md 7.1).
+
+Go, Move, Jump, Arc and their relatives (docs/reference/spel.md 7.1).
+"""
 
 import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
-from robolink.model import rotate_xy
+from robolink.model import Pose, rotate_xy
 from robolink_simulators.cell.frames import Frame, add, product
-from robolink_simulators.epson.arm.trajectory import Leg
-from robolink_simulators.epson.definitions.arches import GATE, Arch
-from robolink_simulators.epson.definitions.local_frames import (
+from robolink_simulators.epson.arm.arch import GATE, Arch, ArchedLeg, arched
+from robolink_simulators.epson.arm.coordinate_systems import (
     Coordinates,
     coordinates_of_frame,
     frame_at,
 )
+from robolink_simulators.epson.arm.kinematics import flange_of, solve
+from robolink_simulators.epson.arm.motion_parameters import MotionPhase
+from robolink_simulators.epson.arm.robots import Joints
+from robolink_simulators.epson.arm.trajectory import JointLeg, Leg
+from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.points import Point
-from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
-from robolink_simulators.epson.spel.expressions.defined.orientations import (
+from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
+from robolink_simulators.epson.spel.expressions.joint_functions import least_motion
+from robolink_simulators.epson.spel.expressions.motion_functions import (
     LEAST_TURN_DEG,
     turn_deg,
 )
-from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
-from robolink_simulators.epson.spel.expressions.joint_functions import least_motion
 from robolink_simulators.epson.spel.expressions.values import out_of_range
 from robolink_simulators.epson.spel.legs import go_leg, held_leg, line_leg
-from robolink_simulators.epson.spel.statements.defined.curves import curve_leg
-from robolink_simulators.epson.spel.statements.defined.xy_limits import require_within_limits
-from robolink_simulators.epson.spel.statements.jump import jump, jump3
-from robolink_simulators.epson.spel.statements.through_points import ARC_VERBS, arc, passing
+from robolink_simulators.epson.spel.statements.areas import require_within_limits
+from robolink_simulators.epson.spel.statements.curves import ARC_VERBS, arc, curve_leg, passing
 from robolink_simulators.epson.spel.tree import (
+    KeywordStatement,
     MotionStatement,
+    Name,
     PointExpression,
     PointRange,
     SwitchOnTheWay,
 )
+
+_SAME_NS = 1000
+
+
+def blends(machine: Machine, motion: MotionStatement) -> bool:
+    """Tell whether the next statement need not wait for the end of a motion."""
+    if motion.options.until is not None:
+        return False
+    return "cp" in motion.options.words or machine.settings.continuous_path
+
+
+def fall_ns(leg: Leg) -> int:
+    """Return how long the deceleration at the end of a leg takes.
+
+    Whoever brakes during the deceleration comes to rest when the leg ends; whoever brakes
+    before comes to rest sooner.
+    """
+    low, high = 0, leg.duration_ns
+    while high - low > _SAME_NS:
+        middle = (low + high) // 2
+        if leg.braked(middle).duration_ns + _SAME_NS < leg.duration_ns:
+            low = middle
+        else:
+            high = middle
+    return leg.duration_ns - high
+
+
+def rest_of_way(machine: Machine, leg: Leg) -> Leg:
+    """Return the way from where the arm stands to where a leg was to end."""
+    end = leg.joints_at(leg.duration_ns)
+    if isinstance(leg, JointLeg | ArchedLeg):
+        return go_leg(machine, machine.arm.joints, end)
+    return line_leg(machine, machine.tip(), machine.tip_at(end), near=machine.arm.joints)
+
+
+def _sync(evaluator: Evaluator, command: KeywordStatement) -> str:
+    """Start the reserved motions of some robots, or of all that have one; wait for none (assumed).
+
+    That All starts nothing where none is reserved is assumed; of a robot that is named the error is
+    documented, its number is not.
+    """
+    machine, arguments = evaluator.session.machine, command.arguments
+    if not arguments:
+        raise SpelRefusal(RefusalKind.SYNTAX, "SyncRobots needs robots, or All")
+    waiting = [n for n, robot in enumerate(machine.robots, start=1) if robot.reserved is not None]
+    if arguments != (Name("all"),):
+        asked = [evaluator.integer(argument) for argument in arguments]
+        for number in asked:
+            machine.numbered(number)
+            if number not in waiting:
+                text = f"No motion of robot {number} is reserved"
+                raise SpelRefusal(RefusalKind.NOT_RESERVED, text)
+        waiting = sorted(set(asked))
+    now_ns, chosen = machine.arm.now_ns, machine.robot_number
+    try:
+        for machine.robot_number in waiting:
+            motion, machine.robot.reservation = machine.robot.reserved, None
+            if motion is not None:
+                motion.start_reserved(now_ns)
+    finally:
+        machine.robot_number = chosen
+    return ""
+
+
+SYNC_STATEMENTS: Final[dict[str, Callable[[Evaluator, KeywordStatement], str]]] = {
+    "syncrobots": _sync
+}
+"""Keyword to what carries it out."""
+
+
+DESCENT = 2
+"""Which leg of a Jump is the descent; Sense is looked at just before it (documented)."""
+
+
+def jump(
+    machine: Machine,
+    point: Point,
+    limz_mm: float | None,
+    *,
+    arch: Arch | None = None,
+    looks: bool = False,
+) -> list[Leg]:
+    """Plan a motion up to LimZ, across, down; ``arch`` rounds it, without one it is a gate (C7).
+
+    LimZ is compared with joint 3, not with the tip (assumed: its default of 0 would else be
+    out of reach under every tool that hangs down). The modifier's height counts in the
+    target's local (documented). ``looks`` is whether Sense is looked at before the descent.
+
+    Raises:
+        Refusal: Start or target lie above LimZ; the start's number is documented (4005).
+    """
+    if machine.model.six_axes:
+        raise SpelRefusal(RefusalKind.OTHER_ROBOT, "Jump is not for six axes; Jump3 is")
+    height_mm = machine.parameters.limz_mm
+    if limz_mm is not None:
+        local, base = machine.locals.get(point.local), machine.kept.base
+        height_mm = limz_mm + local.z_mm + base.coordinates[2]
+    start, end = machine.arm.joints, machine.joints_for(point)
+    for joints, what in ((start, "The motion starts"), (end, "The target lies")):
+        if joints.j3_mm > height_mm + machine.robot.drives.get("limzmargin")[0]:
+            raise SpelRefusal(RefusalKind.ABOVE_LIMZ, f"{what} above LimZ")
+    up = start.at_height(max(start.j3_mm, height_mm))
+    across = end.at_height(max(end.j3_mm, height_mm))
+    gate = [
+        go_leg(machine, start, up, phase=MotionPhase.DEPART),
+        go_leg(machine, up, across),
+        go_leg(machine, across, end, phase=MotionPhase.APPROACH),
+    ]
+    rounded = None if arch is None else arched(gate, arch, looks=looks)
+    return [*(rounded or gate)]
+
+
+def jump3(machine: Machine, points: tuple[Point, Point, Point]) -> list[Leg]:
+    """Plan Jump3: straight to the first point, point to point to the second, straight on.
+
+    LimZ has no bearing on it (documented).
+
+    Raises:
+        Refusal: A point is out of reach.
+    """
+    depart, approach, end = (machine.pose_of(point) for point in points)
+    there = _joints(machine, approach)
+    first = line_leg(machine, machine.tip(), depart, near=machine.arm.joints)
+    return [
+        first,
+        go_leg(machine, first.joints_at(first.duration_ns), there),
+        line_leg(machine, approach, end, near=there),
+    ]
+
+
+def _joints(machine: Machine, tip: Pose) -> Joints:
+    flange = flange_of(machine.model, tip, machine.offset)
+    return solve(machine.model, flange, tip.hand or machine.robot.hand, tip.posture)
+
 
 _SAME_MM = 0.001
 

@@ -6,8 +6,8 @@ Source: docs/reference/spel.md 5.
 from collections.abc import Callable
 from typing import Final
 
+from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 from robolink_simulators.epson.memory.points import HIGHEST_POINT, Point
-from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.joint_functions import (
     FLAG_FUNCTIONS,

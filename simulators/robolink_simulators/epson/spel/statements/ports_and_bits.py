@@ -6,7 +6,7 @@ Source: docs/reference/spel.md 7.1, 8.
 from collections.abc import Callable
 from typing import Final
 
-from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
 from robolink_simulators.epson.spel.expressions.printing import CRLF
 from robolink_simulators.epson.spel.expressions.values import out_of_range

@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from robolink_simulators.epson.spel.expressions.closures import Scope
-from robolink_simulators.epson.spel.expressions.data_types import DataType, Variable
-from robolink_simulators.epson.spel.source.faults import SourcePlace
+from robolink_simulators.epson.spel.expressions.values import DataType, Variable
+from robolink_simulators.epson.spel.source_text import SourcePlace
 
 Operation = Callable[[Any], Any]
 """One step of a ``SpelTask``. It gives ``None`` when it is done, or what is to be waited for."""

@@ -1,27 +1,124 @@
 """Lets the tasks of a program go on side by side in simulated time, statement by statement."""
 
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Final
 
-from robolink_simulators.epson.condition import Condition, Task
-from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
-from robolink_simulators.epson.spel.expressions.data_types import Variable
+from robolink.timing import NS_PER_S, Clock, SystemClock
+from robolink_simulators.epson.condition import Condition, RefusalKind, SpelRefusal, Task
+from robolink_simulators.epson.machine import Machine
+from robolink_simulators.epson.spel.expressions.values import Variable
 from robolink_simulators.epson.spel.session import Session
-from robolink_simulators.epson.spel.statements.waiting import NEVER_NS
-from robolink_simulators.epson.spel.tasks.channels.numbered import NumberedChannels
-from robolink_simulators.epson.spel.tasks.channels.ports import Ports
+from robolink_simulators.epson.spel.statements.conditions import NEVER_NS
+from robolink_simulators.epson.spel.tasks.channels import NumberedChannels
 from robolink_simulators.epson.spel.tasks.compiled import CompiledFunction, SpelProject
+from robolink_simulators.epson.spel.tasks.ports import Ports
 from robolink_simulators.epson.spel.tasks.shared import TaskSharing
 from robolink_simulators.epson.spel.tasks.task import (
     SpelTask,
     TaskFailure,
     TaskKind,
+    Traps,
 )
 from robolink_simulators.epson.spel.tasks.task_steps import TaskSteps
-from robolink_simulators.epson.spel.tasks.task_table import TaskTable
-from robolink_simulators.epson.spel.tasks.traps import Traps
-from robolink_simulators.epson.vision.system import VisionSystem
+from robolink_simulators.epson.vision_system import VisionSystem
+
+_NORMAL: Final = range(1, 33)
+_BACKGROUND: Final = range(65, 81)
+_TRAPS: Final = range(257, 268)
+
+MOST_IN_BACKGROUND: Final = len(_BACKGROUND)
+
+
+class TaskTable:
+    """The tasks of a controller.
+
+    Args:
+        machine: Whose robots they choose.
+
+    Attributes:
+        tasks: Those that are not over, by their numbers.
+        paused: Whether tasks that a pause holds are held.
+    """
+
+    def __init__(self, machine: Machine) -> None:
+        self.tasks: dict[int, SpelTask] = {}
+        self.paused = False
+        self._machine = machine
+
+    def free_number(self, kind: TaskKind, wanted: int | None = None) -> int:
+        """Return the number of a new task.
+
+        Raises:
+            Refusal: There is none, or the one that is wanted is taken.
+        """
+        numbers = {TaskKind.BACKGROUND: _BACKGROUND, TaskKind.TRAP: _TRAPS}.get(kind, _NORMAL)
+        if wanted is None:
+            wanted = next((n for n in numbers if n not in self.tasks), None)
+        if wanted is None:
+            raise SpelRefusal(RefusalKind.TASKS_FULL, "Too many tasks")
+        if wanted not in numbers:
+            raise SpelRefusal(RefusalKind.TASK_NUMBER, f"There is no task {wanted}")
+        if wanted in self.tasks:
+            raise SpelRefusal(RefusalKind.TASK_BUSY, f"Task {wanted} is not free")
+        return wanted
+
+    def first_due(self, seen_ns: int) -> tuple[SpelTask | None, int, int]:
+        """Return the task that is due first, when, and when the next one after it is.
+
+        Args:
+            seen_ns: Until when everything has been done.
+        """
+        first, first_ns, second_ns = None, NEVER_NS, NEVER_NS
+        for task in self.tasks.values():
+            if task.halted or (self.paused and task.held_by_pause):
+                continue
+            waiting = task.waiting
+            due_ns = task.now_ns
+            if waiting is not None:
+                with self.robot_of(task):
+                    due_ns = waiting.due_ns(seen_ns)
+            if due_ns < first_ns:
+                first, first_ns, second_ns = task, due_ns, first_ns
+            elif due_ns < second_ns:
+                second_ns = due_ns
+        return first, first_ns, second_ns
+
+    @contextmanager
+    def robot_of(self, task: SpelTask) -> Iterator[None]:
+        """Put the robot in force that a task has chosen; the command window keeps its own."""
+        machine = self._machine
+        kept, machine.robot_number = machine.robot_number, task.robot_number
+        try:
+            yield
+        finally:
+            task.robot_number, machine.robot_number = machine.robot_number, kept
+
+    def pause(self, now_ns: int) -> None:
+        """Hold the tasks that a pause holds."""
+        self.paused = True
+        for task in self._pausing():
+            with self.robot_of(task):
+                task.pause(now_ns)
+
+    def go_on(self, now_ns: int) -> None:
+        """Let them go on."""
+        self.paused = False
+        for task in self._pausing():
+            task.now_ns = max(task.now_ns, now_ns)
+            if task.waiting is not None:
+                with self.robot_of(task):
+                    task.waiting.go_on(now_ns)
+
+    def _pausing(self) -> list[SpelTask]:
+        return [t for t in self.tasks.values() if t.kind is TaskKind.NORMAL and not t.halted]
+
+    @property
+    def only_background(self) -> bool:
+        """Whether nothing but background tasks is left, or nothing at all."""
+        return all(task.kind is TaskKind.BACKGROUND for task in self.tasks.values())
+
 
 BURST_NS: Final = 1_000_000
 """How long a task goes on before the others are looked at, in ns, if none of them is due."""
@@ -286,3 +383,48 @@ class ProgramRunner:
         self._main = None
         self.channels.close_all()
         self.table.paused = False
+
+
+_LONGEST_NAP_NS: Final = 20_000_000
+
+Advance = Callable[[int], None]
+"""Lets a controller's simulated time reach an instant."""
+
+
+def run_to_end(
+    runner: ProgramRunner,
+    advance: Advance,
+    next_change: Callable[[], int | None],
+    *,
+    most_s: float,
+    clock: Clock | None = None,
+) -> bool:
+    """Let time pass until every task is over; tell whether that came in time.
+
+    Nobody waits for simulated time: it goes on to what happens next. Only while a port is open
+    does it pass as fast as outside, because another program may have to answer.
+
+    Args:
+        runner: What runs; it was started.
+        advance: Lets the controller's time pass.
+        next_change: Tells when something happens next.
+        most_s: Simulated seconds after which it is left as it is.
+        clock: The time outside.
+    """
+    outside = clock or SystemClock()
+    end_ns = runner.now_ns + round(most_s * NS_PER_S)
+    behind_ns = outside.now_ns() - runner.now_ns
+    while runner.tasks:
+        change_ns = next_change()
+        if change_ns is None or change_ns > end_ns:
+            return False
+        if runner.ports.in_use:
+            present_ns = outside.now_ns() - behind_ns
+            if change_ns > present_ns:
+                nap_ns = min(change_ns - present_ns, _LONGEST_NAP_NS)
+                outside.sleep(nap_ns / NS_PER_S)
+                change_ns = min(change_ns, present_ns + nap_ns)
+        else:
+            behind_ns = outside.now_ns() - change_ns
+        advance(change_ns)
+    return True

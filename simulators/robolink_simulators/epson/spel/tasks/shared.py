@@ -7,7 +7,7 @@ import random
 from typing import Final
 
 from robolink.timing import NS_PER_S
-from robolink_simulators.epson.refusals import RefusalKind, SpelRefusal
+from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.values import out_of_range
 from robolink_simulators.epson.spel.tasks.task import SpelTask
 

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Iterator
 from typing import Final, Protocol
 
-from robolink_simulators.epson.spel.execution.statement_execution import StatementExecution
-from robolink_simulators.epson.spel.statements.waiting import NEVER_NS
+from robolink_simulators.epson.spel.execution import StatementExecution
+from robolink_simulators.epson.spel.statements.conditions import NEVER_NS
 
 POLL_NS: Final = 10_000_000
 """How often what happens outside the controller is looked at, in ns.

@@ -1,0 +1,313 @@
+"""camera: a calibrated, up-looking camera sees the tip."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, ClassVar, TypeVar, cast
+
+from robolink.calibration import (
+    CalibrationResult,
+    Sighting,
+    VerifyResult,
+    height_of,
+    seen_from,
+    solvable_planes,
+    solve_up_camera,
+)
+from robolink.messages import declared, tr
+from robolink.methods.method import Method, Needs, Site
+from robolink.methods.shared_parameters import (
+    PLACE,
+    UNMEASURED_Z,
+    LookParameters,
+    camera_at,
+)
+from robolink.model import Pose, TipSensor, ToolOffset
+from robolink.procedures import (
+    NO_OFFSET,
+    CalibratedCameraSource,
+    CameraDrive,
+    CameraSamples,
+    LookPlan,
+    MeasurementContext,
+    Place,
+    PlacedProof,
+    calibrated_camera,
+    camera_error_of,
+    proof_angles,
+    radius_of,
+    verify_by_looking,
+)
+from robolink.runner import Procedure, SeenAt
+from robolink.sensing import sensor_name
+from robolink.stations import CameraStation, StationKind
+
+if TYPE_CHECKING:
+    from robolink.calibration import CameraRound
+    from robolink.procedures import KeptProof, TipSource
+
+
+@dataclass(frozen=True, kw_only=True)
+class CameraParameters(LookParameters):
+    """How a calibrated camera looks at a tip."""
+
+    def no_residual(self) -> str:
+        """Return why residuals cannot be judged, empty when they can."""
+        if len(self.turns_deg) > 2:
+            return ""
+        return tr(
+            "cannot be judged: looks at one or two angles cannot check each other; "
+            "look at three angles or more, or limit the interval and state the "
+            "standard deviation"
+        )
+
+
+ResultT = TypeVar("ResultT", bound=CalibrationResult)
+
+
+def measure_camera(
+    station: CameraStation,
+    plan: LookPlan,
+    *,
+    here: Pose,
+    stored: ToolOffset | None,
+    sigma_mm: float | None = None,
+    retake: bool = False,
+) -> "Procedure[CameraRound]":
+    """Measure X and Y of a tip with a calibrated camera. Runs in Tool 0.
+
+    Args:
+        station: Where the camera is, and what its pixels mean.
+        plan: At which angles it is looked at.
+        here: Where the flange is; its U is where the angles count from.
+        stored: The offset stored now; the tip is expected there.
+        sigma_mm: Standard deviation of one coordinate of one look, where it is known.
+        retake: Offer to take the look again that fits worst.
+
+    Raises:
+        CalibrationError: ``tilted_pose`` before anything moves; ``tip_not_seen``,
+            ``several_tips_seen``, ``camera_not_calibrated``, and those of
+            :func:`solve_camera_round`.
+
+    Example:
+        >>> from robolink.methods import measure_camera
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import LookPlan
+        >>> from robolink.stations import CameraStation
+        >>> from robolink.testing import PaperCell
+        >>> camera, here = CameraStation(x_mm=300, y_mm=80, z_mm=-30), Pose(300, 100, 20, 0)
+        >>> course = measure_camera(camera, LookPlan(), here=here, stored=ToolOffset(12, -3.5, -20))
+        >>> found = PaperCell(here, ToolOffset(12.4, -3.8, -20)).run(course)
+        >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3)
+        (12.4, -3.8)
+    """
+    from robolink.calibration import solve_camera_round
+
+    def solve(sightings: Sequence[Sighting]) -> "CameraRound":
+        return solve_camera_round(sightings, stored=stored, sigma_mm=sigma_mm, camera=station.model)
+
+    return (yield from look_round(station, plan, solve, here=here, stored=stored, retake=retake))
+
+
+def look_round(
+    station: CameraStation,
+    plan: LookPlan,
+    solver: Callable[[Sequence[Sighting]], ResultT],
+    *,
+    here: Pose,
+    stored: ToolOffset | None,
+    retake: bool,
+) -> Procedure[ResultT]:
+    """Bring a tip before a calibrated camera at every angle of a plan, and solve what is seen.
+
+    Args:
+        station: Where the camera is, and what its pixels mean.
+        plan: At which angles it is looked at.
+        solver: Makes the result of what was seen.
+        here: Where the flange is; its U is where the angles count from.
+        stored: The offset stored now; the tip is expected there.
+        retake: Offer to take the look again that fits worst.
+
+    Raises:
+        CalibrationError: ``tilted_pose`` before anything moves; ``tip_not_seen``,
+            ``several_tips_seen``, ``camera_not_calibrated``, and those of the solver.
+        LimitError: The arm cannot bring the tip before the camera so; nothing was moved.
+    """
+    solvable_planes([here], height_of(stored))
+    tip, centred = stored or NO_OFFSET, False
+    drive = CameraDrive(station, plan, here)
+    angles_deg = yield from drive.angles_in_reach(
+        here, lambda angles: [Place(u_deg, stored or NO_OFFSET) for u_deg in angles]
+    )
+    if plan.centre_first:
+        found = Place(angles_deg[0], tip)
+
+        def expected(looks: Sequence[SeenAt]) -> ToolOffset:
+            return solve_up_camera(station.sighting(looks[0]), stored=stored).offset
+
+        tip = yield from drive.centred([found], here, expected)
+        here, centred = drive.pose(found), True
+    places = [Place(u_deg, tip) for u_deg in angles_deg]
+
+    def solve(looks: Sequence[SeenAt]) -> ResultT:
+        return solver([station.sighting(look) for look in looks])
+
+    looks = CameraSamples(drive, solve, here, before_camera=centred)
+    return (yield from looks.at(places, retake=retake))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LookTest(PlacedProof):
+    """All that a proof by a camera needs.
+
+    Attributes:
+        sensor: URL or name of the camera, or the camera itself, which cannot be kept.
+        station: Where it is, and what its pixels mean.
+        plan: Pictures and heights.
+        angles_deg: U of the new tool at which the tip is looked at.
+        camera_error_mm: What the measurement found the camera to be off by, base X and Y.
+        radius_px: How wide the spot was in the measurement; ``None`` where nobody told.
+    """
+
+    method: ClassVar[str] = "camera"
+    by_touch: ClassVar[bool] = False
+
+    # A str or a TipSensor; a value that is read back is a str.
+    sensor: object
+    station: CameraStation
+    plan: LookPlan
+    angles_deg: tuple[float, ...]
+    camera_error_mm: tuple[float, float] = (0.0, 0.0)
+    radius_px: float | None = None
+
+    @property
+    def obstacle(self) -> str:
+        """Why it cannot be kept: an open camera is none that another process can open."""
+        if not isinstance(self.sensor, str):
+            return "camera_open"
+        if sensor_name(self.sensor) != self.sensor:
+            return "camera_token"  # kept nowhere
+        return ""
+
+    def prove(self, context: MeasurementContext) -> VerifyResult:
+        """Make it; see :meth:`~robolink.procedures.KeptProof.prove`."""
+        # As the source gave it; a type with a protocol in it could not be read back from a record.
+        camera = cast("str | TipSensor", self.sensor)
+        here = context.controller.groups[0].pose()
+        with calibrated_camera(camera, self.station) as eye:
+            return context.run(self.steps(here), tip=self.written, camera=eye)
+
+    def prove_after_a_break(self, context: MeasurementContext) -> VerifyResult:
+        """Make it: it goes straight up first, then over the camera."""
+        return self.prove(context)
+
+    def steps(self, here: Pose) -> Procedure[VerifyResult]:
+        """Return the steps from wherever the frame is."""
+        return verify_by_looking(
+            self.station,
+            self.plan,
+            here=here,
+            angles_deg=self.angles_deg,
+            tolerance_mm=self.tolerance_mm,
+            camera_error_mm=self.camera_error_mm,
+            aside=seen_from(self.written, self.tip),
+            radius_px=self.radius_px,
+        )
+
+    def steps_after_a_break(self, here: Pose) -> Procedure[VerifyResult]:
+        """Return the same steps: they begin straight up."""
+        return self.steps(here)
+
+
+@dataclass(frozen=True, slots=True)
+class CameraSource(CalibratedCameraSource):
+    """Measures X and Y of a tip by looking at it at several angles of U.
+
+    Attributes:
+        plan: How the tip is brought before it.
+        sigma_mm: Standard deviation of one coordinate of one look, where it is known.
+        retake: Offer to take the look again that fits worst.
+    """
+
+    plan: LookPlan = field(default_factory=LookPlan)
+    sigma_mm: float | None = None
+    retake: bool = False
+
+    @property
+    def sentence(self) -> str:
+        """What it does, for a report."""
+        return tr(
+            "measured on the robot: seen by the camera {sensor} at {count} angles of U",
+            sensor=sensor_name(self.sensor),
+            count=len(self.plan.turns_deg),
+        )
+
+    @property
+    def remedy(self) -> str:
+        """What to do when a measurement makes the tip jump."""
+        return tr(
+            "Look at the picture: is it the tip that was found, and is it clean? Was the camera "
+            "moved?"
+        )
+
+    def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
+        """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`."""
+        return measure_camera(
+            self.station,
+            self.plan,
+            here=here,
+            stored=stored,
+            sigma_mm=self.sigma_mm,
+            retake=self.retake,
+        )
+
+    def proof(
+        self,
+        context: MeasurementContext,  # noqa: ARG002 - nothing of it is read
+        tool: int,
+        result: CalibrationResult,
+        *,
+        tip: ToolOffset,
+        tolerance_mm: float,
+    ) -> LookTest:
+        """Return the proof at other angles; see :class:`~robolink.procedures.KeepsProof`."""
+        return LookTest(
+            tool=tool,
+            written=result.offset,
+            tip=tip,
+            tolerance_mm=tolerance_mm,
+            sensor=self.sensor,
+            station=self.station,
+            plan=self.plan,
+            angles_deg=proof_angles(result, tool),
+            camera_error_mm=camera_error_of(result),
+            radius_px=radius_of(result),
+        )
+
+
+def _source(parameters: CameraParameters, site: Site) -> "TipSource":
+    sensor, station = camera_at(parameters, site)
+    return CameraSource(
+        sensor, station, parameters.look, sigma_mm=site.sigma_mm, retake=parameters.retake
+    )
+
+
+def _proof() -> "type[KeptProof]":
+    return LookTest
+
+
+METHOD = Method(
+    name="camera",
+    summary=declared("See the tip with a calibrated, up-looking camera: X and Y."),
+    description=declared(
+        "See the tip with an up-looking camera: X and Y; nobody touches anything.\n\n"
+        "What a pixel means is known from 'calibrate camera-affine', or stands in the cell file, "
+        "or the camera answers in millimetres. Looks at several angles tell the tip from what the "
+        "camera itself is off by; a single one believes the camera."
+    ),
+    parameters=CameraParameters,
+    measures=("x_mm", "y_mm"),
+    needs=Needs(station=StationKind.CAMERA, sensor=True, place=PLACE),
+    source=_source,
+    unmeasured_z=UNMEASURED_Z,
+    proof=_proof,
+)

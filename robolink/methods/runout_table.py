@@ -1,0 +1,170 @@
+"""runout-table: a calibrated camera sees how the tip wobbles, angle by angle."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Annotated
+
+from annotated_types import MaxLen, MinLen
+
+from robolink.calibration import CalibrationResult
+from robolink.files.toml import Problem
+from robolink.messages import declared, tr
+from robolink.methods.camera import CameraSource
+from robolink.methods.method import DEGREES, Angle, Check, Help, Method, Needs, Option, Site
+from robolink.methods.shared_parameters import (
+    PLACE,
+    UNMEASURED_Z,
+    LookParameters,
+    camera_at,
+)
+from robolink.model import Pose, ToolOffset
+from robolink.procedures import LookPlan, MeasurementContext
+from robolink.runner import Procedure
+from robolink.sensing import sensor_name
+from robolink.stations import StationKind
+
+if TYPE_CHECKING:
+    from robolink.methods.camera import LookTest
+    from robolink.procedures import KeptProof, TipSource
+
+
+LARGEST_GAP_DEG = 60.0
+"""The solver says it too."""
+
+_LEAST_LOOKS = 8
+
+
+@dataclass(frozen=True, slots=True)
+class AllRoundPlan(LookPlan):
+    """Looks all round, within half a turn to either side of U = 0, as wrists can go.
+
+    They begin at the end that is nearer and go on from neighbour to neighbour, so that every turn
+    but the first is small and the first less than half a turn.
+    """
+
+    def angles_deg(self, u_deg: float) -> tuple[float, ...]:
+        """Return U of every look for a tool that stands at ``u_deg``, in order."""
+        # Between -180, which it leaves out, and 180.
+        within = [180.0 - (180.0 - u_deg - turn_deg) % 360.0 for turn_deg in self.turns_deg]
+        return tuple(sorted(within, reverse=u_deg > 0))
+
+
+@dataclass(frozen=True, kw_only=True)
+class RunoutTableParameters(LookParameters):
+    """How a calibrated camera looks at a tip all round."""
+
+    turns_deg: Annotated[
+        tuple[Angle, ...],
+        MinLen(_LEAST_LOOKS),
+        MaxLen(72),
+        DEGREES,
+        Option(flag="--angles", metavar="0,30,.."),
+        Help(
+            declared(
+                "U of each look, counted from where the tool stands: all round, in steps of 60 or "
+                "less. Each becomes a row of the table."
+            )
+        ),
+    ] = tuple(30.0 * step for step in range(12))
+
+    @property
+    def look(self) -> LookPlan:
+        """The same for a procedure."""
+        return AllRoundPlan(
+            turns_deg=self.turns_deg,
+            pictures=self.pictures,
+            lift_mm=self.lift_mm,
+            beside_mm=self.beside_mm,
+        )
+
+    def problems(self, check: Check) -> Iterator[Problem]:
+        """Check that the looks go all round."""
+        yield from super().problems(check)
+        turned = sorted(turn % 360.0 for turn in self.turns_deg)
+        gaps = (b - a for a, b in zip(turned, [*turned[1:], turned[0] + 360.0], strict=True))
+        if max(gaps) > LARGEST_GAP_DEG:
+            yield Problem(
+                "turns_deg",
+                tr(
+                    "must go all round in steps of {limit:g} degrees or less", limit=LARGEST_GAP_DEG
+                ),
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class RunoutTableSource(CameraSource):
+    """Measures X and Y of a tip by looking at it all round, and how it wobbles."""
+
+    @property
+    def sentence(self) -> str:
+        """What it does, for a report."""
+        return tr(
+            "measured on the robot: seen all round by the camera {sensor}, at {count} angles of U",
+            sensor=sensor_name(self.sensor),
+            count=len(self.plan.turns_deg),
+        )
+
+    def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
+        """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`."""
+        from robolink.methods.runout_table_procedure import measure_runout_table  # numpy
+
+        return measure_runout_table(
+            self.station,
+            self.plan,
+            here=here,
+            stored=stored,
+            sigma_mm=self.sigma_mm,
+            retake=self.retake,
+        )
+
+    def proof(
+        self,
+        context: MeasurementContext,
+        tool: int,
+        result: CalibrationResult,
+        *,
+        tip: ToolOffset,
+        tolerance_mm: float,
+    ) -> "LookTest":
+        """Return the proof at other angles, where the tip has to be where the table says."""
+        from robolink.calibration import RunoutTableResult  # numpy
+        from robolink.methods.runout_table_procedure import WobbleTest
+
+        # "slots" makes the class anew, so the short form of super() would not find it.
+        looks = CameraSource.proof(self, context, tool, result, tip=tip, tolerance_mm=tolerance_mm)
+        if not isinstance(result, RunoutTableResult):
+            return looks
+        plain = {field.name: getattr(looks, field.name) for field in fields(looks)}
+        return WobbleTest(**plain, table=result.table)
+
+
+def _source(parameters: RunoutTableParameters, site: Site) -> "TipSource":
+    sensor, station = camera_at(parameters, site)
+    return RunoutTableSource(
+        sensor, station, parameters.look, sigma_mm=site.sigma_mm, retake=parameters.retake
+    )
+
+
+def _proof() -> "type[KeptProof]":
+    from robolink.methods.runout_table_procedure import WobbleTest
+
+    return WobbleTest
+
+
+METHOD = Method(
+    name="runout-table",
+    summary=declared("See how a pick nozzle wobbles: X and Y, and a table by angle."),
+    description=declared(
+        "See the tip with a calibrated, up-looking camera all round: X and Y, and a table of how "
+        "far beside them it is at each angle of U; nobody touches anything.\n\n"
+        "The table is for nozzles that wobble when they turn. It goes on record and into the JSON "
+        "document; the controller has no place for it, so the program that places parts takes it "
+        "back itself. Only X and Y are offered to be written."
+    ),
+    parameters=RunoutTableParameters,
+    measures=("x_mm", "y_mm"),
+    needs=Needs(station=StationKind.CAMERA, sensor=True, place=PLACE),
+    source=_source,
+    unmeasured_z=UNMEASURED_Z,
+    proof=_proof,
+)

@@ -1,0 +1,132 @@
+"""What plane-touch and sphere-touch share: a surface touched upright and tilted."""
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Any, Generic, Self
+
+from annotated_types import Ge, Le
+
+from robolink.calibration import CalibrationResult
+from robolink.messages import declared
+from robolink.methods.method import DEGREES, MM, Help, InputNumber, Option
+from robolink.methods.pivot import require_known_tip
+from robolink.methods.shared_parameters import PinParameters, Retake
+from robolink.methods.surface_touch.survey import SurveyT
+from robolink.model import Pose, ToolOffset
+from robolink.procedures import TAKE_ALL, SamplingPolicy, TouchPlan, TouchSource
+from robolink.runner import Procedure, TouchedAt
+
+if TYPE_CHECKING:
+    from robolink.methods.surface_touch.drive import SurfaceKind
+
+
+@dataclass(frozen=True, kw_only=True)
+class SurfaceParameters(PinParameters):
+    """How a tip is taken off a surface and brought back; the surface stands for the pin."""
+
+    lift_mm: Annotated[
+        float,
+        Ge(1),
+        Le(100),
+        MM,
+        Help(declared("How far the tip is lifted before it tilts and turns.")),
+    ] = 12.0
+    clearance_mm: Annotated[
+        float,
+        Ge(0.5),
+        Le(50),
+        MM,
+        Help(
+            declared(
+                "Least distance from the surface at which the robot stops; a person jogs the rest."
+            )
+        ),
+    ] = 2.0
+    contact_input: Annotated[
+        InputNumber | None,
+        Option(metavar="N"),
+        Help(
+            declared("Number of the input that shows contact of tip and surface, if there is one.")
+        ),
+    ] = None
+    tilt_deg: Annotated[
+        float,
+        Ge(10),
+        Le(45),
+        DEGREES,
+        Option(metavar="DEG"),
+        Help(declared("How far the tool leans, relative to the first touch.")),
+    ] = 30.0
+
+    retake: Retake = False
+
+    @property
+    def sampling(self) -> SamplingPolicy:
+        """Whether a touch is offered to be made again."""
+        return SamplingPolicy(retake=self.retake)
+
+    def states_station(self) -> bool:
+        """Tell that nothing need be known about the surface: it is found with the tip."""
+        return True
+
+
+@dataclass(frozen=True, slots=True)
+class SurfaceTouchSource(TouchSource, Generic[SurveyT]):
+    """Measures by touching one surface with the tool upright and tilted.
+
+    Attributes:
+        touch: Lift, clearance, contact input.
+        survey: How many touches, and where.
+        axes: How many axes the robot has, 0 where nobody knows.
+        sigma_mm: Standard deviation of one touch along the normal, where it is known.
+        sampling: Whether a touch is offered again when all are made.
+    """
+
+    touch: TouchPlan
+    survey: SurveyT
+    axes: int = 0
+    sigma_mm: float | None = None
+    sampling: SamplingPolicy = TAKE_ALL
+
+    def foreseen(self) -> Self:
+        """Return the source whose steps are only shown."""
+        return replace(TouchSource.foreseen(self), sampling=TAKE_ALL)
+
+    def steps(self, stored: ToolOffset | None) -> Procedure[CalibrationResult]:
+        """Return the steps; they end lifted, over the place touched last, as upright as they began.
+
+        Raises:
+            ConfigError: Nobody knows about where the tip is, so it cannot be kept off the surface.
+        """
+        from robolink.methods.surface_touch.drive import measure_surface  # numpy
+
+        found: CalibrationResult = yield from measure_surface(
+            self, self._kind(), require_known_tip(stored)
+        )
+        return found
+
+    @property
+    def adds_touch(self) -> bool:
+        """Where one more tells most depends on those of the plan."""
+        return False
+
+    def further_steps(
+        self, here: Pose, taken: Sequence[TouchedAt], again: int | None, stored: ToolOffset | None
+    ) -> Procedure[CalibrationResult]:
+        """Return the steps that make one touch again."""
+        from robolink.methods.surface_touch.drive import retake_on_surface  # numpy
+
+        found: CalibrationResult = yield from retake_on_surface(
+            self,
+            self._kind(),
+            require_known_tip(stored),
+            here=here,
+            taken=taken,
+            again=len(taken) - 1 if again is None else again,
+        )
+        return found
+
+    @abstractmethod
+    def _kind(self) -> "SurfaceKind[SurveyT, Any]":
+        """Return what the surface is."""

@@ -1,0 +1,264 @@
+"""sphere-touch: a sphere touched from several sides, on robots that tilt their tool."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, ClassVar
+
+from annotated_types import Ge, Le
+
+from robolink.calibration import HIGHEST_MM, CalibrationResult
+from robolink.files.toml import Problem
+from robolink.messages import declared, tr
+from robolink.methods.method import MM, Check, Help, Method, Needs, Option, PoseHelp, Site
+from robolink.methods.surface_touch import SurfaceParameters, SurfaceTouchSource
+from robolink.methods.surface_touch.survey import SphereSurvey
+from robolink.model import Pose, ToolOffset
+from robolink.procedures import (
+    TAKE_ALL,
+    MeasurementContext,
+    SamplingPolicy,
+    TouchPlan,
+    drift_uncertainty_mm,
+)
+from robolink.runner import Procedure
+from robolink.stations import StationKind
+
+if TYPE_CHECKING:
+    from robolink.calibration import SphereTouchResult
+    from robolink.methods.surface_touch.drive import SurfaceKind
+    from robolink.methods.surface_touch.sphere_procedure import SphereTest
+    from robolink.procedures import KeptProof, PoseMethod, TipSource
+
+
+_USUAL_MM = 10.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class SphereTouchParameters(SurfaceParameters):
+    """How a sphere is touched from several sides, with the tool upright and tilted."""
+
+    count: Annotated[
+        int,
+        Ge(SphereSurvey.least_count),
+        Le(24),
+        Help(
+            declared(
+                "Number of touches; the first four in the orientation in which the tool stands."
+            )
+        ),
+    ] = 12
+    radius_mm: Annotated[
+        float,
+        Ge(2),
+        Le(50),
+        MM,
+        Option(metavar="MM"),
+        Help(
+            declared(
+                "Approximate radius of the sphere. It guides the robot; the true radius is "
+                "measured."
+            )
+        ),
+    ] = _USUAL_MM
+
+    @property
+    def survey(self) -> SphereSurvey:
+        """How many touches there are, and from which sides."""
+        return SphereSurvey(self.radius_mm, self.count, self.tilt_deg)
+
+    def problems(self, check: Check) -> Iterator[Problem]:
+        """Check that the tip passes over the sphere, and stops on its way down to it."""
+        yield from super().problems(check)
+        survey = self.survey
+        least_mm = self.clearance_mm + HIGHEST_MM + survey.drop_mm + survey.aside_mm
+        if least_mm >= self.lift_mm:
+            yield Problem(
+                "lift_mm",
+                tr(
+                    "must be more than {least:.1f}, so that the tip passes over a sphere of "
+                    "{radius:g} mm",
+                    least=least_mm,
+                    radius=self.radius_mm,
+                ),
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class SphereTouchSource(SurfaceTouchSource[SphereSurvey]):
+    """Measures by touching one sphere from several sides, the tool upright and tilted."""
+
+    @property
+    def sentence(self) -> str:
+        """What it does, for a report."""
+        return tr(
+            "measured on the robot: one sphere touched {count} times from several sides, the tool "
+            "upright and tilted by {tilt:g} degrees",
+            count=self.survey.count,
+            tilt=self.survey.tilt_deg,
+        )
+
+    @property
+    def remedy(self) -> str:
+        """What to do when a measurement makes the tip jump."""
+        return tr("Check that all touches were on the same sphere, and that it is fixed.")
+
+    def proof(
+        self,
+        context: MeasurementContext,  # noqa: ARG002 - nothing of it is read
+        tool: int,
+        result: CalibrationResult,
+        *,
+        tip: ToolOffset,
+        tolerance_mm: float,
+    ) -> "SphereTest":
+        """Return the proof in other tilts; see :class:`~robolink.procedures.KeepsProof`.
+
+        Raises:
+            TypeError: The result is not that of a sphere.
+        """
+        from robolink.calibration import SphereTouchResult
+        from robolink.methods.surface_touch.sphere_procedure import (  # numpy
+            SphereTest,
+            TouchedSphere,
+        )
+        from robolink.procedures.tilting_proof import upright_of
+
+        if not isinstance(result, SphereTouchResult):
+            raise TypeError("the sphere that was touched is a part of the result")
+        x_mm, y_mm, z_mm = result.reference_point_mm
+        return SphereTest(
+            tool=tool,
+            written=result.offset,
+            tip=tip,
+            tolerance_mm=tolerance_mm,
+            touch=self.touch,
+            survey=self.survey,
+            sphere=TouchedSphere((x_mm, y_mm, z_mm), result.radius_mm),
+            axes=self.axes,
+            u_mm=drift_uncertainty_mm(result),
+            upright=upright_of(result, result.offset, tool),
+        )
+
+    def _kind(self) -> "SurfaceKind[SphereSurvey, SphereTouchResult]":
+        from robolink.methods.surface_touch.sphere_procedure import SPHERE  # numpy
+
+        return SPHERE
+
+
+def measure_sphere_touch(
+    plan: TouchPlan,
+    survey: SphereSurvey,
+    *,
+    stored: ToolOffset,
+    axes: int = 0,
+    sigma_mm: float | None = None,
+    sampling: SamplingPolicy = TAKE_ALL,
+) -> Procedure[CalibrationResult]:
+    """Measure a tip on a sphere. Runs in Tool 0.
+
+    It ends lifted, over the place that was touched last, in the orientation in which it began.
+
+    Args:
+        plan: Lift, clearance, contact input.
+        survey: How many touches, and from which sides.
+        stored: The offset stored now; the approaches use it. Where it is wrong by e, the tip comes
+            down nearer to the sphere by up to 2 e sin(tilt / 2).
+        axes: How many axes the robot has, 0 where nobody knows.
+        sigma_mm: Standard deviation of one touch along the normal, where it is known.
+        sampling: Whether a touch may be made again when all are made.
+
+    Raises:
+        CalibrationError: ``off_top``, ``radius_contradicted``, ``not_tilted``; ``not_touched``,
+            ``typed_ahead``, ``touch_not_proven``, ``large_residual``; and as
+            :func:`~robolink.calibration.solve_sphere_touch`.
+
+    Example:
+        >>> import math
+        >>> from robolink.methods import SphereSurvey, measure_sphere_touch
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import TouchPlan
+        >>> from robolink.testing import PaperCell
+        >>> def onto_the_ball(at, centre=(310, 95, -60), radius_mm=10):
+        ...     share = radius_mm / math.dist(at, centre)
+        ...     return tuple(c + share * (x - c) for x, c in zip(at, centre))
+        >>> cell = PaperCell(Pose(298, 99, 20, 0), ToolOffset(12.3, -3.9, -20.6), onto_the_ball)
+        >>> course = measure_sphere_touch(
+        ...     TouchPlan(), SphereSurvey(radius_mm=10), stored=ToolOffset(12, -4, -20), axes=6
+        ... )
+        >>> [round(length, 3) for length in cell.run(course).offset.components()[:3]]
+        [12.3, -3.9, -20.6]
+    """
+    source = SphereTouchSource(plan, survey, axes, sigma_mm, sampling)
+    return source.steps(stored)
+
+
+@dataclass(frozen=True, slots=True)
+class SphereTouches:
+    """Touches of one sphere from several sides, the tool upright, turned and tilted.
+
+    Attributes:
+        sigma_mm: Standard deviation of one touch along the normal, where it is known.
+    """
+
+    upright: ClassVar[bool] = False
+    needs: ClassVar[tuple[str, ...]] = ("z_mm", "v_deg", "w_deg")
+
+    sigma_mm: float | None = None
+
+    def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
+        """Solve eight poses and more; see :class:`~robolink.procedures.PoseMethod`."""
+        from robolink.calibration import solve_sphere_touch  # numpy, which a look does without
+
+        return solve_sphere_touch(flange, stored=stored, sigma_mm=self.sigma_mm)
+
+
+def _source(parameters: SphereTouchParameters, site: Site) -> "TipSource":
+    from robolink.methods.pivot import axes_of, require_tilting
+
+    require_tilting(site.controller, METHOD.name)
+    return SphereTouchSource(
+        parameters.touch,
+        parameters.survey,
+        axes=axes_of(site.controller),
+        sigma_mm=site.sigma_mm,
+        sampling=parameters.sampling,
+    )
+
+
+def _from_poses(_parameters: SphereTouchParameters, site: Site) -> "PoseMethod":
+    return SphereTouches(site.sigma_mm)
+
+
+def _proof() -> "type[KeptProof]":
+    from robolink.methods.surface_touch.sphere_procedure import SphereTest
+
+    return SphereTest
+
+
+METHOD = Method(
+    name="sphere-touch",
+    summary=declared("Touch a sphere from several sides, the tool upright and tilted: X, Y and Z."),
+    description=declared(
+        "Touch a sphere from several sides, the tool upright and tilted: X, Y and Z. A ball of a "
+        "bearing or of a gauge will do; nobody has to hit a point.\n\n"
+        "Put the tip some millimetres above the top of the sphere first, the tool as it stands in "
+        "production. Four touches tell where the sphere is; then the robot tilts the tool in the "
+        "air, and stops near one side each time; you do the rest. The tool must be defined "
+        "already, to a millimetre or two. Where the sphere is and its true radius are found. A "
+        "robot whose tool only turns about Z cannot do this.\n\n"
+        "With poses that exist already nothing moves."
+    ),
+    parameters=SphereTouchParameters,
+    measures=("x_mm", "y_mm", "z_mm"),
+    needs=Needs(station=StationKind.TOUCH, named=False, tilt=True),
+    source=_source,
+    from_poses=_from_poses,
+    pose_help=PoseHelp(
+        points=declared(
+            "Eight points or more taught on the pendant from several sides, the tool tilted."
+        ),
+        typed=declared("A pose X,Y,Z,U,V,W in mm and degrees; give it eight times or more."),
+        path=declared("A file of poses that state X to W."),
+    ),
+    proof=_proof,
+)

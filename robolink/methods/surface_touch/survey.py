@@ -1,0 +1,114 @@
+"""How many touches of a plane or a sphere there are, and where on it."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar, Final, TypeVar
+
+Vector = tuple[float, float, float]
+
+_CORNER_DEG: Final = 60.0
+"""The first three places are an equilateral triangle: it stays one that tells how the plane lies
+when a person jogs square to a leaning plane, which shifts the second and the third alike."""
+
+_TURN_DEG: Final = 100.0
+"""From one further place to the next; no two of the first eighteen are the same."""
+
+_AZIMUTHS: Final = 8
+
+
+@dataclass(frozen=True, slots=True)
+class PlaneSurvey:
+    """The touches of one measurement.
+
+    Attributes:
+        count: How many.
+        tilt_deg: How far the tool leans in all but the first three.
+        spread_mm: How far from the first touch the others are, counted level.
+    """
+
+    count: int = 10
+    tilt_deg: float = 30.0
+    spread_mm: float = 10.0
+
+    least_count: ClassVar[int] = 9
+    """Six unknowns and the share of the distances leave two by which they are judged."""
+
+    uprights: ClassVar[int] = 3
+    """Touches in one orientation: they tell how the plane lies, however wrong the tip is."""
+
+    most_lean_deg: ClassVar[float] = 30.0
+    """By how much a plane may lean from the level, while nobody knows it."""
+
+    @property
+    def rise_mm(self) -> float:
+        """How much higher than the first touch such a plane may be where it is touched next."""
+        return self.spread_mm * math.tan(math.radians(self.most_lean_deg))
+
+    def beside_mm(self, number: int) -> tuple[float, float]:
+        """Return where touch ``number``, counted from 0, is beside the first: X and Y, base."""
+        if number == 0:
+            return 0.0, 0.0
+        further = max(0, number - self.uprights + 1)
+        way = math.radians(_CORNER_DEG * min(number - 1, self.uprights - 2) + _TURN_DEG * further)
+        return self.spread_mm * math.cos(way), self.spread_mm * math.sin(way)
+
+
+@dataclass(frozen=True, slots=True)
+class SphereSurvey:
+    """The touches of one measurement.
+
+    Attributes:
+        radius_mm: About the radius of the sphere, which guides the robot only.
+        count: How many.
+        tilt_deg: How far the tool leans in all but the first four.
+    """
+
+    radius_mm: float
+    count: int = 12
+    tilt_deg: float = 30.0
+
+    least_count: ClassVar[int] = 11
+    """Seven unknowns and the share of the distances leave three by which they are judged. With two
+    that share is told so badly on six axes that good runs are refused: docs/calibrate.md,
+    "sphere-touch: a ball, and no pin"."""
+
+    uprights: ClassVar[int] = 4
+    """Touches in one orientation: they tell where the sphere is, but for the error of the tip."""
+
+    most_aside: ClassVar[float] = 0.3
+    """How far from the top the first touch may be, as a share of the radius."""
+
+    side_deg: ClassVar[float] = 45.0
+    """How far from the top it is touched: further down a tool that leans would meet it."""
+
+    @property
+    def aside_mm(self) -> float:
+        """How far from the top the first touch may be; so much more the tip keeps away at first."""
+        return self.most_aside * self.radius_mm
+
+    @property
+    def drop_mm(self) -> float:
+        """How much lower than its top the sphere is touched."""
+        return self.radius_mm * (1.0 - math.cos(math.radians(self.side_deg)))
+
+    def sides(self) -> Iterator[Vector]:
+        """Yield the outward directions among which to choose, the top first."""
+        yield (0.0, 0.0, 1.0)
+        for polar_deg in (self.side_deg / 2, self.side_deg):
+            for number in range(_AZIMUTHS):
+                yield outward(polar_deg, 360.0 * number / _AZIMUTHS)
+
+    def upright_side(self, number: int) -> Vector:
+        """Return the outward direction of touch ``number``, counted from 0, of the first four."""
+        return outward(self.side_deg if number else 0.0, 120.0 * (number - 1))
+
+
+def outward(polar_deg: float, azimuth_deg: float) -> Vector:
+    """Return the unit vector so far from the vertical, toward a direction of the base."""
+    polar, azimuth = math.radians(polar_deg), math.radians(azimuth_deg)
+    beside = math.sin(polar)
+    return beside * math.cos(azimuth), beside * math.sin(azimuth), math.cos(polar)
+
+
+SurveyT = TypeVar("SurveyT", bound=PlaneSurvey | SphereSurvey)

@@ -1,0 +1,432 @@
+"""How marks are brought before a camera."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Final
+
+from robolink.calibration import carrying, tip_did_not_move, toward_zero
+from robolink.errors import CalibrationError, ConfigError
+from robolink.messages import tr
+from robolink.model import TIP, Path, Pose, SpotUnit, ToolOffset
+from robolink.procedures.camera_watch import SpotWatch
+from robolink.runner import Look, Move, Notify, Procedure, SeenAt, first_clear
+from robolink.stations import CameraStation
+
+HALF_ROUND_DEG: Final = (0.0, 60.0, 120.0, 180.0)
+"""Four angles over half a turn, which joints allow wherever they allow to turn about a tip at
+all; a whole turn would bring 0.50 sigma in place of 0.55. In steps of less than half a turn, so
+that no controller has two ways to choose from, and all in one direction."""
+
+TWO_ANGLES_DEG: Final = (0.0, 120.0)
+"""Two that tell the camera's own error from what is on the tool."""
+
+LEAST_BESIDE_MM: Final = 0.2
+"""An approach that begins nearer to its place does not show whether the spot moves with the tip."""
+
+
+@dataclass(frozen=True, slots=True)
+class LookPlan:
+    """How marks are brought before a camera.
+
+    Attributes:
+        turns_deg: Angles U of the looks, counted toward zero from where the tool stands.
+        pictures: How many are taken at each; the median counts.
+        lift_mm: How far the mark is lifted before anything turns.
+        centre_first: Look once to find the mark, and bring it to the middle for the measurement:
+            there an error of the camera's scale, or of the height, does no harm.
+        search_mm: How far from where it is expected the first look may find the mark; the robot
+            does not follow anything farther.
+        beside_mm: Every place is approached from this far beside it in X and Y, always from the
+            same side, so that play in the joints shifts all looks alike. A picture is taken there
+            too: a spot that does not move from there as the robot does is not the tip.
+    """
+
+    turns_deg: tuple[float, ...] = HALF_ROUND_DEG
+    pictures: int = 3
+    lift_mm: float = 10.0
+    centre_first: bool = True
+    search_mm: float = 5.0
+    beside_mm: float = 1.0
+
+    def angles_deg(self, u_deg: float) -> tuple[float, ...]:
+        """Return U of every look for a tool that stands at ``u_deg``, in order."""
+        return tuple(toward_zero(u_deg, turn_deg) for turn_deg in self.turns_deg)
+
+
+_SHARES: Final = (1.0, -1.0, 0.5, -0.5)
+"""By which the planned turns are scaled where the arm cannot take them up."""
+
+_NEARER: Final = (1.0, 0.5, 0.25)
+"""At which shares of the way beside a place a spot is sought that was not seen all of it away."""
+
+_UNSEEN: Final = frozenset(
+    {"tip_not_seen", "fiducial_not_seen", "several_tips_seen", "several_fiducials_seen"}
+)
+"""What a picture beside a place may be refused for although one nearer to it may do."""
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Something to be looked at.
+
+    Attributes:
+        u_deg: U of the frame meanwhile.
+        mark: The tip, or the number of a fiducial.
+        at: Where the mark is expected, seen from the frame.
+        aside_mm: How far from the middle of the image it is brought, base X and Y.
+    """
+
+    u_deg: float
+    at: ToolOffset
+    mark: int = TIP
+    aside_mm: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class CameraDrive:
+    """The way of one frame from place to place, and whether the spot goes with it.
+
+    Each place is looked at twice: from beside it, where its approach begins anyway, and at it. A
+    spot that is the tip moves by what the robot moved meanwhile; one that does not is met once
+    more, from the same side both times and with all pictures, and refused if it still does not.
+
+    Attributes:
+        station, plan: Where and how.
+        frame: A pose of the frame: its V and W, hand, local and tool.
+        calibrated: Whether it is known what the pixels mean; not where that is measured.
+        watch: What the looks said so far of the camera itself.
+
+    Raises:
+        ConfigError: The plan begins approaches too near to the places for that.
+    """
+
+    station: CameraStation
+    plan: LookPlan
+    frame: Pose
+    calibrated: bool = True
+    watch: SpotWatch = field(init=False, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Begin a run of looks."""
+        if self.plan.beside_mm < LEAST_BESIDE_MM:
+            raise ConfigError(
+                tr(
+                    "An approach that begins {beside:g} mm beside its place does not show whether "
+                    "the spot moves with the tip.",
+                    beside=self.plan.beside_mm,
+                ),
+                remedy=tr("Let it begin {least:g} mm beside or more.", least=LEAST_BESIDE_MM),
+            )
+        object.__setattr__(self, "watch", SpotWatch(self.station, self.calibrated))
+
+    def looks(
+        self, places: Sequence[Place], here: Pose, *, before_camera: bool = False
+    ) -> Procedure[list[SeenAt]]:
+        """Look at every place in turn; ends before the camera, with the last one in the image.
+
+        Args:
+            places: What to look at.
+            here: Where the frame is.
+            before_camera: Whether it stands where an earlier call ended.
+
+        Raises:
+            CalibrationError: ``tip_not_seen``, ``several_tips_seen`` and their like;
+                ``tip_did_not_move``, ``camera_changed``, ``spot_changed``; with the frame lifted.
+
+        Example:
+            >>> from robolink.model import Pose, ToolOffset
+            >>> from robolink.procedures import CameraDrive, LookPlan, Place
+            >>> from robolink.stations import CameraStation
+            >>> from robolink.testing import PaperCell
+            >>> here, tip = Pose(300, 100, 20, 0), ToolOffset(12, -4, -20)
+            >>> drive = CameraDrive(CameraStation(300, 80, -30), LookPlan(), here)
+            >>> seen = PaperCell(here, tip).run(drive.looks([Place(0, tip), Place(90, tip)], here))
+            >>> [(look.u_deg, round(look.spot.x, 3), round(look.spot.y, 3)) for look in seen]
+            [(0, 300.0, 80.0), (90, 300.0, 80.0)]
+        """
+        seen = list[SeenAt]()
+        for place in places:
+            if before_camera and place.u_deg == here.u_deg:
+                yield Move(
+                    self._beside(place),
+                    Path.STRAIGHT,
+                    tr("Moving to the next place over the camera."),
+                )
+            else:
+                yield from self._turn_to(place, here)
+            beside = yield from self._look_beside(place)
+            here, before_camera = self.pose(place), True
+            yield from self._approach(here)
+            look = yield from self._look(place)
+            seen.append((yield from self._witnessed(place, beside, look)))
+        return seen
+
+    def _witnessed(self, place: Place, beside: SeenAt | None, look: SeenAt) -> Procedure[SeenAt]:
+        """Return a look whose spot is known to have moved with the robot.
+
+        Raises:
+            CalibrationError: ``tip_did_not_move``, ``camera_changed``, ``spot_changed``.
+        """
+        watch, mark = self.watch, place.mark
+        if beside is None or not watch.follows(mark, beside, look):
+            pair = yield from self._more_closely(place)
+            if beside is not None:
+                watch.learn_play(beside, look)
+            beside, look = pair
+        earlier = watch.known_before(mark, place.u_deg, look)
+        if earlier is not None and not watch.follows(mark, earlier, look):
+            pair = yield from self._again(place, earlier)
+            if not watch.follows(mark, *pair):
+                yield from self.lifted(place)
+                raise watch.refusal(mark, [(earlier, look), pair])
+            look = pair[1]
+        watch.keep(mark, place.u_deg, beside, look)
+        return look
+
+    def _more_closely(self, place: Place) -> Procedure[tuple[SeenAt, SeenAt]]:
+        """Look beside a place and at it with all pictures, both met from the same side.
+
+        From nearer where nothing is seen at the whole distance, and where what is seen moves by
+        another vector: a camera that changed shows that one wrong in the same way.
+
+        Raises:
+            CalibrationError: ``tip_did_not_move``, ``camera_changed``, ``spot_changed``;
+                ``several_tips_seen`` and its like.
+        """
+        yield Notify(_in_doubt())
+        wrong = list[tuple[SeenAt, SeenAt]]()
+        unseen = tip_did_not_move(None, in_mm=False)
+        at, watch = self.pose(place), self.watch
+        for share in _NEARER:
+            start = _shifted(at, -share * self.plan.beside_mm)
+            yield from self._met(start)
+            try:
+                before: SeenAt = yield from self._seen(place, start, self.plan.pictures)
+            except CalibrationError as error:
+                if error.code not in _UNSEEN:
+                    yield from self.lifted(place)
+                    raise
+                unseen = error if error.code.startswith("several") else unseen
+                continue
+            yield from self._approach(at)
+            pair = before, (yield from self._look(place))
+            # Over a shorter way more is allowed for: what was wrong over the whole one must not
+            # come to be right by that.
+            if watch.follows(place.mark, *pair) and not any(
+                watch.alike(pair, other) for other in wrong
+            ):
+                return pair
+            wrong.append(pair)
+            if len(wrong) == 2 or watch.stands_still(place.mark, *pair):
+                break
+        yield from self.lifted(place)
+        raise watch.refusal(place.mark, wrong) if wrong else unseen
+
+    def _again(self, place: Place, earlier: SeenAt) -> Procedure[tuple[SeenAt, SeenAt]]:
+        """Look where a mark was looked at before, and at its place, both met from one side."""
+        start, at = self._at_place(place, earlier), self.pose(place)
+        yield Notify(_in_doubt())
+        yield from self._met(start)
+        try:
+            before: SeenAt = yield from self._seen(place, start, self.plan.pictures)
+        except CalibrationError:
+            yield from self.lifted(place)
+            raise
+        yield from self._met(at)
+        return before, (yield from self._look(place))
+
+    def _at_place(self, place: Place, earlier: SeenAt) -> Pose:
+        return replace(self.pose(place), x_mm=earlier.x_mm, y_mm=earlier.y_mm)
+
+    def _met(self, at: Pose) -> Procedure[None]:
+        """Go to a place beside the camera's middle from the side from which all are met."""
+        yield Move(
+            _shifted(at, -self.plan.beside_mm),
+            Path.STRAIGHT,
+            tr("Moving to the next place over the camera."),
+        )
+        yield from self._approach(at)
+
+    def _approach(self, at: Pose) -> Procedure[None]:
+        yield Move(at, Path.STRAIGHT, tr("Approaching the camera from the same side."))
+
+    def _look_beside(self, place: Place) -> Procedure[SeenAt | None]:
+        """Take one picture where the approach begins; ``None`` where it does not tell."""
+        beside = self._beside(place)
+        pictures = self.plan.pictures if self._measures_pixels else 1
+        try:
+            return (yield from self._seen(place, beside, pictures))
+        except CalibrationError as error:
+            if error.code in _UNSEEN:
+                return None
+            yield Move(self._above(beside), Path.STRAIGHT, tr("Lifting off the camera."))
+            raise
+
+    def _seen(self, place: Place, at: Pose, pictures: int) -> Procedure[SeenAt]:
+        """Take pictures with the frame at a pose beside a place."""
+        middle, there = self._middle(place), self.pose(place)
+        expected_mm = (middle[0] + at.x_mm - there.x_mm, middle[1] + at.y_mm - there.y_mm)
+        look: SeenAt = yield Look(
+            tr("Looking whether the spot moves with the tip."), expected_mm, place.mark, pictures
+        )
+        return self.watch.heard(look)
+
+    def centred(
+        self, places: Sequence[Place], here: Pose, found: Callable[[Sequence[SeenAt]], ToolOffset]
+    ) -> Procedure[ToolOffset]:
+        """Look where marks are, and return where they are to be expected from now on.
+
+        Args:
+            places: What to look at; ends before the camera, at the last of them.
+            here: Where the frame is.
+            found: Makes the expectation of the looks.
+
+        Raises:
+            CalibrationError: ``far_off``: a mark is farther from where it was expected than
+                anything explains; those of :meth:`looks`, and those of ``found``. The frame is
+                lifted then.
+
+        Example:
+            >>> from robolink.model import Pose, ToolOffset
+            >>> from robolink.procedures import CameraDrive, LookPlan, Place
+            >>> from robolink.stations import CameraStation
+            >>> from robolink.testing import PaperCell
+            >>> here, stored = Pose(300, 100, 20, 0), ToolOffset(12, -4, -20)
+            >>> drive = CameraDrive(CameraStation(300, 80, -30), LookPlan(), here)
+            >>> def seen_at_zero(looks):
+            ...     (look,) = looks
+            ...     return ToolOffset(look.spot.x - look.x_mm, look.spot.y - look.y_mm, stored.z_mm)
+            >>> cell = PaperCell(here, ToolOffset(12.7, -4.2, -20))
+            >>> expected = cell.run(drive.centred([Place(0, stored)], here, seen_at_zero))
+            >>> round(expected.x_mm, 3), round(expected.y_mm, 3)
+            (12.7, -4.2)
+        """
+        seen = yield from self.looks(places, here)
+        try:
+            for place, look in zip(places, seen, strict=True):
+                self._require_near(look, self._middle(place))
+            return found(seen)
+        except CalibrationError:
+            yield from self.lifted(places[-1])
+            raise
+
+    def _require_near(self, look: SeenAt, middle_mm: tuple[float, float]) -> None:
+        away_mm = math.dist(self.station.base_mm(look), middle_mm)
+        if away_mm > self.plan.search_mm:
+            raise CalibrationError(
+                "far_off",
+                tr(
+                    "What the camera found is {away:.2f} mm from where it is "
+                    "expected, limit {limit:g} mm.",
+                    away=away_mm,
+                    limit=self.plan.search_mm,
+                ),
+                remedy=tr(
+                    "Look at the picture: is it the tip? Check the number of the tool, its stored "
+                    "offset, and what a pixel means."
+                ),
+            )
+
+    def angles_in_reach(
+        self, here: Pose, places: Callable[[Sequence[float]], Sequence[Place]]
+    ) -> Procedure[tuple[float, ...]]:
+        """Return the angles of the plan, or others where the arm cannot take them up.
+
+        They are turned to the other side then, or half as far.
+
+        Args:
+            here: Where the frame is; its U is where they count from.
+            places: What is looked at with such angles.
+
+        Raises:
+            LimitError: It can take up none of them; nothing was moved.
+        """
+        u_deg = here.u_deg
+        planned = self.plan.angles_deg(u_deg)
+        return (
+            yield from first_clear(
+                [tuple(u_deg + (angle - u_deg) * share for angle in planned) for share in _SHARES],
+                # Followed on paper by a drive of its own: nothing is seen there.
+                lambda angles: replace(self).looks(places(angles), here),
+                here,
+            )
+        )
+
+    def lifted(self, place: Place) -> Procedure[None]:
+        """Lift off the camera from where :meth:`looks` ended."""
+        yield Move(self.above(place), Path.STRAIGHT, tr("Lifting off the camera."))
+
+    def above(self, place: Place) -> Pose:
+        """Return where :meth:`lifted` ends."""
+        return self._above(self.pose(place))
+
+    def pose(self, place: Place) -> Pose:
+        """Return where the frame is with a mark before the camera, as far as that is known."""
+        frame = replace(self.frame, u_deg=place.u_deg)
+        return carrying(frame, place.at, (*self._middle(place), self.station.z_mm))
+
+    def _turn_to(self, place: Place, here: Pose) -> Procedure[None]:
+        """Lift, go over and turn, come down beside the place."""
+        beside = self._beside(place)
+        # Where no pixel is known, the first movement is what all others are compared with: play of
+        # the joints is kept out of it.
+        low = _shifted(beside, -self.plan.beside_mm) if self._measures_pixels else beside
+        above = self._above(low)
+        high_mm = max(here.z_mm, above.z_mm)
+        if here.z_mm < high_mm:
+            yield Move(replace(here, z_mm=high_mm), Path.STRAIGHT, tr("Lifting before the turn."))
+        yield Move(replace(above, z_mm=high_mm), Path.JOINT, tr("Moving above the camera."))
+        yield Move(low, Path.STRAIGHT, tr("Lowering into the camera's focus."))
+        if low != beside:
+            yield from self._approach(beside)
+
+    @property
+    def _measures_pixels(self) -> bool:
+        """Whether the next movement is the first by which a camera is found."""
+        return not self.calibrated and not self.watch.pairs
+
+    def _beside(self, place: Place) -> Pose:
+        return _shifted(self.pose(place), -self.plan.beside_mm)
+
+    def _look(self, place: Place) -> Procedure[SeenAt]:
+        purpose = (
+            tr("Looking at the tip.")
+            if place.mark == TIP
+            else tr("Looking at fiducial {n}.", n=place.mark)
+        )
+        try:
+            seen: SeenAt = yield Look(purpose, self._middle(place), place.mark, self.plan.pictures)
+        except CalibrationError:
+            yield from self.lifted(place)
+            raise
+        told, score = self._told(seen, self._middle(place)), seen.spot.score
+        yield Notify(
+            told if score is None else tr("{seen}; score {score:g}", seen=told, score=score)
+        )
+        return self.watch.heard(seen)
+
+    def _told(self, seen: SeenAt, middle_mm: tuple[float, float]) -> str:
+        if seen.unit is SpotUnit.PIXEL and self.station.model is None:
+            return tr("seen at pixel {x:.1f}, {y:.1f}", x=seen.spot.x, y=seen.spot.y)
+        x_mm, y_mm = self.station.base_mm(seen)
+        return tr(
+            "seen X {dx:+.3f} Y {dy:+.3f} mm from where it is expected",
+            dx=x_mm - middle_mm[0],
+            dy=y_mm - middle_mm[1],
+        )
+
+    def _middle(self, place: Place) -> tuple[float, float]:
+        return self.station.x_mm + place.aside_mm[0], self.station.y_mm + place.aside_mm[1]
+
+    def _above(self, pose: Pose) -> Pose:
+        return replace(pose, z_mm=pose.z_mm + self.plan.lift_mm)
+
+
+def _in_doubt() -> str:
+    return tr("The spot did not move as the robot did. It is looked at once more, more closely.")
+
+
+def _shifted(pose: Pose, by_mm: float) -> Pose:
+    """Return a pose as far aside in X as in Y."""
+    return replace(pose, x_mm=pose.x_mm + by_mm, y_mm=pose.y_mm + by_mm)

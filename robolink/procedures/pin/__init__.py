@@ -1,1 +1,0 @@
-"""One pin that a person brings a tip onto: touches, what they prove, and the proof of a tip."""

@@ -1,1 +1,0 @@
-"""The proof of a written offset as a value, which a change keeps until it is made."""

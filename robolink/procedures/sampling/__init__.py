@@ -1,1 +1,0 @@
-"""Samples of one measurement: how a method takes them, and when they are enough."""

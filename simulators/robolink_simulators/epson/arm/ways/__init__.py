@@ -1,1 +1,0 @@
-"""Ways of the arm that are more than one plain leg."""

@@ -1,1 +1,0 @@
-"""How statements are carried out in simulated time."""

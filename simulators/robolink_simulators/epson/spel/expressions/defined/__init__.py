@@ -1,1 +1,0 @@
-"""Functions about what a robot is told once and keeps."""

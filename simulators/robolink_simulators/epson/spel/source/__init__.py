@@ -1,1 +1,0 @@
-"""Program files to statements: lines, directives, and what is wrong with them."""

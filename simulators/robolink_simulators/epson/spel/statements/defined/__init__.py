@@ -1,1 +1,0 @@
-"""Statements about what a robot is told once and keeps."""

@@ -1,1 +1,0 @@
-"""Vision Guide in a simulated controller: sequences, calibrations, pictures of the world."""

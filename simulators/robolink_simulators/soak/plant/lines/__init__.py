@@ -1,1 +1,0 @@
-"""What carries bytes to the machines of virtual cells, and bends them."""

@@ -1,0 +1,209 @@
+"""The promises of every kind of controller, held to the machine itself after every call.
+
+What :mod:`robolink.testing` asserts about a call is asserted here about each call that the people
+of a cell make, by whatever command: what it says was read is what the machine held, what it says
+was written is there, a selection is in force, a movement that arrived is where it was sent, a pose
+is where the tip is, a stop holds. The driver's own reads prove nothing here.
+"""
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import Any, Protocol
+from unittest import mock
+
+from robolink.controllers.controller_core import ControllerCore
+from robolink.controllers.epson.controller import EpsonController
+from robolink.controllers.epson.group import EpsonGroup
+from robolink.controllers.epson.movement import EpsonMotion
+from robolink.controllers.motion_group import MotionGroupCore
+from robolink.controllers.softmotion.controller import SoftMotionController
+from robolink.controllers.softmotion.group import SoftMotionGroup
+from robolink.controllers.softmotion.movement import SoftMotionMotion
+from robolink.controllers.tool_table import ToolTableCore
+from robolink.model import Marker, Motion, MotionOutcome, Pose, ToolOffset, ToolReceipt, WorkBox
+from tests.soak.adversary.computer import VirtualProcess
+from tests.soak.adversary.plant.machine import MachineState
+
+Call = Callable[..., Any]
+Tell = Callable[[VirtualProcess, Any, "WatchedCall"], None]
+
+
+@dataclass(frozen=True, slots=True)
+class WatchedCall:
+    """A call that has returned.
+
+    Attributes:
+        this: What was called.
+        given: With what, in order.
+        named: With what, by name.
+    """
+
+    this: Any
+    given: tuple[Any, ...]
+    named: Mapping[str, Any]
+
+
+class Promises(Protocol):
+    """Who judges what a call of a process has returned."""
+
+    def begins(self, process: VirtualProcess) -> None:
+        """A call begins: whatever the machine holds from now on may be what it tells."""
+
+    def aims(self, process: VirtualProcess, tool: int | None) -> None:
+        """A movement is about to leave that is meant for the tip of a tool."""
+
+    def has_read(self, process: VirtualProcess, tool: int, offset: ToolOffset | None) -> None:
+        """A tool was read."""
+
+    def has_read_selection(self, process: VirtualProcess, tool: int | None) -> None:
+        """The tool in force was read."""
+
+    def has_written(self, process: VirtualProcess, receipt: ToolReceipt) -> None:
+        """A tool was written or cleared."""
+
+    def has_selected(self, process: VirtualProcess, tool: int) -> None:
+        """A tool was put in force."""
+
+    def has_begun(
+        self, process: VirtualProcess, motion: Motion, target: Pose, box: WorkBox
+    ) -> None:
+        """A movement to a target was begun, which has to lie in a box."""
+
+    def has_arrived(self, process: VirtualProcess, motion: Motion) -> None:
+        """A movement ended by itself."""
+
+    def has_read_pose(self, process: VirtualProcess, pose: Pose) -> None:
+        """It was read where the tip of the tool in force is."""
+
+    def has_read_robot(self, process: VirtualProcess, robot: int) -> None:
+        """The number of the robot in force was read."""
+
+    def stopping(self, process: VirtualProcess) -> None:
+        """A stop begins: nothing begins to move from here on."""
+
+    def has_stopped(
+        self, process: VirtualProcess, controller: ControllerCore, *, acknowledged: bool
+    ) -> None:
+        """A stop has ended; ``acknowledged`` where it said that the machine rests."""
+
+    def has_reset(self, process: VirtualProcess, controller: ControllerCore) -> None:
+        """An error was cleared."""
+
+    def releasing(self, process: VirtualProcess) -> None:
+        """A person says that things may move again."""
+
+
+@contextmanager
+def watched(judge: Promises, process_of_this_thread: Callable[[], object]) -> Iterator[None]:
+    """Let each call of this library pass a judge.
+
+    Args:
+        judge: Told of what a call returned.
+        process_of_this_thread: Returns whose call it is; what is no process is not judged.
+    """
+
+    def judged(call: Call, tell: Tell) -> Call:
+        def calling(this: object, *given: object, **named: object) -> object:
+            process = process_of_this_thread()
+            if not isinstance(process, VirtualProcess):
+                return call(this, *given, **named)
+            judge.begins(process)
+            found = call(this, *given, **named)
+            tell(process, found, WatchedCall(this, given, named))
+            return found
+
+        return calling
+
+    def stopping(controller: ControllerCore) -> None:
+        process, acknowledged = process_of_this_thread(), False
+        if not isinstance(process, VirtualProcess):
+            stop(controller)
+            return
+        judge.stopping(process)
+        try:
+            stop(controller)
+            acknowledged = True
+        finally:
+            if process.alive:
+                judge.has_stopped(process, controller, acknowledged=acknowledged)
+
+    def releasing(controller: ControllerCore) -> None:
+        process = process_of_this_thread()
+        if isinstance(process, VirtualProcess):
+            judge.releasing(process)
+        release(controller)
+
+    def marked(
+        group: MotionGroupCore, target: Pose, request: str, *, selected: int | None
+    ) -> Marker:
+        process = process_of_this_thread()
+        if isinstance(process, VirtualProcess):
+            judge.aims(process, target.tool)
+        return mark(group, target, request, selected=selected)
+
+    def arrived(process: VirtualProcess, outcome: MotionOutcome, call: WatchedCall) -> None:
+        if outcome is MotionOutcome.ARRIVED:
+            judge.has_arrived(process, call.this)
+
+    def begun(process: VirtualProcess, motion: Motion, call: WatchedCall) -> None:
+        judge.has_begun(process, motion, call.given[0], call.named["box"])
+
+    def pose_read(process: VirtualProcess, pose: Pose, _call: WatchedCall) -> None:
+        judge.has_read_pose(process, pose)
+
+    def reset(process: VirtualProcess, _none: None, call: WatchedCall) -> None:
+        judge.has_reset(process, call.this)
+
+    stop, release = ControllerCore.stop, ControllerCore.release_stop
+    mark = MotionGroupCore._marked  # every movement passes it, of whatever kind
+    calls: tuple[tuple[type, str, Tell], ...] = (
+        (ToolTableCore, "read", lambda p, found, call: judge.has_read(p, call.given[0], found)),
+        (ToolTableCore, "selected", lambda p, found, _: judge.has_read_selection(p, found)),
+        (ToolTableCore, "write", lambda p, found, _: judge.has_written(p, found)),
+        (ToolTableCore, "clear", lambda p, found, _: judge.has_written(p, found)),
+        (ToolTableCore, "select", lambda p, _, call: judge.has_selected(p, call.given[0])),
+        (EpsonMotion, "wait", arrived),
+        (SoftMotionMotion, "wait", arrived),
+        (EpsonGroup, "move_to", begun),
+        (SoftMotionGroup, "move_to", begun),
+        (EpsonGroup, "pose", pose_read),
+        (SoftMotionGroup, "pose", pose_read),
+        (EpsonController, "robot_number", lambda p, found, _: judge.has_read_robot(p, found)),
+        (EpsonController, "reset_fault", reset),
+        (SoftMotionController, "reset_fault", reset),
+    )
+    with ExitStack() as stack:
+        for owner, name, tell in calls:
+            call = judged(getattr(owner, name), tell)
+            stack.enter_context(mock.patch.object(owner, name, call))
+        stack.enter_context(mock.patch.object(MotionGroupCore, "_marked", marked))
+        stack.enter_context(mock.patch.object(ControllerCore, "stop", stopping))
+        stack.enter_context(mock.patch.object(ControllerCore, "release_stop", releasing))
+        yield
+
+
+class SeenStates:
+    """What the machine has held since each call began, event by event."""
+
+    def __init__(self) -> None:
+        self._seen: list[MachineState] = []
+        self._since: dict[int, int] = {}
+
+    def note(self, state: MachineState) -> None:
+        """Note what it holds, where that is something else than before."""
+        if not self._seen or self._seen[-1] != state:
+            self._seen.append(state)
+
+    def begin(self, process: VirtualProcess) -> None:
+        """Let a call of a process begin now."""
+        self._since[process.number] = max(0, len(self._seen) - 1)
+
+    def since(self, process: VirtualProcess) -> list[MachineState]:
+        """Return what it has held since the last call of a process began."""
+        return self._seen[self._since.get(process.number, 0) :]
+
+    def forget(self) -> None:
+        """Begin anew."""
+        self._seen.clear()
+        self._since.clear()

@@ -1,0 +1,215 @@
+"""How long each deed is, counted in requests and in points: a fault is placed within it.
+
+Measured: the least of three undisturbed runs of each (``python -m tests.soak.deed_lengths``).
+What is placed behind the end of a deed is never met, so a place is drawn within its length.
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Final
+
+from tests.soak.adversary.history import CellKind, Deed
+
+_MEASURED: Final = """\
+EPSON CHANGE_NOZZLE requests: * 515, TLSet 6, Tool_ 2, Move_ 17, Go_ 3, Login 1, Print Tool 63
+EPSON CHANGE_NOZZLE points: * 2736, commit 124, commit after 62, wire sent 515, procedure 26,
+    question 15, step 16, TLSet 25, Tool_ 13, Move_ 85, lock Move 17, lock TLSet 2
+EPSON SET_TOOL requests: * 14, TLSet 4, Login 1
+EPSON SET_TOOL points: * 76, commit 4, commit after 2, wire sent 14, procedure 1, question 1,
+    TLSet 17, Tool_ 1, lock TLSet 2
+EPSON SET_TWO requests: * 26, TLSet 7, Login 1, Print Tool 1
+EPSON SET_TWO points: * 145, commit 12, commit after 6, wire sent 26, procedure 2, question 1,
+    TLSet 30, Tool_ 1, lock TLSet 3
+EPSON SELECT_TOOL requests: * 7, Login 1, Print Tool 2
+EPSON SELECT_TOOL points: * 37, wire sent 7, procedure 1, question 1, Tool_ 1
+EPSON UNDO requests: * 35, TLSet 9, Login 1, Print Tool 3
+EPSON UNDO points: * 195, commit 16, commit after 8, wire sent 35, procedure 3, question 1,
+    TLSet 37, Tool_ 2, lock TLSet 3
+EPSON SET_THEN_UNDO requests: * 28, TLSet 12, Login 1, Print Tool 1
+EPSON SET_THEN_UNDO points: * 162, commit 16, commit after 8, wire sent 28, procedure 3,
+    question 3, TLSet 51, Tool_ 3, lock TLSet 6
+EPSON MOVE_AND_LEAVE requests: * 60, Move_ 1, Login 1, Print Tool 5
+EPSON MOVE_AND_LEAVE points: * 311, commit 8, commit after 4, wire sent 60, procedure 3,
+    question 1, Tool_ 1, Move_ 5, lock Move 1
+SOFTMOTION CHANGE_NOZZLE requests: * 1700, WRITE_TOOL 1, SELECT_TOOL 2, MOVE_LINEAR 20,
+    MOVE_DIRECT 3, OWNERSHIP 2, read_slot 6, read_response 308, beat 294
+SOFTMOTION CHANGE_NOZZLE points: * 2298, commit 134, commit after 67, wire sent 30, procedure
+    30, question 18, step 16, WRITE_TOOL 5, SELECT_TOOL 12, MOVE_LINEAR 100, MOVE_DIRECT 15,
+    lock 2103 20, lock 5205 1
+SOFTMOTION SET_TOOL requests: * 30, WRITE_TOOL 1, OWNERSHIP 2, read_slot 4, read_response 8
+SOFTMOTION SET_TOOL points: * 53, commit 4, commit after 2, wire sent 3, procedure 1, question
+    1, WRITE_TOOL 5, lock 5205 1
+SOFTMOTION SET_TWO requests: * 42, WRITE_TOOL 2, OWNERSHIP 2, read_slot 9, read_response 12
+SOFTMOTION SET_TWO points: * 81, commit 12, commit after 6, wire sent 4, procedure 2, question
+    1, WRITE_TOOL 10, lock 5205 2
+SOFTMOTION SELECT_TOOL requests: * 7, read_response 4
+SOFTMOTION SELECT_TOOL points: * 13, procedure 1, question 1, SELECT_TOOL 1
+SOFTMOTION UNDO requests: * 42, WRITE_TOOL 1, OWNERSHIP 2, read_slot 10, read_response 14
+SOFTMOTION UNDO points: * 88, commit 16, commit after 8, wire sent 4, procedure 3, question 1,
+    WRITE_TOOL 5, lock 5205 1
+SOFTMOTION SET_THEN_UNDO requests: * 50, WRITE_TOOL 3, OWNERSHIP 2, read_slot 10, read_response
+    15
+SOFTMOTION SET_THEN_UNDO points: * 102, commit 16, commit after 8, wire sent 5, procedure 3,
+    question 3, WRITE_TOOL 15, lock 5205 3
+SOFTMOTION MOVE_AND_LEAVE requests: * 38, MOVE_LINEAR 1, OWNERSHIP 2, read_response 18
+SOFTMOTION MOVE_AND_LEAVE points: * 80, commit 8, commit after 4, wire sent 4, procedure 3,
+    question 1, SELECT_TOOL 1, MOVE_LINEAR 5, lock 2103 1
+EPSON_SERIAL CHANGE_NOZZLE requests: * 511, TLSet 6, Tool_ 2, Move_ 17, Go_ 3, Login 1, Print
+    Tool 63
+EPSON_SERIAL CHANGE_NOZZLE points: * 2717, commit 124, commit after 62, wire sent 512, procedure
+    26, question 15, step 16, TLSet 25, Tool_ 13, Move_ 85, lock Move 17, lock TLSet 2
+EPSON_SERIAL SET_TOOL requests: * 14, TLSet 4, Login 1
+EPSON_SERIAL SET_TOOL points: * 77, commit 4, commit after 2, wire sent 15, procedure 1,
+    question 1, TLSet 17, Tool_ 1, lock TLSet 2
+EPSON_SERIAL SET_TWO requests: * 26, TLSet 7, Login 1, Print Tool 1
+EPSON_SERIAL SET_TWO points: * 146, commit 12, commit after 6, wire sent 27, procedure 2,
+    question 1, TLSet 30, Tool_ 1, lock TLSet 3
+EPSON_SERIAL SELECT_TOOL requests: * 8, Login 1, Print Tool 2
+EPSON_SERIAL SELECT_TOOL points: * 43, wire sent 9, procedure 1, question 1, Tool_ 1
+EPSON_SERIAL UNDO requests: * 35, TLSet 9, Login 1, Print Tool 3
+EPSON_SERIAL UNDO points: * 196, commit 16, commit after 8, wire sent 36, procedure 3, question
+    1, TLSet 37, Tool_ 2, lock TLSet 3
+EPSON_SERIAL SET_THEN_UNDO requests: * 28, TLSet 12, Login 1, Print Tool 1
+EPSON_SERIAL SET_THEN_UNDO points: * 163, commit 16, commit after 8, wire sent 29, procedure 3,
+    question 3, TLSet 51, Tool_ 3, lock TLSet 6
+EPSON_SERIAL MOVE_AND_LEAVE requests: * 60, Move_ 1, Login 1, Print Tool 5
+EPSON_SERIAL MOVE_AND_LEAVE points: * 312, commit 8, commit after 4, wire sent 61, procedure 3,
+    question 1, Tool_ 1, Move_ 5, lock Move 1
+MODBUS_TCP CHANGE_NOZZLE requests: * 1357, WRITE_TOOL 1, SELECT_TOOL 2, MOVE_LINEAR 20,
+    MOVE_DIRECT 3, OWNERSHIP 2, read_slot 6, read_response 283, beat 290
+MODBUS_TCP CHANGE_NOZZLE points: * 1930, commit 134, commit after 67, wire sent 30, procedure
+    30, question 18, step 16, WRITE_TOOL 5, SELECT_TOOL 12, MOVE_LINEAR 100, MOVE_DIRECT 15,
+    lock 2103 20, lock 5205 1
+MODBUS_TCP SET_TOOL requests: * 20, WRITE_TOOL 1, OWNERSHIP 2, read_slot 4, read_response 8
+MODBUS_TCP SET_TOOL points: * 43, commit 4, commit after 2, wire sent 3, procedure 1, question
+    1, WRITE_TOOL 5, lock 5205 1
+MODBUS_TCP SET_TWO requests: * 31, WRITE_TOOL 2, OWNERSHIP 2, read_slot 9, read_response 12
+MODBUS_TCP SET_TWO points: * 70, commit 12, commit after 6, wire sent 4, procedure 2, question
+    1, WRITE_TOOL 10, lock 5205 2
+MODBUS_TCP SELECT_TOOL requests: * 6, read_response 4
+MODBUS_TCP SELECT_TOOL points: * 12, procedure 1, question 1, SELECT_TOOL 1
+MODBUS_TCP UNDO requests: * 34, WRITE_TOOL 1, OWNERSHIP 2, read_slot 10, read_response 14
+MODBUS_TCP UNDO points: * 80, commit 16, commit after 8, wire sent 4, procedure 3, question 1,
+    WRITE_TOOL 5, lock 5205 1
+MODBUS_TCP SET_THEN_UNDO requests: * 37, WRITE_TOOL 3, OWNERSHIP 2, read_slot 10, read_response
+    15
+MODBUS_TCP SET_THEN_UNDO points: * 89, commit 16, commit after 8, wire sent 5, procedure 3,
+    question 3, WRITE_TOOL 15, lock 5205 3
+MODBUS_TCP MOVE_AND_LEAVE requests: * 29, MOVE_LINEAR 1, OWNERSHIP 2, read_response 17
+MODBUS_TCP MOVE_AND_LEAVE points: * 70, commit 8, commit after 4, wire sent 4, procedure 3,
+    question 1, SELECT_TOOL 1, MOVE_LINEAR 5, lock 2103 1
+MODBUS_RTU CHANGE_NOZZLE requests: * 1197, WRITE_TOOL 1, SELECT_TOOL 2, MOVE_LINEAR 20,
+    MOVE_DIRECT 3, OWNERSHIP 2, read_slot 6, read_response 204, beat 362
+MODBUS_RTU CHANGE_NOZZLE points: * 1694, commit 140, commit after 70, wire sent 30, procedure
+    30, question 18, step 16, WRITE_TOOL 5, SELECT_TOOL 12, MOVE_LINEAR 100, MOVE_DIRECT 15,
+    lock 2103 20, lock 5205 1
+MODBUS_RTU SET_TOOL requests: * 21, WRITE_TOOL 1, OWNERSHIP 2, read_slot 4, read_response 8
+MODBUS_RTU SET_TOOL points: * 43, commit 4, commit after 2, wire sent 3, procedure 1, question
+    1, WRITE_TOOL 5, lock 5205 1
+MODBUS_RTU SET_TWO requests: * 32, WRITE_TOOL 2, OWNERSHIP 2, read_slot 9, read_response 12
+MODBUS_RTU SET_TWO points: * 70, commit 12, commit after 6, wire sent 4, procedure 2, question
+    1, WRITE_TOOL 10, lock 5205 2
+MODBUS_RTU SELECT_TOOL requests: * 7, read_response 4
+MODBUS_RTU SELECT_TOOL points: * 12, procedure 1, question 1, SELECT_TOOL 1
+MODBUS_RTU UNDO requests: * 35, WRITE_TOOL 1, OWNERSHIP 2, read_slot 10, read_response 14
+MODBUS_RTU UNDO points: * 80, commit 16, commit after 8, wire sent 4, procedure 3, question 1,
+    WRITE_TOOL 5, lock 5205 1
+MODBUS_RTU SET_THEN_UNDO requests: * 38, WRITE_TOOL 3, OWNERSHIP 2, read_slot 10, read_response
+    15
+MODBUS_RTU SET_THEN_UNDO points: * 89, commit 16, commit after 8, wire sent 5, procedure 3,
+    question 3, WRITE_TOOL 15, lock 5205 3
+MODBUS_RTU MOVE_AND_LEAVE requests: * 33, MOVE_LINEAR 1, OWNERSHIP 2, read_response 15, beat 5
+MODBUS_RTU MOVE_AND_LEAVE points: * 71, commit 8, commit after 4, wire sent 4, procedure 3,
+    question 1, SELECT_TOOL 1, MOVE_LINEAR 5, lock 2103 1
+CANOPEN CHANGE_NOZZLE requests: * 807, WRITE_TOOL 1, SELECT_TOOL 2, MOVE_LINEAR 20, MOVE_DIRECT
+    3, OWNERSHIP 2, read_slot 6, read_response 269, snapshot 269, beat 232
+CANOPEN CHANGE_NOZZLE points: * 1391, commit 134, commit after 67, wire sent 30, procedure 30,
+    question 18, step 16, WRITE_TOOL 5, SELECT_TOOL 12, MOVE_LINEAR 100, MOVE_DIRECT 15, lock
+    2103 20, lock 5205 1
+CANOPEN SET_TOOL requests: * 24, WRITE_TOOL 1, OWNERSHIP 2, read_slot 4, read_response 8,
+    snapshot 8
+CANOPEN SET_TOOL points: * 45, commit 4, commit after 2, wire sent 3, procedure 1, question 1,
+    WRITE_TOOL 5, lock 5205 1
+CANOPEN SET_TWO requests: * 38, WRITE_TOOL 2, OWNERSHIP 2, read_slot 9, read_response 12,
+    snapshot 12
+CANOPEN SET_TWO points: * 72, commit 12, commit after 6, wire sent 4, procedure 2, question 1,
+    WRITE_TOOL 10, lock 5205 2
+CANOPEN SELECT_TOOL requests: * 9, read_response 4, snapshot 4
+CANOPEN SELECT_TOOL points: * 13, procedure 1, question 1, SELECT_TOOL 1
+CANOPEN UNDO requests: * 43, WRITE_TOOL 1, OWNERSHIP 2, read_slot 10, read_response 14, snapshot
+    14
+CANOPEN UNDO points: * 84, commit 16, commit after 8, wire sent 4, procedure 3, question 1,
+    WRITE_TOOL 5, lock 5205 1
+CANOPEN SET_THEN_UNDO requests: * 46, WRITE_TOOL 3, OWNERSHIP 2, read_slot 10, read_response 15,
+    snapshot 15
+CANOPEN SET_THEN_UNDO points: * 93, commit 16, commit after 8, wire sent 5, procedure 3,
+    question 3, WRITE_TOOL 15, lock 5205 3
+CANOPEN MOVE_AND_LEAVE requests: * 39, MOVE_LINEAR 1, OWNERSHIP 2, read_response 17, snapshot 17
+CANOPEN MOVE_AND_LEAVE points: * 74, commit 8, commit after 4, wire sent 4, procedure 3,
+    question 1, SELECT_TOOL 1, MOVE_LINEAR 5, lock 2103 1
+REGISTER_MAP SET_TOOL requests: * 26, fc16 1, fc5 2, fc3 10
+REGISTER_MAP SET_TOOL points: * 28, commit 4, commit after 2, wire sent 3, procedure 1, question
+    1, fc16 1, fc5 2
+REGISTER_MAP SET_TWO requests: * 54, fc16 2, fc5 4, fc3 24
+REGISTER_MAP SET_TWO points: * 63, commit 12, commit after 6, wire sent 6, procedure 2, question
+    1, fc16 2, fc5 4
+REGISTER_MAP UNDO requests: * 55, fc16 2, fc5 4, fc3 24
+REGISTER_MAP UNDO points: * 67, commit 16, commit after 8, wire sent 6, procedure 2, question 1,
+    fc16 2, fc5 4
+REGISTER_MAP SET_THEN_UNDO requests: * 75, fc16 3, fc5 6, fc3 30
+REGISTER_MAP SET_THEN_UNDO points: * 88, commit 16, commit after 8, wire sent 9, procedure 3,
+    question 3, fc16 3, fc5 6
+PROGRAM PRODUCE requests: * 14, HELLO 1, BEGIN 1, POSE 5, SOLVE 1, WROTE 1, PROOF 2, JUDGE 1,
+    KEPT 1
+PROGRAM PRODUCE points: * 42, commit 14, commit after 7, wire sent 14, WELCOME 1, VALUE 1, PROVE
+    1, KEEP 1
+"""
+"""Cell, deed, what is counted: each text that a request or a point may hold, and how many do.
+
+``*`` stands for any; ``_`` for a space behind a text.
+"""
+
+Places = tuple[tuple[str, int], ...]
+"""Texts, each with how many requests or points hold it; never none."""
+
+
+@dataclass(frozen=True, slots=True)
+class DeedLength:
+    """How long a deed is.
+
+    Attributes:
+        requests: What the machine receives.
+        points: What is passed in the process: locks, commits, exchanges, questions.
+        commits: How often the journal is about to commit.
+    """
+
+    requests: Places
+    points: Places
+    commits: int
+
+
+def length_of(kind: CellKind, deed: Deed) -> DeedLength:
+    """Return how long a deed is in a kind of cell."""
+    if deed is Deed.COMMAND:  # most are as short as this one
+        deed = Deed.SET_TOOL
+    measured = _measured()
+    requests = measured[f"{kind.name} {deed.name} requests"]
+    points = measured[f"{kind.name} {deed.name} points"]
+    return DeedLength(requests, points, dict(points).get("commit", 0) // 2)
+
+
+@cache
+def _measured() -> Mapping[str, Places]:
+    found = {}
+    for row in re.sub(r"\n +", " ", _MEASURED).splitlines():
+        name, _, counts = row.partition(": ")
+        found[name] = tuple(map(_place, counts.split(", ")))
+    return found
+
+
+def _place(text: str) -> tuple[str, int]:
+    match, _, count = text.rpartition(" ")
+    spelled = "" if match == "*" else match[:-1] + " " if match.endswith("_") else match
+    return spelled, int(count)

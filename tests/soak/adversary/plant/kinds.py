@@ -1,0 +1,28 @@
+"""Which machine stands in which kind of cell, where robolink is the one that acts."""
+
+from collections.abc import Callable, Mapping
+from typing import Final
+
+from robolink_simulators.cell.clock import ManualClock
+
+from tests.soak.adversary.history import CellKind
+from tests.soak.adversary.plant.epson import EpsonPlant, EpsonSerialPlant
+from tests.soak.adversary.plant.machine import PlantMachine, WireTap
+from tests.soak.adversary.plant.register_map import RegisterMapPlant
+from tests.soak.adversary.plant.softmotion import (
+    CanopenPlant,
+    ModbusRtuPlant,
+    ModbusTcpPlant,
+    SoftMotionPlant,
+)
+
+PLANTS: Final[Mapping[CellKind, Callable[[ManualClock, WireTap, int], PlantMachine]]] = {
+    CellKind.EPSON: EpsonPlant,
+    CellKind.SOFTMOTION: SoftMotionPlant,
+    CellKind.EPSON_SERIAL: EpsonSerialPlant,
+    CellKind.MODBUS_TCP: ModbusTcpPlant,
+    CellKind.MODBUS_RTU: ModbusRtuPlant,
+    CellKind.CANOPEN: CanopenPlant,
+    CellKind.REGISTER_MAP: RegisterMapPlant,
+}
+"""A machine whose own program calls back needs to know whose turn it is, and stands elsewhere."""

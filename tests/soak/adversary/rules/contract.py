@@ -1,0 +1,335 @@
+"""The contract of every controller, held to the machine: after every event, call, and at rest."""
+
+import math
+import weakref
+from typing import Final
+
+from robolink_simulators.cell.frames import Frame, axis_and_angle, product, transposed
+from robolink_simulators.epson.arm.kinematics import frame_of
+
+from robolink.controllers.controller_core import ControllerCore
+from robolink.model import Motion, Pose, ToolOffset, ToolReceipt, WorkBox
+from tests.soak.adversary.call_watch import SeenStates
+from tests.soak.adversary.computer import VirtualProcess
+from tests.soak.adversary.plant.machine import MachineState, SentKind, SentRequest
+from tests.soak.adversary.rules.grounds import Grounds
+
+_NEAR_MM: Final = 0.05
+_NEAR_DEG: Final = 0.05
+"""Room for three decimals, for the noise of a measured position, and for an arm's resolution."""
+
+_MOVED_MM: Final = 1e-6
+
+
+class PlaceRules:
+    """Compares poses and targets with where the machine's tip is.
+
+    Args:
+        grounds: What the rules rest on.
+    """
+
+    def __init__(self, grounds: Grounds) -> None:
+        self._on = grounds
+        self._before: dict[int, Frame | None] = {}
+        # Not the movement itself: it holds the controller of a process that may be killed.
+        self._sent: dict[int, tuple[weakref.ref[Motion], ToolOffset | None]] = {}
+
+    def begin(self) -> None:
+        """Begin an hour."""
+        self._before.clear()
+        self._sent.clear()
+
+    def begins(self, process: VirtualProcess) -> None:
+        """Note where the tip is when a call of a process begins; nothing while it moves."""
+        self._before[process.number] = self._standing()
+
+    def begun(
+        self, process: VirtualProcess, motion: Motion, target: Pose, box: WorkBox
+    ) -> tuple[bool, str]:
+        """Return whether a movement goes where it was sent, in its box; and what was seen."""
+        self._sent[process.number] = weakref.ref(motion), self._value_of(target.tool)
+        limits = (
+            (box.x_min_mm, target.x_mm, box.x_max_mm),
+            (box.y_min_mm, target.y_mm, box.y_max_mm),
+            (box.z_min_mm, target.z_mm, box.z_max_mm),
+        )
+        inside = all(low <= value <= high for low, value, high in limits)
+        return (
+            inside and motion.target == target,
+            f"a movement goes to {motion.target}, sent to {target}, in {box}",
+        )
+
+    def arrived(self, process: VirtualProcess, motion: Motion) -> tuple[bool, str]:
+        """Return whether a movement that arrived is where it was sent; and what was seen."""
+        tip, target = self._standing(), motion.target
+        sent, value = self._sent.get(process.number, (None, None))
+        if sent is None or sent() is not motion or tip is None:
+            return True, ""  # one that ends at an input ends somewhere on its way
+        if target.tool != self._on.plant.state().selected or value != self._value_of(target.tool):
+            return True, ""  # somebody has selected another one meanwhile, or typed its value
+        return _alike(tip, frame_of(target)), f"it arrived at {tip}, sent to {target}"
+
+    def read(self, process: VirtualProcess, pose: Pose) -> tuple[bool, str]:
+        """Return whether a pose that was read is where the tip stands; and what was seen."""
+        before, now = self._before.get(process.number), self._standing()
+        if before is None or now is None or math.dist(before.shift_mm, now.shift_mm) > _MOVED_MM:
+            return True, ""  # it was somewhere on the way
+        return _alike(now, frame_of(pose)), f"{pose} was read, the tip is at {now}"
+
+    def _value_of(self, tool: int | None) -> ToolOffset | None:
+        return None if tool is None else self._on.plant.state().tools.get(tool)
+
+    def _standing(self) -> Frame | None:
+        return None if self._on.plant.moving else self._on.plant.tip()
+
+
+def _alike(one: Frame, other: Frame) -> bool:
+    turn = product(transposed(one.rotation), other.rotation)
+    off_mm, (_, off_deg) = math.dist(one.shift_mm, other.shift_mm), axis_and_angle(turn)
+    return off_mm <= _NEAR_MM and abs(off_deg) <= _NEAR_DEG
+
+
+_STILL_MM: Final = 0.01
+
+
+class StopRules:
+    """Looks at what leaves and what moves once somebody stops.
+
+    Args:
+        grounds: What the rules rest on.
+    """
+
+    def __init__(self, grounds: Grounds) -> None:
+        self._on = grounds
+        self._rest: Frame | None = None
+
+    def begin(self) -> None:
+        """Begin an hour."""
+        self._rest = None
+
+    def leaving(self, process: VirtualProcess, sent: SentRequest) -> None:
+        """Check that no movement leaves a process in which a stop has begun."""
+        if sent.kind is not SentKind.MOVE:
+            return
+        self._rest = None
+        self._on.hold(
+            "StillAfterStop",
+            not process.held_back,
+            f"{sent.text} leaves process {process.number} after a stop has begun in it",
+        )
+
+    def acknowledged(self) -> None:
+        """Check the machine when a stop is acknowledged; from now on it stands there."""
+        self._on.hold("AtRestWhenStopped", not self._on.plant.moving, "it still moves")
+        if not self._on.plant.calls_back:
+            self._rest = self._on.plant.flange()
+
+    def held(self, process: VirtualProcess, controller: ControllerCore, what: str) -> None:
+        """Check that a latch is closed in a process in which somebody has stopped."""
+        self._on.hold(
+            "StillAfterStop",
+            controller.latch.closed or not process.held_back,
+            f"the latch of process {process.number} is open after {what}",
+        )
+
+    def passed(self) -> None:
+        """Check, after an event, that what was acknowledged as stopped stands where it stood."""
+        if self._rest is None or (self._on.plant.bent and not self._on.plant.numbered):
+            return  # a request that the wire held up cannot be told apart where it has no number
+        now = self._on.plant.flange()
+        self._on.hold(
+            "AtRestWhenStopped",
+            now is not None and math.dist(now.shift_mm, self._rest.shift_mm) <= _STILL_MM,
+            f"the flange is at {now}, and a stop was acknowledged when it was at {self._rest}",
+        )
+
+
+_RULE: Final = "ContractHolds"
+
+
+class ContractRules:
+    """Implements :class:`tests.soak.adversary.call_watch.Promises`.
+
+    Args:
+        grounds: What the rules rest on.
+
+    Attributes:
+        stops: What a stop promises.
+    """
+
+    def __init__(self, grounds: Grounds) -> None:
+        self._on = grounds
+        self.stops, self._places = StopRules(grounds), PlaceRules(grounds)
+        self._states = SeenStates()
+        self._aims: dict[int, int | None] = {}
+        self._asked: set[int] = set()
+        self._selects = False
+        self._last: MachineState | None = None
+        self._previews = False
+
+    def begin(self, state: MachineState, *, previews: bool) -> None:
+        """Begin an hour; ``previews`` where its line only shows what it would send."""
+        self._previews = previews
+        self._states.forget()
+        self._states.note(state)
+        self._aims.clear()
+        self._asked.clear()
+        self.stops.begin()
+        self._places.begin()
+        self._selects, self._last = False, state
+
+    def left(self) -> None:
+        """Check what a deed has left; what people do from here on, they do."""
+        self.passed()
+        self._previews = False
+
+    # After every event.
+
+    def leaving(self, process: VirtualProcess, sent: SentRequest) -> None:
+        """Check a request that is about to leave: a movement is for the tool in force."""
+        self.passed()
+        self.stops.leaving(process, sent)
+        if self._previews:
+            only_read = sent.kind in (SentKind.OTHER, SentKind.STOP)
+            self._on.hold(_RULE, only_read, f"{sent.text} leaves, and was only to be shown")
+        if sent.kind is SentKind.WRITE and sent.tool is not None:
+            self._asked.add(sent.tool)
+        self._selects |= sent.kind is SentKind.SELECT
+        if sent.kind is not SentKind.MOVE or self._on.plant.moved_itself:
+            return
+        aim, selected = self._aims.get(process.number), self._on.plant.state().selected
+        self._on.hold(
+            "MovesInItsTool",
+            aim is None or aim == selected,
+            f"{sent.text} leaves, meant for tool {aim}, and tool {selected} is in force",
+        )
+
+    def passed(self) -> None:
+        """Check what has changed since the last event: nothing that nobody asked for."""
+        state, last = self._on.plant.state(), self._last
+        self.stops.passed()
+        self._states.note(state)
+        self._last = state
+        if last is None or state == last or self._on.plant.calls_back:
+            return
+        changed = {
+            tool
+            for tool in {*state.tools, *last.tools}
+            if state.tools.get(tool) != last.tools.get(tool)
+        }
+        self._on.hold(
+            _RULE,
+            changed <= self._asked | self._on.plant.touched,
+            f"tools {sorted(changed)} changed, written were {sorted(self._asked)}",
+        )
+        self._on.hold(
+            _RULE,
+            state.selected == last.selected
+            or self._selects
+            or self._on.plant.moved_itself
+            or state.selected in self._on.now.chosen_by_hand,
+            f"tool {state.selected} is in force in place of {last.selected}, and nobody chose it",
+        )
+        self._on.hold(
+            _RULE,
+            state.robot == last.robot,
+            f"robot {state.robot} is in force in place of {last.robot}, and nobody chose it",
+        )
+
+    # After every call.
+
+    def begins(self, process: VirtualProcess) -> None:
+        """A call begins."""
+        self.passed()
+        self._states.begin(process)
+        self._places.begins(process)
+
+    def aims(self, process: VirtualProcess, tool: int | None) -> None:
+        """A movement is about to leave that is meant for a tool."""
+        self._aims[process.number] = tool
+
+    def has_read(self, process: VirtualProcess, tool: int, offset: ToolOffset | None) -> None:
+        """Check what was read of a tool."""
+        if tool == 0:
+            self._promise(offset == ToolOffset(), "tool 0 reads as zeros")
+            return
+        held = [state.tools.get(tool) for state in self._since(process)]
+        held.append(self._on.plant.shown(tool))
+        self._promise(
+            any(self._on.plant.same(one, offset) for one in held),
+            f"tool {tool} was read as {offset}, it held {held}",
+        )
+
+    def has_read_selection(self, process: VirtualProcess, tool: int | None) -> None:
+        """Check which tool was read to be in force."""
+        held = [state.selected for state in self._since(process)]
+        self._promise(tool is None or tool in held, f"tool {tool} was read as selected: {held}")
+
+    def has_written(self, process: VirtualProcess, receipt: ToolReceipt) -> None:
+        """Check the receipt of a write: what was there, and what is there."""
+        held = [state.tools.get(receipt.tool) for state in self._since(process)]
+        for what, value in (("before", receipt.before), ("now", receipt.read_back)):
+            self._promise(
+                any(self._on.plant.same(one, value) for one in held),
+                f"tool {receipt.tool} is said to have held {value} {what}, it held {held}",
+            )
+        self._promise(
+            self._on.plant.same(receipt.read_back, receipt.requested),
+            f"{receipt} is returned, and another value was read back",
+        )
+
+    def has_selected(self, process: VirtualProcess, tool: int) -> None:
+        """Check that a tool that was selected was in force."""
+        held = [state.selected for state in self._since(process)]
+        self._promise(tool in held, f"tool {tool} was selected, in force were {held}")
+
+    def has_begun(
+        self, process: VirtualProcess, motion: Motion, target: Pose, box: WorkBox
+    ) -> None:
+        """Check where a movement goes that was begun."""
+        self._promise(*self._places.begun(process, motion, target, box))
+
+    def has_arrived(self, process: VirtualProcess, motion: Motion) -> None:
+        """Check that a movement that arrived is over, where it was sent."""
+        self._promise(not self._on.plant.moving, "a movement arrived, and the arm moves")
+        self._promise(*self._places.arrived(process, motion))
+
+    def has_read_pose(self, process: VirtualProcess, pose: Pose) -> None:
+        """Check a pose that was read: whose tip it is, and where that is."""
+        held = [state.selected for state in self._since(process)]
+        self._promise(pose.tool in held, f"{pose} names its tool, in force were {held}")
+        self._promise(*self._places.read(process, pose))
+
+    def has_read_robot(self, process: VirtualProcess, robot: int) -> None:
+        """Check which robot was read to be in force."""
+        held = [state.robot for state in self._since(process)]
+        self._promise(robot in held, f"robot {robot} was read, in force were {held}")
+
+    def stopping(self, process: VirtualProcess) -> None:
+        """A stop begins."""
+        self.passed()
+        process.held_back = True
+
+    def has_stopped(
+        self, process: VirtualProcess, controller: ControllerCore, *, acknowledged: bool
+    ) -> None:
+        """Check the latch when a stop has ended, and the machine where it was acknowledged."""
+        self.stops.held(process, controller, "stop()")
+        if acknowledged:
+            self.stops.acknowledged()
+
+    def has_reset(self, process: VirtualProcess, controller: ControllerCore) -> None:
+        """Check that clearing an error has opened no latch."""
+        self.stops.held(process, controller, "reset_fault()")
+
+    def releasing(self, process: VirtualProcess) -> None:
+        """A person lets things move again."""
+        process.held_back = False
+
+    def _since(self, process: VirtualProcess) -> list[MachineState]:
+        self._states.note(self._on.plant.state())
+        return self._states.since(process)
+
+    def _promise(self, kept: bool, sentence: str) -> None:
+        # What a bent frame tells cannot be told apart from the truth where it has no checksum.
+        self._on.hold(_RULE, kept or self._on.plant.bent, sentence)

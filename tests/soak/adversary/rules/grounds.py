@@ -1,0 +1,139 @@
+"""What the rules know of the hour that runs, and how they are held."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Final
+
+from robolink.model import ToolOffset
+from robolink.nozzle_change import ChangeReport
+from tests.soak.adversary.books import BookedMarker, Books
+from tests.soak.adversary.history import Hour, Story
+from tests.soak.adversary.people import Wish
+from tests.soak.adversary.plant.machine import MachineState, PlantMachine
+
+NAMES: Final = (
+    "MovesOnce",
+    "StillAfterStop",
+    "NoSuccessAfterStop",
+    "AtRestWhenStopped",
+    "OnlyWantedValues",
+    "KeptOnProof",
+    "NoMotionInDoubt",
+    "SessionEnds",
+    "AllOrNone",
+    "TakenBack",
+    "NothingWithoutRecord",
+    "LossIsNoticed",
+    "NoWriteWithoutLease",
+    "BooksAgree",
+    "ExitCodeIsTrue",
+    "StateIsTold",
+    "SameToolSelected",
+    "TipIsWhereItSays",
+    "NoProofWithoutTouch",
+    "NoDefectShown",
+    "UsableAgain",
+    "NoPasswordShown",
+    "NothingGrows",
+    "ContractHolds",
+    "AsBefore",
+    "AskedValue",
+    "ByHandStays",
+    "MovesInItsTool",
+    "NothingMovesOn",
+    "NothingOutlives",
+)
+"""Every rule, in the order in which they are listed."""
+
+SURELY_MM: Final = 0.5
+"""A tip that was certified and lies farther off than this is a wrong certificate in any case."""
+
+TOLERANCE_MM: Final = 0.1
+"""What the touches of a program's proof are held to."""
+
+
+@dataclass(slots=True)
+class HourSoFar:
+    """What the rules know of the hour that runs.
+
+    Attributes:
+        hour: The hour.
+        wish: What its person means to be true at its end.
+        first: What the machine kept at its beginning.
+        before: What it kept at the beginning of the last try.
+        agreed: What it kept when its person last agreed to a change: one deed may make several.
+        entries: The newest entry at its beginning.
+        old_markers: What was open before the last try, by operation.
+        moves: Operations under which a movement has left, with how often.
+        movements: How many the machine had begun.
+        wanted: What each tool may hold.
+        report: Of a tip that was measured and proved.
+        last_move: The last movement that has left.
+        writes: The first write that has left under each marker, by operation.
+        crowded: Whether a second person was at work.
+        typed_by_others: What they typed, by tool.
+        settled_by_others: Tools of what was open when a second person began to recover.
+        chosen_by_hand: Tools that somebody put in force at the machine.
+    """
+
+    hour: Hour
+    wish: Wish
+    first: MachineState
+    before: MachineState
+    entries: int
+    old_markers: frozenset[str]
+    movements: int
+    agreed: MachineState
+    moves: dict[str, int] = field(default_factory=dict)
+    wanted: dict[int, list[ToolOffset | None]] = field(default_factory=dict)
+    report: ChangeReport | None = None
+    last_move: str = ""
+    writes: dict[str, str] = field(default_factory=dict)
+    crowded: bool = False
+    typed_by_others: list[tuple[int, ToolOffset]] = field(default_factory=list)
+    settled_by_others: set[int] = field(default_factory=set)
+    chosen_by_hand: list[int] = field(default_factory=list)
+
+
+class Grounds:
+    """What every rule rests on: the machine and the journal as they are, the hour so far.
+
+    Args:
+        story: Where a broken rule is noted.
+        plant: The machine.
+        books: The journal on the disk.
+
+    Attributes:
+        plant: The machine.
+        books: The journal on the disk.
+        now: The hour that runs.
+        story: Where a broken rule is noted.
+    """
+
+    now: HourSoFar
+
+    def __init__(self, story: Story, plant: PlantMachine, books: Books) -> None:
+        self.story = story
+        self.plant = plant
+        self.books = books
+
+    def hold(self, rule: str, holds: bool, sentence: str) -> None:
+        """Look at a rule; ``sentence`` says what was seen where it does not hold."""
+        self.story.checks[rule] += 1
+        if not holds:
+            self.story.break_rule(rule, sentence)
+
+    def open_selection(self) -> list[BookedMarker]:
+        """Return the markers that say that another tool may be selected than the cell's own."""
+        if not self.books.trusted:
+            return [BookedMarker("", "selection", "", {})]
+        return [m for m in self.books.markers() if m.kind == "selection" or "select" in m.details]
+
+
+def chain(error: BaseException | None) -> Iterator[BaseException]:
+    """Yield an error and what led to it."""
+    seen: list[BaseException] = []
+    while error is not None and not any(error is one for one in seen):  # it may be its own cause
+        seen.append(error)
+        error = error.__cause__ or error.__context__
+    yield from seen

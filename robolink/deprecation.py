@@ -46,6 +46,9 @@ OLD_NAMES: Final[Mapping[str, Mapping[str, str]]] = {
         "Recorded": "robolink.model.Recorded",
         "Signature": "robolink.model.Signature",
     },
+    "robolink.transport": {
+        "open_quick_link": "robolink.transport.open_mailbox_link",
+    },
     "robolink.protocols.epson_binary": {
         "NEED_DATA": "robolink.protocols.NEED_DATA",
         "Role": "robolink.protocols.Role",

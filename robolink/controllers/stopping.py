@@ -144,9 +144,9 @@ def _stop_group(link: LinkUrl, means: _Means) -> "ControllerStatus":
     from robolink.controllers.softmotion.commands import CommandSender, bring_group_to_rest
     from robolink.controllers.softmotion.snapshots import Snapshots
     from robolink.controllers.softmotion.wire import MailboxWire
-    from robolink.transport import open_quick_link
+    from robolink.transport import open_mailbox_link
 
-    mailbox = open_quick_link(link, timeout_s=means.timeout_s, clock=means.clock)
+    mailbox = open_mailbox_link(link, timeout_s=means.timeout_s, clock=means.clock)
     wire = MailboxWire(mailbox, owner=means.owner, timeout_s=means.timeout_s)
     try:
         snapshots = Snapshots(wire)

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from robolink.lazy_exports import lazy_exports
+from robolink.lazy_exports import lazy_exports, old_names
 
 if TYPE_CHECKING:
     from robolink.transport._mailbox_link import MailboxHead as MailboxHead
@@ -11,7 +11,6 @@ if TYPE_CHECKING:
     from robolink.transport._registry import TransportOpener as TransportOpener
     from robolink.transport._registry import open_mailbox_link as open_mailbox_link
     from robolink.transport._registry import open_modbus as open_modbus
-    from robolink.transport._registry import open_quick_link as open_quick_link
     from robolink.transport._registry import open_transport as open_transport
     from robolink.transport._url import LinkUrl as LinkUrl
     from robolink.transport._url import UrlOptions as UrlOptions
@@ -34,8 +33,7 @@ else:
         {
             "_mailbox_link": "MailboxHead MailboxLink",
             "_registry": (
-                "TRANSPORTS_GROUP TransportOpener open_mailbox_link open_modbus "
-                "open_quick_link open_transport"
+                "TRANSPORTS_GROUP TransportOpener open_mailbox_link open_modbus open_transport"
             ),
             "_url": "LinkUrl UrlOptions parse_url",
             "byte_stream": "Direction SECRET_PLACEHOLDER TraceSink TracingTransport Transport",
@@ -44,4 +42,5 @@ else:
                 "parse_dialogues passage_line"
             ),
         },
+        old_names(__name__),
     )

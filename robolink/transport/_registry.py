@@ -105,35 +105,6 @@ def open_mailbox_link(
     return opened
 
 
-def open_quick_link(
-    url: str | LinkUrl, *, timeout_s: float = 3.0, clock: Clock | None = None
-) -> MailboxLink:
-    """Open a link to a PLC mailbox for a stop or a look; as :func:`open_mailbox_link`.
-
-    Over Modbus it has its own frames, because loading pymodbus takes longer than either.
-
-    Args:
-        url: For example ``softmotion+modbus-tcp://192.168.0.2:502``.
-        timeout_s: Longest wait for the connection, and for each exchange.
-        clock: Replaces the machine's clock; a simulator brings its own.
-
-    Example:
-        >>> from robolink.transport import open_quick_link
-        >>> link = open_quick_link("softmotion+sim://quick-link-example", timeout_s=1)
-        >>> link.identity
-        'softmotion+sim://quick-link-example'
-        >>> link.close()
-    """
-    link = parse_url(url) if isinstance(url, str) else url
-    opener = _find(link, _MAILBOX_MEDIA)
-    if link.medium not in _REGISTER_MEDIA:
-        opened: MailboxLink = opener(link, timeout_s=timeout_s, clock=clock)
-        return opened
-    from robolink.transport.modbus.mailbox import open_modbus_link
-
-    return open_modbus_link(link, timeout_s=timeout_s, clock=clock, registers_only=True)
-
-
 def open_modbus(
     url: str | LinkUrl, *, timeout_s: float = 3.0, clock: Clock | None = None
 ) -> "ModbusClient":

@@ -2,7 +2,8 @@
 
 Over TCP, and in process, that is Remote Ethernet; on a serial line Remote RS232, whose frames are
 loaded only there, since a stop is timed (docs/decisions/0017).
-What an unanswered or a refused login means stands here too, since a stop needs nothing else of the answers.
+What an unanswered or a refused login means stands here too: a stop needs nothing else of the
+answers.
 """
 
 from dataclasses import dataclass

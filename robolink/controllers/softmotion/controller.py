@@ -42,7 +42,7 @@ from robolink.protocols.mailbox import (
     Response,
 )
 from robolink.timing import Deadline
-from robolink.transport import LinkUrl, MailboxLink, open_mailbox_link, open_quick_link
+from robolink.transport import LinkUrl, MailboxLink, open_mailbox_link
 from robolink.ways import Way, way
 
 if TYPE_CHECKING:
@@ -285,9 +285,8 @@ def open_softmotion_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
                 record=way(Way.RECORD),
             ),
         )
-    opener = open_quick_link if terms.glance else open_mailbox_link
     url, kinematics = _own_kinematics(url)
-    link = opener(url, timeout_s=terms.timeout_s, clock=terms.clock)
+    link = open_mailbox_link(url, timeout_s=terms.timeout_s, clock=terms.clock)
     return open_softmotion(
         link,
         outcomes=terms.record_of(link),

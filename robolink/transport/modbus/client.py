@@ -18,7 +18,7 @@ from robolink.messages import tr
 from robolink.timing import Clock, Deadline
 from robolink.transport.byte_stream import Transport
 from robolink.transport.modbus.errors import refused
-from robolink.transport.modbus.messages import (
+from robolink.transport.modbus.frames import (
     MOST_BITS_READ,
     MOST_REGISTERS_READ,
     MOST_REGISTERS_WRITTEN,

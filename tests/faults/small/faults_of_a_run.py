@@ -12,8 +12,7 @@ from robolink.protocols import NEED_DATA, Role
 from robolink.protocols.epson_text import EpsonTextCodec, Reply, parse_status
 from robolink.protocols.mailbox import BlockError, decode_slot
 from robolink.protocols.spel import parse_point, parse_tool_listing
-from robolink.transport.modbus.frames import TcpFraming
-from robolink.transport.modbus.framing import FrameError
+from robolink.transport.modbus.frames import FrameError, TcpFraming
 from tests.faults.small.cells import Steps, calibrated, wired_cell
 from tests.faults.small.judging import judge
 from tests.faults.small.wire import Act, SmallFault

@@ -25,6 +25,7 @@ from robolink.model import (
     ToolReceipt,
     describe_offset,
     plain_offset,
+    read_for_verdict,
     read_offset,
 )
 from robolink.transaction._put_back import Step
@@ -248,7 +249,7 @@ def _done(
         )
     for number, value in tools.items():
         tool, left = int(number), read_offset(value)
-        now = controller.tools.read(tool)
+        now = read_for_verdict(controller.tools, tool, (left,))
         if not controller.tools.same(now, left):
             raise ToolChangedError(
                 tr(

@@ -29,6 +29,7 @@ from robolink.model import (
     describe_offset,
     plain_offset,
     put_right,
+    read_for_verdict,
     read_offset,
 )
 from robolink.timing import local_label
@@ -84,7 +85,10 @@ class Settler:
             return self._controller.resolver.examine(marker)
         tools = self._controller.tools
         steps = _steps(marker)
-        now = {step.tool: tools.read(step.tool) for step in steps}
+        now = {
+            step.tool: read_for_verdict(tools, step.tool, (step.before, step.requested))
+            for step in steps
+        }
         new = [tools.same(now[step.tool], step.requested) for step in steps]
         old = [tools.same(now[step.tool], step.before) for step in steps]
         sentence = joined(

@@ -39,7 +39,7 @@ from robolink.methods.surface_touch.plane_procedure import PlaneTest
 from robolink.methods.surface_touch.sphere_procedure import SphereTest
 from robolink.model import Path, Pose, SpotUnit, ToolOffset
 from robolink.procedures import MeasurementContext, TouchPlan
-from robolink.procedures.tilting_proof import TiltingProof
+from robolink.procedures.tilt_proof import TiltingProof
 from robolink.runner import Ask, Move, TouchedAt
 from robolink.stations import BeamStation, CameraStation, TouchStation
 from robolink.testing import MemoryController, PaperCell

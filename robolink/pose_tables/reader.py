@@ -7,7 +7,7 @@ begins with; what is left is a table. What the file does not say is asked for an
 
 import math
 import statistics
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Final
 
@@ -24,7 +24,11 @@ from robolink.pose_tables.formats.printed_arrays import read_arrays
 from robolink.pose_tables.formats.spel_points import read_spel
 from robolink.pose_tables.numbers import settled_length
 from robolink.pose_tables.orientation import EPSON, rule_named
-from robolink.pose_tables.programs.readers import READERS
+from robolink.pose_tables.programs.abb import read_abb
+from robolink.pose_tables.programs.fanuc import read_fanuc
+from robolink.pose_tables.programs.kuka import read_kuka
+from robolink.pose_tables.programs.mitsubishi import read_mitsubishi
+from robolink.pose_tables.programs.urscript import read_urscript
 from robolink.pose_tables.questions import FAR_MM
 from robolink.pose_tables.tabular.in_columns import read_in_columns
 from robolink.pose_tables.tabular.table import read_table
@@ -40,6 +44,16 @@ from robolink.pose_tables.values import (
     refused,
     unclear,
 )
+
+_PROGRAMS: Final[tuple[Callable[[str], RawTable | None], ...]] = (
+    read_points_table,
+    read_fanuc,
+    read_abb,
+    read_kuka,
+    read_mitsubishi,
+    read_urscript,
+)
+"""Each is told by what none of the others writes, in the order in which they are asked."""
 
 MOST_BYTES: Final = 32_000_000
 """Half a million poses; a file of more is something else."""
@@ -132,7 +146,7 @@ def _read(text: str, suffix: str, choices: ReadingChoices) -> RawTable:
     begins = text.lstrip()[:1]
     if suffix == ".json" or begins == "{":
         return read_json(text, choices)
-    for known in (read_points_table, *READERS):
+    for known in _PROGRAMS:
         raw = known("\n".join(lines))
         if raw is not None:
             return _undisputed(raw, choices)

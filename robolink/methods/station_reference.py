@@ -9,7 +9,7 @@ from robolink.calibration import offset_sigma_mm
 from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
 from robolink.methods.beams import BeamsParameters
-from robolink.methods.z_touch import ZTouchParameters
+from robolink.methods.z_touch import ZTouchParameters, measure_z_touch
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import PinTouches, TouchPlan
 from robolink.runner import Procedure
@@ -167,10 +167,6 @@ def _surface(
     sigma_mm: float | None,
     tip_sigma_mm: float,
 ) -> Procedure[Found]:
-    from robolink.methods.z_touch.procedure import (
-        measure_z_touch,  # numpy, which a look does without
-    )
-
     guess = touch_station(station)
     found = yield from measure_z_touch(
         guess, ZTouchParameters(), here=here, stored=tip, sigma_mm=sigma_mm

@@ -20,7 +20,7 @@ from robolink_simulators.epson.spel.programs.project import (
 )
 from robolink_simulators.epson.spel.session import PointFile, Session, UserError
 from robolink_simulators.epson.spel.source_text import ProgramFault, ProgramRefused, encoding_of
-from robolink_simulators.epson.spel.tasks.compiled import CompiledFunction, SpelProject
+from robolink_simulators.epson.spel.tasks.compiled_program import CompiledFunction, SpelProject
 from robolink_simulators.epson.spel.tasks.runner import MOST_IN_BACKGROUND
 
 IO_LABELS: Final = "IOLabels.dat"

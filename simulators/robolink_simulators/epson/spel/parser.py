@@ -19,7 +19,7 @@ from lark.exceptions import LarkError, UnexpectedCharacters, UnexpectedInput, Un
 from robolink.messages import tr
 from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.values import number_value
-from robolink_simulators.epson.spel.line_build import ProgramBuilder
+from robolink_simulators.epson.spel.line_builder import ProgramBuilder
 from robolink_simulators.epson.spel.line_tree import LineNode
 from robolink_simulators.epson.spel.source_text import ProgramFault, SourceLine
 from robolink_simulators.epson.spel.tree import Literal, Statement
@@ -37,7 +37,7 @@ def marked(line: str) -> tuple[str, list[str]]:
     A line with a text or a comment in it has none: what stands there is no number.
 
     Example:
-        >>> from robolink_simulators.epson.spel.parse import marked
+        >>> from robolink_simulators.epson.spel.parser import marked
         >>> marked("Go XY(300.5, -12.25, 7, 0)")
         ('Go XY(0.987654321, -1.987654321, 7, 0)', ['300.5', '12.25'])
     """

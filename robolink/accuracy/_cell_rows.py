@@ -7,8 +7,8 @@ from functools import partial
 from itertools import islice
 from typing import TYPE_CHECKING, Final, Protocol
 
-from robolink.accuracy._measured import LooksAlike, measured_rows, pooled_look
 from robolink.accuracy._repeats import learnt_rows, months_at
+from robolink.accuracy._row_measurements import LooksAlike, measured_rows, pooled_look
 from robolink.calibration import ACCURACY_ROWS, AccuracyFacts, RowFact
 from robolink.errors import ConfigError
 from robolink.messages import tr

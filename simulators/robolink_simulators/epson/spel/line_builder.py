@@ -4,7 +4,6 @@ from typing import Any, cast
 
 from lark import Token, v_args
 
-from robolink_simulators.epson.spel.build import Items, TreeBuilder
 from robolink_simulators.epson.spel.line_tree import (
     AssignElement,
     BlockElseIf,
@@ -41,6 +40,7 @@ from robolink_simulators.epson.spel.tree import (
     PointRange,
     PrintTo,
 )
+from robolink_simulators.epson.spel.tree_builder import Items, TreeBuilder
 
 _SCOPES = {"global": "global", "static": "module"}
 _SCOPES |= {"global preserve": "preserve", "global static": "global", "global nonstatic": "global"}

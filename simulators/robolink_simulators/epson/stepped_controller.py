@@ -17,7 +17,7 @@ from robolink_simulators.epson.memory.tools import HIGHEST_TOOL
 from robolink_simulators.epson.memory.variables import Variables
 from robolink_simulators.epson.panel import EpsonMishaps
 from robolink_simulators.epson.remote.link import OpenLinks
-from robolink_simulators.epson.remote.requests import RequestTaking
+from robolink_simulators.epson.remote.requests import RequestService
 from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
 
 LAYOUT: Final = 1
@@ -76,7 +76,7 @@ class Companion:
         self._variables.set("robolink_end", str(self._count))
 
 
-class TimeStepping(RequestTaking, ABC):
+class SteppedController(RequestService, ABC):
     """Steps from one change to the next; between them nothing is done.
 
     Attributes:
@@ -127,7 +127,7 @@ class TimeStepping(RequestTaking, ABC):
     def _found_next(self) -> int | None:
         first = self._links.next_change()
         for change in (
-            self._slot.deadline(unfinished=self._service.unfinished),
+            self._slot.deadline(unfinished=self._unfinished),
             self._window.next_change(),
             self._mishaps.next_change(),
             self.machine.timed_bits.next_change(),
@@ -193,7 +193,7 @@ class TimeStepping(RequestTaking, ABC):
 
     def _supervise(self, now_ns: int) -> None:
         """Keep the time-outs of docs/reference/epson.md 1.1."""
-        overdue, client = self._slot.overdue(now_ns, unfinished=self._service.unfinished)
+        overdue, client = self._slot.overdue(now_ns, unfinished=self._unfinished)
         watches_only = self.condition.monitoring_only
         if overdue and (not watches_only or self.options.monitoring_timeout == "error"):
             self._window.interrupt(now_ns)

@@ -40,7 +40,7 @@ class KnownDefect:
 _NOTERS: Final = (
     "robolink.controllers.controller_core",
     "robolink.controllers.markers",
-    "robolink.model.record.ledger",
+    "robolink.model._ledger",
     "robolink.transaction._change",
 )
 _WIRE: Final = "robolink.controllers.softmotion.link.wire.MailboxWire.ended"
@@ -145,7 +145,7 @@ DEFECTS: Final = (
     ),
     KnownDefect(
         "what the journal commits is not synced",
-        {"robolink.journal.store.engines._prepare": stand_ins.not_synced},
+        {"robolink.journal.store.connection._prepare": stand_ins.not_synced},
     ),
     KnownDefect(
         "an error of the journal's disk is one of the database's",
@@ -198,7 +198,7 @@ DEFECTS: Final = (
     ),
     KnownDefect(
         "recover keeps what nobody verified",
-        {"robolink.transaction._recovery.Settler": stand_ins.keeping},
+        {"robolink.transaction._settling.Settler": stand_ins.keeping},
     ),
     KnownDefect(
         "the answer to a write is taken for its proof",
@@ -214,7 +214,7 @@ DEFECTS: Final = (
         "who only presses ENTER gets a proof",
         {
             "robolink.procedures.witnessed_touches.TouchPlan.__init__": stand_ins.nominal,
-            "robolink.nozzle_change._turn_verdict.require_proved": stand_ins.nothing,
+            "robolink.calibration_run._turn_test.require_proved": stand_ins.nothing,
         },
         found_by="careless people",
     ),
@@ -268,7 +268,7 @@ DEFECTS: Final = (
     ),
     KnownDefect(
         "undo sorts by the wall clock",
-        {"robolink.transaction._undo_history._newest_done": stand_ins.newest_by_the_clock},
+        {"robolink.transaction._undo._newest_done": stand_ins.newest_by_the_clock},
         found_by=_REAL_DRIVERS,
     ),
     KnownDefect(

@@ -22,7 +22,7 @@ from robolink.controllers.softmotion.link.commands import CommandSender
 from robolink.controllers.tool_table import ToolTableCore
 from robolink.errors import RobolinkError, TransportTimeoutError
 from robolink.journal._lease import Grip, Lease
-from robolink.journal.store import engines
+from robolink.journal.store import connection
 from robolink.model import (
     EntryKind,
     Finding,
@@ -39,7 +39,7 @@ from robolink.protocols.epson_text import parse_status
 from robolink.stop_latch import StopLatch
 from robolink.timing import wall_label
 from robolink.transaction import _put_back as putting_back
-from robolink.transaction import _undo_history as undo_history
+from robolink.transaction import _undo as undo_history
 from robolink.transaction._settling import Settler
 
 Function = Callable[..., Any]
@@ -200,7 +200,7 @@ def unread(tools: Any, marker: Marker) -> Finding:
     return Finding(marker, Verdict.NOT_APPLIED, "it did not take", entries=(entry,))
 
 
-_prepare = engines._prepare
+_prepare = connection._prepare
 
 
 def not_synced(connection: sqlite3.Connection) -> None:

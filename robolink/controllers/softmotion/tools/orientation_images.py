@@ -2,7 +2,7 @@
 
 The code words of the vendor's blocks have their images here; a block of the machine builder's own
 (``CUSTOM``) has one where he names its class in Python (docs/custom-kinematics.md). Which tools
-follow from an image is decided nowhere but in :mod:`robolink.model.motion.orientation_space`.
+follow from an image is decided nowhere but in :mod:`robolink.model._kinematics`.
 Source: docs/reference/softmotion.md 3.1, 3.2.
 """
 

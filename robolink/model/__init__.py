@@ -111,6 +111,7 @@ if TYPE_CHECKING:
     from robolink.model._tools import of_no_tool as of_no_tool
     from robolink.model._tools import plain_offset as plain_offset
     from robolink.model._tools import put_right as put_right
+    from robolink.model._tools import read_for_verdict as read_for_verdict
     from robolink.model._tools import read_offset as read_offset
     from robolink.model._tools import tool_changed as tool_changed
 else:
@@ -155,7 +156,8 @@ else:
             "_tip_sensor": "ControllerSensor LookingController Spot SpotUnit TIP TipSensor",
             "_tools": (
                 "ANY Expect Expected Jump KinematicToolTable ToolOffset ToolReceipt "
-                "ToolTable describe_offset of_no_tool plain_offset put_right read_offset "
+                "ToolTable describe_offset of_no_tool plain_offset put_right "
+                "read_for_verdict read_offset "
                 "tool_changed"
             ),
         },

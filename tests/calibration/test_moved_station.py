@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from robolink.calibration import TipShift, judge_shifts
-from robolink.calibration.quality.moved_station import StationShift, shift_limit
+from robolink.calibration.quality.station import StationShift, shift_limit
 from tests.calibration._scipy_quantiles import chi_square, fisher
 
 TOUCH = 0.02

@@ -6,8 +6,7 @@ import pytest
 
 from robolink.calibration import rotation_of
 from robolink.errors import CalibrationError
-from robolink.methods import informative_tilts, measure_pivot
-from robolink.methods.pivot.procedure import retake_pivot
+from robolink.methods import PivotSource, informative_tilts, measure_pivot
 from robolink.procedures import touches_of
 from robolink.runner import TakenAgainError
 from tests.calibration._tilting_person import PIN, PLAN, STORED, TIP, Person, tip_mm, turned_deg
@@ -36,16 +35,8 @@ def test_a_tilted_touch_is_made_again_in_its_orientation_and_the_tool_ends_uprig
     first = person.run(measure_pivot(PLAN, tilts=TILTS, stored=STORED))
     assert miss_mm(first) > 0.02
     end = person.steps[-1][2]
-    result = person.run(
-        retake_pivot(
-            PLAN,
-            here=end,
-            taken=touches_of(first),
-            again=again,
-            tilts=TILTS,
-            stored=STORED,
-        )
-    )
+    source = PivotSource(TILTS, PLAN)
+    result = person.run(source.further_steps(end, touches_of(first), again, STORED))
     assert miss_mm(result) < 1e-6
     assert turned_deg(person.touches[-1], person.touches[again]) < 0.01
     assert rotation_of(person.steps[-1][2]) == pytest.approx(
@@ -58,14 +49,8 @@ def test_a_touch_made_again_that_is_refused_leaves_the_tool_upright():
     person = SlipsALittle(-1)
     first = person.run(measure_pivot(PLAN, tilts=TILTS, stored=STORED))
     person.slip_mm, person.slip = 8.0, len(person.touches)
-    again = retake_pivot(
-        PLAN,
-        here=person.steps[-1][2],
-        taken=touches_of(first),
-        again=2,
-        tilts=TILTS,
-        stored=STORED,
-    )
+    source, end = PivotSource(TILTS, PLAN), person.steps[-1][2]
+    again = source.further_steps(end, touches_of(first), 2, STORED)
     with pytest.raises(CalibrationError):
         person.run(again)
     assert rotation_of(person.steps[-1][2]) == pytest.approx(

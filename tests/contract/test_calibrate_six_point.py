@@ -9,10 +9,16 @@ from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.calibration import rotation_of
+from robolink.calibration_run import (
+    AcceptanceCriteria,
+    ChangePlan,
+    Listener,
+    NozzleChange,
+    ToolPlan,
+)
 from robolink.errors import VerifyError
 from robolink.methods import AxisTeachPlan, SixPointSource, informative_tilts
 from robolink.model import Pose, ToolOffset
-from robolink.nozzle_change import AcceptanceCriteria, ChangePlan, Listener, NozzleChange, ToolPlan
 from robolink.procedures import TouchPlan
 from robolink.runner import Ask, TeachPrompt
 from tests.contract._method_cell import method_cell

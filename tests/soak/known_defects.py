@@ -198,7 +198,7 @@ DEFECTS: Final = (
     ),
     KnownDefect(
         "recover keeps what nobody verified",
-        {"robolink.transaction._recovery.Settler": stand_ins.keeping},
+        {"robolink.transaction._settling.Settler": stand_ins.keeping},
     ),
     KnownDefect(
         "the answer to a write is taken for its proof",
@@ -214,7 +214,7 @@ DEFECTS: Final = (
         "who only presses ENTER gets a proof",
         {
             "robolink.procedures.witnessed_touches.TouchPlan.__init__": stand_ins.nominal,
-            "robolink.nozzle_change._turn_verdict.require_proved": stand_ins.nothing,
+            "robolink.calibration_run._turn_test.require_proved": stand_ins.nothing,
         },
         found_by="careless people",
     ),
@@ -268,7 +268,7 @@ DEFECTS: Final = (
     ),
     KnownDefect(
         "undo sorts by the wall clock",
-        {"robolink.transaction._undo_history._newest_done": stand_ins.newest_by_the_clock},
+        {"robolink.transaction._undo._newest_done": stand_ins.newest_by_the_clock},
         found_by=_REAL_DRIVERS,
     ),
     KnownDefect(

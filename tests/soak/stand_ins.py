@@ -39,7 +39,7 @@ from robolink.protocols.epson_text import parse_status
 from robolink.stop_latch import StopLatch
 from robolink.timing import wall_label
 from robolink.transaction import _put_back as putting_back
-from robolink.transaction import _undo_history as undo_history
+from robolink.transaction import _undo as undo_history
 from robolink.transaction._settling import Settler
 
 Function = Callable[..., Any]

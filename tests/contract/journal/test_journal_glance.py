@@ -108,7 +108,7 @@ def test_what_others_are_writing_does_not_show_so_a_look_believes_nothing(
     assert nothing_is_open(address)
 
 
-HEAVY = "numpy pydantic pymodbus rich asyncio robolink.calibration robolink.nozzle_change"
+HEAVY = "numpy pydantic pymodbus rich asyncio robolink.calibration robolink.calibration_run"
 
 PROBE = """
 import sys

@@ -18,7 +18,7 @@ from robolink_cli.options.simulation import project_options
 
 if TYPE_CHECKING:
     from robolink_simulators.epson import EpsonSimulator
-    from robolink_simulators.epson.spel.programs.loading import CheckedProject
+    from robolink_simulators.epson.spel.programs.program_load import CheckedProject
     from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
     from robolink_simulators.epson.spel.tasks.task import TaskFailure
 
@@ -52,7 +52,7 @@ def check(files: tuple[Path, ...], points: tuple[Path, ...], encoding: str | Non
     files, IOLabels.dat and UserErrors.dat that lie beside them are read for the names in them.
     Nothing runs and no controller is asked.
     """
-    from robolink_simulators.epson.spel.programs.loading import check_project
+    from robolink_simulators.epson.spel.programs.program_load import check_project
     from robolink_simulators.epson.spel.source_text import ProgramRefused
 
     checked = check_project(files, points, encoding=encoding)

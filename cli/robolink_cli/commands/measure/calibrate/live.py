@@ -5,10 +5,7 @@ from functools import partial
 
 from robolink.backup import keep_first_backup
 from robolink.calibration import known_doubts
-from robolink.messages import tr
-from robolink.methods import find_method
-from robolink.model import Controller
-from robolink.nozzle_change import (
+from robolink.calibration_run import (
     ChangePlan,
     ChangeReport,
     NozzleChange,
@@ -18,6 +15,9 @@ from robolink.nozzle_change import (
     require_inside,
     require_ready,
 )
+from robolink.messages import tr
+from robolink.methods import find_method
+from robolink.model import Controller
 from robolink.procedures import TipSource
 from robolink.transaction import Order, earlier_corrections
 from robolink_cli.access.warnings import note_change

@@ -1,4 +1,4 @@
-"""What each method of ``solve`` takes, and which solver it calls."""
+"""What ``solve`` takes of cameras, boards and orientations."""
 
 from collections.abc import Callable, Mapping
 from typing import Final

@@ -1,4 +1,4 @@
-"""The methods of ``solve`` that go beyond one tip on one point."""
+"""What ``solve`` takes beyond one tip on one point: beams, changes, axes, runout and proofs."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
@@ -16,7 +16,7 @@ from robolink_cli.commands.measure.solve.case import (
     read_poses,
     unusable,
 )
-from robolink_cli.commands.measure.solve.methods import known_tip
+from robolink_cli.commands.measure.solve.sighting_cases import known_tip
 from robolink_cli.views.solve import result_payload, space_payload
 
 Payload = dict[str, object]

@@ -1,4 +1,4 @@
-"""What ``solve`` takes about stations: lengths told by heights, shifts, chains."""
+"""What ``solve`` takes of stations: lengths told by heights, shifts, chains."""
 
 from collections.abc import Callable, Mapping
 from typing import Final, cast

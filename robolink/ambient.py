@@ -1,13 +1,106 @@
-"""The surroundings that are in force, and how a test replaces them as a whole."""
+"""What a program takes from its surroundings: chance, time, and locks that threads wait at.
+
+Whatever decides how a run goes and is not given to it comes from here, so that a test can give
+it instead: the same chance, the same times and the same order of threads give the same run, byte
+for byte (docs/decisions/0026-a-machine-that-looks-for-defects.md). A program never replaces them.
+
+What is left out on purpose: the terminal and the sockets of a stop are read against the real
+time, since nothing simulated stands behind them.
+"""
 
 import os
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from types import TracebackType
+from typing import Protocol
 
-from robolink.ambient.regularly import in_a_thread
-from robolink.ambient.waiting import WaitingLock, WaitingRoom
+__all__ = [
+    "Ambience",
+    "WaitingLock",
+    "WaitingRoom",
+    "boot_ns",
+    "lock",
+    "monotonic_ns",
+    "random_bytes",
+    "random_number",
+    "reentrant_lock",
+    "regularly",
+    "replaced",
+    "sleep",
+    "steps_time",
+    "waiting_room",
+    "wall_s",
+]
+
+
+class WaitingLock(Protocol):
+    """A lock at which a thread may have to wait; a context manager."""
+
+    def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
+        """Take it; False where that takes longer than allowed."""
+
+    def release(self) -> None:
+        """Give it back."""
+
+    def __enter__(self) -> bool: ...
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None: ...
+
+
+class WaitingRoom(Protocol):
+    """A condition variable: a lock, and threads that wait inside it for news."""
+
+    def wait(self, timeout: float | None = None) -> bool:
+        """Wait for news; False where none came within ``timeout`` seconds."""
+
+    def wait_for(self, predicate: Callable[[], bool], timeout: float | None = None) -> bool:
+        """Wait until ``predicate`` holds, ``timeout`` seconds at most; return whether it does."""
+
+    def notify_all(self) -> None:
+        """Let everybody who waits look again."""
+
+    def __enter__(self) -> bool: ...
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None: ...
+
+
+def in_a_thread(every_s: float, act: Callable[[], None], name: str) -> Callable[[], None]:
+    """Have ``act`` called every so many seconds by a thread that ends with its process.
+
+    Args:
+        every_s: How often; the first time after so long.
+        act: What is called; it raises nothing.
+        name: Of the thread.
+
+    Returns:
+        What ends the thread, and waits for that.
+    """
+    ending = threading.Event()
+
+    def run() -> None:
+        while not ending.wait(every_s):
+            act()
+
+    thread = threading.Thread(target=run, name=name, daemon=True)
+    thread.start()
+
+    def end() -> None:
+        ending.set()
+        thread.join()
+
+    return end
 
 
 class Ambience:

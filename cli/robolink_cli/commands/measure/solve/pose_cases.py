@@ -1,4 +1,4 @@
-"""The methods of ``solve`` that take poses on one point, and a budget of uncertainty."""
+"""What ``solve`` takes of poses on one point, and of a budget of uncertainty."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence

@@ -18,7 +18,7 @@ import pytest
 from robolink_simulators.hosting.in_process.transport import InProcessTransport
 
 from robolink import interrupts
-from robolink.journal import _processes
+from robolink.journal import _lease_view
 from tests.faults._recipe_instants import Instants, Kind
 
 _OF_A_PROGRAM = ("send", "receive", "receive_waiting", "wait_readable", "close")
@@ -94,9 +94,9 @@ class Deaths(Instants):
     def _leave(self, transport: InProcessTransport) -> None:
         """Be the world without the program: look at it, and end."""
         self._dead = False
-        ended, program = _processes._has_ended, os.getppid()
+        ended, program = _lease_view._has_ended, os.getppid()
         try:
-            _processes._has_ended = lambda pid, start: pid == program or ended(pid, start)
+            _lease_view._has_ended = lambda pid, start: pid == program or ended(pid, start)
             interrupts._handler = interrupts._Handler()
             transport.close()
             self._check()

@@ -114,7 +114,7 @@ class EpsonPlant(PlantWithWorld):
 
         # In this order: what imports the other one must not meet its stand-in.
         package = "robolink.controllers.epson"
-        return {f"{package}.verify.run.open_line": opened, f"{package}.link.line.open_line": opened}
+        return {f"{package}.verify.run.open_line": opened, f"{package}.line.open_line": opened}
 
     def hang_up(self, process: VirtualProcess) -> None:
         """Close the connection of a process that died."""

@@ -330,7 +330,8 @@ def read_for_verdict(
         >>> from robolink.model import read_for_verdict
         >>> with robolink.connect("epson+sim://verdict-example") as controller:
         ...     old = controller.tools.read(1)
-        ...     now = read_for_verdict(controller.tools, 1, (old, robolink.ToolOffset(12.3, -3.7, -20)))
+        ...     new = robolink.ToolOffset(12.3, -3.7, -20)
+        ...     now = read_for_verdict(controller.tools, 1, (old, new))
         >>> now == old
         True
     """

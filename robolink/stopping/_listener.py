@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Final, Protocol
 
 from robolink import ambient
-from robolink.closing import ClosedAtExit
+from robolink.interrupts import ClosedAtExit
 from robolink.errors import RobolinkError
 from robolink.files.durable import make_folder, state_folder
 from robolink.model import ControllerStatus, is_own_name

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 from urllib.parse import urlsplit
 
-from robolink.closing import ClosedAtExit
+from robolink.interrupts import ClosedAtExit
 from robolink.errors import ConfigError, RobolinkError
 from robolink.messages import tr
 from robolink_simulators.cell.clock import ScaledClock

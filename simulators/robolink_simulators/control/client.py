@@ -8,7 +8,7 @@ from socket import MSG_PEEK, socket
 from typing import Any, Final
 from urllib.parse import urlsplit
 
-from robolink.closing import ClosedAtExit
+from robolink.interrupts import ClosedAtExit
 from robolink.errors import ConfigError, ConnectError, RemoteProtocolError, RobolinkError
 from robolink.messages import tr
 from robolink_simulators.client_errors import (

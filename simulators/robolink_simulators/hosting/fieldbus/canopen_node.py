@@ -13,7 +13,7 @@ import canopen
 from canopen import LocalNode
 from canopen.sdo.server import SdoServer
 
-from robolink.closing import ClosedAtExit
+from robolink.interrupts import ClosedAtExit
 from robolink.errors import ConfigError, ConnectError
 from robolink.messages import tr
 from robolink.protocols.mailbox import COMMAND

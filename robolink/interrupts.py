@@ -18,11 +18,12 @@ sessions of a process share it: a program may hold an EPSON robot and a PLC at a
 import _thread
 import signal
 import threading
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import StrEnum
 from types import FrameType, TracebackType
-from typing import Final
+from typing import Final, Self
 
 from robolink import ambient
 

@@ -31,10 +31,17 @@ for _name in ("LC_ALL", "LC_MESSAGES", "LANG"):
 os.environ.pop("LANGUAGE", None)
 
 
-def pytest_configure():
-    """Start a pytest inside of a test without Hypothesis: no use for it, and it takes longer."""
-    added = os.environ.get("PYTEST_ADDOPTS", "")
-    os.environ["PYTEST_ADDOPTS"] = f"{added} -p no:hypothesispytest"
+def pytest_configure(config):
+    """Start a pytest inside of a test without Hypothesis: no use for it, and it takes longer.
+
+    The workers of xdist are not inside of a test: what starts them passes nothing on.
+    """
+    starts_workers = bool(getattr(config.option, "numprocesses", 0)) and not hasattr(
+        config, "workerinput"
+    )
+    if not starts_workers:
+        added = os.environ.get("PYTEST_ADDOPTS", "")
+        os.environ["PYTEST_ADDOPTS"] = f"{added} -p no:hypothesispytest"
 
 
 def pytest_sessionstart():

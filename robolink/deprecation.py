@@ -90,6 +90,9 @@ OLD_NAMES: Final[Mapping[str, Mapping[str, str]]] = {
         "untested_sentences": "robolink.calibration_run.untested_sentences",
         "usual_box": "robolink.calibration_run.usual_box",
     },
+    "robolink.transport": {
+        "open_quick_link": "robolink.transport.open_mailbox_link",
+    },
     "robolink.protocols.epson_binary": {
         "NEED_DATA": "robolink.protocols.NEED_DATA",
         "Role": "robolink.protocols.Role",
@@ -103,7 +106,7 @@ OLD_NAMES: Final[Mapping[str, Mapping[str, str]]] = {
         "PlcopenSchema": "robolink.protocols.mailbox.exports.PlcopenSchema",
         "electronic_data_sheet": "robolink.protocols.mailbox.exports.electronic_data_sheet",
         "error_table_csv": "robolink.protocols.mailbox.exports.error_table_csv",
-        "plcopen_xml": "robolink.protocols.mailbox.exports.plcopen_xml",
+        "plcopen_xml": "robolink.protocols.mailbox.exports.plc_program",
         "program_texts": "robolink.protocols.mailbox.exports.program_texts",
         "register_map_csv": "robolink.protocols.mailbox.exports.register_map_csv",
         "register_map_markdown": "robolink.protocols.mailbox.exports.register_map_markdown",

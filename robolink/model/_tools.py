@@ -324,6 +324,16 @@ def read_for_verdict(
     Raises:
         UnclearAnswerError: Each of three looks shows something else.
         ToolIndexError: There is no such tool.
+
+    Example:
+        >>> import robolink
+        >>> from robolink.model import read_for_verdict
+        >>> with robolink.connect("epson+sim://verdict-example") as controller:
+        ...     old = controller.tools.read(1)
+        ...     new = robolink.ToolOffset(12.3, -3.7, -20)
+        ...     now = read_for_verdict(controller.tools, 1, (old, new))
+        >>> now == old
+        True
     """
     looks = list(known)
     for _ in range(_LOOKS):

@@ -532,7 +532,7 @@ def test_no_method_is_left_untried():
     }
     here = {"find_beams", "joint", "board_fit", "uncertainty_budget"}
     touching = {*TOUCH_METHODS}  # tests/calibration/test_touch_evidence.py
-    lasting = {*STATION_METHODS}  # tests/calibration/test_station_part.py
+    lasting = {*STATION_METHODS}  # tests/calibration/test_station.py
     assert set(METHODS) == set(MORE) | shared | here | touching | lasting
 
 

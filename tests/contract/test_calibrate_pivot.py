@@ -179,10 +179,8 @@ def test_six_axes_are_sent_v_and_w_but_four_are_refused(tmp_path, monkeypatch):
     """No six-axis EPSON arm is simulated: the requests alone are looked at."""
     with method_cell("epson", tmp_path, monkeypatch) as cell:
         robot = "robolink.controllers.epson"
-        monkeypatch.setattr(
-            f"{robot}.motion.group.EpsonGroup.axes", lambda _: {"joints": (0.0,) * 6}
-        )
-        monkeypatch.setattr(f"{robot}.link.asked_once.Robot.six_axes", property(lambda _: True))
+        monkeypatch.setattr(f"{robot}.group.EpsonGroup.axes", lambda _: {"joints": (0.0,) * 6})
+        monkeypatch.setattr(f"{robot}.link.Robot.six_axes", property(lambda _: True))
         shown = cell.run("calibrate", "pivot", "--tool", "1", "--dry-run", "--json")
         assert shown.code == 0, shown.err
         sent = [line for step in shown.document["steps"] for line in step["requests"]]

@@ -156,10 +156,8 @@ def test_six_axes_of_an_arm_would_do_it_too(tmp_path, monkeypatch):
     """No six-axis EPSON arm is simulated: the steps and requests alone are looked at."""
     with method_cell("epson", tmp_path, monkeypatch) as cell:
         robot = "robolink.controllers.epson"
-        monkeypatch.setattr(
-            f"{robot}.motion.group.EpsonGroup.axes", lambda _: {"joints": (0.0,) * 6}
-        )
-        monkeypatch.setattr(f"{robot}.link.asked_once.Robot.six_axes", property(lambda _: True))
+        monkeypatch.setattr(f"{robot}.group.EpsonGroup.axes", lambda _: {"joints": (0.0,) * 6})
+        monkeypatch.setattr(f"{robot}.link.Robot.six_axes", property(lambda _: True))
         shown = cell.run("calibrate", "six-point", "--tool", "1", "--dry-run", "--json")
         assert shown.code == 0, shown.err
         steps = shown.document["steps"]

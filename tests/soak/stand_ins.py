@@ -14,11 +14,10 @@ from typing import Any
 from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.controllers.controller_core import ControllerCore
 from robolink.controllers.epson.controller import EpsonController
-from robolink.controllers.epson.link.requests import command_class_of
-from robolink.controllers.epson.link.session import EpsonSession
-from robolink.controllers.epson.motion.group import EpsonGroup
+from robolink.controllers.epson.group import EpsonGroup
+from robolink.controllers.epson.session import EpsonSession, command_class_of
 from robolink.controllers.markers import MarkerStore
-from robolink.controllers.softmotion.link.commands import CommandSender
+from robolink.controllers.softmotion.commands import CommandSender
 from robolink.controllers.tool_table import ToolTableCore
 from robolink.errors import RobolinkError, TransportTimeoutError
 from robolink.journal._lease import Grip, Lease

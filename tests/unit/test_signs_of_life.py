@@ -6,7 +6,7 @@ import pytest
 from robolink_simulators.cell.clock import ManualClock
 
 from robolink.ambient import in_a_thread, replaced
-from robolink.controllers.signs_of_life import SignsOfLife
+from robolink.controllers.driver_link import SignsOfLife
 from robolink.errors import TransportClosedError
 from tests.contract._quiet_time import QuietTime
 

@@ -13,6 +13,8 @@ are put back, and only then it ends. Without that they do what they always did: 
 The handler is swapped when the first session opens and not once per exchange, because two calls
 of ``signal.signal`` would cost more than everything else that the driver does in one. All
 sessions of a process share it: a program may hold an EPSON robot and a PLC at a time.
+
+However a block ends, what it holds is given back: :class:`ClosedAtExit`.
 """
 
 import _thread

@@ -91,6 +91,12 @@ def test_a_look_at_a_journal_in_order_leaves_the_file_as_it_is(address, tmp_path
     assert entry.verdict == "kept"
 
 
+def test_who_does_not_say_that_it_only_looks_has_the_journal_open_from_the_beginning(address):
+    close_files()
+    with robolink.connect(address):
+        assert len(_opened) == 1
+
+
 def test_what_others_are_writing_does_not_show_so_a_look_believes_nothing(
     address, tmp_path, monkeypatch
 ):

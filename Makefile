@@ -27,7 +27,7 @@ demo: $(VENV)/.installed ## Install robolink and show a nozzle change on a simul
 
 .PHONY: test
 test: check ## Install everything, check the sources and run the tests.
-	$(BIN)/python -m pytest -n 2
+	$(BIN)/python -m pytest --processes 2
 
 # What takes many minutes or asks a package index; docs/contributing.md says what stands for it
 # in `make test`.
@@ -45,7 +45,7 @@ MARKS := soak
 .PHONY: soak
 soak: $(VENV)/.installed-dev $(if $(SEEDS),,docs) ## Run what make test leaves out for its length; SEEDS=0-499 the adversary only.
 ifeq ($(SEEDS),)
-	$(BIN)/python -m pytest -n 2 -m '$(MARKS)'
+	$(BIN)/python -m pytest --processes 2 -m '$(MARKS)'
 	$(BIN)/python -m tests.certificate.table
 	$(BIN)/python -m tests.soak.mutant_table
 else

@@ -8,10 +8,10 @@ given up keeps its body and has :func:`deprecated` before it.
 
 import sys
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import wraps
 from importlib import import_module
-from typing import Final, ParamSpec, TypeVar
+from typing import Final, ParamSpec, TypeVar, cast
 
 GONE_IN: Final = "0.2.0"
 """The version without the names that this one still knows; a test reminds whoever makes it."""
@@ -42,9 +42,56 @@ OLD_NAMES: Final[Mapping[str, Mapping[str, str]]] = {
     },
     "robolink.journal": {
         "EntryKind": "robolink.model.EntryKind",
+        "LookingLog": "robolink.journal.ReadOnlyLog",
         "NewEntry": "robolink.model.NewEntry",
         "Recorded": "robolink.model.Recorded",
         "Signature": "robolink.model.Signature",
+    },
+    "robolink.nozzle_change": {
+        "AcceptanceCriteria": "robolink.calibration_run.AcceptanceCriteria",
+        "Attended": "robolink.calibration_run.Attended",
+        "ChangePlan": "robolink.calibration_run.ChangePlan",
+        "ChangeReport": "robolink.calibration_run.ChangeReport",
+        "DescribeReport": "robolink.calibration_run.DescribeReport",
+        "Earlier": "robolink.calibration_run.Earlier",
+        "LimitVerdict": "robolink.calibration_run.LimitVerdict",
+        "Limits": "robolink.calibration_run.Limits",
+        "Listener": "robolink.calibration_run.Listener",
+        "Moment": "robolink.calibration_run.Moment",
+        "NozzleChange": "robolink.calibration_run.NozzleChange",
+        "OpenTurnTest": "robolink.calibration_run.OpenTurnTest",
+        "PlannedStep": "robolink.calibration_run.PlannedStep",
+        "Proposal": "robolink.calibration_run.Proposal",
+        "Seating": "robolink.calibration_run.Seating",
+        "ToolPlan": "robolink.calibration_run.ToolPlan",
+        "ToolReport": "robolink.calibration_run.ToolReport",
+        "TurnTestStep": "robolink.calibration_run.TurnTestStep",
+        "WriteSubject": "robolink.calibration_run.WriteSubject",
+        "accuracy_facts": "robolink.calibration_run.accuracy_facts",
+        "assessed_in_cell": "robolink.calibration_run.assessed_in_cell",
+        "clearance_too_small": "robolink.calibration_run.clearance_too_small",
+        "conclude_turn_test": "robolink.calibration_run.conclude_turn_test",
+        "finish_by_turn_test": "robolink.calibration_run.finish_by_turn_test",
+        "flange_now": "robolink.calibration_run.flange_now",
+        "foresee": "robolink.calibration_run.foresee",
+        "height_is_known": "robolink.calibration_run.height_is_known",
+        "known_height": "robolink.calibration_run.known_height",
+        "next_steps": "robolink.calibration_run.next_steps",
+        "open_turn_tests": "robolink.calibration_run.open_turn_tests",
+        "preview": "robolink.calibration_run.preview",
+        "require_contact_input": "robolink.calibration_run.require_contact_input",
+        "require_inside": "robolink.calibration_run.require_inside",
+        "require_ready": "robolink.calibration_run.require_ready",
+        "seating_of": "robolink.calibration_run.seating_of",
+        "tip_sigma_mm": "robolink.calibration_run.tip_sigma_mm",
+        "told_of_contradiction": "robolink.calibration_run.told_of_contradiction",
+        "touches_made": "robolink.calibration_run.touches_made",
+        "touching_as_recorded": "robolink.calibration_run.touching_as_recorded",
+        "untested_sentences": "robolink.calibration_run.untested_sentences",
+        "usual_box": "robolink.calibration_run.usual_box",
+    },
+    "robolink.transport": {
+        "open_quick_link": "robolink.transport.open_mailbox_link",
     },
     "robolink.protocols.epson_binary": {
         "NEED_DATA": "robolink.protocols.NEED_DATA",
@@ -59,13 +106,14 @@ OLD_NAMES: Final[Mapping[str, Mapping[str, str]]] = {
         "PlcopenSchema": "robolink.protocols.mailbox.exports.PlcopenSchema",
         "electronic_data_sheet": "robolink.protocols.mailbox.exports.electronic_data_sheet",
         "error_table_csv": "robolink.protocols.mailbox.exports.error_table_csv",
-        "plcopen_xml": "robolink.protocols.mailbox.exports.plcopen_xml",
+        "plcopen_xml": "robolink.protocols.mailbox.exports.plc_program",
         "program_texts": "robolink.protocols.mailbox.exports.program_texts",
         "register_map_csv": "robolink.protocols.mailbox.exports.register_map_csv",
         "register_map_markdown": "robolink.protocols.mailbox.exports.register_map_markdown",
         "structured_text_types": "robolink.protocols.mailbox.exports.structured_text_types",
     },
     "robolink.protocols.spel_callback": {"NEED_DATA": "robolink.protocols.NEED_DATA"},
+    "robolink.recipe": {"RecipeRun": "robolink.calibration_run.RecipeRun"},
     "robolink.register_maps": {"Problem": "robolink.files.toml.Problem"},
     "robolink.transaction": {"Jump": "robolink.model.Jump"},
     "robolink_simulators.softmotion.mailbox": {
@@ -136,6 +184,29 @@ def deprecated(instead: str) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
         return warned
 
     return marked
+
+
+def without_sign(sentence: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Mark a function of sentences that took what stands before a half width: it still does.
+
+    ``sign``, by name or as the last argument, replaces ``+-`` in what is returned, and warns.
+    """
+    takes = sentence.__code__.co_argcount
+
+    @wraps(sentence)
+    def warned(*args: object, **kwargs: object) -> object:
+        said = cast("Callable[..., str | Iterator[str]]", sentence)
+        sign = kwargs.pop("sign", args[takes] if len(args) == takes + 1 else None)
+        if not isinstance(sign, str):
+            return said(*args, **kwargs)
+        name = sentence.__name__
+        _warn(f"sign of {name}", "'+-' alone, which whoever shows a sentence may replace", 3)
+        found = said(*args[:takes], **kwargs)
+        if isinstance(found, str):
+            return found.replace("+-", sign)
+        return (one.replace("+-", sign) for one in found)
+
+    return cast("Callable[_P, _R]", warned)
 
 
 def old_hook(kind: type, old: str, new: str, adapted: Callable[..., object]) -> None:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from robolink.backup import ToolState
+from robolink.calibration_run import RecipeRun
 from robolink.config import Cell
 from robolink.drift import KINDS, drift_of
 from robolink.errors import CalibrationError, NotReadyError
@@ -22,7 +23,6 @@ from robolink.model import (
     ToolOffset,
     begun_in_words,
 )
-from robolink.recipe import RecipeRun
 from robolink.stations import find_stations
 from robolink.timing import local_label
 from robolink.transaction import changed_since

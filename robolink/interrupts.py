@@ -13,16 +13,19 @@ are put back, and only then it ends. Without that they do what they always did: 
 The handler is swapped when the first session opens and not once per exchange, because two calls
 of ``signal.signal`` would cost more than everything else that the driver does in one. All
 sessions of a process share it: a program may hold an EPSON robot and a PLC at a time.
+
+However a block ends, what it holds is given back: :class:`ClosedAtExit`.
 """
 
 import _thread
 import signal
 import threading
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from enum import StrEnum
 from types import FrameType, TracebackType
-from typing import Final
+from typing import Final, Self
 
 from robolink import ambient
 
@@ -321,3 +324,22 @@ class InterruptGate:
 
 
 _MAIN = threading.main_thread().ident
+
+
+class ClosedAtExit(ABC):
+    """A context manager that is itself what the block uses, and whose end is its ``close``."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Give back what it holds. Idempotent."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()

@@ -10,7 +10,7 @@ import pytest
 
 from tests._canary import Watch, install
 from tests._documents import DOCUMENTS
-from tests._from_both_ends import import_from_the_other_end
+from tests._processes import pytest_addoption, pytest_runtestloop  # noqa: F401 - hooks
 
 # Before anything imports numpy: threads for matrices of six rows cost far more than they bring,
 # the more so the more cores a machine has.
@@ -32,7 +32,7 @@ os.environ.pop("LANGUAGE", None)
 
 
 def pytest_configure(config):
-    """Start pytest inside of a test without Hypothesis, as it has no use for it and takes longer.
+    """Start a pytest inside of a test without Hypothesis: no use for it, and it takes longer.
 
     The workers of xdist are not inside of a test: what starts them passes nothing on.
     """
@@ -120,14 +120,9 @@ def documents_fit_their_schemas():
         pytest.fail("\n".join(DOCUMENTS.wrong[:9]), pytrace=False)
 
 
-def pytest_collection(session):
-    """Share the compiling of the tests between the processes that share them."""
-    import_from_the_other_end(session.config)
-
-
 def pytest_collection_modifyitems(config, items):
     """Leave out what ``make soak`` is for, unless the command line speaks of it."""
-    # Two processes share the tests by their names, so a name may hold no address in memory.
+    # A test is asked for by its name, so a name may hold no address in memory.
     if changing := [item.nodeid for item in items if " at 0x" in item.nodeid]:
         raise pytest.UsageError(f"give this test ids that are alike in each run: {changing[0]}")
     for item in items:

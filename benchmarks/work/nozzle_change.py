@@ -10,7 +10,7 @@ from robolink_simulators.hosting.in_process.epson import simulator_named, unregi
 
 import robolink
 from benchmarks.table import Amount, Figure
-from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
+from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
 
 ROUNDS = 9
 

@@ -28,7 +28,7 @@ from robolink.calibration import (
     solve_pivot,
     uvw_deg,
 )
-from robolink.calibration.core.robust import Floats
+from robolink.calibration.core.least_squares import Floats
 from robolink.model import Pose
 
 SIZES = (10, 20, 100, 1_000, 10_000)

@@ -18,8 +18,8 @@ from robolink_simulators.hosting.in_process.epson import simulator_named, unregi
 import robolink
 from benchmarks.table import Amount, Figure
 from benchmarks.work.asked_cells import measured_asking
+from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
 from robolink.journal import memory_journal
-from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
 
 GOALS: Final = ((100, 300.0), (2_000, 10.0))
 """Cells, and how many times faster than real time all of them together are wanted to be."""

@@ -4,7 +4,7 @@ Each row of a budget (``robolink.calibration.ACCURACY_ROWS``) is stated by the r
 cell file, learnt from the journal, or a default. docs/accuracy.md explains all three.
 """
 
-from robolink.accuracy._known import (
+from robolink.accuracy._cell_rows import (
     CellRecord,
     KnownRow,
     Recall,
@@ -13,7 +13,15 @@ from robolink.accuracy._known import (
     rows_of_station,
     stated_rows,
 )
-from robolink.accuracy._measured import (
+from robolink.accuracy._overview import (
+    RowsAt,
+    learning_commands,
+    measuring_step,
+    mm_per_px,
+    rows_of_cell,
+)
+from robolink.accuracy._repeats import learnt_rows, months_at
+from robolink.accuracy._row_measurements import (
     LEAST_RECORDS,
     ArtefactTest,
     LooksAlike,
@@ -27,14 +35,6 @@ from robolink.accuracy._measured import (
     scatter_of_repeats,
     upper_half_width,
 )
-from robolink.accuracy._overview import (
-    RowsAt,
-    learning_commands,
-    measuring_step,
-    mm_per_px,
-    rows_of_cell,
-)
-from robolink.accuracy._repeats import learnt_rows, months_at
 from robolink.accuracy._studies import (
     MeasuredTip,
     artefact_row,

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from robolink.accuracy._known import CellRecord, KnownRow, rows_at, stated_rows
+from robolink.accuracy._cell_rows import CellRecord, KnownRow, rows_at, stated_rows
 from robolink.accuracy._repeats import months_at
 from robolink.calibration import ACCURACY_ROWS, NORMAL_95, chi_square_quantile
 from robolink.config import Cell

@@ -10,7 +10,7 @@ from contextlib import suppress
 from datetime import UTC, datetime
 from typing import Final
 
-from robolink.accuracy._measured import RowBound, scatter_of_repeats
+from robolink.accuracy._row_measurements import RowBound, scatter_of_repeats
 from robolink.calibration import RowFact
 from robolink.messages import tr
 from robolink.model import Recorded

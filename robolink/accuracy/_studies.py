@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from robolink.accuracy._measured import MeasuredRow, artefact_test, paired_half_width
+from robolink.accuracy._row_measurements import MeasuredRow, artefact_test, paired_half_width
 from robolink.calibration import GaugeStudy, require_positive
 from robolink.errors import CalibrationError, ConfigError, RobolinkError
 from robolink.messages import tr

@@ -1,14 +1,28 @@
 """Backups of a controller's tools: taken, kept as a file, compared, restored."""
 
 from robolink.backup._comparison import (
+    TOOLS,
+    Backup,
     Comparison,
     ComparisonTolerance,
     ComponentComparison,
     ToolComparison,
+    ToolHolder,
+    ToolState,
     compare,
+    read_tools,
+    take_backup,
 )
-from robolink.backup._file import SCHEMA, backup_from_text, backup_to_text, load, save
-from robolink.backup._first import first_backup_path, keep_first_backup, kept_backup
+from robolink.backup._file import (
+    SCHEMA,
+    backup_from_text,
+    backup_to_text,
+    first_backup_path,
+    keep_first_backup,
+    kept_backup,
+    load,
+    save,
+)
 from robolink.backup._restore import (
     RestoreChange,
     RestorePlan,
@@ -16,7 +30,6 @@ from robolink.backup._restore import (
     require_same_controller,
     restore,
 )
-from robolink.backup._values import TOOLS, Backup, ToolHolder, ToolState, read_tools, take_backup
 
 __all__ = [
     "Backup",

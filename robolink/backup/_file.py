@@ -2,21 +2,133 @@
 
 One line holds one tool, so that two files can be compared with any text tool. Reading is
 strict: what is missing, unknown or not a number is refused by its place in the file, because
-a file that is half understood would be half restored.
+a file that is half understood would be half restored. The first backup of a controller is made by
+itself, before the first write to it.
 """
 
 import json
-from collections.abc import Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Final
+from typing import Final, NoReturn
 
-from robolink.backup._reading import JsonReader
-from robolink.backup._values import COMPONENTS, TOOLS, Backup, ToolState
+from robolink.backup._comparison import (
+    COMPONENTS,
+    TOOLS,
+    Backup,
+    ToolHolder,
+    ToolState,
+    take_backup,
+)
 from robolink.errors import ConfigError
+from robolink.files.durable import file_name, make_folder, state_folder
 from robolink.files.named import read_named, save_named
 from robolink.messages import tr
-from robolink.model import ControllerFacts, ToolOffset
+from robolink.model import ControllerFacts, EntryKind, NewEntry, ToolOffset
+
+
+class JsonReader:
+    """Reads one document.
+
+    Args:
+        source: What an error calls the file.
+    """
+
+    def __init__(self, source: str) -> None:
+        self.source = source
+
+    def document(self, text: str) -> object:
+        """Return the document; a name that stands twice and NaN are refused.
+
+        Raises:
+            ConfigError: It is no JSON.
+        """
+        try:
+            found: object = json.loads(
+                text, object_pairs_hook=self._once, parse_constant=self._no_constant
+            )
+        except ConfigError:
+            raise
+        except (ValueError, RecursionError) as error:
+            raise self.wrong("", tr("it is not JSON ({cause})", cause=error)) from error
+        return found
+
+    def members(self, value: object, path: str, names: Sequence[str]) -> dict[str, object]:
+        """Return an object that has exactly these members, in this order."""
+        if not isinstance(value, dict):
+            raise self.wrong(path, tr("it is not an object in braces"))
+        for name in value:
+            if name not in names:
+                raise self.wrong(_joined(path, name), tr("this name is not known here"))
+        for name in names:
+            if name not in value:
+                raise self.wrong(_joined(path, name), tr("it is missing"))
+        return {name: value[name] for name in names}
+
+    def text(self, value: object, path: str) -> str:
+        """Return a text."""
+        if not isinstance(value, str):
+            raise self.wrong(path, tr("{value!r} is not text", value=value))
+        return value
+
+    def texts(self, value: object, path: str) -> tuple[str, ...]:
+        """Return a list of texts."""
+        if not isinstance(value, list):
+            raise self.wrong(path, tr("{value!r} is not a list", value=value))
+        return tuple(self.text(item, f"{path}.{i}") for i, item in enumerate(value))
+
+    def whole(self, value: object, path: str, lowest: int, highest: int) -> int:
+        """Return a whole number in a range."""
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise self.wrong(path, tr("{value!r} is not a whole number", value=value))
+        if not lowest <= value <= highest:
+            raise self.wrong(
+                path,
+                tr(
+                    "{value} is not from {lowest} to {highest}",
+                    value=value,
+                    lowest=lowest,
+                    highest=highest,
+                ),
+            )
+        return value
+
+    def number(self, value: object, path: str) -> float:
+        """Return a finite number."""
+        if isinstance(value, bool) or not isinstance(value, (int, float)):
+            raise self.wrong(path, tr("{value!r} is not a number", value=value))
+        try:
+            found = float(value)
+        except OverflowError:
+            found = math.inf
+        if not math.isfinite(found):
+            raise self.wrong(path, tr("it is not a finite number"))
+        return found
+
+    def wrong(self, path: str, cause: str) -> ConfigError:
+        """Return the error for one place of the file."""
+        place = path or tr("the file")
+        return ConfigError(
+            tr("{source}: {place}: {cause}.", source=self.source, place=place, cause=cause),
+            remedy=tr("Nothing was sent. Correct it by hand, or use another backup."),
+        )
+
+    def _once(self, pairs: list[tuple[str, object]]) -> dict[str, object]:
+        found: dict[str, object] = {}
+        for name, value in pairs:
+            if name in found:
+                raise self.wrong(name, tr("it appears twice"))
+            found[name] = value
+        return found
+
+    def _no_constant(self, constant: str) -> NoReturn:
+        raise self.wrong("", tr("{constant} is not a number", constant=constant))
+
+
+def _joined(path: str, name: str) -> str:
+    return f"{path}.{name}" if path else name
+
 
 SCHEMA: Final = "robolink/backup/1"
 
@@ -168,3 +280,91 @@ def _plain(offset: ToolOffset | None) -> dict[str, float] | None:
 def _block(members: Mapping[str, object]) -> str:
     lines = [f'    "{name}": {json.dumps(value)}' for name, value in members.items()]
     return "{\n" + ",\n".join(lines) + "\n  }"
+
+
+def first_backup_path(identity: str) -> Path:
+    """Return where the first backup of a controller stands, in the user's state folder.
+
+    Args:
+        identity: Who the controller is, as its record calls it; not its URL.
+    """
+    return state_folder("backups") / file_name(identity)
+
+
+def keep_first_backup(
+    controller: ToolHolder, *, tell: Callable[[str], None] = lambda _sentence: None
+) -> Path | None:
+    """Save the tools of a controller that has no backup in the user's state folder yet.
+
+    To be called before a tool is written. A simulator that dies with this process needs none.
+
+    Args:
+        controller: The controller, connected.
+        tell: Told where it was saved, in a sentence.
+
+    Returns:
+        Where it was saved, ``None`` when that was done before.
+
+    Raises:
+        ConfigError: It cannot be stored. Nothing may be written then.
+        NotReadyError: The tools cannot be read now.
+    """
+    if not controller.outcomes.durable:
+        return None
+    paths = _paths(controller)
+    path = paths[0]
+    if any(one.exists() for one in paths):
+        return None
+    backup = take_backup(controller)
+    # Before it is there: a backup that is not on record is a sign that the record was lost.
+    verdict = tr("saved in {path}", path=path)
+    controller.outcomes.append(NewEntry(EntryKind.BACKUP, verdict=verdict))
+    try:
+        make_folder(path.parent)
+        save(backup, path)
+    except (OSError, ConfigError) as error:
+        raise ConfigError(
+            tr(
+                "The tools as they are now cannot be saved in {path}: {cause}",
+                path=path,
+                cause=error,
+            ),
+            remedy=tr(
+                "Nothing was written: the first write to a controller needs a backup. "
+                "Make that folder writable, or name another one with "
+                "ROBOLINK_STATE_DIR."
+            ),
+            controller=controller.identity,
+        ) from error
+    tell(
+        tr(
+            "Before the first write to this controller its tools were saved in {path}",
+            path=path,
+        )
+    )
+    return path
+
+
+def kept_backup(controller: ToolHolder) -> Backup | None:
+    """Return the backup of a controller that was made before the first write, read from its file.
+
+    Args:
+        controller: The controller, connected; it is not asked for its tools.
+
+    Returns:
+        ``None`` when there is none on this computer.
+
+    Raises:
+        ConfigError: There is one that cannot be read.
+    """
+    if not controller.outcomes.durable:
+        return None
+    path = next((one for one in _paths(controller) if one.exists()), None)
+    return None if path is None else load(path)
+
+
+def _paths(controller: ToolHolder) -> list[Path]:
+    """Return where the backup may be, by every name of the controller, that of now first."""
+    outcomes = controller.outcomes
+    names = (outcomes.robot,) if outcomes.robot else outcomes.names
+    return [first_backup_path(name) for name in names]

@@ -3,8 +3,7 @@
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
-from robolink.backup._comparison import compare
-from robolink.backup._values import TOOLS, Backup, ToolState
+from robolink.backup._comparison import TOOLS, Backup, ToolState, compare
 from robolink.errors import (
     ConfigError,
     ReservedToolError,

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 from robolink.lazy_exports import lazy_exports, old_names
 
 if TYPE_CHECKING:
-    from robolink.config._adding import add_cell as add_cell
-    from robolink.config._adding import content_with_cell as content_with_cell
     from robolink.config._cells import USUAL_CHANGE_MM as USUAL_CHANGE_MM
     from robolink.config._cells import Cell as Cell
     from robolink.config._cells import CellGlimpse as CellGlimpse
+    from robolink.config._cells import add_cell as add_cell
     from robolink.config._cells import cell_names as cell_names
     from robolink.config._cells import check_file as check_file
+    from robolink.config._cells import content_with_cell as content_with_cell
     from robolink.config._cells import find_cell as find_cell
     from robolink.config._cells import glimpse_of_cell as glimpse_of_cell
     from robolink.config._cells import load_cells as load_cells
@@ -35,10 +35,9 @@ else:
     __getattr__, __dir__, __all__ = lazy_exports(
         __name__,
         {
-            "_adding": "add_cell content_with_cell",
             "_cells": (
-                "Cell CellGlimpse USUAL_CHANGE_MM cell_names check_file find_cell "
-                "glimpse_of_cell load_cells settings_of_file"
+                "Cell CellGlimpse USUAL_CHANGE_MM add_cell cell_names check_file "
+                "content_with_cell find_cell glimpse_of_cell load_cells settings_of_file"
             ),
             "_files": "ConfigFile Source config_files",
             "_reach": "Expected Reach glance_at_cell proof_of_files reach_cell remember_reach",

@@ -1,21 +1,90 @@
 """From the cell files to one cell, and where each of its values came from."""
 
+import json
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, NamedTuple
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 from robolink.config._files import CELL_FILE, config_files, read_document
-from robolink.config._problems import dotted, problems_of
 from robolink.config._reach import Expected
 from robolink.errors import ConfigError
+from robolink.files.durable import write_whole
+from robolink.files.key_problems import is_not_known, sentence
 from robolink.files.toml import Problem
 from robolink.messages import tr
 from robolink.model import ChangeLimits
 
 if TYPE_CHECKING:
+    from pydantic import ValidationError
+
     from robolink.config._settings import CellSettings
+
+_BARE_KEY = re.compile("[A-Za-z0-9_-]+")
+_KIND = 4
+"""Where in a path the kind of a station stands: cells, NAME, stations, ID, kind."""
+
+_SECRET = re.compile("pass|pwd|secret|token|credential|^pin$", re.IGNORECASE)
+
+
+def dotted(keys: Iterable[object]) -> str:
+    """Return the path of a key as TOML writes it."""
+    texts = (str(key) for key in keys)
+    return ".".join(
+        text if _BARE_KEY.fullmatch(text) else json.dumps(text, ensure_ascii=False)
+        for text in texts
+    )
+
+
+def problems_of(
+    error: "ValidationError",
+    known: Mapping[int, Sequence[str]],
+    kinds: Mapping[str, Sequence[str]] = MappingProxyType({}),
+) -> list[Problem]:
+    """Return everything that pydantic objects to.
+
+    Args:
+        error: What it raised.
+        known: The keys that are known at each depth, for a better guess at what was meant.
+        kinds: The same for stations, by their kind.
+    """
+    details = error.errors(include_url=False, include_input=False)
+    problems = []
+    for detail in details:
+        path, names = list(detail["loc"]), known.get(len(detail["loc"]), ())
+        # Behind the name of a station pydantic puts its kind, which stands in no file.
+        if len(path) > _KIND and path[2] == "stations":
+            names = kinds.get(str(path.pop(_KIND)), ())
+        counted = [part + 1 if isinstance(part, int) else part for part in path]
+        problems.append(Problem(dotted(counted), _sentence(detail, names, kinds)))
+    return problems
+
+
+def _sentence(
+    detail: Any,  # noqa: ANN401 - pydantic's own form
+    known: Sequence[str],
+    kinds: Iterable[str],
+) -> str:
+    match detail["type"]:
+        case "extra_forbidden":
+            return _unknown(str(detail["loc"][-1]), known)
+        case "union_tag_invalid" | "union_tag_not_found":
+            return tr("needs a kind: {kinds}", kinds=", ".join(kinds))
+        case "string_pattern_mismatch":
+            return tr("must be the name of a variable that begins with ROBOLINK_PASSWORD")
+    return sentence(detail)
+
+
+def _unknown(key: str, known: Sequence[str]) -> str:
+    if _SECRET.search(key):
+        return tr(
+            "looks like a password, and a cell file must not hold one; name a "
+            "password_file that only you can read, or a password_env"
+        )
+    return is_not_known(key, known)
+
 
 _Said = dict[str, tuple[Path, object]]
 """What files say about a cell: each value with the file that said it."""
@@ -135,9 +204,7 @@ def problems_in(document: dict[str, object]) -> tuple[Problem, ...]:
     """
     from pydantic import ValidationError
 
-    from robolink.config._accuracy_settings import AccuracySettings
-    from robolink.config._settings import CellFile, CellSettings
-    from robolink.config._station_settings import station_keys
+    from robolink.config._settings import AccuracySettings, CellFile, CellSettings, station_keys
 
     cells = document.get("cells")
     names = [
@@ -253,3 +320,73 @@ def _cell(name: str, said: Mapping[str, tuple[Path, object]]) -> Cell:
         missing = Problem(dotted(["cells", name, "url"]), tr("is missing in every file"))
         raise CELL_FILE.refusal(next(iter(origins.values())), [missing])
     return Cell(name, settings.url, settings, origins)
+
+
+def add_cell(path: Path, name: str, said: Mapping[str, str | float]) -> None:
+    """Write a cell into a cell file; the rest of the file stays as it is, to the byte.
+
+    Args:
+        path: The file; it is made where there is none.
+        name: The cell's name.
+        said: Its keys, in this order.
+
+    Raises:
+        ConfigError: The file has a cell of that name, is wrong, or would be; nothing is written.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from robolink.config import add_cell, cell_names
+        >>> add_cell(Path("robolink.toml"), "line3", {"url": "epson+tcp://192.168.0.1:5000"})
+        >>> cell_names()
+        ['line3']
+    """
+    content = content_with_cell(path, name, said)
+    try:
+        write_whole(path, content, mode=0o666)
+    except OSError as error:
+        raise ConfigError(
+            tr("{path} cannot be written: {cause}.", path=path, cause=error.strerror or error),
+            remedy=tr("Nothing was written."),
+        ) from error
+
+
+def content_with_cell(path: Path, name: str, said: Mapping[str, str | float]) -> bytes:
+    r"""Return what a cell file says with one more cell, so far as its keys are known by now.
+
+    Args:
+        path: The file; it is read where there is one.
+        name: The cell's name.
+        said: Its keys, in this order.
+
+    Raises:
+        ConfigError: The file has a cell of that name, is wrong, or would be.
+
+    Example:
+        >>> from pathlib import Path
+        >>> from robolink.config import content_with_cell
+        >>> content_with_cell(Path("new-cell-example.toml"), "line3", {})
+        b'[cells."line3"]\n'
+    """
+    before = CELL_FILE.read(path) if path.exists() else b""
+    cells = CELL_FILE.parse(path, before).get("cells")
+    if isinstance(cells, dict) and name in cells:
+        raise ConfigError(
+            tr("{path} has a cell {name} already.", path=path, name=name),
+            remedy=tr(
+                "Choose another name, or change that cell in an editor. Nothing was written."
+            ),
+        )
+    rows = [f"[cells.{_quoted(name)}]", *(f"{key} = {_quoted(one)}" for key, one in said.items())]
+    gap = b"" if not before else b"\n" if before.endswith(b"\n") else b"\n\n"
+    content = before + gap + "\n".join([*rows, ""]).encode()
+    problems = problems_in(CELL_FILE.parse(path, content))
+    if problems:
+        error = CELL_FILE.refusal(path, problems)
+        error.remedy = tr("Nothing was written.")
+        raise error
+    return content
+
+
+def _quoted(value: str | float) -> str:
+    """Return a value as TOML has it; of text JSON's way of writing is one of TOML's."""
+    return json.dumps(value)

@@ -13,16 +13,25 @@ STOP   Abort, Stop                                 may be repeated
 
 Speed, SpeedS, Power and the motors need no marker: they are set and read back before each
 move, and a lost answer leaves nothing that the next connection would not set again.
+
+Signs of life of an open block: that somebody is at work, although nothing is sent.
+
+A change that is open while a person looks at the parts sends nothing, and who is silent for ten
+seconds counts as gone: his lease may be taken (docs/reference/rules.md 6), and a PLC gives its
+mailbox away (docs/mailbox.md, "Owners"). So as long as a block is open, both are told once a
+second that its program is there. That keeps nothing going: no command, and no heartbeat of a
+movement. It ends with the block, with the thread that is in it, and with the process.
 """
 
+import threading
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, suppress
 from functools import cached_property
-from typing import Generic, TypeVar
+from typing import Final, Generic, TypeVar
 
+from robolink import ambient
 from robolink.controllers.markers import MarkerStore, ProcedureLock
-from robolink.controllers.signs_of_life import SignsOfLife
 from robolink.errors import (
     ConfigError,
     ControllerFaultError,
@@ -34,6 +43,54 @@ from robolink.messages import joined, tr
 from robolink.model import ChangeGuard, EntryKind, Marker, MarkerKind, NewEntry, OutcomeLog
 from robolink.stop_latch import StopLatch
 from robolink.timing import Clock
+
+EVERY_S: Final = 1.0
+"""Between two signs: a tenth of the silence after which somebody counts as gone."""
+
+
+class SignsOfLife:
+    """Gives signs of life for as long as a block of this process is open on a controller.
+
+    Args:
+        sign: Gives one, to the record and to the controller. It may fail: what is the matter
+            then, the next act of whoever is in the block says.
+    """
+
+    def __init__(self, sign: Callable[[], None]) -> None:
+        self._sign = sign
+        self._lock = threading.Lock()
+        self._inside: list[threading.Thread] = []
+        self._end: Callable[[], None] = _nothing
+
+    @contextmanager
+    def shown(self) -> Iterator[None]:
+        """Give them within the block; blocks inside of it give no more."""
+        here = threading.current_thread()
+        with self._lock:
+            first = not self._inside
+            self._inside.append(here)
+            if first:
+                self._end = ambient.regularly(EVERY_S, self._one, "signs of life")
+        try:
+            yield
+        finally:
+            end: Callable[[], None] = _nothing
+            with self._lock:
+                self._inside.remove(here)
+                if not self._inside:
+                    end, self._end = self._end, _nothing
+            end()
+
+    def _one(self) -> None:
+        # A thread that has ended without leaving its block is at no work any more.
+        if any(thread.is_alive() for thread in self._inside):
+            with suppress(RobolinkError):
+                self._sign()
+
+
+def _nothing() -> None:
+    """End nothing."""
+
 
 T = TypeVar("T")
 

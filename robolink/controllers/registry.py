@@ -4,19 +4,37 @@ Kinds that this package brings stand in a table and are imported when they are n
 are found in the entry-point group ``robolink.controllers``, by the full scheme of the URL
 (``gantry+tcp``) or by its kind alone (``gantry``). No entry point is looked for where the table
 knows the kind: a stop and a look are timed (docs/decisions/0017).
+
+Reaching a controller that is not there yet, without a storm when many come back at once.
+
+No link is renewed by itself (docs/reference/rules.md 11), so whoever wants to wait for a
+controller, a monitor after a power cut say, says so. A switch that restarts loses every cell
+behind it at the same instant; if all of them tried again at fixed times they would knock together
+for ever (docs/reference/faults.md F77).
+
+How many axes a robot has by its model alone, before anything is connected.
 """
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Final, Protocol, cast
+from types import MappingProxyType
+from typing import Final, Protocol, TypeVar, cast
 
-from robolink.errors import ConfigError, RobolinkError
+from robolink import ambient
+from robolink.errors import (
+    ConfigError,
+    ConnectError,
+    RobolinkError,
+    TransportBrokenError,
+    TransportTimeoutError,
+)
 from robolink.journal import open_log, signature_here
 from robolink.messages import tr
 from robolink.model import Capabilities, ChangeLimits, Controller, OutcomeLog, Secret, Signature
 from robolink.plug_ins import PlugInError, find_plug_in
-from robolink.timing import Clock
+from robolink.timing import Clock, Deadline, SystemClock
 from robolink.transport import LinkUrl, TraceSink, parse_url
 from robolink.version import VERSION
 
@@ -255,3 +273,112 @@ def connect(
     if limits is not None:
         controller.change_guard.limits = limits
     return controller
+
+
+Reached = TypeVar("Reached")
+
+FIRST_PAUSE_S: Final = 1.0
+LONGEST_PAUSE_S: Final = 60.0
+
+_BITS: Final = 32
+
+
+def connect_when_reachable(
+    connect: Callable[[], Reached], *, within_s: float, clock: Clock | None = None
+) -> Reached:
+    """Connect to a controller as soon as it is there.
+
+    The first attempt is made at once. After each that fails there is a pause, counted from its
+    end: drawn between half and the whole of :data:`FIRST_PAUSE_S`, which doubles each time up to
+    :data:`LONGEST_PAUSE_S`. What waiting does not mend, as a wrong password or a mistake in the
+    URL, ends it at once. ::
+
+        robot = connect_when_reachable(lambda: robolink.connect(url), within_s=600)
+
+    Args:
+        connect: One attempt; nothing but connecting should happen in it, since it is repeated.
+        within_s: How long it is tried; an attempt that has begun is awaited.
+        clock: Replaces the machine's clock.
+
+    Returns:
+        What ``connect`` returned.
+
+    Raises:
+        ConfigError: ``within_s`` is negative or no number.
+        ConnectError, TransportBrokenError, TransportTimeoutError: The last attempt failed so.
+        RobolinkError: As ``connect`` raised it, where waiting is no remedy.
+
+    Example:
+        >>> import robolink
+        >>> from robolink.controllers import connect_when_reachable
+        >>> url = "epson+sim://reach-example"
+        >>> with connect_when_reachable(lambda: robolink.connect(url), within_s=60) as controller:
+        ...     controller.status().state.value
+        'ready'
+    """
+    if not within_s >= 0:
+        raise ConfigError(
+            tr("A wait of {seconds} s is not possible.", seconds=within_s),
+            remedy=tr("Say for how many seconds to keep trying; 0 means one attempt."),
+        )
+    clock = clock or SystemClock()
+    deadline, pause_s = Deadline.after(clock, within_s), FIRST_PAUSE_S
+    while True:
+        try:
+            return connect()
+        except (ConnectError, TransportBrokenError, TransportTimeoutError):
+            if deadline.expired:
+                raise
+        clock.sleep(min(_drawn(pause_s), deadline.remaining_s()))
+        pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
+
+
+def _drawn(pause_s: float) -> float:
+    share: float = ambient.random_number(_BITS) / (1 << _BITS)
+    return pause_s * (1 + share) / 2
+
+
+_FAMILIES: Final[Mapping[str, int]] = MappingProxyType(
+    {"GX": 4, "RS": 4, "T": 4, "LS": 4, "G": 4, "C": 6, "CX": 6, "VT": 6}
+)
+"""The letters before the first digit of EPSON's models (docs/reference/epson-robots.md)."""
+
+_KINEMATICS: Final[Mapping[str, int]] = MappingProxyType(
+    {
+        "Kin_Scara2_Z": 3,
+        "Kin_Scara3_Z": 4,
+        "Kin_Polar_Z": 3,
+        "Kin_Gantry3": 3,
+        "Kin_HGantry3": 3,
+        "Kin_Pos_RRR": 3,
+        "Kin_5Axes": 5,
+        "Kin_ArticulatedRobot_6DOF": 6,
+        "Kin_4AxisPalletizer": 4,
+    }
+)
+"""Kinematics that stand alone (docs/reference/softmotion.md 3.3)."""
+
+
+def axes_of_model(kind: str, model: str | None) -> int | None:
+    """Return how many axes a robot of a model has.
+
+    Args:
+        kind: The first word of its controller's URL.
+        model: The model as the controller says it, ``None`` where nobody wrote it down.
+
+    Returns:
+        ``None`` where only a connected controller tells it.
+
+    Example:
+        >>> from robolink.controllers import axes_of_model
+        >>> axes_of_model("epson", "T6-602S"), axes_of_model("epson", "C8-C901S")
+        (4, 6)
+        >>> axes_of_model("softmotion", "Kin_Gantry3+Kin_CAxis") is None
+        True
+    """
+    if model is None:
+        return None
+    if kind == "softmotion":
+        return _KINEMATICS.get(model)
+    family = re.match(r"([A-Z]+)\d", model) if kind == "epson" else None
+    return None if family is None else _FAMILIES.get(family[1])

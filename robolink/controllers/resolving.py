@@ -16,6 +16,7 @@ from robolink.model import (
     describe_offset,
     plain_offset,
     put_right,
+    read_for_verdict,
     read_offset,
 )
 from robolink.timing import local_label
@@ -37,7 +38,7 @@ def examine_write(tools: ToolTable, marker: Marker) -> Finding:
     tool = int(str(marker.details["tool"]))
     requested = read_offset(marker.details.get("requested"))
     before = read_offset(marker.details.get("before"))
-    now = tools.read(tool)
+    now = read_for_verdict(tools, tool, (before, requested))
     if tools.same(now, requested):
         verdict = Verdict.DONE
         sentence = tr("Tool {tool} holds the new value {now}.", tool=tool, now=describe_offset(now))

@@ -23,7 +23,7 @@ from robolink.transport import LinkUrl, parse_url
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from robolink.controllers.softmotion.link.wire import MailboxWire
+    from robolink.controllers.softmotion.wire import MailboxWire
     from robolink.model import Controller, ControllerStatus, Secret
     from robolink.timing import Clock
     from robolink.transport import TraceSink
@@ -95,12 +95,12 @@ def stop_requests(url: str) -> tuple[str, ...]:
     """
     kind = parse_url(url).kind
     if kind == "epson":
-        from robolink.controllers.epson.link.requests import as_sent
+        from robolink.controllers.epson.session import as_sent
         from robolink.protocols.epson_text import Request
 
         return tuple(as_sent(Request(name)) for name in ("Abort", "Stop"))
     if kind == "softmotion":
-        from robolink.controllers.softmotion.link.answers import describe
+        from robolink.controllers.softmotion.answers import describe
         from robolink.protocols.mailbox import Command, Opcode
 
         return (describe(Command(0, Opcode.STOP)),)
@@ -121,8 +121,8 @@ class _Means(NamedTuple):
 
 
 def _stop_epson(link: LinkUrl, means: _Means) -> "ControllerStatus":
-    from robolink.controllers.epson.link.line import open_line
-    from robolink.controllers.epson.link.stopping import StopLine
+    from robolink.controllers.epson.line import open_line
+    from robolink.controllers.epson.rest import StopLine
 
     traces = () if means.trace is None else (means.trace,)
     opened = open_line(link, timeout_s=means.timeout_s, clock=means.clock, traces=traces)
@@ -130,7 +130,7 @@ def _stop_epson(link: LinkUrl, means: _Means) -> "ControllerStatus":
     try:
         line.login(means.password)
         flags, code = line.stop()
-        from robolink.controllers.epson.link.answers import status_from_flags
+        from robolink.controllers.epson.answers import status_from_flags
 
         if means.met is not None and (name := line.who()):
             means.met(name)
@@ -141,19 +141,18 @@ def _stop_epson(link: LinkUrl, means: _Means) -> "ControllerStatus":
 
 
 def _stop_group(link: LinkUrl, means: _Means) -> "ControllerStatus":
-    from robolink.controllers.softmotion.link.commands import CommandSender
-    from robolink.controllers.softmotion.link.snapshots import Snapshots
-    from robolink.controllers.softmotion.link.stopping import bring_group_to_rest
-    from robolink.controllers.softmotion.link.wire import MailboxWire
-    from robolink.transport import open_quick_link
+    from robolink.controllers.softmotion.commands import CommandSender, bring_group_to_rest
+    from robolink.controllers.softmotion.snapshots import Snapshots
+    from robolink.controllers.softmotion.wire import MailboxWire
+    from robolink.transport import open_mailbox_link
 
-    mailbox = open_quick_link(link, timeout_s=means.timeout_s, clock=means.clock)
+    mailbox = open_mailbox_link(link, timeout_s=means.timeout_s, clock=means.clock)
     wire = MailboxWire(mailbox, owner=means.owner, timeout_s=means.timeout_s)
     try:
         snapshots = Snapshots(wire)
         commands = CommandSender(wire, snapshots)
         now = bring_group_to_rest(commands, snapshots, wire.clock, controller=wire.identity)
-        from robolink.controllers.softmotion.link.condition import status_of
+        from robolink.controllers.softmotion.condition import status_of
 
         if means.met is not None:
             _tell_which(wire, means.met)
@@ -164,7 +163,7 @@ def _stop_group(link: LinkUrl, means: _Means) -> "ControllerStatus":
 
 def _tell_which(wire: "MailboxWire", met: "Callable[[str], None]") -> None:
     """Say which PLC stands now, where its program has a number."""
-    from robolink.controllers.softmotion.link.device import identity_of, read_device_id
+    from robolink.controllers.softmotion.mailbox import identity_of, read_device_id
 
     with suppress(RobolinkError):
         device_id = read_device_id(wire)

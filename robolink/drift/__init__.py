@@ -3,9 +3,15 @@
 Reads the record alone; nothing is asked of a controller.
 """
 
-from robolink.drift.cell import CellDrift, drift_of, last_statements
 from robolink.drift.charts import Chart, ChartPoint, charts_of
-from robolink.drift.findings import DriftCode, DriftFinding, findings_in
+from robolink.drift.findings import (
+    CellDrift,
+    DriftCode,
+    DriftFinding,
+    drift_of,
+    findings_in,
+    last_statements,
+)
 from robolink.drift.history import KINDS, MeasuredChange, measured_changes
 
 __all__ = [

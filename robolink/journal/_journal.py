@@ -6,10 +6,10 @@ from dataclasses import fields
 from typing import TYPE_CHECKING, Any, Final, cast
 
 from robolink.errors import JournalError
+from robolink.journal._lease_view import LeaseHolder
 from robolink.journal._outcome_log import JournalOutcomeLog
-from robolink.journal._processes import LeaseHolder
-from robolink.journal._records import ChainVerification, Filter
 from robolink.journal.store.chain import ChainCheck
+from robolink.journal.store.entry_rows import ChainVerification, Filter
 from robolink.messages import tr
 from robolink.model import EntryKind, Marker, Recorded, Signature
 from robolink.timing import Clock
@@ -267,7 +267,7 @@ def _entry(row: Mapping[str, Any]) -> Recorded:
     return Recorded(
         **{name: row[name] for name in _PLAIN},
         # A kind that only a newer robolink knows stays the text that it is.
-        kind=_KINDS.get(row["kind"], cast(EntryKind, row["kind"])),
+        kind=_KINDS.get(row["kind"], cast("EntryKind", row["kind"])),
         details=_details(row["details"]),
         signature=Signature(**{field.name: row[field.name] for field in fields(Signature)}),
     )

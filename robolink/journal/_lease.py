@@ -13,15 +13,14 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Final
 
 from robolink.errors import LeaseHeldError, LeaseLostError
-from robolink.journal._processes import LeaseHolder
-from robolink.journal._sightings import FREE, LEASE_S, LeaseSighting
+from robolink.journal._lease_view import FREE, LEASE_S, LeaseHolder, LeaseView
 from robolink.journal.store.chain import canonical, storable
 from robolink.messages import tr
 from robolink.model import NewEntry, new_operation
 from robolink.timing import NS_PER_S, Clock, Deadline, wall_label
 
 if TYPE_CHECKING:
-    from robolink.journal.store.lease_rows import LeaseRows
+    from robolink.journal.store.state_rows import LeaseRows
     from robolink.journal.store.store import Store
 
 BEAT_S: Final = 1.0
@@ -63,8 +62,8 @@ class Lease:
         self._epoch = 0
         self._beaten_ns = 0
         self._lost = False
-        self._taken = LeaseSighting()  # as it was when its loss was noticed
-        self._seen: tuple[LeaseSighting, str] | None = None  # and why its holder may be replaced
+        self._taken = LeaseView()  # as it was when its loss was noticed
+        self._seen: tuple[LeaseView, str] | None = None  # and why its holder may be replaced
 
     @property
     def held(self) -> bool:
@@ -199,7 +198,7 @@ class Lease:
         insisting = replace(self._holder, operator=operator or self._holder.operator)
         return seen.taken_entry(reason, insisting)
 
-    def _judged(self, seen: LeaseSighting) -> tuple[LeaseSighting, str]:
+    def _judged(self, seen: LeaseView) -> tuple[LeaseView, str]:
         """Return a lease that can be taken, and why if it is another's; or raise LeaseHeldError."""
         if seen.token in (FREE, self._token):
             return seen, ""
@@ -214,7 +213,7 @@ class Lease:
             return seen, ""
         return seen, tr("it gave no sign of life for {seconds:.0f} s", seconds=LEASE_S)
 
-    def _watched(self, seen: LeaseSighting) -> LeaseSighting:
+    def _watched(self, seen: LeaseView) -> LeaseView:
         """Watch a holder whose clock cannot be read here."""
         deadline = Deadline.after(self._clock, LEASE_S)
         while not deadline.expired:
@@ -226,7 +225,7 @@ class Lease:
                 raise self._held_error(now)
         return seen
 
-    def _sight(self) -> LeaseSighting:
+    def _sight(self) -> LeaseView:
         with self._store.read(tr("The command was not sent.")) as tables:
             return tables.leases.sight(self.controller)
 
@@ -251,7 +250,7 @@ class Lease:
             self._taken = rows.sight(self.controller)
         self._epoch, self._lost = 0, True
 
-    def _held_error(self, seen: LeaseSighting) -> LeaseHeldError:
+    def _held_error(self, seen: LeaseView) -> LeaseHeldError:
         who = seen.who()
         if self._holder.shares_clock_with(who):
             silent_s = max(0, self._clock.now_ns() - seen.beat_ns) / NS_PER_S

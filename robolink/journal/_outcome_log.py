@@ -7,11 +7,17 @@ from typing import TYPE_CHECKING, Final
 
 from robolink import ambient
 from robolink.errors import JournalError, LeaseLostError, OutcomeUnknownError
+from robolink.journal._identity import Names, Naming
+from robolink.journal._journal_loss import LOST, Traces, leave_trace, traces_of
 from robolink.journal._lease import Lease
-from robolink.journal._naming import Names, Naming
-from robolink.journal._processes import BootClock, LeaseHolder, this_process
-from robolink.journal._runs import forget_client, note_client, run_of
-from robolink.journal._traces import LOST, Traces, leave_trace, traces_of
+from robolink.journal._lease_view import (
+    BootClock,
+    LeaseHolder,
+    forget_client,
+    note_client,
+    run_of,
+    this_process,
+)
 from robolink.messages import tr
 from robolink.model import (
     NO_HISTORY,
@@ -181,7 +187,12 @@ class JournalOutcomeLog:
         with self._lock:
             names = self._named()
             last = not self._holds and not self._begun - {operation}
-            with self._writing(_left_open()) as tables:
+            with self._writing(
+                tr(
+                    "How the last command ended could not be recorded, so it counts as "
+                    "unfinished: run 'robolink recover' after that."
+                )
+            ) as tables:
                 if operation in self._begun:
                     self._proved(tables, operation, last=last)
                 elif last:
@@ -486,10 +497,3 @@ def _act(kind: EntryKind, marker: Marker) -> NewEntry:
 
 def _untouched() -> str:
     return tr("The command was not sent.")
-
-
-def _left_open() -> str:
-    return tr(
-        "How the last command ended could not be recorded, so it counts as unfinished: run "
-        "'robolink recover' after that."
-    )

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from robolink.methods.beams import BeamLine as BeamLine
     from robolink.methods.beams import BeamsParameters as BeamsParameters
     from robolink.methods.beams import BeamsSource as BeamsSource
-    from robolink.methods.beams.procedure import measure_beams as measure_beams
+    from robolink.methods.beams import measure_beams as measure_beams
     from robolink.methods.beams.procedure import trace_beams as trace_beams
     from robolink.methods.beams.procedure import verify_by_crossing as verify_by_crossing
     from robolink.methods.board import BoardParameters as BoardParameters
@@ -70,14 +70,14 @@ if TYPE_CHECKING:
     from robolink.methods.pivot import PivotParameters as PivotParameters
     from robolink.methods.pivot import PivotSource as PivotSource
     from robolink.methods.pivot import PivotTouches as PivotTouches
+    from robolink.methods.pivot import measure_pivot as measure_pivot
     from robolink.methods.pivot import require_tilting as require_tilting
-    from robolink.methods.pivot.procedure import measure_pivot as measure_pivot
     from robolink.methods.pivot.procedure import verify_by_tilting as verify_by_tilting
+    from robolink.methods.pivot.six_point import AxisTeachPlan as AxisTeachPlan
     from robolink.methods.pivot.six_point import SixPointParameters as SixPointParameters
     from robolink.methods.pivot.six_point import SixPoints as SixPoints
     from robolink.methods.pivot.six_point import SixPointSource as SixPointSource
-    from robolink.methods.pivot.six_point_procedure import AxisTeachPlan as AxisTeachPlan
-    from robolink.methods.pivot.six_point_procedure import measure_six_point as measure_six_point
+    from robolink.methods.pivot.six_point import measure_six_point as measure_six_point
     from robolink.methods.pivot.tilts import OverPin as OverPin
     from robolink.methods.pivot.tilts import Tilt as Tilt
     from robolink.methods.pivot.tilts import informative_tilts as informative_tilts
@@ -95,7 +95,7 @@ if TYPE_CHECKING:
     from robolink.methods.shared_parameters import LookParameters as LookParameters
     from robolink.methods.shared_parameters import PinParameters as PinParameters
     from robolink.methods.shared_parameters import UprightPinParameters as UprightPinParameters
-    from robolink.methods.station_learning import learn_station as learn_station
+    from robolink.methods.station_reference import learn_station as learn_station
     from robolink.methods.surface_touch import SurfaceParameters as SurfaceParameters
     from robolink.methods.surface_touch.plane import PlaneTouches as PlaneTouches
     from robolink.methods.surface_touch.plane import PlaneTouchParameters as PlaneTouchParameters
@@ -113,14 +113,14 @@ if TYPE_CHECKING:
     from robolink.methods.two_pose import measure_two_pose as measure_two_pose
     from robolink.methods.z_touch import ZTouchParameters as ZTouchParameters
     from robolink.methods.z_touch import ZTouchSource as ZTouchSource
-    from robolink.methods.z_touch.procedure import measure_z_touch as measure_z_touch
+    from robolink.methods.z_touch import measure_z_touch as measure_z_touch
     from robolink.methods.z_touch.procedure import verify_by_touching as verify_by_touching
 else:
     __getattr__, __dir__, __all__ = lazy_exports(
         __name__,
         {
-            "beams": "BeamLine BeamsParameters BeamsSource",
-            "beams.procedure": "measure_beams trace_beams verify_by_crossing",
+            "beams": "BeamLine BeamsParameters BeamsSource measure_beams",
+            "beams.procedure": "trace_beams verify_by_crossing",
             "board": "BoardParameters BoardSource measure_board verify_board",
             "camera": "CameraParameters CameraSource measure_camera",
             "camera_affine": (
@@ -142,17 +142,18 @@ else:
             "parameter_checks": (
                 "ParameterField fields_of order_of_residuals parameter_problems source_of"
             ),
-            "pivot": "PivotParameters PivotSource PivotTouches require_tilting",
-            "pivot.procedure": "measure_pivot verify_by_tilting",
-            "pivot.six_point": "SixPointParameters SixPointSource SixPoints",
-            "pivot.six_point_procedure": "AxisTeachPlan measure_six_point",
+            "pivot": "PivotParameters PivotSource PivotTouches measure_pivot require_tilting",
+            "pivot.procedure": "verify_by_tilting",
+            "pivot.six_point": (
+                "AxisTeachPlan SixPointParameters SixPointSource SixPoints measure_six_point"
+            ),
             "pivot.tilts": "OverPin Tilt informative_tilts proving_tilts",
             "points": "PointsParameters",
             "registry": "METHODS_GROUP all_methods find_method method_names register",
             "runout_table": "AllRoundPlan RunoutTableParameters RunoutTableSource",
             "runout_table_procedure": "measure_runout_table",
             "shared_parameters": "LookParameters PinParameters UprightPinParameters",
-            "station_learning": "learn_station",
+            "station_reference": "learn_station",
             "surface_touch": "SurfaceParameters",
             "surface_touch.plane": (
                 "PlaneTouchParameters PlaneTouchSource PlaneTouches measure_plane_touch"
@@ -162,7 +163,7 @@ else:
             ),
             "surface_touch.survey": "PlaneSurvey SphereSurvey",
             "two_pose": "TwoPoseParameters TwoPoseSource TwoTouches measure_two_pose",
-            "z_touch": "ZTouchParameters ZTouchSource",
-            "z_touch.procedure": "measure_z_touch verify_by_touching",
+            "z_touch": "ZTouchParameters ZTouchSource measure_z_touch",
+            "z_touch.procedure": "verify_by_touching",
         },
     )

@@ -62,7 +62,7 @@ from robolink.stations import CameraStation, StationKind
 
 if TYPE_CHECKING:
     from robolink.calibration import CameraRound
-    from robolink.procedures import KeptProof, TipSource
+    from robolink.procedures import TipSource
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -442,10 +442,6 @@ def _source(parameters: BoardParameters, site: Site) -> "TipSource":
     )
 
 
-def _proof() -> "type[KeptProof]":
-    return BoardTest
-
-
 METHOD = Method(
     name="board",
     summary=declared("See the fiducials of a held board: X, Y and U."),
@@ -460,6 +456,6 @@ METHOD = Method(
     needs=Needs(station=StationKind.CAMERA, sensor=True, place=PLACE),
     source=_source,
     unmeasured_z=UNMEASURED_Z,
-    proof=_proof,
+    proof=lambda: BoardTest,
     next_steps=board_steps,
 )

@@ -43,7 +43,7 @@ from robolink.stations import CameraStation, StationKind
 
 if TYPE_CHECKING:
     from robolink.calibration import CameraRound
-    from robolink.procedures import KeptProof, TipSource
+    from robolink.procedures import TipSource
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -291,10 +291,6 @@ def _source(parameters: CameraParameters, site: Site) -> "TipSource":
     )
 
 
-def _proof() -> "type[KeptProof]":
-    return LookTest
-
-
 METHOD = Method(
     name="camera",
     summary=declared("See the tip with a calibrated, up-looking camera: X and Y."),
@@ -309,5 +305,5 @@ METHOD = Method(
     needs=Needs(station=StationKind.CAMERA, sensor=True, place=PLACE),
     source=_source,
     unmeasured_z=UNMEASURED_Z,
-    proof=_proof,
+    proof=lambda: LookTest,
 )

@@ -47,7 +47,7 @@ def were_held(context: MeasurementContext, *, stated: bool) -> bool:
 
     Example:
         >>> from robolink.methods.given_poses import were_held
-        >>> from robolink.nozzle_change import Limits
+        >>> from robolink.calibration_run import Limits
         >>> from robolink.procedures import MeasurementContext
         >>> from robolink.testing import MemoryController
         >>> with MemoryController() as controller:

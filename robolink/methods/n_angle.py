@@ -51,7 +51,7 @@ from robolink.runner import Procedure, TouchedAt, first_clear
 from robolink.stations import StationKind
 
 if TYPE_CHECKING:
-    from robolink.procedures import PoseMethod, TipSource
+    from robolink.procedures import TipSource
 
 
 _SAME_ANGLE_DEG: Final = 1e-9
@@ -394,10 +394,6 @@ def _source(parameters: NAngleParameters, site: Site) -> "TipSource":
     )
 
 
-def _from_poses(_parameters: NAngleParameters, site: Site) -> "PoseMethod":
-    return ManyTouches(site.sigma_mm)
-
-
 METHOD = Method(
     name="n-angle",
     summary=declared("Touch one pin at several angles of U; the touches check each other."),
@@ -412,7 +408,7 @@ METHOD = Method(
     measures=("x_mm", "y_mm"),
     needs=Needs(station=StationKind.PIN, named=False, finds_pin=True),
     source=_source,
-    from_poses=_from_poses,
+    from_poses=lambda _parameters, site: ManyTouches(site.sigma_mm),
     pose_help=PoseHelp(
         points=declared("Three points or more taught on the pendant, for example 901-904."),
         typed=declared(

@@ -42,7 +42,7 @@ from robolink.runner import Notify, Procedure, TakenAgainError, TouchedAt, first
 from robolink.stations import StationKind
 
 if TYPE_CHECKING:
-    from robolink.procedures import KeptProof, PoseMethod, TipSource
+    from robolink.procedures import KeptProof, TipSource
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -201,10 +201,6 @@ def _source(parameters: TwoPoseParameters, site: Site) -> "TipSource":
     return TwoPoseSource(parameters.touch, sigma_mm=site.sigma_mm)
 
 
-def _from_poses(_parameters: TwoPoseParameters, site: Site) -> "PoseMethod":
-    return TwoTouches(site.sigma_mm)
-
-
 def _proof() -> "type[KeptProof]":
     from robolink.procedures import TurnTest
 
@@ -226,7 +222,7 @@ METHOD = Method(
     measures=("x_mm", "y_mm"),
     needs=Needs(station=StationKind.PIN, named=False, finds_pin=True),
     source=_source,
-    from_poses=_from_poses,
+    from_poses=lambda _parameters, site: TwoTouches(site.sigma_mm),
     pose_help=PoseHelp(
         points=declared("Two points taught on the pendant, for example 901,902. Nothing moves."),
         typed=declared("A pose in mm and degrees, for example 287.5,103.25,180; give it twice."),

@@ -1,24 +1,137 @@
-"""What a controller is to its user."""
+"""What a controller is to its user, what only some kinds have, and whether it is simulated."""
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from enum import StrEnum
 from types import TracebackType
-from typing import Protocol, Self
+from typing import Final, Generic, Protocol, Self, TypeVar
 
+from robolink.errors import ControllerError
 from robolink.model._change_limits import ChangeGuard
+from robolink.model._geometry import Pose
 from robolink.model._identity import ControllerFacts
-from robolink.model._optional_parts import AlarmList, DigitalIo, PointReader, VariableTable
+from robolink.model._journal_entries import NewEntry
+from robolink.model._ledger import Ledger
+from robolink.model._movement import MotionGroup
+from robolink.model._outcomes import Marker, MarkerKind, OutcomeLog, Resolver
 from robolink.model._status import ControllerStatus
 from robolink.model._tools import ToolTable
-from robolink.model.motion.movement import MotionGroup
-from robolink.model.record.findings import Resolver
-from robolink.model.record.journal_entries import NewEntry
-from robolink.model.record.ledger import Ledger
-from robolink.model.record.outcomes import Marker, MarkerKind, OutcomeLog
 from robolink.stop_latch import StopLatch
 from robolink.timing import Clock
+
+Value = bool | int | float | str
+ValueT = TypeVar("ValueT", bound=Value)
+
+
+@dataclass(frozen=True, slots=True)
+class ValueReceipt(Generic[ValueT]):
+    """What setting a value did.
+
+    Attributes:
+        request: The request, as it stands on the wire.
+        before: What was there.
+        requested: What was asked for.
+        read_back: What is there now.
+        skipped: It was there already, so nothing was sent.
+    """
+
+    request: str
+    before: ValueT
+    requested: ValueT
+    read_back: ValueT
+    skipped: bool
+
+
+class DigitalIo(Protocol):
+    """Inputs and outputs by number."""
+
+    def read_input(self, bit: int) -> bool:
+        """Read one input."""
+
+    def set_output(self, bit: int, on: bool) -> ValueReceipt[bool] | None:
+        """Switch one output, and prove it as far as this controller lets it be proved.
+
+        Returns:
+            ``None`` where an output cannot be read back: the acknowledgement is the proof.
+
+        Raises:
+            NotReadyError: The state forbids it.
+            RejectedError: It was refused; nothing was switched.
+            OutcomeUnknownError: No answer came; motion is blocked until ``recover``.
+        """
+
+    def preview_output(self, bit: int, on: bool) -> tuple[str, ...]:
+        """Return what :meth:`set_output` would send, as it stands on the wire."""
+
+
+class PointReader(Protocol):
+    """The taught points of a controller."""
+
+    def read_all(self, numbers: Iterable[int]) -> Mapping[int, Pose | None]:
+        """Read some of them; an undefined one is ``None``."""
+
+
+class VariableTable(Protocol):
+    """Variables of the program in a controller, by name and by the name of their type."""
+
+    def read(self, name: str, kind: str) -> Value:
+        """Read one variable."""
+
+    def write(self, name: str, value: Value, kind: str) -> ValueReceipt[Value]:
+        """Set one variable and read it back; raises like :meth:`DigitalIo.set_output`.
+
+        Args:
+            name: Name of the variable, as the project of the controller has it.
+            value: What it is to hold.
+            kind: Its type, such as ``Real``.
+
+        Example:
+            >>> import robolink
+            >>> from robolink.protocols.epson_text import VariableType
+            >>> from robolink_simulators.epson import EpsonSimulator
+            >>> from robolink_simulators.hosting.in_process.epson import register
+            >>> simulator = EpsonSimulator()
+            >>> simulator.variables.declare("g_height", VariableType.REAL)
+            >>> with robolink.connect(register("variable-example", simulator)) as controller:
+            ...     receipt = controller.variables.write("g_height", 2.5, "Real")
+            >>> receipt.before, receipt.read_back
+            (0.0, 2.5)
+        """
+
+    def preview_write(self, name: str, value: Value, kind: str) -> tuple[str, ...]:
+        """Return what :meth:`write` would send besides its reads; reads only.
+
+        Args:
+            name: Name of the variable.
+            value: What it would hold.
+            kind: Its type.
+
+        Example:
+            >>> import robolink
+            >>> from robolink_simulators.epson import EpsonSimulator
+            >>> from robolink_simulators.hosting.in_process.epson import register
+            >>> simulator = EpsonSimulator()
+            >>> simulator.variables.declare("g_height", "real")
+            >>> with robolink.connect(register("preview-example", simulator)) as controller:
+            ...     controller.variables.preview_write("g_height", 2.5, "real")
+            ('$SetVariable,g_height,2.5,Real',)
+        """
+
+
+class AlarmList(Protocol):
+    """What a controller wants looked after, apart from errors."""
+
+    def list(self) -> tuple[int, ...]:
+        """Read the numbers of the alarms that stand.
+
+        Raises:
+            RejectedError: This firmware does not tell them.
+        """
+
+    def reset(self, number: int) -> None:
+        """Reset one because a person asked for it, and prove that it is gone."""
 
 
 class Act(StrEnum):
@@ -251,3 +364,59 @@ class Controller(Protocol):
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None: ...
+
+
+_SERIAL: Final = re.compile(r"(?:C-)?SIM[0-9A-F]{8}")
+"""Serial numbers of simulated EPSON controllers and robots; no other maker's are known."""
+
+_MEDIUM: Final = "+sim://"
+"""In the URL of a simulator that runs in the process that uses it."""
+
+
+def is_simulated_name(name: str) -> bool:
+    """Tell whether the name of a controller, or a serial number, is a simulator's.
+
+    ``False`` says nothing: the name of a PLC does not tell.
+
+    Args:
+        name: An identity, an address or a serial number.
+
+    Example:
+        >>> from robolink.model import is_simulated_name
+        >>> is_simulated_name("epson:C-SIM0A1B2C3D/SIM0A1B2C3D"), is_simulated_name("softmotion:1A")
+        (True, False)
+    """
+    parts = re.split(r"[:/+#]", name)
+    return _MEDIUM in name or any(map(_SERIAL.fullmatch, parts))
+
+
+def are_simulated_facts(facts: ControllerFacts) -> bool:
+    """Tell whether the serial numbers of a controller or its robots are a simulator's."""
+    return any(map(is_simulated_name, (facts.controller_serial or "", *facts.robot_serials)))
+
+
+def says_it_is_simulated(controller: Controller, facts: ControllerFacts | None = None) -> bool:
+    """Tell whether a controller says of itself that nothing real moves; an answer is not guessed.
+
+    A PLC says it of its axes, in the mailbox (docs/mailbox.md); a simulated EPSON controller by
+    its serial numbers. One that cannot be asked just now says nothing.
+
+    Args:
+        controller: The controller; what can be read is read.
+        facts: What it said of itself, where it was asked already.
+
+    Example:
+        >>> from robolink import connect
+        >>> from robolink.model import says_it_is_simulated
+        >>> with connect("softmotion+sim://simulated-example") as controller:
+        ...     says_it_is_simulated(controller)
+        True
+    """
+    if is_simulated_name(controller.identity):
+        return True
+    try:
+        if are_simulated_facts(controller.facts() if facts is None else facts):
+            return True
+        return controller.condition().get("simulated") is True
+    except ControllerError:
+        return False

@@ -1,8 +1,30 @@
-"""Who a controller is, whatever the URL by which it was reached, and what it says of itself."""
+"""Who a controller is, whatever the URL, what it says of itself, and the password that it takes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TypeAlias
+from typing import Final, TypeAlias
+
+
+class Secret:
+    """Wraps a password so that no format, log or traceback of ours can show it."""
+
+    __slots__ = ("_value",)
+
+    def __init__(self, value: str) -> None:
+        self._value: Final = value
+
+    def reveal(self) -> str:
+        """Return the text. Called where the login frame is built, and nowhere else."""
+        return self._value
+
+    def __repr__(self) -> str:
+        return "Secret('***')"
+
+    def __str__(self) -> str:
+        return "***"
+
+    def __bool__(self) -> bool:
+        return bool(self._value)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,20 +1,23 @@
 """Tool offsets and the table that holds them: the centre of the product."""
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from numbers import Real
 from typing import Final, Literal, Protocol, runtime_checkable
 
-from robolink.errors import ConfigError, ToolChangedError
+from robolink.errors import ConfigError, ToolChangedError, UnclearAnswerError
 from robolink.messages import tr
-from robolink.model.motion.geometry import angle_difference_deg, described
+from robolink.model._geometry import angle_difference_deg, described
 
 _LEAST: Final = 1e-100
 _MOST: Final = 1e9
 """Beyond what any tool has in any unit, rounding included. A round number whose words are in
 another order is far below; of any other one in six lies in between."""
+
+_LOOKS: Final = 3
+"""A line that bends three answers in a row is no line to change a tool over."""
 
 _NUMBERS: Final = frozenset({float, int})
 
@@ -303,6 +306,45 @@ class ToolTable(Protocol):
         Raises:
             UndefinedToolError: The tool has no definition.
         """
+
+
+def read_for_verdict(
+    tools: ToolTable, tool: int, known: Iterable[ToolOffset | None]
+) -> ToolOffset | None:
+    """Read a tool whose value decides what becomes of a change, ``None`` when it is undefined.
+
+    A value that nobody is known to have written counts when it was read twice: the checksum of
+    Remote RS232 does not notice two bytes that changed places (docs/reference/epson.md 2.1).
+
+    Args:
+        tools: The table.
+        tool: Its number.
+        known: What it may well hold: the old value, the new one.
+
+    Raises:
+        UnclearAnswerError: Each of three looks shows something else.
+        ToolIndexError: There is no such tool.
+
+    Example:
+        >>> import robolink
+        >>> from robolink.model import read_for_verdict
+        >>> with robolink.connect("epson+sim://verdict-example") as controller:
+        ...     old = controller.tools.read(1)
+        ...     new = robolink.ToolOffset(12.3, -3.7, -20)
+        ...     now = read_for_verdict(controller.tools, 1, (old, new))
+        >>> now == old
+        True
+    """
+    looks = list(known)
+    for _ in range(_LOOKS):
+        now = tools.read(tool)
+        if any(tools.same(now, one) for one in looks):
+            return now
+        looks.append(now)
+    raise UnclearAnswerError(
+        tr("Tool {tool} reads back otherwise at each look.", tool=tool),
+        remedy=tr("Nothing was written. Check the cable, then look again."),
+    )
 
 
 @dataclass(frozen=True, slots=True)

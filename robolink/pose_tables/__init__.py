@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from robolink.pose_tables.formats.epson_points import read_pts as read_pts
     from robolink.pose_tables.orientation import RULES as RULES
     from robolink.pose_tables.orientation import RotationRule as RotationRule
-    from robolink.pose_tables.reading import read_poses as read_poses
+    from robolink.pose_tables.reader import read_poses as read_poses
     from robolink.pose_tables.values import NOTHING_SAID as NOTHING_SAID
     from robolink.pose_tables.values import HowRead as HowRead
     from robolink.pose_tables.values import LengthUnit as LengthUnit
@@ -22,7 +22,7 @@ else:
         {
             "formats.epson_points": "parse_pts read_pts",
             "orientation": "RULES RotationRule",
-            "reading": "read_poses",
+            "reader": "read_poses",
             "values": "HowRead LengthUnit NOTHING_SAID PoseTable ReadingChoices TabledPose",
         },
     )

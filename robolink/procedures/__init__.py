@@ -39,16 +39,16 @@ if TYPE_CHECKING:
     from robolink.procedures.pin_touches import lift_off as lift_off
     from robolink.procedures.pin_touches import touch_again as touch_again
     from robolink.procedures.pin_touches import turned_touches as turned_touches
+    from robolink.procedures.sample_sequence import TAKE_ALL as TAKE_ALL
+    from robolink.procedures.sample_sequence import SamplingPolicy as SamplingPolicy
+    from robolink.procedures.sample_sequence import agreement as agreement
+    from robolink.procedures.sample_sequence import finalize_samples as finalize_samples
+    from robolink.procedures.sample_sequence import may_end_early as may_end_early
+    from robolink.procedures.sample_sequence import resume_samples as resume_samples
+    from robolink.procedures.sample_sequence import sample_sequentially as sample_sequentially
     from robolink.procedures.samples import Sampler as Sampler
     from robolink.procedures.samples import Samples as Samples
     from robolink.procedures.samples import SequentialSampler as SequentialSampler
-    from robolink.procedures.sequential_sampling import TAKE_ALL as TAKE_ALL
-    from robolink.procedures.sequential_sampling import SamplingPolicy as SamplingPolicy
-    from robolink.procedures.sequential_sampling import agreement as agreement
-    from robolink.procedures.sequential_sampling import finalize_samples as finalize_samples
-    from robolink.procedures.sequential_sampling import may_end_early as may_end_early
-    from robolink.procedures.sequential_sampling import resume_samples as resume_samples
-    from robolink.procedures.sequential_sampling import sample_sequentially as sample_sequentially
     from robolink.procedures.source import FindsStation as FindsStation
     from robolink.procedures.source import MeasurementContext as MeasurementContext
     from robolink.procedures.source import MovingSource as MovingSource
@@ -74,7 +74,7 @@ if TYPE_CHECKING:
     from robolink.procedures.source_bases import radius_of as radius_of
     from robolink.procedures.source_bases import touches_of as touches_of
     from robolink.procedures.surface_touches import SurfaceTouches as SurfaceTouches
-    from robolink.procedures.tilting_proof import SurfaceProof as SurfaceProof
+    from robolink.procedures.tilt_proof import SurfaceProof as SurfaceProof
     from robolink.procedures.witnessed_touches import TOUCH_CODES as TOUCH_CODES
     from robolink.procedures.witnessed_touches import TouchPlan as TouchPlan
     from robolink.procedures.witnessed_touches import heights_agree as heights_agree
@@ -98,11 +98,11 @@ else:
                 "DriftProof MOST_MORE TurnTest contact_pose drift_uncertainty_mm verify_by_turning"
             ),
             "pin_touches": "PinTouches lift_off touch_again turned_touches",
-            "samples": "Sampler Samples SequentialSampler",
-            "sequential_sampling": (
+            "sample_sequence": (
                 "SamplingPolicy TAKE_ALL agreement finalize_samples may_end_early "
                 "resume_samples sample_sequentially"
             ),
+            "samples": "Sampler Samples SequentialSampler",
             "source": (
                 "FindsStation MeasurementContext MovingSource PoseMethod RequiresMotion "
                 "RequiresSensor StopsAbovePin TipSource TouchesFurther"
@@ -113,7 +113,7 @@ else:
                 "middles_of_gaps pixel_camera proof_angles radius_of touches_of"
             ),
             "surface_touches": "SurfaceTouches",
-            "tilting_proof": "SurfaceProof",
+            "tilt_proof": "SurfaceProof",
             "witnessed_touches": (
                 "TOUCH_CODES TouchPlan heights_agree jog_mm plain_pose require_one_height "
                 "require_touches"

@@ -8,8 +8,8 @@ from robolink.messages import tr
 from robolink.model import TIP, Pose, ToolOffset
 from robolink.procedures.approach import NO_OFFSET
 from robolink.procedures.camera_drive import CameraDrive, LookPlan, Place
+from robolink.procedures.sample_sequence import finalize_samples
 from robolink.procedures.samples import ResultT
-from robolink.procedures.sequential_sampling import finalize_samples
 from robolink.runner import Procedure, SeenAt
 from robolink.stations import CameraStation
 

@@ -62,7 +62,7 @@ class MeasurementContext:
 
     Example:
         >>> from robolink.model import Pose, ToolOffset
-        >>> from robolink.nozzle_change import Limits
+        >>> from robolink.calibration_run import Limits
         >>> from robolink.procedures import MeasurementContext
         >>> from robolink.testing import MemoryController
         >>> class Nobody:  # implements robolink.Operator
@@ -126,7 +126,7 @@ class MeasurementContext:
 
         Example:
             >>> from robolink.model import AnsweredBy
-            >>> from robolink.nozzle_change import Limits
+            >>> from robolink.calibration_run import Limits
             >>> from robolink.procedures import MeasurementContext
             >>> from robolink.testing import MemoryController
             >>> with MemoryController() as controller:
@@ -158,7 +158,7 @@ class MeasurementContext:
             camera: What looks are taken with.
 
         Example:
-            >>> from robolink.nozzle_change import Limits
+            >>> from robolink.calibration_run import Limits
             >>> from robolink.procedures import MeasurementContext, approach_path, offset_z
             >>> from robolink.testing import MemoryController
             >>> class Nobody:  # implements robolink.Operator
@@ -202,7 +202,7 @@ class MeasurementContext:
             tool: The tool that answers are about, ``None`` for the one that is being measured.
 
         Example:
-            >>> from robolink.nozzle_change import Limits
+            >>> from robolink.calibration_run import Limits
             >>> from robolink.procedures import MeasurementContext
             >>> from robolink.testing import MemoryController
             >>> class Person:  # implements robolink.Operator
@@ -274,7 +274,7 @@ class TipSource(Protocol):
         Example:
             >>> from robolink.methods import PointsSource
             >>> from robolink.model import Pose, ToolOffset
-            >>> from robolink.nozzle_change import Limits
+            >>> from robolink.calibration_run import Limits
             >>> from robolink.procedures import MeasurementContext
             >>> from robolink.testing import MemoryController
             >>> source = PointsSource(lambda: [Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)])
@@ -320,7 +320,7 @@ class MovingSource(TipSource, Protocol):
         Example:
             >>> from robolink.methods import CameraSource
             >>> from robolink.model import Spot, SpotUnit, ToolOffset
-            >>> from robolink.nozzle_change import Limits
+            >>> from robolink.calibration_run import Limits
             >>> from robolink.procedures import MeasurementContext
             >>> from robolink.stations import CameraStation
             >>> from robolink.testing import MemoryController, MemoryMachine

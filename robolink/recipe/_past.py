@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Final
 
 from robolink.methods import KEPT, ToolHistory
 from robolink.model import EntryKind, Recorded, read_offset
-from robolink.recipe._loading import LoadedRecipe
 
 if TYPE_CHECKING:
     from robolink.journal import Journal
+    from robolink.recipe._loading import LoadedRecipe
 
 _LOOKED_AT: Final = 1000
 """So many of the newest entries are looked at for changes with a recipe."""
@@ -40,7 +40,7 @@ class RecipePast:
 
 
 def pasts_of(
-    recipes: Sequence[LoadedRecipe], journal: "Journal", address: str
+    recipes: Sequence["LoadedRecipe"], journal: "Journal", address: str
 ) -> tuple[RecipePast, ...]:
     """Return what is on record of each recipe.
 
@@ -93,11 +93,11 @@ def _usual_s(ends: Iterable[Recorded]) -> float | None:
     return median(took.values()) if took else None
 
 
-def _changes_left(loaded: LoadedRecipe, journal: "Journal", address: str) -> int | None:
+def _changes_left(loaded: "LoadedRecipe", journal: "Journal", address: str) -> int | None:
     return min(changes_left_of(loaded, journal, address).values(), default=None)
 
 
-def changes_left_of(loaded: LoadedRecipe, journal: "Journal", address: str) -> dict[int, int]:
+def changes_left_of(loaded: "LoadedRecipe", journal: "Journal", address: str) -> dict[int, int]:
     """Return after how many more changes a full calibration is due, by tool; 0 for now.
 
     Tools of which the record does not say it are left out.
@@ -123,8 +123,6 @@ def changes_left_of(loaded: LoadedRecipe, journal: "Journal", address: str) -> d
     tells = recipe.source.of_method.changes_left
     if tells is None or journal.robots_of(address):
         return {}  # of several robots it is not known here which one is meant
-    from robolink.recipe._plans import parameters_of
-
     left = {}
     for tool in recipe.tools:
         holds = journal.last_value(address, tool.number)
@@ -135,7 +133,7 @@ def changes_left_of(loaded: LoadedRecipe, journal: "Journal", address: str) -> d
             sigma_mm=recipe.tolerances.sigma_mm,
             interval_mm=recipe.tolerances.interval_mm,
         )
-        found = tells(parameters_of(recipe), history)
+        found = tells(recipe.parameters, history)
         if found is not None:
             left[tool.number] = found
     return left

@@ -6,7 +6,7 @@
 from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
-from robolink.recipe.file.schema import json_schema
+from robolink.recipe._recipe import json_schema
 
 _OPENING: Final = """\
 # Every key of a recipe

@@ -23,22 +23,22 @@ from robolink.register_maps._loading import check_map, load_map
 from robolink.register_maps._map import (
     ANGLES,
     COMPONENTS,
+    LREAL_TOLERANCE,
     AllZero,
     Commit,
     CommitKind,
     Input,
     MapProbe,
     MapSlot,
+    Number,
+    NumberType,
     RegisterMap,
-    span_of,
-)
-from robolink.register_maps._numbers import LREAL_TOLERANCE, Number, NumberType
-from robolink.register_maps._places import (
     RegisterTable,
     RegisterWords,
     Signal,
     Word,
     describe_place,
+    span_of,
 )
 
 __all__ = [

@@ -13,8 +13,7 @@ from typing import Final, NamedTuple, Self
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.register_maps._map import COMPONENTS, MapSlot, RegisterMap
-from robolink.register_maps._numbers import Number
+from robolink.register_maps._map import COMPONENTS, MapSlot, Number, RegisterMap
 
 _FINEST: Final = 2
 """Digits after the point that a comparison needs: hundredths of a millimetre or of a degree."""

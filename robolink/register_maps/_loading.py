@@ -1,14 +1,31 @@
-"""From a file to a map, or to everything that is wrong in it."""
+"""From a file to a map, or to everything that is wrong in it.
+
+What no key says alone: that places do not overlap and can be read and written as needed.
+"""
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from robolink.files.key_problems import is_not_known, sentence
 from robolink.files.toml import FileKind, Problem
 from robolink.messages import tr
-from robolink.register_maps._map import RegisterMap
+from robolink.register_maps._map import (
+    LAST_ADDRESS,
+    CommitKind,
+    MapSlot,
+    Number,
+    RegisterMap,
+    RegisterTable,
+    Signal,
+    Word,
+    describe_place,
+    span_of,
+)
+from robolink.register_maps._tables import CommitBitKeys, LevelKeys, MapFile
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
@@ -46,9 +63,8 @@ def check_map(path: Path) -> tuple[Problem, ...]:
 def _checked(path: Path) -> tuple[RegisterMap | None, list[Problem]]:
     from pydantic import ValidationError
 
-    from robolink.register_maps._checks import problems_together
-    from robolink.register_maps._resolving import Resolving
-    from robolink.register_maps._tables import MapFile
+    from robolink.register_maps._loading import problems_together
+    from robolink.register_maps._tables import MapFile, Resolving
 
     content = MAP_FILE.read(path)
     try:
@@ -115,3 +131,206 @@ def _missing(location: Sequence[int | str]) -> str:
                 '"commit_bit", "level" or "none"'
             )
     return ""
+
+
+_MOST_READ: Final = 125
+"""Registers that one request reads (docs/reference/softmotion.md 4.3)."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Claim:
+    """A place that something in the map takes.
+
+    ``shared`` tells whether it is only looked at, and leaves room for others that are.
+    """
+
+    where: str
+    table: RegisterTable
+    addresses: range
+    bit: int | None = None
+    on: int | None = None
+    shared: bool = False
+
+    def clashes(self, other: "_Claim") -> bool:
+        if self.table is not other.table or not _overlap(self.addresses, other.addresses):
+            return False
+        if not (self.shared and other.shared):
+            return True
+        return (self.bit, self.on) == (other.bit, other.on)
+
+
+def problems_together(file: MapFile, found: RegisterMap) -> list[Problem]:
+    """Return what is wrong with the places of a map as a whole."""
+    return [
+        *_twice(file),
+        *(
+            problem
+            for slot in enumerate(found.slots.values(), 1)
+            for problem in _slot(*slot, found)
+        ),
+        *_unreadable("flange", found.flange),
+        *_signals(file, found),
+        *_probe(found),
+        *_places(file, found),
+    ]
+
+
+def _twice(file: MapFile) -> Iterator[Problem]:
+    numbered = (
+        ("tools", [t.number for t in file.tools]),
+        ("inputs", [i.number for i in file.inputs]),
+    )
+    for key, numbers in numbered:
+        for position, number in enumerate(numbers, start=1):
+            if number in numbers[: position - 1]:
+                what = tr("{number} is given twice", number=number)
+                yield Problem(f"{key}#{position}.number", what)
+
+
+def _slot(position: int, slot: MapSlot, found: RegisterMap) -> Iterator[Problem]:
+    where = f"tools#{position}"
+    unreadable = list(_unreadable(where, slot.components))
+    if unreadable:
+        yield from unreadable
+    elif found.commit.kind is CommitKind.NONE and slot.table.writable and not slot.contiguous:
+        yield Problem(
+            where,
+            tr(
+                "has gaps between its registers: without a handshake they must follow one another, "
+                "so that one request writes them all"
+            ),
+        )
+
+
+def _unreadable(where: str, components: Mapping[str, Number]) -> Iterator[Problem]:
+    """Find out whether one request reads all components."""
+    if len({number.table for number in components.values()}) > 1:
+        yield Problem(where, tr("has components in two tables; one request must read them all"))
+    elif components and len(span_of(components)) > _MOST_READ:
+        yield Problem(
+            where,
+            tr(
+                "stretches over {count} registers; one request reads at most {most}",
+                count=len(span_of(components)),
+                most=_MOST_READ,
+            ),
+        )
+
+
+def _signals(file: MapFile, found: RegisterMap) -> Iterator[Problem]:
+    for where, signal in _all_signals(file, found):
+        if signal.table.holds_bits and (signal.bit is not None or {signal.on, signal.off} - {0, 1}):
+            yield Problem(where, tr("is a single bit: take bit out, and let on be 0 or 1"))
+        elif signal.bit is not None and signal.on > 1:
+            yield Problem(f"{where}.on", tr("must be 0 or 1 for one bit of a register"))
+    request = found.commit.request
+    if request is None:
+        return
+    where = "commit.trigger" if found.commit.kind is CommitKind.COMMIT_BIT else "commit.request"
+    if not request.writable:
+        yield Problem(
+            where,
+            tr(
+                "must be a coil or a whole holding register: one bit of a register cannot be "
+                "written without the bits beside it"
+            ),
+        )
+    elif request.on == request.off:
+        yield Problem(where, tr("reads the same on and off"))
+    number = found.commit.tool_number
+    if number is not None and not number.table.writable:
+        yield Problem("commit.tool_number", tr("must be a holding register"))
+
+
+def _probe(found: RegisterMap) -> Iterator[Problem]:
+    if found.probe is None:
+        return
+    try:
+        words = found.probe.number.encode(found.probe.value)
+    except OverflowError:
+        words = ()
+    if len(set(words)) < len(words) or not any(words):
+        yield Problem(
+            "probe.value",
+            tr("does not tell the word order: take a number with no two words alike, as 12.3456"),
+        )
+
+
+def _places(file: MapFile, found: RegisterMap) -> Iterator[Problem]:
+    claims = list(_claims(file, found))
+    for claim in claims:
+        if claim.addresses.stop - 1 > LAST_ADDRESS:
+            yield Problem(claim.where, tr("ends beyond address {last}", last=LAST_ADDRESS))
+    for first, second in combinations(claims, 2):
+        if first.clashes(second):
+            address = max(first.addresses.start, second.addresses.start)
+            yield Problem(
+                second.where,
+                tr(
+                    "overlaps {other} at {place}",
+                    other=first.where,
+                    place=describe_place(second.table, address),
+                ),
+            )
+
+
+def _claims(file: MapFile, found: RegisterMap) -> Iterator[_Claim]:
+    for position, slot in enumerate(found.slots.values(), start=1):
+        for name, number in slot.components.items():
+            yield _of_number(f"tools#{position}.{name}", number)
+    for name, number in found.flange.items():
+        yield _of_number(f"flange.{name}", number)
+    if found.probe is not None:
+        yield _of_number("probe", found.probe.number)
+    if found.device_id is not None:
+        yield _Claim("device_id", found.device_id.table, found.device_id.registers)
+    for where, signal in _all_signals(file, found):
+        ours = signal is found.commit.request or (where.endswith(".defined") and signal.writable)
+        yield _Claim(
+            where,
+            signal.table,
+            range(signal.address, signal.address + 1),
+            signal.bit,
+            signal.on,
+            shared=not ours,
+        )
+    words = (
+        ("commit.error_code", found.commit.error_code),
+        ("commit.tool_number", found.commit.tool_number),
+        ("selected", found.selected),
+    )
+    for where, word in words:
+        if word is not None:
+            yield _of_word(where, word, shared=where == "commit.error_code")
+
+
+def _of_number(where: str, number: Number) -> _Claim:
+    return _Claim(where, number.table, number.registers)
+
+
+def _of_word(where: str, word: Word, *, shared: bool) -> _Claim:
+    return _Claim(where, word.table, range(word.address, word.address + 1), shared=shared)
+
+
+def _all_signals(file: MapFile, found: RegisterMap) -> Iterator[tuple[str, Signal]]:
+    commit = found.commit
+    bit = isinstance(file.commit, CommitBitKeys)
+    if bit or isinstance(file.commit, LevelKeys):
+        named = (
+            ("commit.trigger" if bit else "commit.request", commit.request),
+            ("commit.done" if bit else "commit.acknowledge", commit.answer),
+            ("commit.busy", commit.busy),
+            ("commit.error", commit.error),
+        )
+        yield from ((where, signal) for where, signal in named if signal is not None)
+    if found.permit is not None:
+        yield "permit", found.permit
+    for position, slot in enumerate(found.slots.values(), start=1):
+        if slot.defined is not None:
+            yield f"tools#{position}.defined", slot.defined
+    for position, one in enumerate(found.inputs.values(), start=1):
+        yield f"inputs#{position}", one.signal
+
+
+def _overlap(a: range, b: range) -> bool:
+    return a.start < b.stop and b.start < a.stop

@@ -1,12 +1,247 @@
-"""What a map says, ready for use: places with units, without defaults left open."""
+"""What a map says, ready for use: places with units, without defaults left open.
 
+How a length or an angle stands in registers.
+
+Inside a register the high byte comes first on the wire. A 32 or 64 bit number of a CODESYS
+PLC has its low word first; other makers have the high word first, and some gateways swap
+bytes (docs/reference/softmotion.md 4.4). Nothing here is guessed: a map says it.
+
+Places in the tables of a Modbus server.
+
+Addresses count from 0, as on the wire. What a manual prints as 40001 is holding register 0;
+whoever reads a place is shown both, because tools disagree about which one they mean
+(docs/reference/softmotion.md 4.4).
+"""
+
+import math
+import struct
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Final
 
-from robolink.register_maps._numbers import Number
-from robolink.register_maps._places import RegisterTable, RegisterWords, Signal, Word
+from robolink.messages import tr
+
+LAST_ADDRESS: Final = 0xFFFF
+
+
+class RegisterTable(StrEnum):
+    """A table of a Modbus server, as a map names it."""
+
+    HOLDING = "holding"
+    INPUT = "input"
+    COIL = "coil"
+    DISCRETE = "discrete"
+
+    @property
+    def holds_bits(self) -> bool:
+        """Whether its places are single bits."""
+        return self in (RegisterTable.COIL, RegisterTable.DISCRETE)
+
+    @property
+    def writable(self) -> bool:
+        """Whether a client may write it."""
+        return self in (RegisterTable.HOLDING, RegisterTable.COIL)
+
+    def reference(self, address: int) -> str:
+        """Return the number that a manual gives an address: holding register 0 is ``40001``."""
+        digits = 4 if address < 9999 else 5
+        return f"{_FIRST_DIGITS[self]}{address + 1:0{digits}d}"
+
+
+_FIRST_DIGITS: Final = {
+    RegisterTable.COIL: 0,
+    RegisterTable.DISCRETE: 1,
+    RegisterTable.INPUT: 3,
+    RegisterTable.HOLDING: 4,
+}
+
+
+def describe_place(table: RegisterTable, address: int, bit: int | None = None) -> str:
+    """Return a place as a person reads it, its number given both ways.
+
+    Args:
+        table: Which table of the PLC.
+        address: Number of the register or coil, counted from 0.
+        bit: Number of a bit in a register.
+
+    Example:
+        >>> from robolink.register_maps import RegisterTable, describe_place
+        >>> describe_place(RegisterTable.HOLDING, 100)
+        '40101 (address 100)'
+    """
+    reference = table.reference(address)
+    if bit is None:
+        return tr("{reference} (address {address})", reference=reference, address=address)
+    return tr(
+        "{reference} (address {address}) bit {bit}", reference=reference, address=address, bit=bit
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """Something that is on or off.
+
+    Attributes:
+        table: Where.
+        address: Which coil, discrete input or register.
+        bit: Bit of a register, 0 the lowest; ``None`` for a coil or a whole register.
+        on: What it reads when it is on, and is written to switch it on.
+        off: What is written to switch it off.
+    """
+
+    table: RegisterTable
+    address: int
+    bit: int | None = None
+    on: int = 1
+    off: int = 0
+
+    @property
+    def writable(self) -> bool:
+        """Whether it can be written without touching anything beside it."""
+        return self.table.writable and self.bit is None
+
+    @property
+    def place(self) -> str:
+        """The place as a person reads it."""
+        return describe_place(self.table, self.address, self.bit)
+
+
+@dataclass(frozen=True, slots=True)
+class Word:
+    """A register that holds a whole number from 0 to 65535."""
+
+    table: RegisterTable
+    address: int
+
+    @property
+    def place(self) -> str:
+        """The place as a person reads it."""
+        return describe_place(self.table, self.address)
+
+
+@dataclass(frozen=True, slots=True)
+class RegisterWords:
+    """Registers in a row that hold a number of the machine's own."""
+
+    table: RegisterTable
+    address: int
+    count: int
+
+    @property
+    def registers(self) -> range:
+        """Which ones."""
+        return range(self.address, self.address + self.count)
+
+
+LREAL_TOLERANCE: Final = 1e-9
+"""Two LREALs this near are equal (docs/reference/rules.md 3)."""
+
+_TINY: Final = 1e-20
+"""What is smaller and not 0 is no length and no angle, but words in the wrong order."""
+
+
+class NumberType(StrEnum):
+    """How a number is encoded, by the names that PLC programmers use."""
+
+    INT16 = "int16"
+    UINT16 = "uint16"
+    INT32 = "int32"
+    UINT32 = "uint32"
+    REAL = "REAL"
+    LREAL = "LREAL"
+
+    @property
+    def words(self) -> int:
+        """How many registers it takes."""
+        return struct.calcsize(_FORMATS[self]) // 2
+
+    @property
+    def whole(self) -> bool:
+        """Whether it holds whole numbers only."""
+        return self not in (NumberType.REAL, NumberType.LREAL)
+
+
+_FORMATS: Final = {
+    NumberType.INT16: ">h",
+    NumberType.UINT16: ">H",
+    NumberType.INT32: ">i",
+    NumberType.UINT32: ">I",
+    NumberType.REAL: ">f",
+    NumberType.LREAL: ">d",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A length in mm, or an angle in degrees, in the registers of a PLC.
+
+    Attributes:
+        table: Holding or input registers.
+        address: The first register.
+        type: How it is encoded.
+        low_word_first: Whether the low word stands at the lower address.
+        swapped_bytes: Whether the low byte of each register comes first.
+        factor: Millimetres or degrees in one unit of the encoded number; not 0.
+    """
+
+    table: RegisterTable
+    address: int
+    type: NumberType
+    low_word_first: bool = False
+    swapped_bytes: bool = False
+    factor: float = 1.0
+
+    @property
+    def registers(self) -> range:
+        """The addresses that it takes."""
+        return range(self.address, self.address + self.type.words)
+
+    @property
+    def place(self) -> str:
+        """The place as a person reads it."""
+        return describe_place(self.table, self.address)
+
+    def encode(self, value: float) -> tuple[int, ...]:
+        """Return the registers that hold ``value`` (mm, degrees) as nearly as they can.
+
+        Raises:
+            OverflowError: They cannot hold it.
+        """
+        raw: float = value / self.factor + 0.0  # no negative zero
+        try:
+            data = struct.pack(_FORMATS[self.type], round(raw) if self.type.whole else raw)
+        except struct.error as error:
+            raise OverflowError(str(error)) from error
+        words = [word for (word,) in struct.iter_unpack(">H", data)]
+        return tuple(self._as_stored(words))
+
+    def decode(self, words: tuple[int, ...]) -> float:
+        """Return the value in mm or degrees; it may be no number, or an absurd one."""
+        raw: float
+        data = struct.pack(f">{len(words)}H", *self._as_stored(list(words)))
+        (raw,) = struct.unpack(_FORMATS[self.type], data)
+        return raw * self.factor + 0.0  # which takes the sign off a negative zero
+
+    def is_absurd(self, value: float) -> bool:
+        """Tell whether ``value`` is no number, or smaller than any length that is not 0."""
+        return not math.isfinite(value) or 0 < abs(value / self.factor) < _TINY
+
+    def slack(self, value: float) -> float:
+        """Return how far from ``value`` another may be that these registers hold alike."""
+        if self.type.whole:
+            return abs(self.factor) / 2
+        if self.type is NumberType.REAL:
+            _, exponent = math.frexp(value / self.factor)
+            return math.ldexp(abs(self.factor), exponent - 24)
+        return LREAL_TOLERANCE
+
+    def _as_stored(self, words: list[int]) -> list[int]:
+        """Swap words and bytes; done twice it changes nothing."""
+        if self.swapped_bytes:
+            words = [(word & 0xFF) << 8 | word >> 8 for word in words]
+        return words[::-1] if self.low_word_first else words
+
 
 COMPONENTS: Final = ("x", "y", "z", "u", "v", "w")
 """Components of a tool offset and of a pose, in the order of :class:`robolink.model.Pose`."""

@@ -1,7 +1,6 @@
 """The report of a tool change: one HTML page that needs nothing beside itself."""
 
-from robolink.report._drift_page import render_drift, save_drift
-from robolink.report._page import render, save
+from robolink.report._page import render, render_drift, save, save_drift
 from robolink.report._recorded import recorded_fit, reports_of
 from robolink.report._values import (
     Attempt,

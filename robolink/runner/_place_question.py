@@ -11,18 +11,19 @@ from typing import Final
 from robolink.errors import CalibrationError, ConfigError, DeclinedError, JournalError
 from robolink.messages import tr
 from robolink.model import Controller, DigitalIo, InputEdge, MotionGroup, Pose
-from robolink.runner._capture import (
+from robolink.runner._jog_steps import parse_steps
+from robolink.runner._prompt_context import GuidedOperator, Operator, Question, TouchSubject, regard
+from robolink.runner._steps import (
     OLDEST_READING_S,
+    Ask,
     NotYet,
     StepsTaken,
+    TeachPrompt,
+    TouchedAt,
     no_contact,
     old_reading,
     still_moving,
 )
-from robolink.runner._jog_steps import parse_steps
-from robolink.runner._operator import Operator, Question
-from robolink.runner._steps import Ask, TeachPrompt, TouchedAt
-from robolink.runner._subjects import GuidedOperator, TouchSubject, regard
 from robolink.timing import FASTEST_ANSWER_S, NS_PER_S
 
 MOST_EARLY: Final = 3

@@ -1,6 +1,7 @@
 """Takes the steps of a procedure on one motion group."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from itertools import starmap
 from typing import Final, TypeVar
@@ -13,12 +14,15 @@ from robolink.errors import (
     DeclinedError,
     HeartbeatLostError,
     LimitError,
+    NotReadyError,
+    NotReadyReason,
     StoppedError,
 )
 from robolink.messages import tr
 from robolink.model import (
     Controller,
     ControllerState,
+    ControllerStatus,
     MotionGroup,
     MotionOutcome,
     MotionProfile,
@@ -26,12 +30,26 @@ from robolink.model import (
     Pose,
     TipSensor,
 )
-from robolink.runner._endings import EndingWatch, as_measurement
-from robolink.runner._foreseeing import considered
-from robolink.runner._jog_steps import jog_target, parse_steps, typed_pose, way_in_words
-from robolink.runner._operator import POLL_S, Operator, awaited_line
+from robolink.runner._dry_run import considered
+from robolink.runner._jog_steps import (
+    RunSettings,
+    jog_target,
+    parse_steps,
+    typed_pose,
+    way_in_words,
+)
 from robolink.runner._place_question import PlaceQuestion
-from robolink.runner._settings import RunSettings
+from robolink.runner._prompt_context import (
+    POLL_S,
+    GuidedOperator,
+    JogRange,
+    JogSubject,
+    MoveSubject,
+    OfferedChoice,
+    Operator,
+    awaited_line,
+    regard,
+)
 from robolink.runner._steps import (
     Ask,
     Confirm,
@@ -45,17 +63,61 @@ from robolink.runner._steps import (
     StepDone,
     TakenStep,
 )
-from robolink.runner._subjects import (
-    GuidedOperator,
-    JogRange,
-    JogSubject,
-    MoveSubject,
-    OfferedChoice,
-    regard,
-)
 from robolink.runner._yes_no import Asking
 from robolink.sensing import median_spot, scatter_of, seen_in
 from robolink.ways import Way, way
+
+
+def ended_by(status: ControllerStatus) -> str:
+    """Return why a controller goes on with nothing, empty where it does."""
+    if status.serious_fault:
+        return tr("The controller reported a serious error.")
+    if status.emergency_stop:
+        return tr("The emergency stop was pressed.")
+    if status.guard_open:
+        return tr("The safety guard was opened.")
+    if status.fault:
+        return tr("The controller went into error {code:04d}.", code=status.code)
+    return ""
+
+
+class EndingWatch:
+    """Looks for what ends a procedure while a person is asked.
+
+    A controller that tells of its drives has lost them when they had power before: an emergency
+    stop of a PLC shows in nothing else. Where they never had power, a person moves the machine in
+    another way.
+
+    Example:
+        >>> from robolink.model import ControllerStatus
+        >>> from robolink.runner import EndingWatch
+        >>> watch = EndingWatch()
+        >>> watch.obstacle(ControllerStatus(remote=True, ready=True))
+        ''
+        >>> watch.obstacle(ControllerStatus(remote=True, unpowered=True))
+        'The motors went off.'
+    """
+
+    def __init__(self) -> None:
+        self._had_power = False
+
+    def obstacle(self, status: ControllerStatus) -> str:
+        """Return why nothing goes on, empty where it does."""
+        off = status.unpowered or status.disabled
+        lost, self._had_power = off and self._had_power, self._had_power or not off
+        return ended_by(status) or (tr("The motors went off.") if lost else "")
+
+
+@contextmanager
+def as_measurement() -> Iterator[None]:
+    """Let an input that has switched too early count as a bad measurement."""
+    try:
+        yield
+    except NotReadyError as error:
+        if error.reason is not NotReadyReason.EDGE_PASSED:
+            raise
+        raise CalibrationError("edge_passed", error.what, remedy=error.remedy) from error
+
 
 CONTACT_POLL_S: Final = 0.2
 """The same while an input is watched that shows contact."""

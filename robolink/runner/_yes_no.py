@@ -8,9 +8,14 @@ from typing import Final
 from robolink.errors import DeclinedError
 from robolink.messages import tr
 from robolink.model import AnsweredBy, OutcomeLog, answer_entry
-from robolink.runner._operator import Operator, Question
 from robolink.runner._place_question import MOST_REFUSED, ended_by_operator
-from robolink.runner._subjects import GuidedOperator, OfferedChoice, regard
+from robolink.runner._prompt_context import (
+    GuidedOperator,
+    OfferedChoice,
+    Operator,
+    Question,
+    regard,
+)
 
 _YES: Final = frozenset({"y", "yes", "j", "ja", "是"})
 MORE: Final = "more"

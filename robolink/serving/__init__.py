@@ -5,8 +5,8 @@ whether a value that it wrote is proved. For the program of a PLC, which moves, 
 written from here (docs/plc-callback.md). Nothing moves from here.
 """
 
+from robolink.serving._callback_limits import CallbackLimits
 from robolink.serving._conversation import CallbackConversation
-from robolink.serving._judging import CallbackLimits
 from robolink.serving._permits import PERMIT_METHODS, PermitCall, PermitPlan, free_machine
 from robolink.serving._server import CallbackServer
 

@@ -35,17 +35,26 @@ from robolink.protocols.spel_callback import (
     read_tool,
     same_thousandths,
 )
-from robolink.serving._book import ProgramChange, begin_change, open_changes, record_name
-from robolink.serving._facts import facts_for_program, proved, statements_on_record
-from robolink.serving._judging import CallbackLimits, believed
-from robolink.serving._measures import measure_named
+from robolink.serving._callback_journal import (
+    ProgramChange,
+    begin_change,
+    open_changes,
+    record_name,
+)
+from robolink.serving._callback_limits import CallbackLimits, believed
+from robolink.serving._program_measure import (
+    facts_for_program,
+    measure_named,
+    proved,
+    statements_on_record,
+)
 from robolink.stations import Station, StationKind, find_station
 
 if TYPE_CHECKING:
     from robolink.calibration import AccuracyFacts, CalibrationResult
     from robolink.config import Cell
     from robolink.journal import Journal, JournalOutcomeLog
-    from robolink.serving._measures import ProgramMeasure
+    from robolink.serving._program_measure import ProgramMeasure
 
 Answer = tuple[CallbackWord, tuple[str, ...]]
 

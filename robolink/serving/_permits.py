@@ -13,10 +13,10 @@ from robolink.controllers.softmotion.controller import MACHINE_WAITS
 from robolink.errors import CalibrationError, ConfigError, LeaseHeldError, RobolinkError
 from robolink.messages import tr
 from robolink.model import Controller, EntryKind, NewEntry, Pose, ToolOffset, plain_offset
-from robolink.serving._book import CALLED_BACK
-from robolink.serving._facts import facts_for_program, proved, statements_on_record
-from robolink.serving._judging import CallbackLimits, believed
-from robolink.serving._touches import LEAST_PROOFS, LEAST_TOUCHES, touches_by
+from robolink.serving._callback_journal import CALLED_BACK
+from robolink.serving._callback_limits import CallbackLimits, believed
+from robolink.serving._pin_measure import LEAST_PROOFS, LEAST_TOUCHES, touches_by
+from robolink.serving._program_measure import facts_for_program, proved, statements_on_record
 from robolink.timing import Deadline
 from robolink.transaction import ToolChange, Wanted
 

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 from robolink.lazy_exports import lazy_exports
 
 if TYPE_CHECKING:
-    from robolink.stations._finding import base_now as base_now
-    from robolink.stations._finding import find_station as find_station
-    from robolink.stations._finding import find_stations as find_stations
-    from robolink.stations._finding import learnt_elsewhere as learnt_elsewhere
-    from robolink.stations._finding import require_base_of as require_base_of
+    from robolink.stations._lookup import base_now as base_now
+    from robolink.stations._lookup import find_station as find_station
+    from robolink.stations._lookup import find_stations as find_stations
+    from robolink.stations._lookup import learnt_elsewhere as learnt_elsewhere
+    from robolink.stations._lookup import require_base_of as require_base_of
     from robolink.stations._places import BeamStation as BeamStation
     from robolink.stations._places import CameraStation as CameraStation
     from robolink.stations._places import TouchStation as TouchStation
@@ -33,7 +33,7 @@ else:
     __getattr__, __dir__, __all__ = lazy_exports(
         __name__,
         {
-            "_finding": "base_now find_station find_stations learnt_elsewhere require_base_of",
+            "_lookup": "base_now find_station find_stations learnt_elsewhere require_base_of",
             "_places": (
                 "BeamStation CameraStation TouchStation beam_station camera_station "
                 "pin_of sensor_of touch_station"

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from robolink.stopping._asking import ControllerHolder as ControllerHolder
     from robolink.stopping._asking import HolderGoneError as HolderGoneError
     from robolink.stopping._asking import LastSeen as LastSeen
+    from robolink.stopping._asking import far_end_of as far_end_of
     from robolink.stopping._asking import holders_of as holders_of
-    from robolink.stopping._far_end import far_end_of as far_end_of
     from robolink.stopping._listener import StopListener as StopListener
     from robolink.stopping._notes import StopNote as StopNote
     from robolink.stopping._notes import clear_note as clear_note
@@ -24,8 +24,7 @@ else:
     __getattr__, __dir__, __all__ = lazy_exports(
         __name__,
         {
-            "_asking": "ControllerHolder HolderGoneError LastSeen holders_of",
-            "_far_end": "far_end_of",
+            "_asking": "ControllerHolder HolderGoneError LastSeen far_end_of holders_of",
             "_listener": "StopListener",
             "_notes": "StopNote clear_note find_note leave_note",
         },

@@ -25,12 +25,12 @@ from pathlib import Path
 from typing import Final, Protocol
 
 from robolink import ambient
-from robolink.closing import ClosedAtExit
 from robolink.errors import RobolinkError
 from robolink.files.durable import make_folder, state_folder
+from robolink.interrupts import ClosedAtExit
 from robolink.model import ControllerStatus, is_own_name
 from robolink.plug_ins import unexpected
-from robolink.stopping._far_end import far_end_of
+from robolink.stopping._asking import far_end_of
 from robolink.timing import NS_PER_S
 
 KIND: Final = "holders"

@@ -4,14 +4,13 @@ The checks are plain functions; any test framework, or none, can call them. They
 kinds of this package too (``tests/contract/test_controller_contract.py``).
 """
 
-from robolink.testing.compared_map import confirm_whole_map
 from robolink.testing.memory_controller import MemoryController, MemoryMachine
 from robolink.testing.motion_checks import MOVING_CHECKS, WRITING_WHILE_MOVING_CHECKS
 from robolink.testing.on_site import kept_on_site
 from robolink.testing.paper_cell import PaperCell
 from robolink.testing.reading_checks import READING_CHECKS
 from robolink.testing.subject import Check, ContractBrokenError, Subject
-from robolink.testing.suite import CheckOutcome, check_controller, outcomes
+from robolink.testing.suite import CheckOutcome, check_controller, confirm_whole_map, outcomes
 from robolink.testing.tool_checks import WRITING_CHECKS
 
 __all__ = [

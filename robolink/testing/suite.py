@@ -1,15 +1,41 @@
-"""All checks that apply to a controller, one after the other."""
+"""All checks that apply to a controller in turn, and a map that counts as compared for them."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from traceback import extract_tb
+from typing import Final
 
-from robolink.errors import RobolinkError
+from robolink.controllers import PlcMapController
+from robolink.errors import ConfigError, RobolinkError
+from robolink.messages import tr
+from robolink.model import Controller
+from robolink.register_maps import ComparedValue, Confirmation, confirm, values_of
 from robolink.testing.motion_checks import MOVING_CHECKS, WRITING_WHILE_MOVING_CHECKS
 from robolink.testing.reading_checks import READING_CHECKS
 from robolink.testing.subject import Check, ContractBrokenError, Subject
 from robolink.testing.tool_checks import WRITING_CHECKS
+
+_BY: Final = "robolink.testing"
+
+
+def confirm_whole_map(controller: Controller) -> Confirmation:
+    """Put on record, under the name of this package, that every value of a map was compared.
+
+    Never at a machine: there a person compares (``robolink expert plc check-map``).
+
+    Raises:
+        ConfigError: It is no PLC with a map, or it cannot be stored.
+        RobolinkError: The PLC does not say who it is.
+    """
+    if not isinstance(controller, PlcMapController):
+        raise ConfigError(
+            tr("{url} is not a PLC with a map.", url=controller.identity),
+            remedy=tr("This is for other kinds of controllers."),
+        )
+    register_map = controller.register_map
+    compared = [ComparedValue(value, "") for value in values_of(register_map)]
+    return confirm(controller.who().name, register_map, by=_BY, compared=compared)
 
 
 @dataclass(frozen=True, slots=True)

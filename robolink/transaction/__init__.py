@@ -3,13 +3,7 @@
 from typing import TYPE_CHECKING
 
 from robolink.lazy_exports import old_names
-from robolink.transaction._change import ToolChange, change_tools
-from robolink.transaction._history import (
-    ChangedSince,
-    changed_since,
-    earlier_corrections,
-    last_proof,
-)
+from robolink.transaction._change import ToolChange, Wanted, change_tools
 from robolink.transaction._orders import (
     LONGEST_ORDER,
     Describe,
@@ -20,11 +14,18 @@ from robolink.transaction._orders import (
     require_order_id,
 )
 from robolink.transaction._put_back import PutBack, Step
-from robolink.transaction._recovery import Recovery, look, recover
-from robolink.transaction._settling import Settler
-from robolink.transaction._undo import Undone, UndoPlan, plan_undo, undo
-from robolink.transaction._undo_history import id_of_change
-from robolink.transaction._wanted import Wanted
+from robolink.transaction._settling import Recovery, Settler, look, recover
+from robolink.transaction._undo import (
+    ChangedSince,
+    Undone,
+    UndoPlan,
+    changed_since,
+    earlier_corrections,
+    id_of_change,
+    last_proof,
+    plan_undo,
+    undo,
+)
 
 __all__ = [
     "ChangedSince",

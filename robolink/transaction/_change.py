@@ -8,7 +8,7 @@ until :meth:`ToolChange.keep`; whatever ends it earlier puts the old values back
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Self
 
@@ -44,7 +44,27 @@ from robolink.model import (
 from robolink.standing import note_standing
 from robolink.transaction._orders import Describe, Order, OrderedChange, plain_result
 from robolink.transaction._put_back import PutBack, Step, left_unverified, put_back
-from robolink.transaction._wanted import Wanted
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What one tool is to hold.
+
+    Attributes:
+        tool: Its number.
+        offset: The new value; ``None`` clears it.
+        expected: What the caller believes it holds now.
+        details: More for the journal, plain JSON.
+        then_select: The tool to put in force before this one is cleared, should this one be in
+            force; without it that is refused.
+    """
+
+    tool: int
+    offset: ToolOffset | None
+    expected: Expected
+    details: Mapping[str, object] | None = None
+    then_select: int | None = None
+
 
 _OUT_OF_REACH = (OutcomeUnknownError, TransportError, RemoteProtocolError, LeaseLostError)
 """After these nothing can be taken back here: the link is gone, or the right to write."""

@@ -25,6 +25,7 @@ from robolink.model import (
     ToolReceipt,
     describe_offset,
     plain_offset,
+    read_for_verdict,
     read_offset,
 )
 from robolink.transaction._put_back import Step
@@ -135,7 +136,7 @@ def carrying_out(controller: Controller, order: str, job: Mapping[str, object]) 
 
     Where :attr:`Order.done` says that it was carried out before, nothing is to be done; else the
     order goes with the change: :class:`ToolChange`, :func:`change_tools` and
-    :class:`robolink.nozzle_change.NozzleChange` take it.
+    :class:`robolink.calibration_run.NozzleChange` take it.
 
     Args:
         controller: The controller, connected.
@@ -248,7 +249,7 @@ def _done(
         )
     for number, value in tools.items():
         tool, left = int(number), read_offset(value)
-        now = controller.tools.read(tool)
+        now = read_for_verdict(controller.tools, tool, (left,))
         if not controller.tools.same(now, left):
             raise ToolChangedError(
                 tr(

@@ -13,6 +13,7 @@ from robolink.model import (
     ToolTable,
     describe_offset,
     plain_offset,
+    read_for_verdict,
 )
 
 
@@ -83,7 +84,7 @@ def put_back(
 def _put_one_back(controller: Controller, step: Step, *, spoiled: bool, selected: int) -> PutBack:
     tools, tool, before = controller.tools, step.tool, step.before
     try:
-        now = tools.read(tool)
+        now = read_for_verdict(tools, tool, (before, step.requested))
         if tools.same(now, before):
             return _restored(step, tr("Tool {tool} holds its old value.", tool=tool), written=False)
         if not (spoiled or tools.same(now, step.requested)):

@@ -1,38 +1,235 @@
 """Undoing a change: what the tools held before it, or any value proved earlier, is written back.
 
 An undo is a change like any other (docs/reference/rules.md 6): it expects what the journal proved
-last, writes all of its tools or none, and can itself be undone.
+last, writes all of its tools or none, and can itself be undone. What the record says of a tool,
+and of how it was changed, is read here.
 """
 
+import math
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 
 from robolink.errors import ConfigError, ToolChangedError
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.model import (
+    PROOFS,
     Controller,
     EntryKind,
     NewEntry,
+    OutcomeLog,
     Recorded,
     ToolOffset,
     ToolReceipt,
+    describe_offset,
     new_operation,
+    read_offset,
     require_engineer,
 )
 from robolink.timing import local_label
-from robolink.transaction._change import change_tools
-from robolink.transaction._history import changed_since, last_proof
+from robolink.transaction._change import Wanted, change_tools
 from robolink.transaction._put_back import Step
-from robolink.transaction._undo_history import (
-    id_of_change,
-    of_change,
-    offset_of,
-    proof_numbered,
-    tool_of,
-)
-from robolink.transaction._wanted import Wanted
 from robolink.ways import Way, way
+
+
+@dataclass(frozen=True, slots=True)
+class ChangedSince:
+    """A tool that somebody else changed.
+
+    Attributes:
+        tool: Its number.
+        recorded: What was read back last.
+        at: When, as a label.
+        now: What it holds.
+    """
+
+    tool: int
+    recorded: ToolOffset | None
+    at: str
+    now: ToolOffset | None
+
+    @property
+    def distance_mm(self) -> float | None:
+        """How far the tip was moved, ``None`` where a value is undefined."""
+        if self.recorded is None or self.now is None:
+            return None
+        return math.dist(self.recorded.components()[:3], self.now.components()[:3])
+
+    @property
+    def sentence(self) -> str:
+        """When, by how much, and the usual causes."""
+        changed = tr(
+            "Tool {tool} holds {now}; on {at} it was left with {recorded}.",
+            tool=self.tool,
+            now=describe_offset(self.now),
+            at=local_label(self.at),
+            recorded=describe_offset(self.recorded),
+        )
+        distance = self.distance_mm
+        by = tr("That is {distance:.3f} mm away.", distance=distance) if distance else ""
+        causes = tr(
+            "The usual causes: a program that runs TLSet at its start, an edit on the pendant, a "
+            "restored project."
+        )
+        return joined(" ", (part for part in (changed, by, causes) if part))
+
+
+def last_proof(controller: Controller, tool: int) -> Recorded | None:
+    """Return the newest entry that says what was read from ``tool`` after a write."""
+    return next(
+        (
+            entry
+            for entry in controller.outcomes.recorded(tool=tool, kinds=PROOFS)
+            if "value" in entry.details
+        ),
+        None,
+    )
+
+
+def changed_since(controller: Controller, tool: int, now: ToolOffset | None) -> ChangedSince | None:
+    """Compare a tool with what this software last proved to be in it.
+
+    Args:
+        controller: The controller, connected.
+        tool: Number of the tool.
+        now: What it holds.
+
+    Returns:
+        ``None`` when it agrees, or was never written with this software.
+
+    Example:
+        >>> import robolink
+        >>> from robolink.transaction import changed_since
+        >>> with robolink.connect("epson+sim://since-example") as controller:
+        ...     now = controller.tools.read(1)
+        ...     print(changed_since(controller, 1, now))  # it was never written from here
+        None
+    """
+    last = last_proof(controller, tool)
+    if last is None:
+        return None
+    recorded = read_offset(last.details["value"])
+    if controller.tools.same(recorded, now):
+        return None
+    return ChangedSince(tool, recorded, last.at, now)
+
+
+def earlier_corrections(controller: Controller, tool: int) -> tuple[float, ...]:
+    """Return the lengths, mm, of the corrections since the nozzle was mounted, oldest first.
+
+    They are those in the plane: Z is often measured by another method, and a write of
+    Z alone is none. A nozzle is known by the id
+    that was given for it; without one nothing is known to be the same nozzle, and there is nothing
+    to compare with. What was taken back is none.
+    """
+    nozzle = controller.outcomes.signature.nozzle
+    lengths: list[float] = []
+    taken_back: set[str] = set()
+    if not nozzle:
+        return ()
+    kinds = (EntryKind.DONE, EntryKind.ROLLED_BACK)
+    for entry in controller.outcomes.recorded(tool=tool, kinds=kinds):
+        if entry.signature.nozzle != nozzle:
+            break
+        if entry.kind is EntryKind.ROLLED_BACK:
+            taken_back.add(entry.change)
+        if entry.change in taken_back:
+            continue
+        before = read_offset(entry.details.get("before"))
+        value = read_offset(entry.details.get("value"))
+        if before is None or value is None:
+            break
+        length_mm = math.hypot(value.x_mm - before.x_mm, value.y_mm - before.y_mm)
+        if length_mm or value.z_mm == before.z_mm:  # a write of Z alone corrected no X and Y
+            lengths.append(length_mm)
+    return tuple(reversed(lengths))
+
+
+_ENDS = (EntryKind.DONE, EntryKind.ROLLED_BACK)
+
+
+def id_of_change(entry: Recorded) -> str:
+    """Return by which id a person names what an entry belongs to.
+
+    A single write that was made outside of a change is known by its operation.
+    """
+    return entry.change or entry.operation
+
+
+def of_change(outcomes: OutcomeLog, change: str, tool: int | None) -> list[Recorded]:
+    """Return how the tools of a change were done, newest first.
+
+    Args:
+        outcomes: The record of one controller.
+        change: Id of the change, empty for the newest that was not taken back.
+        tool: Only this tool of it.
+
+    Raises:
+        ConfigError: There is none, or it was taken back.
+    """
+    chosen = change or _newest_done(outcomes, tool)
+    ends = list(outcomes.recorded(change=chosen, kinds=_ENDS)) if chosen else []
+    if chosen and not ends:  # a single write, known by its operation
+        ends = [entry for entry in outcomes.recorded(kinds=_ENDS) if id_of_change(entry) == chosen]
+    taken_back = any(entry.kind is EntryKind.ROLLED_BACK for entry in ends)
+    done = [entry for entry in ends if tool in (None, entry.tool)]
+    if not done or taken_back:
+        raise ConfigError(
+            _nothing_to_undo(chosen, taken_back=taken_back),
+            remedy=tr("{changes} shows what can be undone.", changes=way(Way.LIST_CHANGES)),
+        )
+    return done
+
+
+def _newest_done(outcomes: OutcomeLog, tool: int | None) -> str:
+    taken_back = set()
+    for entry in outcomes.recorded(tool=tool, kinds=_ENDS):
+        if entry.kind is EntryKind.ROLLED_BACK:
+            taken_back.add(id_of_change(entry))
+        elif id_of_change(entry) not in taken_back:
+            return id_of_change(entry)
+    return ""
+
+
+def _nothing_to_undo(change: str, *, taken_back: bool) -> str:
+    if not change:
+        return tr("No finished change of this controller is on record.")
+    if taken_back:
+        return tr("The change {change} was taken back when it was made.", change=change[:8])
+    return tr("The change {change} completed nothing for that tool.", change=change[:8])
+
+
+def proof_numbered(outcomes: OutcomeLog, number: int) -> Recorded | None:
+    """Return the entry of that number if it says what was read from a tool."""
+    for entry in outcomes.recorded(kinds=PROOFS):
+        if entry.number <= number:
+            known = entry.number == number and entry.tool is not None and "value" in entry.details
+            return entry if known else None
+    return None
+
+
+def tool_of(entry: Recorded) -> int:
+    """Return which tool an entry is about."""
+    if entry.tool is None:
+        raise _unreadable(entry)
+    return entry.tool
+
+
+def offset_of(entry: Recorded, name: str) -> ToolOffset | None:
+    """Return a value of an entry, ``None`` for an undefined tool."""
+    if name not in entry.details:
+        raise _unreadable(entry)
+    return read_offset(entry.details[name])
+
+
+def _unreadable(entry: Recorded) -> ConfigError:
+    return ConfigError(
+        tr("Entry {number} of the journal cannot be understood.", number=entry.number),
+        remedy=tr(
+            "'robolink journal verify' checks it; name an earlier value with {to}.",
+            to=way(Way.EARLIER_VALUE),
+        ),
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from robolink.lazy_exports import lazy_exports
+from robolink.lazy_exports import lazy_exports, old_names
 
 if TYPE_CHECKING:
     from robolink.transport._mailbox_link import MailboxHead as MailboxHead
@@ -11,39 +11,36 @@ if TYPE_CHECKING:
     from robolink.transport._registry import TransportOpener as TransportOpener
     from robolink.transport._registry import open_mailbox_link as open_mailbox_link
     from robolink.transport._registry import open_modbus as open_modbus
-    from robolink.transport._registry import open_quick_link as open_quick_link
     from robolink.transport._registry import open_transport as open_transport
     from robolink.transport._url import LinkUrl as LinkUrl
+    from robolink.transport._url import UrlOptions as UrlOptions
     from robolink.transport._url import parse_url as parse_url
-    from robolink.transport._url_options import UrlOptions as UrlOptions
-    from robolink.transport.stream.contract import Transport as Transport
-    from robolink.transport.stream.dialogue import Dialogue as Dialogue
-    from robolink.transport.stream.dialogue import DialogueLog as DialogueLog
-    from robolink.transport.stream.dialogue import Passage as Passage
-    from robolink.transport.stream.dialogue import format_dialogue as format_dialogue
-    from robolink.transport.stream.dialogue import opening_line as opening_line
-    from robolink.transport.stream.dialogue import parse_dialogues as parse_dialogues
-    from robolink.transport.stream.dialogue import passage_line as passage_line
-    from robolink.transport.stream.trace import SECRET_PLACEHOLDER as SECRET_PLACEHOLDER
-    from robolink.transport.stream.trace import Direction as Direction
-    from robolink.transport.stream.trace import TraceSink as TraceSink
-    from robolink.transport.stream.trace import TracingTransport as TracingTransport
+    from robolink.transport.byte_stream import SECRET_PLACEHOLDER as SECRET_PLACEHOLDER
+    from robolink.transport.byte_stream import Direction as Direction
+    from robolink.transport.byte_stream import TraceSink as TraceSink
+    from robolink.transport.byte_stream import TracingTransport as TracingTransport
+    from robolink.transport.byte_stream import Transport as Transport
+    from robolink.transport.dialogue import Dialogue as Dialogue
+    from robolink.transport.dialogue import DialogueLog as DialogueLog
+    from robolink.transport.dialogue import Passage as Passage
+    from robolink.transport.dialogue import format_dialogue as format_dialogue
+    from robolink.transport.dialogue import opening_line as opening_line
+    from robolink.transport.dialogue import parse_dialogues as parse_dialogues
+    from robolink.transport.dialogue import passage_line as passage_line
 else:
     __getattr__, __dir__, __all__ = lazy_exports(
         __name__,
         {
             "_mailbox_link": "MailboxHead MailboxLink",
             "_registry": (
-                "TRANSPORTS_GROUP TransportOpener open_mailbox_link open_modbus "
-                "open_quick_link open_transport"
+                "TRANSPORTS_GROUP TransportOpener open_mailbox_link open_modbus open_transport"
             ),
-            "_url": "LinkUrl parse_url",
-            "_url_options": "UrlOptions",
-            "stream.contract": "Transport",
-            "stream.dialogue": (
+            "_url": "LinkUrl UrlOptions parse_url",
+            "byte_stream": "Direction SECRET_PLACEHOLDER TraceSink TracingTransport Transport",
+            "dialogue": (
                 "Dialogue DialogueLog Passage format_dialogue opening_line "
                 "parse_dialogues passage_line"
             ),
-            "stream.trace": "Direction SECRET_PLACEHOLDER TraceSink TracingTransport",
         },
+        old_names(__name__),
     )

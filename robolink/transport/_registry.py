@@ -15,7 +15,7 @@ from robolink.plug_ins import PlugInError, find_plug_in
 from robolink.timing import Clock
 from robolink.transport._mailbox_link import MailboxLink
 from robolink.transport._url import LinkUrl, parse_url
-from robolink.transport.stream.contract import Transport
+from robolink.transport.byte_stream import Transport
 
 if TYPE_CHECKING:
     from robolink.transport.modbus.client import ModbusClient
@@ -23,8 +23,8 @@ if TYPE_CHECKING:
 TRANSPORTS_GROUP = "robolink.transports"
 
 _MEDIA = {
-    "tcp": ("robolink.transport.stream.tcp", "open_tcp"),
-    "serial": ("robolink.transport.stream.serial_port", "open_serial_line"),
+    "tcp": ("robolink.transport.tcp", "open_tcp"),
+    "serial": ("robolink.transport.serial_port", "open_serial_line"),
 }
 _MAILBOX_MEDIA = {
     "modbus-tcp": ("robolink.transport.modbus.mailbox", "open_modbus_link"),
@@ -103,35 +103,6 @@ def open_mailbox_link(
     link = parse_url(url) if isinstance(url, str) else url
     opened: MailboxLink = _find(link, _MAILBOX_MEDIA)(link, timeout_s=timeout_s, clock=clock)
     return opened
-
-
-def open_quick_link(
-    url: str | LinkUrl, *, timeout_s: float = 3.0, clock: Clock | None = None
-) -> MailboxLink:
-    """Open a link to a PLC mailbox for a stop or a look; as :func:`open_mailbox_link`.
-
-    Over Modbus it has its own frames, because loading pymodbus takes longer than either.
-
-    Args:
-        url: For example ``softmotion+modbus-tcp://192.168.0.2:502``.
-        timeout_s: Longest wait for the connection, and for each exchange.
-        clock: Replaces the machine's clock; a simulator brings its own.
-
-    Example:
-        >>> from robolink.transport import open_quick_link
-        >>> link = open_quick_link("softmotion+sim://quick-link-example", timeout_s=1)
-        >>> link.identity
-        'softmotion+sim://quick-link-example'
-        >>> link.close()
-    """
-    link = parse_url(url) if isinstance(url, str) else url
-    opener = _find(link, _MAILBOX_MEDIA)
-    if link.medium not in _REGISTER_MEDIA:
-        opened: MailboxLink = opener(link, timeout_s=timeout_s, clock=clock)
-        return opened
-    from robolink.transport.modbus.mailbox import open_modbus_link
-
-    return open_modbus_link(link, timeout_s=timeout_s, clock=clock, registers_only=True)
 
 
 def open_modbus(

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from robolink.calibration import Beam, BoardDrawing, Pin, rotation_of, tip_pose, uvw_deg
+from robolink.calibration_run import Limits
 from robolink.methods import (
     Absolute,
     AllRoundPlan,
@@ -37,9 +38,8 @@ from robolink.methods import (
 from robolink.methods.surface_touch.plane_procedure import PlaneTest
 from robolink.methods.surface_touch.sphere_procedure import SphereTest
 from robolink.model import Path, Pose, SpotUnit, ToolOffset
-from robolink.nozzle_change import Limits
 from robolink.procedures import MeasurementContext, TouchPlan
-from robolink.procedures.tilting_proof import TiltingProof
+from robolink.procedures.tilt_proof import TiltingProof
 from robolink.runner import Ask, Move, TouchedAt
 from robolink.stations import BeamStation, CameraStation, TouchStation
 from robolink.testing import MemoryController, PaperCell

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from robolink.calibration import Robust, quaternion_rotations
-from robolink.calibration.core.robust import _best_set, draw_poses
-from robolink.calibration.pin import pivot_fit
+from robolink.calibration.core.least_squares import _best_set, draw_poses
+from robolink.calibration.pin import pivot
 
 KINDS = [(threshold, outliers) for threshold in (0.12, 0.16, 0.3) for outliers in (0.0, 0.1, 0.3)]
 
@@ -22,9 +22,9 @@ def agreement_of(seed, outliers, monkeypatch):
     asked = []
     with monkeypatch.context() as seen:
         seen.setattr(
-            pivot_fit, "largest_consensus", lambda agreement, *_, **__: asked.append(agreement)
+            pivot, "largest_consensus", lambda agreement, *_, **__: asked.append(agreement)
         )
-        pivot_fit.pivot_consensus(positions, turned, Robust(), sigma_mm=None)
+        pivot.pivot_consensus(positions, turned, Robust(), sigma_mm=None)
     return asked[0]
 
 

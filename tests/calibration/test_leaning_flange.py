@@ -34,7 +34,7 @@ from robolink.calibration import (
     solve_up_camera,
     solve_z_touch,
 )
-from robolink.calibration.z_touch import Touch
+from robolink.calibration.touch.z_touch import Touch
 from robolink.model import Pose, ToolOffset
 from tests.calibration._simulated import assert_honest, refused
 

@@ -1,11 +1,23 @@
-"""A pin that is known, one touch, a new tip."""
+"""A pin that is known, one touch, a new tip.
 
+A new needle by difference, and the chain of such differences.
+"""
+
+import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from robolink.calibration import Pin, pin_touched, solve_one_touch
-from robolink.model import Pose, ToolOffset
+from robolink.calibration import (
+    NeedleChain,
+    NeedleLimits,
+    Pin,
+    pin_touched,
+    solve_needle_change,
+    solve_one_touch,
+)
+from robolink.model import Pose, ToolOffset, rotate_xy
 from tests.calibration._simulated import (
     PIN,
     assert_honest,
@@ -60,3 +72,84 @@ def test_bad_input_is_named():
         solve_one_touch(Pose(300, 90, 0, 0), Pin(float("nan"), 0, 0))
     with refused("implausible_offset"):
         solve_one_touch(Pose(300, 90, 0, 0), Pin(2000, 0, 0))
+
+
+FLANGE = Pose(300, 90, -10, 130, tool=0)
+OLD = ToolOffset(12, -3, -20, 30)
+SIGMA = 0.01
+FRESH = NeedleChain(0.01)
+USUAL = NeedleLimits()
+
+
+def seen(tip, noise=(0.0, 0.0, 0.0), bias=(0.0, 0.0, 0.0)):
+    x, y = rotate_xy(tip.x_mm, tip.y_mm, FLANGE.u_deg)
+    place = (FLANGE.x_mm + x, FLANGE.y_mm + y, FLANGE.z_mm + tip.z_mm)
+    return tuple(a + b + c for a, b, c in zip(place, noise, bias, strict=True))
+
+
+def change(new, *, dimensions=3, chain=FRESH, limits=USUAL, **shake):
+    before = seen(OLD, **{k: v for k, v in shake.items() if k == "bias"})
+    return solve_needle_change(
+        FLANGE,
+        before[:dimensions],
+        seen(new, **shake)[:dimensions],
+        stored=OLD,
+        chain=chain,
+        sigma_mm=SIGMA,
+        limits=limits,
+    )
+
+
+def test_the_difference_is_found_whatever_the_camera_adds_to_both():
+    new = ToolOffset(12.3, -3.4, -20.2, 30)
+    result = change(new, bias=(5.0, -7.0, 2.0))
+    assert result.offset.components() == pytest.approx(new.components(), abs=1e-10)
+    assert result.measured == ("x_mm", "y_mm", "z_mm")
+    assert math.hypot(*result.shift_mm) == pytest.approx(math.hypot(0.3, 0.4, 0.2))
+
+
+def test_a_camera_that_sees_no_height_keeps_z():
+    result = change(ToolOffset(12.3, -3.4, -20.2), dimensions=2)
+    assert (result.offset.z_mm, result.kept) == (-20, ("z_mm", "u_deg", "v_deg", "w_deg"))
+
+
+def test_uncertainty_grows_along_the_chain_until_a_full_calibration_is_due():
+    chain, length = FRESH, 0
+    while not (result := change(ToolOffset(12.1, -3, -20), chain=chain)).full_calibration_due:
+        chain, length = result.chain, length + 1
+        assert chain.sigma_mm == pytest.approx(math.sqrt(0.01**2 + length * 2 * SIGMA**2))
+        assert result.warnings == ()
+    assert result.half_width95[0] > 0.1
+    assert length == 12
+    assert result.warnings == ("full_calibration_due",)
+
+
+def test_after_enough_changes_it_is_due_in_any_case():
+    limits = NeedleLimits(max_changes=3, tolerance_mm=5)
+    assert not change(OLD, chain=NeedleChain(0.01, 1), limits=limits).full_calibration_due
+    assert change(OLD, chain=NeedleChain(0.01, 2), limits=limits).full_calibration_due
+
+
+def test_a_shift_that_no_needle_makes_is_refused():
+    with refused("implausible_change"):
+        change(ToolOffset(14.5, -3, -20))
+    with refused("non_finite"):
+        change(ToolOffset(12, -3, -20), noise=(math.nan, 0, 0))
+    with pytest.raises(ValueError, match="coordinates"):
+        solve_needle_change(FLANGE, (1, 2), (1, 2, 3), stored=OLD, chain=FRESH, sigma_mm=0.01)
+
+
+def test_the_interval_holds_the_truth_at_every_length_of_the_chain(trials):
+    # The stored offset has the error of its own calibration, and each change adds its own.
+    rng = np.random.default_rng(5)
+    truth, hits = np.array([12.2, -3.1, -20.0]), np.zeros(3)
+    for _ in range(trials):
+        stored = ToolOffset(*(truth + rng.normal(0, FRESH.sigma_mm, 3)).tolist())
+        chain = FRESH
+        for _ in range(3):
+            looks = [seen(ToolOffset(*truth.tolist()), rng.normal(0, SIGMA, 3)) for _ in range(2)]
+            result = solve_needle_change(FLANGE, *looks, stored=stored, chain=chain, sigma_mm=SIGMA)
+            stored, chain = result.offset, result.chain
+        found = np.array(result.offset.components()[:3])
+        hits += np.abs(found - truth) <= np.array(result.half_width95)
+    assert_honest(hits / trials, trials)

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from robolink.calibration import Robust, fit_pivot, pivot_design, solve_pivot
 from robolink.calibration.core.rotations import pose_arrays
-from robolink.calibration.pin.pivot_fit import QR_ABOVE_CONDITION, _by_normal_equations, _by_qr
+from robolink.calibration.pin.pivot import QR_ABOVE_CONDITION, _by_normal_equations, _by_qr
 from robolink.model import ToolOffset
 from tests.calibration._simulated import (
     PIN,

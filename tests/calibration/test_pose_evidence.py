@@ -24,7 +24,7 @@ from robolink.calibration import (
     with_station,
     writes_refused_unattended,
 )
-from robolink.calibration.core.pose_checks import leans
+from robolink.calibration.core.pose_checks import tilted
 from robolink.errors import CalibrationError, ConfigError
 from robolink.model import Pose, ToolOffset
 from tests.calibration._scipy_quantiles import fisher
@@ -388,4 +388,4 @@ def test_a_touch_that_a_person_brought_from_somewhere_does_not_disturb_the_bias(
 
 @pytest.mark.parametrize(("v_deg", "w_deg"), [(0.0, 0.5), (0.5, 0.0), (0.0, -0.5)])
 def test_half_a_degree_about_either_axis_leans(v_deg, w_deg):
-    assert leans(Pose(0, 0, 0, 0, v_deg, w_deg))
+    assert tilted(Pose(0, 0, 0, 0, v_deg, w_deg))

@@ -8,7 +8,7 @@ import pytest
 from robolink.calibration import rotation_of
 from robolink.errors import CalibrationError
 from robolink.methods import AxisTeachPlan, informative_tilts, measure_six_point
-from robolink.methods.pivot.six_point_procedure import retake_six_point
+from robolink.methods.pivot.six_point import SixPointSource
 from robolink.model import Path, Pose, ToolOffset
 from robolink.runner import TeachPrompt, TouchedAt
 from tests.calibration._tilting_person import (
@@ -187,14 +187,8 @@ def test_from_the_values_one_touch_is_made_again_and_the_ways_stay(again):
     assert np.linalg.norm(np.subtract(before.offset.components()[:3], TIP.components()[:3])) > 0.01
     taken = [TouchedAt.of(pose) for pose in before.inputs]
     result = guide.run(
-        retake_six_point(
-            PLAN,
-            AxisTeachPlan(),
-            here=guide.steps[-1][2],
-            taken=taken,
-            again=again,
-            tilts=informative_tilts(5, 20.0),
-            stored=STORED,
+        SixPointSource(informative_tilts(5, 20.0), PLAN, ways=AxisTeachPlan()).further_steps(
+            guide.steps[-1][2], taken, again, STORED
         )
     )
     assert result.offset.components() == pytest.approx(TOOL.components(), abs=1e-6)

@@ -21,8 +21,8 @@ from robolink.calibration import (
     judge_drift,
     judge_touches,
 )
-from robolink.calibration.touch.standoff import NO_STANDOFF
-from robolink.calibration.touch.touch_limits import LEVELS_MM
+from robolink.calibration.quality.doubts import LEVELS_MM
+from robolink.calibration.touch.touch_evidence import NO_STANDOFF
 from robolink.model import Pose
 from tests.calibration._simulated import PIN, rotation
 

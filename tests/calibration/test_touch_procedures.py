@@ -7,10 +7,10 @@ from itertools import pairwise
 import pytest
 
 from robolink.calibration import Drift, DriftVerdict
+from robolink.calibration_run import foresee
 from robolink.errors import CalibrationError
 from robolink.methods import measure_two_pose
 from robolink.model import Path, Pose, ToolOffset, WorkBox, rotate_xy
-from robolink.nozzle_change import foresee
 from robolink.procedures import (
     DriftProof,
     SurfaceTouches,

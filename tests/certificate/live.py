@@ -22,6 +22,15 @@ from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
 from robolink.calibration import BoardDrawing, Pin, RowFact, VerifyResult, carrying
+from robolink.calibration_run import (
+    AcceptanceCriteria,
+    ChangePlan,
+    Limits,
+    Listener,
+    NozzleChange,
+    Proposal,
+    ToolPlan,
+)
 from robolink.controllers import SoftMotionController
 from robolink.errors import RobolinkError, VerifyError
 from robolink.methods import (
@@ -48,15 +57,6 @@ from robolink.methods import (
     informative_tilts,
 )
 from robolink.model import InputEdge, Pose, ToolOffset, ToolReceipt
-from robolink.nozzle_change import (
-    AcceptanceCriteria,
-    ChangePlan,
-    Limits,
-    Listener,
-    NozzleChange,
-    Proposal,
-    ToolPlan,
-)
 from robolink.procedures import LookPlan, TouchPlan
 from robolink.runner import Question
 from tests.contract._camera_cell import camera_station, furnish

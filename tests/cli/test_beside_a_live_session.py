@@ -9,7 +9,7 @@ from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
 from robolink.journal import LeaseHolder, open_journal
-from robolink.journal._processes import BootClock, this_process
+from robolink.journal._lease_view import BootClock, this_process
 from robolink.model import Marker, MarkerKind, Signature
 from robolink.timing import NS_PER_S
 

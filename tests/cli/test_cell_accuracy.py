@@ -126,8 +126,9 @@ def test_beams_that_were_learnt_five_times_have_the_scatter_of_their_crossing(ru
         file.write('[cells.line3.stations.BEAMS-02]\nkind = "beams"\nz_mm = -100.0\nbeams = [')
         file.write("{input = 3, x_mm = 300.0, y_mm = 90.0, direction_deg = 90.0},")
         file.write("{input = 4, x_mm = 280.0, y_mm = 100.0, direction_deg = 0.0}]\n")
-    for x_mm in (300.0, 300.01, 300.0, 300.01, 300.0):
-        crossed = [beam(x_mm, 90.0, 90.0), beam(280.0, 100.0, 0.0)]
+    # A beam is named by any point on it: where that lies along the beam says nothing.
+    for along_mm, x_mm in enumerate((300.0, 300.01, 300.0, 300.01, 300.0)):
+        crossed = [beam(x_mm, 90.0 + along_mm, 90.0), beam(280.0 - along_mm, 100.0, 0.0)]
         recorded(learnt("BEAMS-02", "beams", z_mm=-100.0, beams=crossed))
     recorded(learnt("BEAMS-02", "beams", z_mm=-100.0, beams=crossed[:1]))
     _, document, _ = run("-c", "line3", "cell", "accuracy", "--json")

@@ -158,11 +158,11 @@ def test_calibrate_takes_its_limits_from_the_cell(cell, simulator, monkeypatch, 
     cell(LIMITS)
     plans = []
 
-    def remember(controller, plan, **_kwargs):
+    def remember(_controller, _frame, plan, _order):
         plans.append(plan)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("robolink_cli.commands.measure.calibrate.live.LiveCalibration", remember)
+    monkeypatch.setattr("robolink_cli.commands.measure.calibrate.live._measure", remember)
     assert main.run(["-c", "a", "calibrate", "two-pose", "--tool", "1", *options]) == 130
     (plan,) = plans
     (one,) = plan.tools

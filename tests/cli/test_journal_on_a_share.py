@@ -5,7 +5,7 @@ from robolink_cli.commands.computer.checkup import Level, check_journal
 
 from robolink.errors import JournalError
 from robolink.journal import _places, open_journal
-from robolink.journal._opening import close_files
+from robolink.journal._connections import close_files
 
 
 @pytest.fixture

@@ -10,11 +10,11 @@ from robolink_cli.prompts import questions as consent
 from robolink_cli.prompts import questions as jumps
 
 import robolink
+from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
 from robolink.config import find_cell
 from robolink.errors import CalibrationError, NotAllowedError
 from robolink.methods import PointsSource
 from robolink.model import ChangeLimits, Jump, PersonRole, Pose, Signature, ToolOffset
-from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
 from robolink.testing import MemoryController, MemoryMachine
 from robolink.transaction import Wanted, change_tools
 

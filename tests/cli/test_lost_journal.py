@@ -13,7 +13,7 @@ import robolink.transaction
 from robolink.controllers import EpsonController
 from robolink.errors import JournalError, OutcomeUnknownError
 from robolink.journal import open_journal
-from robolink.journal._opening import _closed, _opened, close_files
+from robolink.journal._connections import _closed, _opened, close_files
 from robolink.model import ANY, EntryKind, NewEntry, ToolOffset
 
 

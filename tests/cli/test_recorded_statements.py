@@ -16,10 +16,10 @@ from robolink.calibration import (
     held_to_claim,
     solve_two_pose,
 )
+from robolink.calibration_run import AcceptanceCriteria, Proposal, Seating
+from robolink.calibration_run._records import calibration_entry, verification_entry
 from robolink.journal import open_journal
 from robolink.model import EntryKind, NewEntry, Pose, Signature, ToolOffset, plain_offset
-from robolink.nozzle_change import AcceptanceCriteria, Proposal, Seating
-from robolink.nozzle_change._records import calibration_entry, verification_entry
 
 TOUCHES = Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)
 OLD = ToolOffset(12.0, -4.0, -20.0)

@@ -10,6 +10,7 @@ from robolink_cli.access.change_page import page_of_change
 from robolink_simulators.epson.memory.points import Point
 
 from robolink.calibration import Drift, VerifyResult
+from robolink.calibration_run._records import verification_entry
 from robolink.errors import ConfigError
 from robolink.journal import open_journal
 from robolink.model import (
@@ -21,7 +22,6 @@ from robolink.model import (
     ToolOffset,
     answer_entry,
 )
-from robolink.nozzle_change._records import verification_entry
 
 ELSEWHERE = "epson+tcp://192.168.0.9:5000"
 OLD, NEW = [12.0, -3.5, -20.0, 0.0, 0.0, 0.0], [12.3, -3.7, -20.0, 0.0, 0.0, 0.0]

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from robolink_cli import main
 from robolink_cli.commands.measure.solve.solving import METHODS
-from robolink_cli.commands.measure.solve.station_methods import STATION_METHODS
-from robolink_cli.commands.measure.solve.touch_methods import TOUCH_METHODS
+from robolink_cli.commands.measure.solve.station_cases import STATION_METHODS
+from robolink_cli.commands.measure.solve.touch_cases import TOUCH_METHODS
 
 from robolink.calibration import Beam
 from robolink.model import rotate_xy
@@ -532,7 +532,7 @@ def test_no_method_is_left_untried():
     }
     here = {"find_beams", "joint", "board_fit", "uncertainty_budget"}
     touching = {*TOUCH_METHODS}  # tests/calibration/test_touch_evidence.py
-    lasting = {*STATION_METHODS}  # tests/calibration/test_station_part.py
+    lasting = {*STATION_METHODS}  # tests/calibration/test_station.py
     assert set(METHODS) == set(MORE) | shared | here | touching | lasting
 
 

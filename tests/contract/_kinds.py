@@ -11,7 +11,7 @@ from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
 from robolink.controllers import ConnectionTerms, PlcMapController
-from robolink.controllers.softmotion.motion.jog import Jog
+from robolink.controllers.softmotion.jog import Jog
 from robolink.journal import memory_journal, signature_here
 from robolink.model import (
     ANY,

@@ -17,8 +17,7 @@ from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 import robolink
 from robolink.calibration import Beam
-from robolink.model import Controller, InputEdge, Pose, ToolOffset
-from robolink.nozzle_change import (
+from robolink.calibration_run import (
     AcceptanceCriteria,
     ChangePlan,
     Listener,
@@ -27,6 +26,7 @@ from robolink.nozzle_change import (
     ToolPlan,
     preview,
 )
+from robolink.model import Controller, InputEdge, Pose, ToolOffset
 from robolink.procedures import TipSource
 from robolink.runner import Ask, Look, Move, Question, Seek, StepDone
 from robolink.stations import BeamStation, TouchStation

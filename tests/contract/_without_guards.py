@@ -185,8 +185,8 @@ _ITSELF: Final[Mapping[str, StandIn]] = {
     "robolink.controllers.markers.MarkerStore.begin": _begun,
     "robolink.journal._outcome_log.JournalOutcomeLog._refuse_lost": _nothing,
     "robolink.controllers.markers.MarkerStore.doubt": _open,
-    "robolink.controllers.epson.link.session.EpsonSession._end": _nothing,
-    "robolink.controllers.softmotion.link.wire.MailboxWire.ended": _ended,
+    "robolink.controllers.epson.session.EpsonSession._end": _nothing,
+    "robolink.controllers.softmotion.wire.MailboxWire.ended": _ended,
     "robolink.controllers.ToolWrite.change": _changed,
     "robolink.controllers.ToolTableCore.require_writable": _nothing,
     "robolink.model.ChangeGuard.require": _nothing,
@@ -198,7 +198,7 @@ _ITSELF: Final[Mapping[str, StandIn]] = {
     "robolink.stop_latch.StopLatch.admit": _nothing,
     "robolink.stop_latch.StopLatch.restoring": _open,
     "robolink.stop_latch.StopLatch.calming": _calmed,
-    "robolink.controllers.epson.tools.preserve.EpsonPreserver._restore_more": _nothing,
+    "robolink.controllers.epson.preserve.EpsonPreserver._restore_more": _nothing,
     "robolink.controllers.connect_when_reachable": _knocking,
     "robolink.transaction.Settler.examine": _settled_unread,
     "robolink.controllers.PolledGroup.halt": lambda group: group._send_stop(),
@@ -208,9 +208,9 @@ _ITSELF: Final[Mapping[str, StandIn]] = {
     "robolink.controllers.ToolTableCore.preview_write": _previewed,
     "robolink.controllers.ToolTableCore._require_known": _nothing,
     "robolink.model.ToolOffset.__post_init__": _nothing,
-    "robolink.controllers.epson.io.raw_statements.RawStatements.execute": _unguarded,
+    "robolink.controllers.epson.controller.RawStatements.execute": _unguarded,
     "robolink.controllers.ControllerCore.close": _nothing,
-    "robolink.transport.stream.tcp.TcpTransport.send": _sent_in_part,
+    "robolink.transport.tcp.TcpTransport.send": _sent_in_part,
 }
 _AS_IMPORTED: Final[Mapping[str, Mapping[str, StandIn]]] = {
     "robolink_cli.prompts.questions.agree": {
@@ -222,19 +222,19 @@ _AS_IMPORTED: Final[Mapping[str, Mapping[str, StandIn]]] = {
         "robolink.runner._runner.awaited_line": _line_without_a_look,
     },
     "robolink.controllers.ToolTableCore.same": {
-        "robolink.controllers.epson.tools.table.EpsonToolTable.same": _to_the_last_bit,
-        "robolink.controllers.epson.tools.table.EpsonToolTable._storable": _as_given,
+        "robolink.controllers.epson.tools.EpsonToolTable.same": _to_the_last_bit,
+        "robolink.controllers.epson.tools.EpsonToolTable._storable": _as_given,
     },
-    "robolink.controllers.epson.link.stopping.bring_to_rest": {
-        "robolink.controllers.epson.link.stopping.bring_to_rest": _nothing,
-        "robolink.controllers.epson.motion.group.bring_to_rest": _nothing,
+    "robolink.controllers.epson.rest.bring_to_rest": {
+        "robolink.controllers.epson.rest.bring_to_rest": _nothing,
+        "robolink.controllers.epson.group.bring_to_rest": _nothing,
     },
-    "robolink.controllers.softmotion.link.stopping.bring_group_to_rest": {
-        "robolink.controllers.softmotion.motion.group.bring_group_to_rest": _nothing
+    "robolink.controllers.softmotion.commands.bring_group_to_rest": {
+        "robolink.controllers.softmotion.group.bring_group_to_rest": _nothing
     },
-    "robolink.controllers.epson.link.answers.require_ready": {
-        "robolink.controllers.epson.link.window.require_ready": _nothing,
-        "robolink.controllers.epson.motion.acts.require_ready": _nothing,
+    "robolink.controllers.epson.answers.require_ready": {
+        "robolink.controllers.epson.window.require_ready": _nothing,
+        "robolink.controllers.epson.group.require_ready": _nothing,
     },
 }
 LEFT: Final[Mapping[str, Mapping[str, StandIn]]] = {

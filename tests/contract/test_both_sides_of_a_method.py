@@ -2,7 +2,7 @@
 
 import pytest
 
-from robolink.nozzle_change import usual_box
+from robolink.calibration_run import usual_box
 from robolink.recipe import load_recipe
 from tests.contract._method_cell import KINDS, method_cell
 from tests.contract.test_calibrate_pivot import plc, run

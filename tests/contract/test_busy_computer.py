@@ -4,9 +4,9 @@ import pytest
 from robolink_cli.prompts.operator import AssistedOperator
 from robolink_simulators.assist.port import InProcessEyes
 
+from robolink.calibration_run import ChangePlan, Limits, NozzleChange, ToolPlan
 from robolink.errors import ControllerFaultError, DeclinedError, HeartbeatLostError
 from robolink.model import Path, WorkBox
-from robolink.nozzle_change import ChangePlan, Limits, NozzleChange, ToolPlan
 from robolink.runner import Runner, RunSettings
 from tests.contract._softmotion_cell import above, served
 

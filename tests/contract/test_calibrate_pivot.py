@@ -15,10 +15,7 @@ from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.hosting.in_process import softmotion
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
-from robolink.errors import ConfigError, VerifyError
-from robolink.methods import PivotSource, informative_tilts
-from robolink.model import Pose, ToolOffset
-from robolink.nozzle_change import (
+from robolink.calibration_run import (
     AcceptanceCriteria,
     ChangePlan,
     Limits,
@@ -27,6 +24,9 @@ from robolink.nozzle_change import (
     ToolPlan,
     flange_now,
 )
+from robolink.errors import ConfigError, VerifyError
+from robolink.methods import PivotSource, informative_tilts
+from robolink.model import Pose, ToolOffset
 from robolink.procedures import TouchPlan
 from robolink.runner import Ask
 from tests.contract._method_cell import method_cell
@@ -47,7 +47,7 @@ def plc(tmp_path, monkeypatch):
 
     It moves faster than commands let it, which changes nothing but how long a test takes.
     """
-    monkeypatch.setattr("robolink.nozzle_change.Limits", partial(Limits, speed_percent=100))
+    monkeypatch.setattr("robolink.calibration_run.Limits", partial(Limits, speed_percent=100))
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
     name, simulator = f"five-axes-{next(_names)}", SoftMotionSimulator(FIVE, seed=4)
     simulator.url = softmotion.register(name, simulator, clock=ManualClock())
@@ -179,10 +179,8 @@ def test_six_axes_are_sent_v_and_w_but_four_are_refused(tmp_path, monkeypatch):
     """No six-axis EPSON arm is simulated: the requests alone are looked at."""
     with method_cell("epson", tmp_path, monkeypatch) as cell:
         robot = "robolink.controllers.epson"
-        monkeypatch.setattr(
-            f"{robot}.motion.group.EpsonGroup.axes", lambda _: {"joints": (0.0,) * 6}
-        )
-        monkeypatch.setattr(f"{robot}.link.asked_once.Robot.six_axes", property(lambda _: True))
+        monkeypatch.setattr(f"{robot}.group.EpsonGroup.axes", lambda _: {"joints": (0.0,) * 6})
+        monkeypatch.setattr(f"{robot}.link.Robot.six_axes", property(lambda _: True))
         shown = cell.run("calibrate", "pivot", "--tool", "1", "--dry-run", "--json")
         assert shown.code == 0, shown.err
         sent = [line for step in shown.document["steps"] for line in step["requests"]]

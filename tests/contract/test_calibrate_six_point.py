@@ -9,10 +9,16 @@ from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.calibration import rotation_of
+from robolink.calibration_run import (
+    AcceptanceCriteria,
+    ChangePlan,
+    Listener,
+    NozzleChange,
+    ToolPlan,
+)
 from robolink.errors import VerifyError
 from robolink.methods import AxisTeachPlan, SixPointSource, informative_tilts
 from robolink.model import Pose, ToolOffset
-from robolink.nozzle_change import AcceptanceCriteria, ChangePlan, Listener, NozzleChange, ToolPlan
 from robolink.procedures import TouchPlan
 from robolink.runner import Ask, TeachPrompt
 from tests.contract._method_cell import method_cell
@@ -150,10 +156,8 @@ def test_six_axes_of_an_arm_would_do_it_too(tmp_path, monkeypatch):
     """No six-axis EPSON arm is simulated: the steps and requests alone are looked at."""
     with method_cell("epson", tmp_path, monkeypatch) as cell:
         robot = "robolink.controllers.epson"
-        monkeypatch.setattr(
-            f"{robot}.motion.group.EpsonGroup.axes", lambda _: {"joints": (0.0,) * 6}
-        )
-        monkeypatch.setattr(f"{robot}.link.asked_once.Robot.six_axes", property(lambda _: True))
+        monkeypatch.setattr(f"{robot}.group.EpsonGroup.axes", lambda _: {"joints": (0.0,) * 6})
+        monkeypatch.setattr(f"{robot}.link.Robot.six_axes", property(lambda _: True))
         shown = cell.run("calibrate", "six-point", "--tool", "1", "--dry-run", "--json")
         assert shown.code == 0, shown.err
         steps = shown.document["steps"]

@@ -16,7 +16,7 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process import epson, softmotion
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
-from robolink.nozzle_change import Limits
+from robolink.calibration_run import Limits
 from tests.calibration._surface_person import Ball, Plate, touches_of, touches_of_ball
 
 pytestmark = pytest.mark.simulator_only
@@ -32,7 +32,7 @@ _names = count()
 @pytest.fixture
 def plc(tmp_path, monkeypatch):
     """Opens a simulated machine of five axes, in process; its URL stands in ``url``."""
-    monkeypatch.setattr("robolink.nozzle_change.Limits", partial(Limits, speed_percent=100))
+    monkeypatch.setattr("robolink.calibration_run.Limits", partial(Limits, speed_percent=100))
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
     opened = []
 

@@ -11,9 +11,9 @@ from robolink_simulators.hosting.in_process.softmotion import register, unregist
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
+from robolink.calibration_run import ChangePlan, Limits, NozzleChange, ToolPlan
 from robolink.journal import memory_journal
 from robolink.methods import NAngleSource, TwoPoseSource
-from robolink.nozzle_change import ChangePlan, Limits, NozzleChange, ToolPlan
 from robolink.procedures import TipSource
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "kinematics"

@@ -7,10 +7,10 @@ import pytest
 from robolink_cli import main
 
 import robolink
+from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
 from robolink.errors import ConfigError
 from robolink.methods import TwoPoseSource
 from robolink.model import InputEdge
-from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
 from robolink.procedures import TouchPlan
 from tests.contract._method_cell import method_cell, on
 from tests.contract.test_third_kind import Fitter, install

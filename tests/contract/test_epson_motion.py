@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from robolink import ToolOffset
-from robolink.controllers.epson.link.session import EpsonSession
+from robolink.controllers.epson.session import EpsonSession
 from robolink.errors import (
     BusyError,
     ControllerFaultError,

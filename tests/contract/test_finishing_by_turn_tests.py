@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import pytest
 
+from robolink.calibration_run import finish_by_turn_test, open_turn_tests
 from robolink.errors import OutcomeUnknownError, StoppedError, VerifyError
 from robolink.methods import TwoPoseSource
 from robolink.model import ToolOffset
-from robolink.nozzle_change import finish_by_turn_test, open_turn_tests
 from robolink.transaction import recover
 from tests.contract._sensor_cell import TOOL, sensor_cell
 from tests.contract.test_proof_after_a_break import Later

@@ -9,10 +9,10 @@ from robolink_cli.prompts.operator import AssistedOperator
 from robolink_simulators.assist.port import InProcessEyes
 
 import robolink
+from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
 from robolink.errors import CalibrationError
 from robolink.methods import TwoPoseSource
 from robolink.model import EntryKind, NewEntry
-from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
 from robolink.procedures import TouchPlan
 from tests.contract._method_cell import method_cell
 from tests.contract.test_touches_not_made import RECIPE, has_habit

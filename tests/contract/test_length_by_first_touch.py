@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import pytest
 
+from robolink.calibration_run import ToolPlan
+from robolink.calibration_run._length import told_by_first_touch
 from robolink.methods import TwoPoseSource
 from robolink.model import Pose, ToolOffset
-from robolink.nozzle_change import ToolPlan
-from robolink.nozzle_change._first_touch import told_by_first_touch
 from robolink.runner import Ask, StepDone, TouchedAt, TouchSubject
 from robolink.stations import Station, StationKind
 from robolink.testing import MemoryController

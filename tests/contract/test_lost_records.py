@@ -7,7 +7,7 @@ import pytest
 
 from robolink.errors import OutcomeUnknownError, RobolinkError
 from robolink.journal import open_journal
-from robolink.journal._opening import _closed, _opened, close_files
+from robolink.journal._connections import _closed, _opened, close_files
 from robolink.model import EntryKind, Marker, MarkerKind, NewEntry
 from robolink.protocols.spel_callback import CallbackLine, CallbackWord
 from robolink.serving import CallbackConversation, CallbackLimits
@@ -175,7 +175,7 @@ def test_a_record_begun_anew_that_cannot_be_noted_is_said(state, monkeypatch):
             raise OSError("no space left on device")
 
         with opened(kind, state / "elsewhere.db") as controller:
-            monkeypatch.setattr("robolink.journal._traces.write_whole", full)
+            monkeypatch.setattr("robolink.journal._journal_loss.write_whole", full)
             with pytest.raises(RobolinkError, match="no space left"):
                 recover(controller, confirm=lambda _finding: True)
             assert refuses_everything(kind, controller) == []

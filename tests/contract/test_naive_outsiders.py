@@ -6,6 +6,7 @@ from typing import cast
 
 import pytest
 
+from robolink.calibration_run import Limits
 from robolink.errors import LimitError, OutcomeUnknownError, StoppedError
 from robolink.model import (
     Controller,
@@ -17,7 +18,6 @@ from robolink.model import (
     ToolOffset,
     ToolReceipt,
 )
-from robolink.nozzle_change import Limits
 from robolink.procedures import MeasurementContext
 from robolink.runner import Move, Operator
 from robolink.stop_latch import CommandClass

@@ -12,10 +12,10 @@ from click.testing import CliRunner
 from robolink_cli import main
 from robolink_cli.commands.measure.calibrate.method_command import command_of
 
+from robolink.calibration_run import usual_box
 from robolink.errors import ConfigError
 from robolink.methods import Site, StatedLimits, all_methods, fields_of, source_of
 from robolink.model import Controller
-from robolink.nozzle_change import usual_box
 from robolink.recipe._loading import _checked
 from robolink.stations import Station
 

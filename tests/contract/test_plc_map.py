@@ -13,6 +13,7 @@ from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
 from robolink import ANY, ToolOffset
+from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
 from robolink.errors import (
     BusyError,
     ConfigError,
@@ -28,7 +29,6 @@ from robolink.errors import (
 )
 from robolink.methods import PointsSource
 from robolink.model import Verdict
-from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
 from robolink.register_maps import load_map
 from robolink.runner import Question
 from robolink.testing import confirm_whole_map

@@ -8,9 +8,9 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.hosting.in_process.epson import register, unregister
 
+from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
 from robolink.methods import PointsSource
 from robolink.model import EntryKind, Pose, ToolOffset, rotate_xy
-from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
 from robolink.testing import MemoryController, MemoryMachine
 
 SMALL = ToolOffset(0.7, -0.55, -20.0)

@@ -21,6 +21,15 @@ from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
 from robolink.calibration import BoardDrawing, Pin
+from robolink.calibration_run import (
+    ChangePlan,
+    Listener,
+    NozzleChange,
+    ToolPlan,
+    finish_by_turn_test,
+    open_turn_tests,
+    untested_sentences,
+)
 from robolink.errors import ConfigError, RobolinkError, VerifyError
 from robolink.journal import open_journal
 from robolink.methods import (
@@ -46,15 +55,6 @@ from robolink.methods import (
     informative_tilts,
 )
 from robolink.model import EntryKind, MarkerKind, Pose
-from robolink.nozzle_change import (
-    ChangePlan,
-    Listener,
-    NozzleChange,
-    ToolPlan,
-    finish_by_turn_test,
-    open_turn_tests,
-    untested_sentences,
-)
 from robolink.procedures import LazySource, TouchPlan
 from robolink.sensing import open_sensor
 from robolink.transaction import recover

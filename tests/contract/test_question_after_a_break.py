@@ -7,11 +7,11 @@ import pytest
 
 from robolink.accuracy import learning_commands
 from robolink.calibration import AccuracyFacts, ErrorSource, assessed, solve_two_pose
+from robolink.calibration_run import ToolPlan, finish_by_turn_test, open_turn_tests
+from robolink.calibration_run._turn_test import relearning_commands
 from robolink.errors import NotAllowedError, RobolinkError, VerifyError
 from robolink.methods import BeamsSource
 from robolink.model import EntryKind, Pose, ToolOffset
-from robolink.nozzle_change import ToolPlan, finish_by_turn_test, open_turn_tests
-from robolink.nozzle_change._turn_question import relearning_commands
 from robolink.report import reports_of
 from robolink.runner import Question
 from robolink.stations import Found, StationKind, station_entry

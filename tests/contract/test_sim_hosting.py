@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
-from robolink_simulators.epson.spel import parse
+from robolink_simulators.epson.spel import parser
 from robolink_simulators.faults import Fault, FaultAction
 from robolink_simulators.hosting.streams.epson import serve_serial, serve_tcp
 
@@ -244,6 +244,6 @@ def test_a_taken_port_is_named():
 def test_no_client_waits_until_statements_can_be_read(serve, monkeypatch):
     """That takes a third of a second, and several of them on a busy machine."""
     made = []
-    monkeypatch.setattr(parse, "_parser", lambda: made.append("the parser"))
+    monkeypatch.setattr(parser, "_parser", lambda: made.append("the parser"))
     with serve(EpsonSimulator()):
         assert made == ["the parser"]

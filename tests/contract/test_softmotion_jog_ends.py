@@ -7,7 +7,7 @@ import pytest
 from robolink_simulators.faults import PlcFault, PlcFaultAction
 
 from robolink.controllers import Jog
-from robolink.controllers.softmotion.link.wire import MailboxWire
+from robolink.controllers.softmotion.wire import MailboxWire
 from robolink.errors import (
     ControllerFaultError,
     LeaseLostError,

@@ -8,7 +8,7 @@ from robolink_simulators.softmotion import GroupOptions
 from robolink_simulators.softmotion.mailbox import PlcOptions, SoftMotionSimulator
 
 from robolink.controllers import Jog
-from robolink.controllers.softmotion.link.wire import MailboxWire
+from robolink.controllers.softmotion.wire import MailboxWire
 from robolink.errors import (
     BusyError,
     ControllerFaultError,

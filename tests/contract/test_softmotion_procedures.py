@@ -14,6 +14,7 @@ from robolink.backup import (
     restore,
     take_backup,
 )
+from robolink.calibration_run import ChangePlan, Limits, NozzleChange, ToolPlan
 from robolink.errors import (
     NotReadyError,
     NotReadyReason,
@@ -21,7 +22,6 @@ from robolink.errors import (
     TransportBrokenError,
 )
 from robolink.model import ANY, ControllerState, EntryKind, ToolOffset, Verdict, WorkBox
-from robolink.nozzle_change import ChangePlan, Limits, NozzleChange, ToolPlan
 from robolink.transaction import Wanted, change_tools, plan_undo, recover, undo
 from tests.contract._softmotion_cell import LINKS, OWNER_SILENCE_S, QUICK, above, served
 

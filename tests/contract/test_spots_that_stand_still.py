@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from robolink.calibration import BoardDrawing
+from robolink.calibration_run import Listener
 from robolink.errors import CalibrationError, ConfigError, VerifyError
 from robolink.methods import (
     BoardSource,
@@ -21,7 +22,6 @@ from robolink.methods import (
     RunoutTableSource,
 )
 from robolink.model import EntryKind
-from robolink.nozzle_change import Listener
 from robolink.procedures import LookPlan
 from tests.contract._camera_cell import camera_station, cell_of, furnish, run_source, stored_in
 from tests.contract._sensor_cell import TOOL, miss_mm

@@ -3,10 +3,10 @@
 import pytest
 
 from robolink.calibration import AccuracyFacts, Pin, RowFact, assessed, solve_one_touch
+from robolink.calibration_run import AcceptanceCriteria
+from robolink.calibration_run._repeatability import Seating, seating_of, touch_sigma_z_mm
 from robolink.errors import CalibrationError
 from robolink.model import EntryKind, NewEntry, Pose, ToolOffset, plain_offset
-from robolink.nozzle_change import AcceptanceCriteria
-from robolink.nozzle_change._seating import Seating, seating_of, touch_sigma_z_mm
 from robolink.stations import (
     Found,
     Station,

@@ -420,7 +420,8 @@ def pytest_runtest_protocol(item, nextitem):
 """
 
 
-def test_a_test_that_fails_shows_wire_seed_and_state(tmp_path):
+@pytest.mark.parametrize("shared", [(), pytest.param(("-n", "2"), marks=pytest.mark.soak)], ids=str)
+def test_a_test_that_fails_shows_wire_seed_and_state(tmp_path, shared):
     (tmp_path / "test_theirs.py").write_text(FAILING)
     (tmp_path / "conftest.py").write_text(AGAIN)
     done = subprocess.run(
@@ -434,6 +435,7 @@ def test_a_test_that_fails_shows_wire_seed_and_state(tmp_path):
             "7",
             "--strict-markers",
             "--junitxml=report.xml",
+            *shared,
         ],
         cwd=tmp_path,
         env={**os.environ, "ROBOLINK_PASSWORD": "of-another-cell"},

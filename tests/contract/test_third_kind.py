@@ -7,10 +7,10 @@ import pytest
 
 import robolink
 from robolink import ToolOffset
+from robolink.calibration_run import AcceptanceCriteria, ChangePlan, NozzleChange, ToolPlan
 from robolink.controllers import CONTROLLERS_GROUP, stop_now
 from robolink.errors import ConfigError, ConnectError, RejectedError
 from robolink.methods import TwoPoseSource
-from robolink.nozzle_change import AcceptanceCriteria, ChangePlan, NozzleChange, ToolPlan
 from robolink.runner import Question
 from robolink.testing import (
     ContractBrokenError,

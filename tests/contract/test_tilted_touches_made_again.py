@@ -8,6 +8,7 @@ import pytest
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
+from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
 from robolink.methods import (
     AxisTeachPlan,
     PivotSource,
@@ -19,7 +20,6 @@ from robolink.methods import (
     informative_tilts,
 )
 from robolink.model import EntryKind, Pose
-from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
 from robolink.procedures import TouchPlan
 from tests.contract._softmotion_cell import served
 from tests.contract.test_calibrate_pivot import FIVE, QUICK

@@ -11,7 +11,7 @@ from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
 from robolink import ToolOffset
-from robolink.controllers.softmotion.tools.orientation_images import (
+from robolink.controllers.softmotion.kinematics import (
     NoOrientationImageError,
     OrientationImages,
 )

@@ -13,6 +13,7 @@ from robolink_simulators.assist.port import InProcessEyes
 
 import robolink
 from robolink.calibration import NeedleLimits
+from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
 from robolink.errors import CalibrationError, DeclinedError
 from robolink.methods import (
     NAngleSource,
@@ -21,7 +22,6 @@ from robolink.methods import (
     difference_from_last,
 )
 from robolink.model import EntryKind
-from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
 from robolink.procedures import SamplingPolicy
 from robolink.runner import Question
 from tests.contract._method_cell import method_cell
@@ -209,7 +209,7 @@ def test_one_touch_that_is_made_again_starts_from_what_is_stored(cell):
 
 
 def test_stations_that_were_found_with_a_tool_are_named_before_it_is_written(cell):
-    from robolink.nozzle_change._station_check import found_with
+    from robolink.calibration_run._station_check import found_with
     from robolink.stations import Found, StationKind, station_entry
 
     with robolink.connect(cell.cell.url) as controller:

@@ -11,10 +11,10 @@ from robolink_cli.prompts.operator import AssistedOperator
 from robolink_simulators.assist.port import InProcessEyes, perform
 
 import robolink
+from robolink.calibration_run import AcceptanceCriteria, ChangePlan, NozzleChange, ToolPlan
 from robolink.errors import CalibrationError, VerifyError
 from robolink.methods import NAngleSource, TwoPoseSource
 from robolink.model import EntryKind
-from robolink.nozzle_change import AcceptanceCriteria, ChangePlan, NozzleChange, ToolPlan
 from robolink.procedures import TouchPlan
 from robolink.runner import TouchedAt
 from tests.contract._method_cell import method_cell, on

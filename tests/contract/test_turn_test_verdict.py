@@ -6,9 +6,9 @@ from itertools import count
 import pytest
 
 from robolink.calibration import Drift, TurnClaim, VerifyResult
+from robolink.calibration_run import Attended, _records, conclude_turn_test
 from robolink.errors import NotAllowedError, VerifyError
 from robolink.model import EntryKind, Pose
-from robolink.nozzle_change import Attended, _records, conclude_turn_test
 from robolink.testing import MemoryController
 
 BEAMS = TurnClaim(

@@ -5,10 +5,10 @@ from typing import Any
 import pytest
 
 import robolink
+from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
 from robolink.errors import CalibrationError, VerifyError
 from robolink.methods import NAngleSource, TwoPoseSource
 from robolink.model import EntryKind
-from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
 from tests.contract._method_cell import method_cell
 from tests.contract.test_touches_made_again import Undecided
 

@@ -29,7 +29,7 @@ import robolink.stopping
 import robolink.transaction
 import robolink.transport.modbus.frames
 import robolink.transport.modbus.opening
-import robolink.transport.stream.tcp
+import robolink.transport.tcp
 
 _ALL_OF = (
     robolink.controllers,

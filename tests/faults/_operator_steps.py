@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Final, Literal
 
-from robolink.controllers.epson.link.session import EpsonSession
-from robolink.controllers.softmotion.link.wire import MailboxWire
+from robolink.controllers.epson.session import EpsonSession
+from robolink.controllers.softmotion.wire import MailboxWire
 from robolink.journal import JournalOutcomeLog
 from robolink.journal.store.store import Store, Tables
 from robolink.protocols.epson_text import Refusal, Reply

@@ -156,6 +156,12 @@ class RecipeCell(ABC):
             assert (done := self.run(*words)).code == 0, done.err
         assert self.moves_asked() == asked + 1
 
+    def come_to_rest(self) -> None:
+        """Let a movement end that goes on without its client."""
+        while self.moving:
+            self.clock.sleep(0.1)
+            self._hosted.advance(self.clock.now_ns())
+
     def requests(self) -> list[str]:
         """Return what came in so far."""
         return [text for _, direction, text in self._hosted.log if direction == ">"]

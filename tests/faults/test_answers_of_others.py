@@ -18,7 +18,7 @@ from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
 from robolink import ToolOffset
-from robolink.controllers.epson.tools.table import EpsonToolTable
+from robolink.controllers.epson.tools import EpsonToolTable
 from robolink.errors import RemoteProtocolError, RobolinkError, TransportError
 from robolink.protocols import spel
 from tests.contract._softmotion_cell import served

@@ -8,7 +8,7 @@ from contextlib import closing
 import pytest
 
 from robolink.journal import open_journal
-from robolink.journal._traces import leave_trace
+from robolink.journal._journal_loss import leave_trace
 from robolink.model import EntryKind, ToolOffset
 from robolink.protocols.spel_callback import CallbackLine, CallbackWord, encode_line
 from robolink.serving import CallbackConversation, CallbackLimits

@@ -20,8 +20,7 @@ from robolink.errors import RobolinkError, TransportError
 from robolink.model import ToolOffset
 from robolink.timing import Deadline, SystemClock
 from robolink.transport import parse_url
-from robolink.transport.stream.dial import dial
-from robolink.transport.stream.tcp import TcpTransport
+from robolink.transport.tcp import TcpTransport, dial
 from tests.faults._far_computer import far_computer
 from tests.peers._faulty_proxy import SerialProxy
 

@@ -28,7 +28,7 @@ import robolink
 from robolink import ambient
 from robolink.errors import LeaseHeldError, LeaseLostError, TransportTimeoutError
 from robolink.journal import open_journal
-from robolink.journal.store import engines
+from robolink.journal.store import connection
 from robolink.model import Marker, MarkerKind
 from tests._patience import PATIENCE_S
 from tests.faults._client_process import ClientProcess
@@ -103,7 +103,7 @@ sys.stdin.read()
 def test_f63_a_record_that_another_process_keeps_locked_is_waited_for_and_then_refused(
     cell, monkeypatch
 ):
-    monkeypatch.setattr(engines, "BUSY_S", 0.3)
+    monkeypatch.setattr(connection, "BUSY_S", 0.3)
     assert cell.run("tool", "set", "2", "--x", "1", "--yes").code == 0
     path = cell.state_folder / "journal.db"
     command = [sys.executable, "-c", HOLD, str(path)]

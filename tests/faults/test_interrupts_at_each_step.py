@@ -18,10 +18,10 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process.epson import register, unregister
 
 import robolink
+from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
 from robolink.interrupts import InterruptGate
 from robolink.journal import JournalOutcomeLog, memory_journal
 from robolink.model import describe_offset
-from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
 from tests._patience import PATIENCE_S
 from tests.faults._client_process import ClientProcess
 from tests.faults._nozzle_cell import MOVE, OLD_TIP, NozzleCell, served_cell

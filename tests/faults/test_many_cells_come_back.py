@@ -10,7 +10,7 @@ from robolink_simulators.hosting.streams.epson import serve_tcp
 
 import robolink
 from robolink.controllers import connect_when_reachable
-from robolink.controllers.reaching import FIRST_PAUSE_S, LONGEST_PAUSE_S
+from robolink.controllers.registry import FIRST_PAUSE_S, LONGEST_PAUSE_S
 from robolink.errors import (
     ConfigError,
     ConnectError,

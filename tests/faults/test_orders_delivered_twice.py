@@ -6,7 +6,6 @@ taken, under the marker ``soak`` all.
 """
 
 import json
-from collections import Counter
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from itertools import count
@@ -26,6 +25,8 @@ from tests._patience import PATIENCE_S
 from tests.faults._change_cell import ChangeCell, Step, change_cell
 from tests.faults._change_process import NEW, OLD, ORDER, PROGRAMS, CommitStep
 from tests.faults._client_process import ClientProcess
+from tests.faults._deaths import Deaths
+from tests.faults._epson_recipe_cell import EpsonRecipeCell
 from tests.faults._nozzle_cell import OLD_TIP, NozzleCell, served_cell
 from tests.faults._softmotion_change_cell import plc_change_cell
 from tests.faults._steps import MOMENTS, Moment
@@ -207,27 +208,51 @@ def test_f79_a_change_killed_at_its_write_and_delivered_again_is_made_once(tmp_p
     check_killed_at(tmp_path / "cell", monkeypatch, write)
 
 
-@pytest.mark.soak
-@pytest.mark.parametrize("share", range(KILL_SHARES))
+def words_of_the_order(cell: EpsonRecipeCell, folder: Path) -> list[str]:
+    recipe = folder / "touch.toml"
+    recipe.write_text(RECIPE)
+    return ["change", str(recipe), "--order", ORDER, "--yes", "--json", "--assist", cell.url]
+
+
+def check_delivered_again(cell: EpsonRecipeCell, words: list[str]) -> None:
+    """The order of a change that was killed is carried out once, however often it is delivered."""
+    cell.come_to_rest()
+    if cell.open_markers():
+        moves, writes = cell.moves_begun, cell.writes()
+        assert cell.run(*words).code == 6
+        assert (cell.moves_begun, cell.writes()) == (moves, writes)
+        assert cell.run("recover", "--yes").code == 0
+    cell.simulator.machine.motors_on = True
+    first = cell.run(*words)
+    assert first.code == 0, first.err
+    assert cell.changed() == {1}
+    made, moves, writes = cell.tools(), cell.moves_begun, cell.writes()
+    again = cell.run(*words)
+    assert again.code == 0, again.err
+    assert (cell.tools(), cell.moves_begun, cell.writes()) == (made, moves, writes)
+    told = json.loads(again.out)
+    assert (told["order"], told["already_done"]) == (ORDER, True)
+    assert told == {**json.loads(first.out), "already_done": True}
+    kept = list(cell.journal.entries(kinds=(EntryKind.ORDER,)))
+    assert [entry.change for entry in kept] == [told["change"]]
+    assert (cell.selected, cell.settings()) == (1, cell.settings_before)
+
+
+@pytest.mark.parametrize("share", [pytest.param(share, marks=SOAK) for share in range(KILL_SHARES)])
 @pytest.mark.fault("F79")
-def test_f79_a_change_killed_at_each_step_and_delivered_again_is_made_once(
-    tmp_path, monkeypatch, share
-):
-    monkeypatch.setattr(NozzleCell, "calibration", property(ordered_change))
-    with served_cell(tmp_path / "whole", monkeypatch) as cell:
-        client = cell.calibrate()
-        assert client.exit_code() == 0, client.err
-        requests = Counter(map(kind_of, cell.requests))
-    instants = [
-        Instant(request, nth, moment)
-        for request, most in requests.items()
-        for nth in range(1, most + 1)
-        for moment in MOMENTS
-    ]
-    mine = instants[share::KILL_SHARES]
-    for number, at in enumerate(mine):
-        check_killed_at(tmp_path / str(number), monkeypatch, at)
-    print(f"{len(mine)} kill points of {len(instants)}")  # noqa: T201 - for pytest -s
+def test_f79_a_change_killed_at_each_step_and_delivered_again_is_made_once(tmp_path, share):
+    cell = EpsonRecipeCell((1,))
+    words = words_of_the_order(cell, tmp_path)
+    deaths = Deaths(
+        lambda instant: instant % KILL_SHARES == share,
+        lambda: check_delivered_again(cell, words),
+    )
+    with deaths.deadly():
+        ended = cell.run(*words, instants=deaths)
+    cell.close()
+    assert ended.code == 0, ended.err
+    assert deaths.told == []
+    print(f"{len(range(share, deaths.chances, KILL_SHARES))} kill points of {deaths.chances}")  # noqa: T201 - for pytest -s
 
 
 _desks = count()

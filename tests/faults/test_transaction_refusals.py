@@ -11,10 +11,10 @@ from robolink_simulators.epson.world import STORED
 from robolink_simulators.hosting.in_process.epson import register, unregister
 
 import robolink
+from robolink.calibration_run import ChangePlan, Listener, NozzleChange, ToolPlan
 from robolink.errors import CalibrationError, DeclinedError, VerifyError
 from robolink.journal import memory_journal
 from robolink.model import EntryKind, Signature, ToolReceipt, read_offset
-from robolink.nozzle_change import ChangePlan, Listener, NozzleChange, ToolPlan
 from robolink.transaction import earlier_corrections
 
 _names = count()

@@ -15,7 +15,7 @@ from robolink_cli.console.exit_codes import USAGE
 
 from robolink.errors import JournalError
 from robolink.journal import open_journal
-from robolink.journal.store import engines
+from robolink.journal.store import connection
 from robolink.model import EntryKind, NewEntry
 from tests.faults._nozzle_cell import OLD_TIP, NozzleCell, served_cell
 from tests.faults._requests import changes
@@ -26,14 +26,14 @@ NOBODY = 65534
 @contextmanager
 def full_disk(path, monkeypatch):
     """Let the file have no more pages than it has, as a full disk would."""
-    prepare = engines._prepare
+    prepare = connection._prepare
 
     def prepared(connection):
         prepare(connection)
         connection.execute("PRAGMA max_page_count = 1")  # SQLite takes what it has got already
 
     open_journal(str(path)).close()
-    monkeypatch.setattr(engines, "_prepare", prepared)
+    monkeypatch.setattr(connection, "_prepare", prepared)
     log = open_journal(str(path)).log("somebody else")
     with pytest.raises(JournalError, match="disk is full"):
         for _ in range(1000):
@@ -78,7 +78,7 @@ def newer(path, monkeypatch):
 @contextmanager
 def locked(path, monkeypatch):
     """Let another program write for a long time."""
-    monkeypatch.setattr(engines, "BUSY_S", 0.1)
+    monkeypatch.setattr(connection, "BUSY_S", 0.1)
     other = sqlite3.connect(path, isolation_level=None)
     other.execute("BEGIN IMMEDIATE")
     try:

@@ -11,7 +11,7 @@ from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.hosting.in_process.transport import InProcessTransport
 
 from robolink.controllers import open_epson
-from robolink.controllers.epson.link.line import text_line
+from robolink.controllers.epson.line import text_line
 from robolink.errors import RemoteProtocolError, RobolinkError
 from robolink.journal import memory_journal
 from robolink.model import ANY, Signature, ToolOffset

@@ -9,9 +9,7 @@ from robolink_simulators.plc.frames import LineFrames, PlcRequest, TcpFrames
 from robolink.errors import RobolinkError
 from robolink.transport.can.bus import CanLine
 from robolink.transport.can.mailbox import CanopenMailboxLink
-from robolink.transport.modbus.frames import RtuFraming, TcpFraming
-from robolink.transport.modbus.framing import FrameError
-from robolink.transport.modbus.messages import Area, ModbusRequest
+from robolink.transport.modbus.frames import Area, FrameError, ModbusRequest, RtuFraming, TcpFraming
 from tests.fuzz._mutating import BYTES, edited_bytes, fuzzed
 from tests.unit._scripted_can import IDENTITY, NODE, SDO_ANSWER, SDO_ASK, FakeClock, ScriptedBus
 

@@ -19,11 +19,11 @@ import pytest
 from tests.mutants.lines import FOLDER
 from tests.mutants.places import PACKAGES, ROOT
 
-_NAME: Final = os.environ.get("PYTEST_XDIST_WORKER", "main")
 _FOLDER: Final = Path(os.environ[FOLDER])
 
 _coverage: Final = coverage.Coverage(
-    data_file=str(_FOLDER / f"lines.{_NAME}"),
+    data_file=str(_FOLDER / "lines"),
+    data_suffix=True,  # one of its own for every process
     source=[str(ROOT / folder) for folder in PACKAGES],
     config_file=False,
 )
@@ -41,14 +41,14 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     finally:
         _coverage.switch_context("")
         row = {"test": item.nodeid, "cpu_s": round(time.process_time() - begun_s, 4)}
-        with (_FOLDER / f"costs.{_NAME}.jsonl").open("a", encoding="utf-8") as file:
+        with (_FOLDER / f"costs.{os.getpid()}.jsonl").open("a", encoding="utf-8") as file:
             file.write(json.dumps(row) + "\n")
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
     """Note each test that fails here: it cannot judge a mutant."""
     if report.failed:
-        with (_FOLDER / f"failed.{_NAME}.jsonl").open("a", encoding="utf-8") as file:
+        with (_FOLDER / f"failed.{os.getpid()}.jsonl").open("a", encoding="utf-8") as file:
             file.write(json.dumps({"test": report.nodeid}) + "\n")
 
 

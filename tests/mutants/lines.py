@@ -70,7 +70,8 @@ def record(folder: Path) -> None:
     shutil.rmtree(batch, ignore_errors=True)
     batch.mkdir(parents=True)
     asked = changed if known else ["tests"]
-    command = [sys.executable, "-m", "pytest", "-p", "tests.mutants.contexts", "-q", "-n", "2"]
+    command = [sys.executable, "-m", "pytest", "-p", "tests.mutants.contexts", "-q"]
+    command += ["--processes", "2"]
     with (batch / "output").open("wb") as output:
         subprocess.run(
             [*command, "--timeout=240", *asked],

@@ -161,8 +161,8 @@ def test_what_a_page_of_the_api_names_has_a_page():
 @pytest.mark.parametrize(
     ("module", "owners", "target", "there"),
     [
-        ("robolink.model.motion.movement", ("WorkBox",), "about", True),
-        ("robolink.model.motion.movement", ("WorkBox",), "above", False),
+        ("robolink.model._movement", ("WorkBox",), "about", True),
+        ("robolink.model._movement", ("WorkBox",), "above", False),
         ("robolink.methods.given_poses", (), "TwoTouches", True),
         ("robolink.methods.given_poses", (), "robolink.procedures.TipSource", True),
         ("robolink.methods.given_poses", (), "robolink.procedures.TipSink", False),

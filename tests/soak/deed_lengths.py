@@ -1,6 +1,6 @@
 """``python -m tests.soak.deed_lengths [KIND ..]``: measure how long each deed is, undisturbed.
 
-Prints the rows of ``robolink_simulators/soak/drawing/lengths.py``: the least of three runs of each
+Prints the rows of ``tests/soak/adversary/deed_lengths.py``: the least of three runs of each
 deed, so that what is placed within it is met.
 """
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from robolink.controllers.epson.tools.table import EpsonToolTable
+from robolink.controllers.epson.tools import EpsonToolTable
 from robolink.model import MarkerKind
 from robolink.standing import UNTOUCHED
 from tests.soak import stand_ins
@@ -40,24 +40,24 @@ class KnownDefect:
 _NOTERS: Final = (
     "robolink.controllers.controller_core",
     "robolink.controllers.markers",
-    "robolink.model.record.ledger",
+    "robolink.model._ledger",
     "robolink.transaction._change",
 )
-_WIRE: Final = "robolink.controllers.softmotion.link.wire.MailboxWire.ended"
-_COMMANDS: Final = "robolink.controllers.softmotion.link.commands"
+_WIRE: Final = "robolink.controllers.softmotion.wire.MailboxWire.ended"
+_COMMANDS: Final = "robolink.controllers.softmotion.commands"
 _SENDER: Final = f"{_COMMANDS}.CommandSender"
 _CORE: Final = "robolink.controllers.controller_core.ControllerCore"
-_GROUP: Final = "robolink.controllers.softmotion.motion.group"
+_GROUP: Final = "robolink.controllers.softmotion.group"
 _BEGIN: Final = "robolink.controllers.markers.MarkerStore.begin"
-_SESSION: Final = "robolink.controllers.epson.link.session.EpsonSession"
+_SESSION: Final = "robolink.controllers.epson.session.EpsonSession"
 
 _THREAD: Final = "stops from a second thread"
 _RECALIBRATION: Final = "stops in a whole recalibration"
 _PROXY: Final = "disturbed runs"
 _REAL_DRIVERS: Final = "kinds of defects that real drivers had"
-_MOVEMENT: Final = "robolink.controllers.epson.motion.movement"
-_EPSON_GROUP: Final = "robolink.controllers.epson.motion.group.EpsonGroup"
-_EPSON_TOOLS: Final = "robolink.controllers.epson.tools.table.EpsonToolTable"
+_MOVEMENT: Final = "robolink.controllers.epson.movement"
+_EPSON_GROUP: Final = "robolink.controllers.epson.group.EpsonGroup"
+_EPSON_TOOLS: Final = "robolink.controllers.epson.tools.EpsonToolTable"
 
 DEFECTS: Final = (
     KnownDefect(
@@ -94,8 +94,8 @@ DEFECTS: Final = (
         {
             f"{place}.bring_to_rest": stand_ins.stop_not_looked_after
             for place in (
-                "robolink.controllers.epson.motion.group",
-                "robolink.controllers.epson.link.stopping",
+                "robolink.controllers.epson.group",
+                "robolink.controllers.epson.rest",
             )
         },
         CellKind.EPSON,
@@ -145,7 +145,7 @@ DEFECTS: Final = (
     ),
     KnownDefect(
         "what the journal commits is not synced",
-        {"robolink.journal.store.engines._prepare": stand_ins.not_synced},
+        {"robolink.journal.store.connection._prepare": stand_ins.not_synced},
     ),
     KnownDefect(
         "an error of the journal's disk is one of the database's",
@@ -198,7 +198,7 @@ DEFECTS: Final = (
     ),
     KnownDefect(
         "recover keeps what nobody verified",
-        {"robolink.transaction._recovery.Settler": stand_ins.keeping},
+        {"robolink.transaction._settling.Settler": stand_ins.keeping},
     ),
     KnownDefect(
         "the answer to a write is taken for its proof",
@@ -214,13 +214,13 @@ DEFECTS: Final = (
         "who only presses ENTER gets a proof",
         {
             "robolink.procedures.witnessed_touches.TouchPlan.__init__": stand_ins.nominal,
-            "robolink.nozzle_change._turn_verdict.require_proved": stand_ins.nothing,
+            "robolink.calibration_run._turn_test.require_proved": stand_ins.nothing,
         },
         found_by="careless people",
     ),
     KnownDefect(
         "a tool change after a restart of the PLC goes on",
-        {"robolink.controllers.softmotion.link.snapshots.Snapshots._other_plc": stand_ins.nothing},
+        {"robolink.controllers.softmotion.snapshots.Snapshots._other_plc": stand_ins.nothing},
         CellKind.SOFTMOTION,
         found_by="users of pyads",
     ),
@@ -258,17 +258,13 @@ DEFECTS: Final = (
     ),
     KnownDefect(
         "power and speed are not put back",
-        {
-            "robolink.controllers.epson.tools.preserve.EpsonPreserver._restore_more": (
-                stand_ins.nothing
-            )
-        },
+        {"robolink.controllers.epson.preserve.EpsonPreserver._restore_more": (stand_ins.nothing)},
         CellKind.EPSON,
         found_by=_REAL_DRIVERS,
     ),
     KnownDefect(
         "undo sorts by the wall clock",
-        {"robolink.transaction._undo_history._newest_done": stand_ins.newest_by_the_clock},
+        {"robolink.transaction._undo._newest_done": stand_ins.newest_by_the_clock},
         found_by=_REAL_DRIVERS,
     ),
     KnownDefect(
@@ -292,7 +288,7 @@ DEFECTS: Final = (
     ),
     KnownDefect(
         "a movement that nobody waits on goes on when the session ends",
-        {"robolink.controllers.epson.motion.group.EpsonGroup.abort_unfinished": stand_ins.nothing},
+        {"robolink.controllers.epson.group.EpsonGroup.abort_unfinished": stand_ins.nothing},
         CellKind.EPSON,
         found_by=_REAL_DRIVERS,
     ),

@@ -14,15 +14,14 @@ from typing import Any
 from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.controllers.controller_core import ControllerCore
 from robolink.controllers.epson.controller import EpsonController
-from robolink.controllers.epson.link.requests import command_class_of
-from robolink.controllers.epson.link.session import EpsonSession
-from robolink.controllers.epson.motion.group import EpsonGroup
+from robolink.controllers.epson.group import EpsonGroup
+from robolink.controllers.epson.session import EpsonSession, command_class_of
 from robolink.controllers.markers import MarkerStore
-from robolink.controllers.softmotion.link.commands import CommandSender
+from robolink.controllers.softmotion.commands import CommandSender
 from robolink.controllers.tool_table import ToolTableCore
 from robolink.errors import RobolinkError, TransportTimeoutError
 from robolink.journal._lease import Grip, Lease
-from robolink.journal.store import engines
+from robolink.journal.store import connection
 from robolink.model import (
     EntryKind,
     Finding,
@@ -39,7 +38,7 @@ from robolink.protocols.epson_text import parse_status
 from robolink.stop_latch import StopLatch
 from robolink.timing import wall_label
 from robolink.transaction import _put_back as putting_back
-from robolink.transaction import _undo_history as undo_history
+from robolink.transaction import _undo as undo_history
 from robolink.transaction._settling import Settler
 
 Function = Callable[..., Any]
@@ -200,7 +199,7 @@ def unread(tools: Any, marker: Marker) -> Finding:
     return Finding(marker, Verdict.NOT_APPLIED, "it did not take", entries=(entry,))
 
 
-_prepare = engines._prepare
+_prepare = connection._prepare
 
 
 def not_synced(connection: sqlite3.Connection) -> None:

@@ -484,6 +484,22 @@ HISTORIES = (
             ),
         ),
     ),
+    History(
+        892864113,
+        CellKind.EPSON_SERIAL,
+        (
+            Hour(12, Deed.CHANGE_NOZZLE, Habit(), ()),
+            Hour(
+                13,
+                Deed.SET_TOOL,
+                Habit(),
+                (
+                    Disturbance(Hindrance.STOP, "", "commit", 1, 0.0, None),
+                    Disturbance(Hindrance.LINE, "SWAP_ANSWERED", "TLSet", 2, 0.0, 23),
+                ),
+            ),
+        ),
+    ),
 )
 HALF_A_FILE = drawn_history(919893192, 20)
 """A PLC over Modbus TCP, and a journal whose rows came back empty."""

@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from robolink.model import Marker, MarkerKind, plain_offset
-from robolink.serving._book import ProgramChange
+from robolink.serving._callback_journal import ProgramChange
 from tests.soak.adversary import CellKind, live_through, run
 from tests.soak.adversary.drawn_hours import deeds_of
 from tests.soak.adversary.history import Habit, History, Hour

@@ -24,14 +24,14 @@ PLACES = [Path(robolink.__file__).parent, Path(robolink_cli.__file__).parent]
 PRIMITIVES = {
     "runner/_yes_no.py",
     "prompts/questions.py",
-    "wizard/choices.py",
+    "wizard/state.py",
     "session/check_before_start.py",
 }
 """Where a person is asked for a word, and the answer is kept."""
 
 NO_VALUE_RESTS_ON_IT = {
     "runner/_place_question.py",  # a place: the pose and how it was touched are in the measurement
-    "commands/companions/map_comparison.py",  # what an HMI shows: kept with its map
+    "commands/companions/check_map.py",  # what an HMI shows: kept with its map
 }
 
 

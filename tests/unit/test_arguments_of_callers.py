@@ -11,7 +11,7 @@ import robolink
 from robolink import ANY, ToolOffset
 from robolink.errors import ConfigError, ToolIndexError
 from robolink.model import Pose, WorkBox
-from robolink.model.motion.movement import MotionProfile
+from robolink.model._movement import MotionProfile
 
 
 @pytest.fixture
@@ -59,7 +59,7 @@ def test_an_offset_is_a_tool_offset(controller):
 
 
 @pytest.mark.parametrize(
-    "target", [(1, 2, 3, 4), replace(Pose(1, 2, 3, 4), x_mm=cast(Any, "1")), None]
+    "target", [(1, 2, 3, 4), replace(Pose(1, 2, 3, 4), x_mm=cast("Any", "1")), None]
 )
 def test_a_target_is_a_pose(controller, target):
     box = WorkBox(-500, 500, -500, 500, -500, 500)
@@ -75,7 +75,7 @@ def test_what_is_neither_url_nor_controller_is_refused(url):
 
 def test_the_action_of_a_fault_may_be_a_word_and_nothing_else():
     plan = FaultPlan(seed=1)
-    plan.add(Fault(cast(Any, "drop_reply")))
+    plan.add(Fault(cast("Any", "drop_reply")))
     assert plan.pending[0].action is FaultAction.DROP_REPLY
     with pytest.raises(ConfigError, match="no fault 'drop_replies'"):
-        Fault(cast(Any, "drop_replies"))
+        Fault(cast("Any", "drop_replies"))

@@ -15,11 +15,11 @@ from robolink_simulators.epson.condition import Condition
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.variables import Variables
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.epson.spel.programs.loading import load_project
+from robolink_simulators.epson.spel.programs.program_load import load_project
 from robolink_simulators.epson.spel.session import Session
 from robolink_simulators.epson.spel.tasks.ports import Ports
 from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
-from robolink_simulators.epson.time_stepping import LAST_COUNT, Companion
+from robolink_simulators.epson.stepped_controller import LAST_COUNT, Companion
 
 from robolink.model import ToolOffset
 

@@ -3,7 +3,7 @@
 import pytest
 from robolink_simulators.cell.clock import ManualClock
 
-from robolink.controllers.epson.link.stopping import REST_S, bring_to_rest
+from robolink.controllers.epson.rest import REST_S, bring_to_rest
 from robolink.errors import BusyError, OutcomeUnknownError, RejectedError
 from robolink.protocols.epson_text import Reply
 from robolink.timing import NS_PER_S

@@ -3,9 +3,9 @@
 import pytest
 
 from robolink.calibration import CalibrationResult
+from robolink.calibration_run import AcceptanceCriteria, Proposal
 from robolink.errors import CalibrationError
 from robolink.model import ToolOffset
-from robolink.nozzle_change import AcceptanceCriteria, Proposal
 
 BEFORE = ToolOffset(12.0, -3.5, -20.0)
 XY, XYZ = ("x_mm", "y_mm"), ("x_mm", "y_mm", "z_mm")

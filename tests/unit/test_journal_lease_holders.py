@@ -10,7 +10,7 @@ import pytest
 from robolink_simulators.cell.clock import ManualClock
 
 from robolink.errors import LeaseHeldError
-from robolink.journal._sightings import LEASE_S
+from robolink.journal._lease_view import LEASE_S
 from tests.unit._lease_logs import (
     ANNA,
     BERT,

@@ -4,7 +4,7 @@ import pytest
 
 from robolink.errors import JournalError, LeaseHeldError, LeaseLostError
 from robolink.journal._lease import BEAT_S
-from robolink.journal._sightings import LEASE_S
+from robolink.journal._lease_view import LEASE_S
 from robolink.model import EntryKind, NewEntry
 from tests.unit._lease_logs import ANNA, BERT, HERE, IDENTITY, leases_in_memory, marker
 

@@ -9,7 +9,7 @@ import pytest
 from robolink.errors import JournalError
 from robolink.journal import default_location
 from robolink.journal._places import place_of
-from robolink.journal.store.engines import parameters_of
+from robolink.journal.store.connection import parameters_of
 
 
 @pytest.fixture(autouse=True)

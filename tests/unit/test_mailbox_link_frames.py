@@ -1,18 +1,27 @@
 """Modbus frames: what is taken for an answer, and what is not."""
 
+import struct
 from contextlib import suppress
 from itertools import pairwise
 
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
+from pymodbus.exceptions import ModbusIOException
 from pymodbus.framer import FramerRTU, FramerSocket
-from pymodbus.pdu import DecodePDU
+from pymodbus.pdu import DecodePDU, ModbusPDU
+from pymodbus.pdu.bit_message import (
+    ReadCoilsRequest,
+    ReadDiscreteInputsRequest,
+    WriteSingleCoilRequest,
+)
+from pymodbus.pdu.register_message import (
+    ReadHoldingRegistersRequest,
+    ReadInputRegistersRequest,
+    WriteMultipleRegistersRequest,
+)
 
-from robolink.transport.modbus.frames import RtuFraming, TcpFraming
-from robolink.transport.modbus.framing import FrameError
-from robolink.transport.modbus.messages import Area, ModbusRequest
-from robolink.transport.modbus.register_frames import RegisterRtuFraming, RegisterTcpFraming
+from robolink.transport.modbus.frames import Area, FrameError, ModbusRequest, RtuFraming, TcpFraming
 
 READ = ModbusRequest(unit=5, function=4, area=Area.INPUT, address=0, count=3)
 WRITE = ModbusRequest(unit=5, function=16, area=Area.HOLDING, address=7, count=2, values=(1, 2))
@@ -162,53 +171,131 @@ def test_addresses_have_the_numbers_that_manuals_print(area, address, reference)
     assert area.reference(address) == reference
 
 
+AREAS = {1: Area.COILS, 2: Area.DISCRETE, 3: Area.HOLDING, 4: Area.INPUT, 5: Area.COILS}
+
+
+def asked(function, unit, address, words):
+    """Return a request of any function that the client sends."""
+    if function == 5:
+        return ModbusRequest(unit, 5, Area.COILS, address, 1, (words[0] & 1,))
+    values = tuple(words) if function == 16 else ()
+    area = AREAS.get(function, Area.HOLDING)
+    return ModbusRequest(unit, function, area, address, len(words), values)
+
+
 REQUESTS = st.builds(
-    lambda function, unit, address, words: ModbusRequest(
-        unit=unit,
-        function=function,
-        area=Area.INPUT if function == 4 else Area.HOLDING,
-        address=address,
-        count=len(words),
-        values=tuple(words) if function == 16 else (),
-    ),
-    st.sampled_from([3, 4, 16]),
+    asked,
+    st.sampled_from([1, 2, 3, 4, 5, 16]),
     st.integers(1, 247),
     st.integers(0, 0xFFFF - 123),
     st.lists(st.integers(0, 0xFFFF), min_size=1, max_size=123),
 )
+ASKED_BY_PYMODBUS = {
+    1: ReadCoilsRequest,
+    2: ReadDiscreteInputsRequest,
+    3: ReadHoldingRegistersRequest,
+    4: ReadInputRegistersRequest,
+}
 
 
-@settings(max_examples=60, deadline=None)
+def payload_by_pymodbus(request):
+    """Return what pymodbus sends for a request."""
+    if request.function == 16:
+        pdu: ModbusPDU = WriteMultipleRegistersRequest(
+            address=request.address, registers=list(request.values)
+        )
+    elif request.function == 5:
+        pdu = WriteSingleCoilRequest(address=request.address, bits=[bool(request.values[0])])
+    else:
+        pdu = ASKED_BY_PYMODBUS[request.function](address=request.address, count=request.count)
+    return bytes([pdu.function_code]) + pdu.encode()
+
+
+@settings(max_examples=80, deadline=None)
 @given(request=REQUESTS, transaction=st.integers(1, 0xFFFF))
-def test_a_stop_sends_the_bytes_that_pymodbus_sends(request, transaction):
-    assert RegisterTcpFraming().pack(request, transaction) == TcpFraming().pack(
-        request, transaction
-    )
-    assert RegisterRtuFraming().pack(request, 0) == RtuFraming().pack(request, 0)
+def test_a_request_has_the_bytes_that_pymodbus_sends(request, transaction):
+    payload = payload_by_pymodbus(request)
+    assert TcpFraming().pack(request, transaction) == tcp(payload, transaction, request.unit)
+    assert RtuFraming().pack(request, 0) == rtu(payload, request.unit)
+
+
+def words_of(*numbers):
+    return b"".join(number.to_bytes(2, "big") for number in numbers)
 
 
 PAYLOADS = st.one_of(
-    st.lists(st.integers(0, 0xFFFF), min_size=1, max_size=112).map(read_answer),
-    st.tuples(st.integers(0, 0xFFFF), st.integers(1, 123)).map(
-        lambda pair: b"\x10" + pair[0].to_bytes(2, "big") + pair[1].to_bytes(2, "big")
+    st.tuples(WORDS, st.sampled_from([3, 4])).map(lambda pair: read_answer(pair[0][:112], pair[1])),
+    st.tuples(st.sampled_from([1, 2]), st.binary(min_size=1, max_size=40)).map(
+        lambda pair: bytes([pair[0], len(pair[1])]) + pair[1]
     ),
-    st.tuples(st.sampled_from([0x83, 0x84, 0x90]), st.integers(1, 11)).map(bytes),
+    st.tuples(st.integers(0, 0xFFFF), st.sampled_from([0, 0xFF00])).map(
+        lambda pair: b"\x05" + words_of(*pair)
+    ),
+    st.tuples(st.integers(0, 0xFFFF), st.integers(1, 123)).map(
+        lambda pair: b"\x10" + words_of(*pair)
+    ),
+    st.tuples(st.sampled_from([0x81, 0x82, 0x83, 0x84, 0x85, 0x90]), st.integers(1, 11)).map(bytes),
 )
 
 
-@settings(max_examples=120, deadline=None)
-@given(payload=PAYLOADS, serial=st.booleans(), place=st.integers(0, 300), flip=st.integers(0, 255))
-def test_a_stop_takes_what_pymodbus_takes_and_nothing_else(payload, serial, place, flip):
-    frame = bytearray(rtu(payload) if serial else tcp(payload, 77))
-    # The bytes that say which function it is and how long: another function is for pymodbus.
-    if place < len(frame) and place not in ((1, 2) if serial else (7, 8)):
-        frame[place] ^= flip
-    kinds = (RegisterRtuFraming(), RtuFraming()) if serial else (RegisterTcpFraming(), TcpFraming())
-    seen: list[object] = []
-    for framing in kinds:
+def taken(framing, frame):
+    """Return the reply that a frame gives, ``None`` where it is no frame or not a whole one."""
+    try:
+        return framing.take(bytearray(frame))
+    except FrameError:
+        return None
+
+
+def told_by_pymodbus(payload):
+    """Return function, refusal, values, address and count as pymodbus reads them, if it does."""
+    try:
+        pdu = DecodePDU(False).decode(payload)
+    except (ModbusIOException, IndexError, struct.error):
+        return None
+    if pdu is None:
+        return None
+    refusal = pdu.exception_code if pdu.isError() else None
+    values = tuple(int(value) for value in (*pdu.registers, *pdu.bits))
+    return pdu.function_code & 0x7F, refusal, values, pdu.address, pdu.count
+
+
+def told(reply):
+    return reply.function, reply.refusal, reply.values, reply.address, reply.count
+
+
+@settings(max_examples=150, deadline=None)
+@given(payload=PAYLOADS)
+def test_a_whole_answer_says_what_pymodbus_reads_in_it(payload):
+    for reply in (taken(TcpFraming(), tcp(payload, 77)), taken(RtuFraming(), rtu(payload))):
+        assert reply is not None
+        assert told(reply) == told_by_pymodbus(payload)
+
+
+# A count that was damaged, and two bytes of the answer that are the sum over what it counts.
+CUT_BY_CHANCE = bytes.fromhex("031eb5143dfcd817c99c8d7d1ef24772d706390e1ca9c4f66268a5eeacb3b4eb6c")
+
+
+@settings(max_examples=300, deadline=None)
+@example(payload=CUT_BY_CHANCE, place=0, flip=1, cut=0, more=b"")
+@given(
+    payload=PAYLOADS,
+    place=st.integers(0, 60),
+    flip=st.integers(1, 255),
+    cut=st.integers(0, 3),
+    more=st.binary(max_size=2),
+)
+def test_of_a_damaged_answer_nothing_is_taken_that_pymodbus_refuses(
+    payload, place, flip, cut, more
+):
+    damaged = bytearray(payload[: max(len(payload) - cut, 1)] + more)
+    damaged[place % len(damaged)] ^= flip
+    for framing, frame, head, sum_bytes in (
+        (TcpFraming(), tcp(bytes(damaged), 77), 7, 0),
+        (RtuFraming(), rtu(bytes(damaged)), 1, 2),
+    ):
         buffer = bytearray(frame)
-        try:
-            seen.append((framing.take(buffer), bytes(buffer)))
-        except FrameError:
-            seen.append("no frame")
-    assert seen[0] == seen[1]
+        with suppress(FrameError):
+            reply = framing.take(buffer)
+            if reply is not None:  # judged by the bytes that it was taken from
+                payload_taken = frame[head : len(frame) - len(buffer) - sum_bytes]
+                assert told(reply) == told_by_pymodbus(payload_taken)

@@ -6,8 +6,7 @@ import pytest
 
 from robolink.errors import ConfigError, RemoteProtocolError, TransportTimeoutError
 from robolink.transport.modbus.client import ModbusClient
-from robolink.transport.modbus.frames import RtuFraming
-from robolink.transport.modbus.messages import Area
+from robolink.transport.modbus.frames import Area, RtuFraming
 from robolink.transport.modbus.rtu import RtuExchange, RtuLine
 from tests.unit._scripted_modbus import IDENTITY, ScriptedLine, rtu, words
 

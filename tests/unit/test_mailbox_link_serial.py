@@ -13,7 +13,7 @@ from robolink.errors import (
 )
 from robolink.timing import Deadline, SystemClock
 from robolink.transport import parse_url
-from robolink.transport.stream.serial_port import SerialSettings, open_serial
+from robolink.transport.serial_port import SerialSettings, open_serial
 
 CLOCK = SystemClock()
 

@@ -16,9 +16,9 @@ from robolink.transport import (
     open_modbus,
     parse_url,
 )
-from robolink.transport._url_options import UrlOptions
+from robolink.transport._url import UrlOptions
 from robolink.transport.modbus.mailbox import _take_places
-from robolink.transport.stream.serial_port import SerialSettings, serial_device
+from robolink.transport.serial_port import SerialSettings, serial_device
 
 TCP = "softmotion+modbus-tcp://192.0.2.1:502"
 RTU = "softmotion+modbus-rtu:///dev/no-such-port"

@@ -8,9 +8,7 @@ from typing import Any
 
 import pytest
 
-from robolink.methods import TwoPoseSource, measure_two_pose
-from robolink.model import Marker, MarkerKind, Pose, ToolOffset, WorkBox
-from robolink.nozzle_change import (
+from robolink.calibration_run import (
     AcceptanceCriteria,
     ChangePlan,
     Limits,
@@ -18,8 +16,10 @@ from robolink.nozzle_change import (
     Proposal,
     ToolPlan,
 )
-from robolink.nozzle_change._measuring import offer_of
-from robolink.nozzle_change.open_turn_test import marking
+from robolink.calibration_run import _open_turn_test as marking
+from robolink.calibration_run._measurement import offer_of
+from robolink.methods import TwoPoseSource, measure_two_pose
+from robolink.model import Marker, MarkerKind, Pose, ToolOffset, WorkBox
 from robolink.procedures import MeasurementContext, TouchPlan
 from robolink.testing import MemoryController, PaperCell
 

@@ -5,10 +5,10 @@ from typing import Any
 import pytest
 
 from robolink.calibration import Pin
+from robolink.calibration_run import Limits
 from robolink.errors import DeclinedError
 from robolink.methods import Absolute, NAngleSource, OneTouchSource, TwoPoseSource
 from robolink.model import Pose, ToolOffset
-from robolink.nozzle_change import Limits
 from robolink.procedures import MeasurementContext
 from robolink.testing import MemoryController, MemoryMachine, PaperCell
 

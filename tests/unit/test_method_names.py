@@ -3,7 +3,7 @@
 from robolink.calibration import solve_two_pose
 from robolink.methods import method_names
 from robolink.model import Pose, finding_named_now, method_name_now, with_method_name_now
-from robolink.model.record import method_names as former
+from robolink.model import _journal_entries as former
 
 
 def test_what_was_written_before_is_the_name_of_a_method():

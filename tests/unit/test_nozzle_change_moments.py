@@ -4,10 +4,10 @@ from typing import cast
 
 import pytest
 
+from robolink.calibration_run import ChangePlan, Listener, Moment, NozzleChange, ToolPlan
 from robolink.errors import DeclinedError
 from robolink.methods import PointsSource
 from robolink.model import Pose, ToolOffset
-from robolink.nozzle_change import ChangePlan, Listener, Moment, NozzleChange, ToolPlan
 from robolink.runner import Operator
 from robolink.testing import MemoryController, MemoryMachine
 

@@ -1,14 +1,17 @@
 """A public name that was given up works for one more version, and says what it is now."""
 
+import contextlib
 import importlib
+import inspect
 import pickle
 import warnings
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import ClassVar
 
 import pytest
 
-from robolink import Pose, ToolOffset
+from robolink import Pose, ToolOffset, calibration, drift, journal
 from robolink.deprecation import GONE_IN, OLD_NAMES, deprecated
 from robolink.methods import TwoPoseSource, measure_two_pose
 from robolink.procedures import InputSource, ManualPinSource, TouchPlan
@@ -26,6 +29,12 @@ def told(act):
         warnings.simplefilter("always")
         given = act()
     return caught, given
+
+
+def tried(act, *args, **kwargs):
+    """Call what may fail on what it is given; the warning comes first."""
+    with contextlib.suppress(AttributeError):
+        act(*args, **kwargs)
 
 
 def imported(package, name):
@@ -107,6 +116,56 @@ def test_an_old_method_does_what_it_did_and_warns_where_it_is_called():
         assert (one.category, one.filename) == (DeprecationWarning, __file__)
         assert str(one.message).startswith(message)
     assert Tolerance.doubts.__doc__ == "Return whether it is."
+
+
+def test_a_look_at_a_journal_under_its_old_name_is_the_same_and_warns():
+    here = journal.signature_here("1.0")
+    caught, old = told(lambda: journal.GlancingLog("epson://192.0.2.1:5000", signature=here))
+    new = journal.open_log("epson://192.0.2.1:5000", durable=True, signature=here, glance=True)
+    assert type(old) is type(new)
+    assert old.signature == here
+    assert [one.category for one in caught] == [DeprecationWarning]
+
+
+@pytest.mark.parametrize("given", [(), (8,)], ids=["by name", "last"])
+def test_a_sentence_with_a_sign_of_its_own_warns_and_has_it(given):
+    sentence: Callable[..., str] = calibration.seating_sentence
+    caught, found = told(
+        lambda: sentence(0.1, *given, "~") if given else sentence(0.1, 8, sign="~")
+    )
+    assert found == sentence(0.1, 8).replace("+-", "~") != sentence(0.1, 8)
+    assert [(one.category, one.filename) for one in caught] == [(DeprecationWarning, __file__)]
+
+
+def test_sentences_that_are_yielded_have_the_sign_too():
+    at, tip_mm = "2026-11-22T08:00:00Z", {"x": 12.3, "y": -3.9}
+    change = drift.MeasuredChange(7, at, "c-1", 1, "", "", tip_mm, None, 0.05, 0.024, 0.064)
+    sentences: Callable[..., Iterator[str]] = drift.last_statements
+    caught, found = told(lambda: list(sentences([change], sign="~")))
+    assert found == [one.replace("+-", "~") for one in drift.last_statements([change])]
+    assert "~0.024" in found[0]
+    assert len(caught) == 1
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "accurate_sentence",
+        "largest_row_sentence",
+        "proved_statements",
+        "repeatable_sentence",
+        "seating_sentence",
+        "statement_sentences",
+    ],
+)
+def test_every_sentence_that_took_a_sign_takes_it_and_nothing_else(name):
+    sentence = getattr(calibration, name)
+    assert "sign" not in inspect.signature(sentence).parameters
+    nothing = [None] * len(inspect.signature(sentence).parameters)
+    caught, _ = told(lambda: tried(sentence, *nothing, sign="~"))
+    assert [str(one.message).partition(" is now")[0] for one in caught] == [f"sign of {name}"]
+    with pytest.raises(TypeError, match="positional argument"):
+        sentence(*nothing, "~", "more")
 
 
 def a_source_with_old_hooks():

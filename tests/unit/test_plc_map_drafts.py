@@ -6,7 +6,7 @@ import pytest
 
 from robolink.errors import ConfigError
 from robolink.register_maps import draft_from_csv
-from robolink.register_maps._variable_names import component_of
+from robolink.register_maps._drafts import component_of
 
 
 def draft_of(tmp_path, text):

@@ -5,6 +5,7 @@ from struct import pack, unpack
 
 import pytest
 
+from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
 from robolink.errors import (
     BusyError,
     ConfigError,
@@ -19,7 +20,6 @@ from robolink.errors import (
 )
 from robolink.methods import PointsSource
 from robolink.model import ANY, ToolOffset, Verdict
-from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
 from robolink.register_maps import RegisterTable
 from robolink.runner import Question
 from robolink.transaction import Wanted, change_tools, recover

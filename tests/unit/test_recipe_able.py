@@ -10,9 +10,10 @@ import pytest
 from robolink_cli.commands.shipped.recipe import copy_recipe, models
 
 import robolink
+from robolink.calibration_run import RecipeRun
 from robolink.controllers import capabilities_of_kind
 from robolink.errors import ConfigError, LimitError
-from robolink.recipe import LoadedRecipe, Recipe, RecipeRun, beyond, load_recipe
+from robolink.recipe import LoadedRecipe, Recipe, beyond, load_recipe
 from robolink.standing import standing_after
 from robolink.testing import MemoryController
 

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from robolink.calibration_run import AcceptanceCriteria, Limits, Moment, RecipeRun
 from robolink.config import Cell
 from robolink.errors import ConfigError
 from robolink.methods import (
@@ -26,17 +27,8 @@ from robolink.methods import (
     TwoPoseParameters,
     ZTouchParameters,
 )
-from robolink.nozzle_change import AcceptanceCriteria, Limits, Moment
 from robolink.procedures import TWO_ANGLES_DEG, LookPlan, TouchPlan
-from robolink.recipe import (
-    LoadedRecipe,
-    Output,
-    Prompt,
-    Recipe,
-    RecipeRun,
-    check_recipe,
-    load_recipe,
-)
+from robolink.recipe import LoadedRecipe, Output, Prompt, Recipe, check_recipe, load_recipe
 from robolink.recipe._loading import _checked
 from robolink.testing import MemoryController
 

@@ -7,13 +7,12 @@ from pathlib import Path
 import pytest
 
 from robolink.calibration import CalibrationResult
+from robolink.calibration_run import Proposal
+from robolink.calibration_run._recipe_plan import Reference, proposed
+from robolink.calibration_run._records import touch_details
 from robolink.model import Pose, ToolOffset
-from robolink.nozzle_change import Proposal
-from robolink.nozzle_change._pin_record import touch_details
 from robolink.recipe import load_recipe
 from robolink.recipe._loading import _checked
-from robolink.recipe._proposing import proposed
-from robolink.recipe._reference import Reference
 
 PIVOT = Path(__file__).parents[2] / "examples" / "recipes" / "five-axes-pivot.toml"
 

@@ -5,9 +5,8 @@ import threading
 import pytest
 from robolink_simulators.cell.clock import ManualClock
 
-from robolink.ambient import replaced
-from robolink.ambient.regularly import in_a_thread
-from robolink.controllers.signs_of_life import SignsOfLife
+from robolink.ambient import in_a_thread, replaced
+from robolink.controllers.driver_link import SignsOfLife
 from robolink.errors import TransportClosedError
 from tests.contract._quiet_time import QuietTime
 

@@ -12,7 +12,7 @@ from robolink_simulators.epson.arm.robots import find_robot
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.options import EpsonOptions, SpelNumbers
 from robolink_simulators.epson.spel import Interpreter
-from robolink_simulators.epson.spel.parse import parse
+from robolink_simulators.epson.spel.parser import parse
 
 NUMBERS = SpelNumbers()
 
@@ -220,8 +220,8 @@ def test_whatever_is_sent_ends_in_an_answer(text):
 def test_importing_the_language_builds_no_parser():
     script = (
         "import sys; import robolink_simulators.epson.spel; "
-        "from robolink_simulators.epson.spel import parse; "
-        "print(parse._parser.cache_info().misses)"
+        "from robolink_simulators.epson.spel import parser; "
+        "print(parser._parser.cache_info().misses)"
     )
     paths = os.pathsep.join(filter(None, sys.path))
     ran = subprocess.run(

@@ -1,7 +1,7 @@
 """A controller that passes over time in which nothing happens does what one does that never does.
 
-The shortcuts of ``time_stepping`` rest on what was foreseen last; whatever is foreseen too late, or
-kept too long, shows in an answer, in the truth, or in when the next change is told.
+The shortcuts of ``stepped_controller`` rest on what was foreseen last; whatever is foreseen too
+late, or kept too long, shows in an answer, in the truth, or in when the next change is told.
 """
 
 import random

@@ -2,7 +2,7 @@
 
 import pytest
 from robolink_simulators.epson.condition import SpelRefusal
-from robolink_simulators.epson.spel.parse import _read, filler, marked, parse
+from robolink_simulators.epson.spel.parser import _read, filler, marked, parse
 
 LINES = [
     "Go XY(172.331, -477.810, -96.529, 0.000) /R /0",

@@ -12,7 +12,7 @@ from robolink_simulators.epson.spel.expressions.machine_functions import (
     POINT_FUNCTIONS,
 )
 from robolink_simulators.epson.spel.expressions.state_functions import STATE_FUNCTIONS
-from robolink_simulators.epson.spel.parse import (
+from robolink_simulators.epson.spel.parser import (
     UNSIMULATED,
     UNSIMULATED_FAMILIES,
     UNSIMULATED_FUNCTIONS,

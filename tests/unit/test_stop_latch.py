@@ -5,8 +5,8 @@ import threading
 import pytest
 
 from robolink.checkpoints import Checkpoint, checkpoint, observed
-from robolink.controllers.epson.link.requests import command_class_of
-from robolink.controllers.softmotion.link.commands import command_class_of as class_of_command
+from robolink.controllers.epson.session import command_class_of
+from robolink.controllers.softmotion.commands import command_class_of as class_of_command
 from robolink.errors import NotReadyError, NotReadyReason, OutcomeUnknownError, StoppedError
 from robolink.protocols.epson_text import COMMANDS, Request
 from robolink.protocols.mailbox import Command, Opcode

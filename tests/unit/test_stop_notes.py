@@ -5,8 +5,7 @@ import json
 import pytest
 
 from robolink.files.durable import file_name, state_folder
-from robolink.journal._processes import LeaseHolder
-from robolink.journal._sightings import LeaseSighting
+from robolink.journal._lease_view import LeaseHolder, LeaseView
 from robolink.stopping import clear_note, find_note, leave_note
 
 URL = "epson+tcp://192.168.0.1:5000"
@@ -57,4 +56,4 @@ def test_a_note_of_another_controller_hides_none_of_this_one_and_stays():
 
 @pytest.mark.parametrize("record", ['{"nobody": 1}', "[]", "", "{", '"x"', "[" * 100_000])
 def test_a_record_of_a_holder_that_is_damaged_names_nobody(record):
-    assert LeaseSighting(holder=record).who() == LeaseHolder()
+    assert LeaseView(holder=record).who() == LeaseHolder()

@@ -3,9 +3,16 @@
 import pytest
 from robolink_simulators.faults import Fault, FaultAction
 
-from robolink.errors import ConfigError, LeaseHeldError, NotReadyError, RobolinkError
+from robolink.errors import (
+    ConfigError,
+    LeaseHeldError,
+    NotReadyError,
+    RobolinkError,
+    UnclearAnswerError,
+)
 from robolink.model import EntryKind, Marker, MarkerKind, Verdict, plain_offset
 from robolink.transaction import Recovery, Settler, recover
+from robolink.transaction._put_back import Step, put_back
 from tests.unit._transaction_cell import NEW, OLD, OTHER, tool_cell
 
 
@@ -86,6 +93,41 @@ def test_what_is_not_finished_is_put_back(cell, controller, verify, there):
     assert cell.writes == len(there)
     assert {entry.tool for entry in cell.entries(EntryKind.ROLLED_BACK)} == set(there)
     assert cell.journal.open_markers() == ()
+
+
+def swapped(look, text):
+    """Let the first two of some bytes that are printed of tool 2 change places on the way."""
+    printed = '#Execute," X:  -12.000 Y:   -3.500 Z:  -21.000'
+    at = printed.index(text)
+    return Fault(FaultAction.SWAP_BYTES, look, match="TLSet(2)", position=at)
+
+
+@pytest.mark.fault("F08")
+def test_a_look_that_was_bent_on_its_way_is_no_conflict(cell, controller):
+    """A checksum by XOR does not notice it: -21.000 is read as -12.000."""
+    marker = leave_open(cell)
+    cell.simulator.faults.add(swapped(0, "21.000"))
+    assert Settler(controller).examine(marker).verdict is Verdict.NOT_APPLIED
+    assert cell.simulator.faults.pending == ()
+
+
+def test_looks_that_never_agree_settle_nothing(cell, controller):
+    marker = leave_open(cell)
+    for look, text in enumerate(("21.000", "12.000", "500")):
+        cell.simulator.faults.add(swapped(look, text))
+    with pytest.raises(UnclearAnswerError, match="reads back otherwise at each look") as refused:
+        Settler(controller).examine(marker)
+    assert "Check the cable" in refused.value.remedy
+    assert cell.journal.open_markers() == ((controller.outcomes.identity, marker),)
+
+
+def test_a_bent_look_does_not_leave_a_new_value_behind(cell, controller):
+    """A roll-back that misreads the new value puts the old one back all the same."""
+    cell.put(2, NEW[2])
+    cell.simulator.faults.add(swapped(0, "21.000"))
+    (done,) = put_back(controller, [Step(2, OLD[2], NEW[2])])
+    assert done.restored
+    assert cell.tools[2] == OLD[2]
 
 
 @pytest.mark.fault("F59")

@@ -16,8 +16,7 @@ from robolink.errors import (
 )
 from robolink.timing import Deadline
 from robolink.transport import parse_url
-from robolink.transport.stream.dial import dial
-from robolink.transport.stream.tcp import TcpTransport, open_tcp
+from robolink.transport.tcp import TcpTransport, dial, open_tcp
 
 URL = parse_url("epson+tcp://192.0.2.1:5000")
 ADDRESSES = [

@@ -14,7 +14,7 @@ def main() -> int:
         print("Windows was not tried: this machine lacks", *lacks, sep="\n  ")  # noqa: T201
         return 1
     here = str(Path(__file__).parent)
-    settings = ["-o", "python_files=judge_*.py", "-o", "timeout=1800", "-n", "0"]
+    settings = ["-o", "python_files=judge_*.py", "-o", "timeout=1800"]
     return pytest.main([*settings, "-v", "-rP", here, *sys.argv[1:]])
 
 

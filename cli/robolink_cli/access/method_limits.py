@@ -3,11 +3,11 @@
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from robolink.calibration_run import clearance_too_small
 from robolink.config import USUAL_CHANGE_MM
 from robolink.files.toml import Problem
 from robolink.messages import tr
 from robolink.methods import AnyMethod, Check, all_methods, parameter_problems
-from robolink.nozzle_change import clearance_too_small
 from robolink.stations import StationKind
 
 if TYPE_CHECKING:

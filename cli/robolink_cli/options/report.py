@@ -14,8 +14,8 @@ from robolink_cli.options.declaration import Option
 
 if TYPE_CHECKING:
     from robolink.calibration import Impact, VerifyResult
+    from robolink.calibration_run import Proposal
     from robolink.model import Controller, ControllerFacts, Pose, ToolOffset, ToolReceipt
-    from robolink.nozzle_change import Proposal
     from robolink.report import Outcome, Report, TouchOnRecord
 
 

@@ -8,8 +8,8 @@ from robolink.model import Controller
 
 if TYPE_CHECKING:
     from robolink.calibration import CalibrationResult, VerifyResult
+    from robolink.calibration_run import Proposal
     from robolink.model import Controller, Finding, Pose, ToolOffset, ToolReceipt
-    from robolink.nozzle_change import Proposal
 
 
 COMPONENTS = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
@@ -69,7 +69,7 @@ def proposal_payload(proposal: "Proposal") -> dict[str, object]:
 
 def _touches_payload(poses: "Sequence[Pose]") -> dict[str, object]:
     """Return how each touch was made, as the journal has it; ``None`` where nobody touched."""
-    from robolink.nozzle_change import touches_made  # here, because a status needs no numpy
+    from robolink.calibration_run import touches_made  # here, because a status needs no numpy
 
     return {"touches": None, "standoff_seed": None, **touches_made(poses)}
 

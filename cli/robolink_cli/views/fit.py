@@ -18,16 +18,16 @@ from robolink.calibration import (
     turn_test_headline,
     turn_test_sentences,
 )
-from robolink.messages import tr
-from robolink.methods import NextStep
-from robolink.model import ToolOffset, ToolReceipt, describe_offset
-from robolink.nozzle_change import (
+from robolink.calibration_run import (
     LimitVerdict,
     PlannedStep,
     Proposal,
     ToolReport,
     next_steps,
 )
+from robolink.messages import tr
+from robolink.methods import NextStep
+from robolink.model import ToolOffset, ToolReceipt, describe_offset
 from robolink.runner import TeachPrompt
 from robolink_cli.console.render import next_lines, note, say, table
 from robolink_cli.prompts.present import present_desk

@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
+from robolink.calibration_run import PlannedStep
 from robolink.model import Controller
-from robolink.nozzle_change import PlannedStep
 from robolink_cli.views.documents import pose_payload
 
 

@@ -7,9 +7,9 @@ is refused here is what the runner would refuse too, said before it is sent.
 import math
 from dataclasses import replace
 
+from robolink.calibration_run import ChangeReport
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.nozzle_change import ChangeReport
 from robolink.runner import (
     SETTLING_S,
     FitSubject,

@@ -6,8 +6,8 @@ Each returns the answer to be sent, or the state that only shows what became of 
 from dataclasses import replace
 from typing import Final
 
+from robolink.calibration_run import WriteSubject
 from robolink.messages import tr
-from robolink.nozzle_change import WriteSubject
 from robolink.runner import BACK, MORE, FitSubject, Question
 from robolink_cli.wizard.happenings import KeyPressed, WizardCommand
 from robolink_cli.wizard.keys import folded, meaning_of

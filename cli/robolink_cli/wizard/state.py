@@ -6,10 +6,10 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING, Final
 
+from robolink.calibration_run import ChangeReport, WriteSubject
 from robolink.errors import DeclinedError
 from robolink.messages import tr
 from robolink.model import AnsweredBy, Pose
-from robolink.nozzle_change import ChangeReport, WriteSubject
 from robolink.runner import (
     FINEST_STEP,
     FitSubject,

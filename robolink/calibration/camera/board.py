@@ -4,32 +4,35 @@ Two fiducials (EPSON's CalcBoardTool): the origin is the middle between them and
 direction runs from the second to the first. A drawing that runs from 1 to 2 is off by
 180 degrees (docs/reference/calibration.md 1.3). Both are seen from the flange's own axes, so its
 lean and which way up it hangs go in first (docs/reference/evidence.md 3).
+
+A board with fiducials, as its drawing shows it, and where they are on a tool.
 """
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
 
-from robolink.calibration.camera.camera_model import CameraModel
-from robolink.calibration.camera.camera_uncertainty import (
-    camera_part,
-    camera_sources,
-    print_source,
-)
-from robolink.calibration.camera.sighting import (
+from robolink.calibration.camera.camera_model import (
+    CameraModel,
     Sighting,
     check_sightings,
     plane_gains,
     seen_in_flange,
 )
+from robolink.calibration.camera.camera_uncertainty import (
+    camera_part,
+    camera_sources,
+    print_source,
+)
 from robolink.calibration.core.dispersion import Dispersion
-from robolink.calibration.core.pose_checks import keep_unmeasured
+from robolink.calibration.core.pose_checks import keep_unmeasured, require_finite, require_poses
 from robolink.calibration.core.result import CalibrationResult
-from robolink.calibration.flange_checks import with_height_error
-from robolink.calibration.flange_plane import FlangePlane, TipHeight, height_of
-from robolink.calibration.quality.station_part import with_station
+from robolink.calibration.flange_plane import FlangePlane, TipHeight, height_of, with_height_error
+from robolink.calibration.quality.station import with_station
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.model import ToolOffset
+from robolink.model import ToolOffset, rotate_xy
 
 LEAST_SPACING_MM = 5.0
 
@@ -181,3 +184,42 @@ def check_spacing(spacing_mm: float, nominal_mm: float | None) -> None:
             ),
             remedy=tr("Check which marks the camera found, and its scale."),
         )
+
+
+@dataclass(frozen=True, slots=True)
+class BoardDrawing:
+    """Fiducials of a board, in the axes that its tool is to have.
+
+    Attributes:
+        fiducials_mm: X and Y of each, in the order of their numbers.
+    """
+
+    fiducials_mm: tuple[tuple[float, float], ...]
+
+    @classmethod
+    def of_two(cls, spacing_mm: float) -> "BoardDrawing":
+        """Return EPSON's board: the origin half way between two fiducials, X from 2 to 1."""
+        return cls(((spacing_mm / 2, 0.0), (-spacing_mm / 2, 0.0)))
+
+    @property
+    def is_pair(self) -> bool:
+        """Whether it is such a board."""
+        spacing_mm = math.dist(self.fiducials_mm[0], self.fiducials_mm[1])
+        return self == BoardDrawing.of_two(spacing_mm)
+
+    def require_apart(self) -> None:
+        """Refuse a drawing in which fiducials lie on each other.
+
+        Raises:
+            CalibrationError: ``too_few_poses``, ``non_finite`` or ``coincident_fiducials``.
+        """
+        require_poses(len(self.fiducials_mm), 2)
+        for number, (x, y) in enumerate(self.fiducials_mm, start=1):
+            require_finite(**{f"x of fiducial {number}": x, f"y of fiducial {number}": y})
+        for one, other in combinations(self.fiducials_mm, 2):
+            check_spacing(math.dist(one, other), None)
+
+    def seen_from(self, board: ToolOffset) -> tuple[ToolOffset, ...]:
+        """Return where the fiducials are, seen from the frame that holds the board there."""
+        turned = [rotate_xy(x, y, board.u_deg) for x, y in self.fiducials_mm]
+        return tuple(ToolOffset(board.x_mm + dx, board.y_mm + dy, board.z_mm) for dx, dy in turned)

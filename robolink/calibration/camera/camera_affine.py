@@ -19,7 +19,7 @@ from robolink.calibration.camera.camera_model import (
     require_same_camera,
 )
 from robolink.calibration.core.accuracy import ErrorSource
-from robolink.calibration.core.least_squares import LinearFit, linear_fit
+from robolink.calibration.core.least_squares import Floats, LinearFit, linear_fit
 from robolink.calibration.core.pose_checks import (
     check_poses,
     keep_unmeasured,
@@ -27,11 +27,16 @@ from robolink.calibration.core.pose_checks import (
     require_poses,
 )
 from robolink.calibration.core.result import CalibrationResult, offset_sigma_mm
-from robolink.calibration.core.robust import Floats
-from robolink.calibration.flange_checks import require_flange_in_base, with_height_error
-from robolink.calibration.flange_plane import TipHeight, height_of, known_z_mm, solvable_planes
+from robolink.calibration.flange_plane import (
+    TipHeight,
+    height_of,
+    known_z_mm,
+    require_flange_in_base,
+    solvable_planes,
+    with_height_error,
+)
+from robolink.calibration.quality.doubts import PLANAR_TOLERANCE, Tolerance
 from robolink.calibration.quality.fit_quality import judged
-from robolink.calibration.quality.tolerances import PLANAR_TOLERANCE, Tolerance
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
@@ -173,7 +178,7 @@ def solve_camera_affine(
     result = with_height_error(result, (by_height[0], by_height[1]), height)
     rms_px = _rms_px(camera, residuals) if result.dof else None
     limits.require_fit(rms_px, max(result.half_width95, default=None))
-    doubts = (*result.warnings, *limits.doubts(camera, rms_px))
+    doubts = (*result.warnings, *limits.exceeded(camera, rms_px))
     known = _with_spread(camera, fit, offset_sigma_mm(result), pixels.mean(axis=0).tolist())
     return replace(result, rms_px=rms_px, warnings=doubts, camera=known)
 

@@ -13,9 +13,8 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from robolink.calibration.camera.camera_model import CameraModel
+from robolink.calibration.camera.camera_model import CameraModel, Sighting, check_sightings
 from robolink.calibration.camera.camera_uncertainty import camera_sources
-from robolink.calibration.camera.sighting import Sighting, check_sightings
 from robolink.calibration.camera.up_camera import solve_up_camera
 from robolink.calibration.core.least_squares import linear_fit
 from robolink.calibration.core.pose_checks import (
@@ -25,17 +24,17 @@ from robolink.calibration.core.pose_checks import (
     require_poses,
 )
 from robolink.calibration.core.result import CalibrationResult
-from robolink.calibration.flange_checks import with_height_error
 from robolink.calibration.flange_plane import (
     FlangePlane,
     TipHeight,
     height_of,
     known_z_mm,
     solvable_planes,
+    with_height_error,
 )
 from robolink.calibration.pin.n_angle import solve_n_angle
+from robolink.calibration.quality.doubts import PLANAR_TOLERANCE, Tolerance
 from robolink.calibration.quality.fit_quality import judged
-from robolink.calibration.quality.tolerances import PLANAR_TOLERANCE, Tolerance
 from robolink.model import Pose, ToolOffset
 
 CAMERA_MOVED_MM = 0.1

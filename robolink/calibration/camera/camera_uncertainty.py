@@ -16,11 +16,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Final
 
-from robolink.calibration.camera.camera_model import CameraModel
-from robolink.calibration.camera.sighting import Sighting
+from robolink.calibration.camera.camera_model import CameraModel, Sighting
 from robolink.calibration.core.accuracy import ErrorSource
 from robolink.calibration.flange_plane import FlangePlane
-from robolink.calibration.quality.station_part import StationPart
+from robolink.calibration.quality.station import StationPart
 from robolink.messages import tr
 
 USUAL_MM_PER_PX: Final = 0.02

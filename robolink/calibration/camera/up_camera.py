@@ -10,20 +10,24 @@ is ``R' (tip - flange)``.
 from collections.abc import Sequence
 from dataclasses import replace
 
-from robolink.calibration.camera.camera_model import CameraModel
+from robolink.calibration.camera.camera_model import (
+    CameraModel,
+    Sighting,
+    check_sightings,
+    plane_gains,
+)
 from robolink.calibration.camera.camera_uncertainty import camera_sources
-from robolink.calibration.camera.sighting import Sighting, check_sightings, plane_gains
 from robolink.calibration.core.dispersion import Dispersion
 from robolink.calibration.core.pose_checks import keep_unmeasured
 from robolink.calibration.core.result import CalibrationResult
-from robolink.calibration.flange_checks import with_height_error
 from robolink.calibration.flange_plane import (
     TipHeight,
     height_of,
     known_z_mm,
     solvable_planes,
+    with_height_error,
 )
-from robolink.calibration.quality.station_part import StationPart, with_station
+from robolink.calibration.quality.station import StationPart, with_station
 from robolink.messages import tr
 from robolink.model import ToolOffset
 

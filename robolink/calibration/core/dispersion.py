@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal, Self
 
-from robolink.calibration.core.budget import BudgetRow, UncertaintyBudget
+from robolink.calibration.core.accuracy import BudgetRow, UncertaintyBudget
 from robolink.calibration.core.statistics import f_quantile, student_t95
 from robolink.errors import ConfigError
 from robolink.messages import tr

@@ -1,11 +1,265 @@
-"""Linear least squares with what is needed to trust the answer, and how errors reach a result."""
+"""Linear least squares with what is needed to trust the answer, and which poses belong together.
 
-from collections.abc import Callable
+Of poses the largest set is taken that agrees on one tip. Whole poses are rejected, never single
+coordinates. Every smallest sample that has a solution is tried where there are not too many of
+them, else random draws; the best of them are refined until their set stays, and the largest set is
+kept. So the answer is a property of the data, not of the seed of the draws, and where draws under
+several seeds disagree that is told (docs/reference/evidence.md 10).
+"""
+
+import math
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from itertools import combinations
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from robolink.calibration.core.robust import Floats
+from robolink.calibration.core.dispersion import require_positive
+from robolink.errors import CalibrationError
+from robolink.messages import tr
+
+Floats = NDArray[np.float64]
+
+Mask = NDArray[np.bool_]
+
+Indices = NDArray[np.intp]
+
+REJECT_BEYOND: Final = 4.0
+"""Residual distance, in standard deviations of a coordinate, beyond which a pose is rejected."""
+
+MOST_SAMPLES: Final = 20_000
+"""Up to so many smallest samples are all tried."""
+
+REFINED: Final = 30
+"""So many of the best samples are refined."""
+
+MOST_REFITS: Final = 20
+
+_WIDER: Final = (1.5, 1.25, 1.0)
+
+_AT_ONCE: Final = 400_000
+"""Distances that are computed in one piece, so that the memory stays small."""
+
+# Median length of a normal vector with 2 or 3 coordinates, in standard deviations of one.
+_MEDIAN_DISTANCE: Final = {2: 1.1774100225, 3: 1.5381722545}
+
+
+@dataclass(frozen=True, slots=True)
+class Robust:
+    """How outliers are looked for.
+
+    Attributes:
+        threshold_mm: Residual distance beyond which a pose is rejected; ``None`` takes four
+            times the stated sigma, or the estimated one.
+        resolution_mm: No coordinate is taken to be better than this, so that a lucky sample of
+            exact values does not reject all others. The default is half a small pixel.
+        draws: Random samples, where there are too many to try all.
+        seeds: Of the draws, one set of draws each. The largest set that any of them finds is the
+            result; how far they lie apart is told.
+    """
+
+    threshold_mm: float | None = None
+    resolution_mm: float = 0.005
+    draws: int = 100
+    seeds: tuple[int, ...] = (1, 2, 3, 4, 5)
+
+
+@dataclass(frozen=True, slots=True)
+class Consensus:
+    """Poses that agree.
+
+    Attributes:
+        kept: Which they are, in the largest set that was found.
+        others: Different sets that single seeds ended with.
+    """
+
+    kept: Mask
+    others: tuple[Mask, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Agreement:
+    """What the search asks of a method.
+
+    Attributes:
+        count: How many poses there are.
+        size: How many of them have one solution.
+        dimensions: Coordinates of a residual, 2 or 3.
+        unknowns: Numbers that a fit finds.
+        of_samples: Residual distances of all poses, a row for each sample; infinite where a
+            sample cannot tell.
+        of_fit: Residual distances of all poses from the least squares of some; ``None`` where
+            these cannot tell.
+    """
+
+    count: int
+    size: int
+    dimensions: int
+    unknowns: int
+    of_samples: Callable[[Indices], Floats]
+    of_fit: Callable[[Mask], Floats | None]
+
+
+def largest_consensus(
+    agreement: Agreement, robust: Robust, *, sigma_mm: float | None = None
+) -> Consensus:
+    """Return the largest set of poses that agree.
+
+    Raises:
+        CalibrationError: ``too_many_outliers`` when more than a third is left out.
+        ConfigError: The threshold is not positive.
+    """
+    known = _known_threshold(robust, sigma_mm)
+    memory: dict[bytes, Floats | None] = {}
+    ends = [
+        _best_set(agreement, samples, robust, known, memory)
+        for samples in _starts(agreement, robust)
+    ]
+    found = [end for end in ends if end is not None]
+    if not found:
+        raise _too_many(agreement.count, agreement.count)
+    _, _, best = min(found, key=lambda end: end[:2])
+    rejected = int(np.count_nonzero(~best))
+    if 3 * rejected > best.size:
+        raise _too_many(rejected, best.size)
+    different = {mask.tobytes(): mask for _, _, mask in found if not np.array_equal(mask, best)}
+    return Consensus(best, tuple(different.values()))
+
+
+def draw_poses(count: int, size: int, draws: int, seed: int) -> Indices:
+    """Return draws of ``size`` different poses out of ``count``, one a row."""
+    random = np.random.default_rng(seed)
+    drawn = np.empty((draws, 0), dtype=np.intp)
+    for taken in range(size):
+        pick = random.integers(0, count - taken, draws)
+        for earlier in np.sort(drawn, axis=1).T:
+            pick += pick >= earlier
+        drawn = np.column_stack((drawn, pick))
+    return drawn
+
+
+def _starts(agreement: Agreement, robust: Robust) -> Iterator[Indices]:
+    """Yield all smallest samples at once, or draws of them, one set for each seed."""
+    count, size = agreement.count, agreement.size
+    if math.comb(count, size) <= MOST_SAMPLES:
+        yield np.array(list(combinations(range(count), size)), dtype=np.intp)
+        return
+    for seed in robust.seeds:
+        yield draw_poses(count, size, robust.draws, seed)
+
+
+def _known_threshold(robust: Robust, sigma_mm: float | None) -> float | None:
+    if robust.threshold_mm is not None:
+        require_positive(robust.threshold_mm, "threshold_mm")
+        return robust.threshold_mm
+    return None if sigma_mm is None else REJECT_BEYOND * max(sigma_mm, robust.resolution_mm)
+
+
+def _best_set(
+    agreement: Agreement,
+    samples: Indices,
+    robust: Robust,
+    known_mm: float | None,
+    memory: dict[bytes, Floats | None],
+) -> tuple[int, float, Mask] | None:
+    """Return the largest set, as minus its size, its sum of squares and itself."""
+
+    def refit(kept: Mask) -> Floats | None:
+        key = kept.tobytes()
+        if key not in memory:
+            memory[key] = agreement.of_fit(kept)
+        return memory[key]
+
+    starts = _best_samples(agreement, samples, known_mm)
+    threshold_mm = known_mm
+    if threshold_mm is None:
+        threshold_mm = _estimated(agreement, robust, starts[0], refit)
+    inside = starts <= threshold_mm * _WIDER[0]
+    # Where it begins is all that decides where it ends; good samples begin with the same set.
+    different = {mask.tobytes(): mask for mask in inside}.values()
+    ends = (_settled(mask, threshold_mm, refit) for mask in different)
+    # Python keeps the first among equals: the sample with the least cost.
+    return min(
+        ((-int(kept.sum()), squares, kept) for kept, squares in filter(None, ends)),
+        key=lambda end: end[:2],
+        default=None,
+    )
+
+
+def _best_samples(agreement: Agreement, samples: Indices, threshold_mm: float | None) -> Floats:
+    """Return the distances of the samples that explain the poses best, the best first.
+
+    Against a known threshold as many poses as possible and among equals the tightest; without one
+    the least median decides.
+    """
+    costs, rows = [], []
+    for part in _parts(samples, agreement.count):
+        distances = agreement.of_samples(part)
+        if threshold_mm is None:
+            cost = np.median(distances, axis=1)
+        else:
+            cost = (np.minimum(distances / threshold_mm, 1.0) ** 2).sum(axis=1)
+        best = np.argsort(cost, kind="stable")[:REFINED]
+        costs.append(cost[best])
+        rows.append(distances[best])
+    best = np.argsort(np.concatenate(costs), kind="stable")[:REFINED]
+    chosen: Floats = np.concatenate(rows)[best]
+    return chosen
+
+
+def _parts(samples: Indices, count: int) -> Iterable[Indices]:
+    rows = max(_AT_ONCE // count, 1)
+    return (samples[first : first + rows] for first in range(0, len(samples), rows))
+
+
+def _estimated(
+    agreement: Agreement,
+    robust: Robust,
+    distances: Floats,
+    refit: Callable[[Mask], Floats | None],
+) -> float:
+    """Return a threshold from the median distances of the best sample, then of its refit."""
+    for _ in range(2):
+        # The correction for few poses is the usual one of least median of squares.
+        spare = max(distances.size - agreement.unknowns / agreement.dimensions, 1.0)
+        middle = float(np.median(distances)) / _MEDIAN_DISTANCE[agreement.dimensions]
+        threshold_mm = REJECT_BEYOND * max((1 + 5 / spare) * middle, robust.resolution_mm)
+        refined = refit(distances <= threshold_mm)
+        if refined is None:
+            break
+        distances = refined
+    return threshold_mm
+
+
+def _settled(
+    inside: Mask, threshold_mm: float, refit: Callable[[Mask], Floats | None]
+) -> tuple[Mask, float] | None:
+    """Refine the poses near a sample until their set stays; return it and its sum of squares."""
+    for step in range(1, MOST_REFITS + 1):
+        refined = refit(inside)
+        if refined is None:
+            return None
+        kept, distances = inside, refined
+        inside = distances <= threshold_mm * _WIDER[min(step, len(_WIDER) - 1)]
+        if step >= len(_WIDER) and np.array_equal(inside, kept):
+            break
+    chosen = distances[kept]
+    return kept, float(chosen @ chosen)
+
+
+def _too_many(rejected: int, count: int) -> CalibrationError:
+    return CalibrationError(
+        "too_many_outliers",
+        tr(
+            "{rejected} of {count} touches do not fit the others; a third may be left out.",
+            rejected=rejected,
+            count=count,
+        ),
+        remedy=tr("Look for what moved between the poses, and measure again."),
+    )
+
 
 _RANK_BELOW = 1e-10
 

@@ -228,15 +228,14 @@ def require_upright(poses: Sequence[Pose]) -> None:
     """
     down = set()
     for number, pose in enumerate(poses, start=1):
-        upward = _upward(pose)
-        if lean_deg(upward) >= UPRIGHT_WITHIN_DEG:
-            raise tilted(number, pose)
-        down.add(upward < 0)
+        if tilted(pose):
+            raise tilted_pose(number, pose)
+        down.add(on_its_head(pose))
     if len(down) > 1:
         raise some_on_their_head()
 
 
-def leans(pose: Pose) -> bool:
+def tilted(pose: Pose) -> bool:
     """Tell whether the tool does not stand along the base's Z, either way up."""
     return lean_deg(_upward(pose)) >= UPRIGHT_WITHIN_DEG
 
@@ -265,7 +264,7 @@ def lean_deg(upward: float) -> float:
     return math.degrees(math.acos(min(abs(upward), 1.0)))
 
 
-def tilted(number: int, pose: Pose) -> CalibrationError:
+def tilted_pose(number: int, pose: Pose) -> CalibrationError:
     """Return the refusal of a pose that leans."""
     return CalibrationError(
         "tilted_pose",

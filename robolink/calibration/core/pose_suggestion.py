@@ -13,8 +13,8 @@ from typing import Final
 import numpy as np
 
 from robolink.calibration.core.dispersion import require_positive
+from robolink.calibration.core.least_squares import Floats
 from robolink.calibration.core.result import CalibrationResult
-from robolink.calibration.core.robust import Floats
 from robolink.calibration.core.rotations import pose_arrays, rotations
 from robolink.errors import CalibrationError, ConfigError, LimitError
 from robolink.messages import tr

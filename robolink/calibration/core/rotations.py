@@ -12,13 +12,13 @@ from struct import error as struct_error
 
 import numpy as np
 
+from robolink.calibration.core.least_squares import Floats
 from robolink.calibration.core.pose_checks import (
     METRES_BELOW,
     check_frames,
     refuse_metres,
     require_finite_poses,
 )
-from robolink.calibration.core.robust import Floats
 from robolink.model import Pose
 
 _SINGULAR = 1e-9

@@ -13,13 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from robolink.calibration.core.dispersion import Dispersion
-from robolink.calibration.core.least_squares import LinearFit, linear_fit
+from robolink.calibration.core.least_squares import Floats, LinearFit, linear_fit
 from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, require_poses
 from robolink.calibration.core.result import COMPONENTS, CalibrationResult
-from robolink.calibration.core.robust import Floats
 from robolink.calibration.core.rotations import pose_arrays
+from robolink.calibration.quality.doubts import PLANAR_TOLERANCE, TOUCH_TOLERANCE, Tolerance
 from robolink.calibration.quality.fit_quality import judged
-from robolink.calibration.quality.tolerances import PLANAR_TOLERANCE, TOUCH_TOLERANCE, Tolerance
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset

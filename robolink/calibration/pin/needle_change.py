@@ -14,11 +14,9 @@ from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, 
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.rotations import rotation_of
 from robolink.calibration.core.statistics import NORMAL_95
-from robolink.calibration.flange_checks import require_flange_in_base
-from robolink.calibration.flange_plane import FlangePlane
-from robolink.calibration.pin.needle_chain import NeedleChain, NeedleLimits
+from robolink.calibration.flange_plane import FlangePlane, require_flange_in_base
+from robolink.calibration.pin.needle_chain import NeedleChain, NeedleLimits, StoredZ
 from robolink.calibration.pin.one_touch import one_touch_sources
-from robolink.calibration.pin.stored_z import StoredZ
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset

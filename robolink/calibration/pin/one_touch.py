@@ -16,8 +16,8 @@ from robolink.calibration.core.dispersion import Dispersion
 from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, require_finite
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.rotations import rotation_of
-from robolink.calibration.flange_checks import require_flange_in_base
-from robolink.calibration.quality.station_part import StationPart, with_station
+from robolink.calibration.flange_plane import require_flange_in_base
+from robolink.calibration.quality.station import StationPart, with_station
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 

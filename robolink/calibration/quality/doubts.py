@@ -1,15 +1,90 @@
-"""The named doubts and notes of a measurement, as sentences.
+"""What a measurement is doubted for: the limits, and the named doubts and notes as sentences.
 
-A code is for programs; what a person reads, on a screen or in a report, is the same sentence.
+Residuals above the limits give a result a warning (docs/reference/calibration.md 3); others tell
+how a touch was made (docs/reference/evidence.md 1). A code is for programs; what a person reads, on
+a screen or in a report, is the same sentence.
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Final
 
-from robolink.calibration.core.evidence import RunOrder
+from robolink.calibration.core.result import RunOrder
+from robolink.deprecation import deprecated
 from robolink.messages import tr
 from robolink.ways import Way, way
+
+BEYOND_TOLERANCE: Final = ("large_residual", "large_rms", "large_pixel_residual")
+"""Codes of a result that does not agree with itself, the plainest first: nothing to be written."""
+
+
+def beyond_tolerance(codes: Sequence[str], *, judged: Sequence[str] = ()) -> tuple[str, ...]:
+    """Return the codes for which a result that nobody watched is refused, the plainest first.
+
+    Args:
+        codes: Those of the result.
+        judged: Codes for which somebody stated a limit, which then decides.
+    """
+    return tuple(code for code in BEYOND_TOLERANCE if code in codes and code not in judged)
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerance:
+    """What the residuals of a good calibration stay below, mm.
+
+    Attributes:
+        rms_mm: For the root mean square of the residual distances.
+        max_residual_mm: For the largest of them.
+    """
+
+    rms_mm: float
+    max_residual_mm: float
+
+    def exceeded(self, rms_mm: float | None, max_residual_mm: float | None) -> tuple[str, ...]:
+        """Return the codes of the limits that are exceeded."""
+        found = []
+        if rms_mm is not None and rms_mm > self.rms_mm:
+            found.append("large_rms")
+        if max_residual_mm is not None and max_residual_mm > self.max_residual_mm:
+            found.append("large_residual")
+        return tuple(found)
+
+    @deprecated("Tolerance.exceeded")
+    def doubts(self, rms_mm: float | None, max_residual_mm: float | None) -> tuple[str, ...]:
+        """Return what :meth:`exceeded` returns."""
+        return self.exceeded(rms_mm, max_residual_mm)
+
+
+PLANAR_TOLERANCE = Tolerance(rms_mm=0.05, max_residual_mm=0.15)
+"""For a camera or a well visible pin on four axes."""
+
+TOUCH_TOLERANCE = Tolerance(rms_mm=0.3, max_residual_mm=1.0)
+"""For a pin touched with six axes."""
+
+
+NEAREST_MM: Final = 0.8
+FARTHEST_MM: Final = 1.2
+"""How far beside the pin the tip stops: well above what a person misses it by."""
+
+LEVELS_MM: Final = (0.0, 0.6, 1.2, 1.8)
+"""How much above the clearance it stops: one and the same way down would not end at one height."""
+
+HIGHEST_MM: Final = max(LEVELS_MM)
+
+LEAST_JOG_MM: Final = 0.02
+PRINT_STEPS: Final = 3
+"""A robot at rest prints positions that differ by as much."""
+
+LEAST_HEIGHT_LIMIT_MM: Final = 0.10
+PERSON_SIGMA_Z_MM: Final = 0.05
+PROBE_SIGMA_Z_MM: Final = 0.01
+"""Standard deviation of a touch in height, of a person and of a contact input."""
+
+MOST_LEFT: Final = 0.5
+"""Share of the standoffs that may be left, with the uncertainty of the share on top."""
+
+MOST_RESIDUAL_MM: Final = 0.15
 
 
 def doubt_sentence(code: str) -> str:

@@ -7,11 +7,10 @@ from typing import Any, TypeVar
 import numpy as np
 
 from robolink.calibration.core.dispersion import Dispersion
-from robolink.calibration.core.evidence import FitEvidence
-from robolink.calibration.core.result import CalibrationResult
-from robolink.calibration.core.robust import Floats
+from robolink.calibration.core.least_squares import Floats
+from robolink.calibration.core.result import CalibrationResult, FitEvidence
 from robolink.calibration.core.statistics import chi_square_quantile
-from robolink.calibration.quality.tolerances import Tolerance
+from robolink.calibration.quality.doubts import Tolerance
 
 ResultT = TypeVar("ResultT", bound=CalibrationResult)
 
@@ -60,7 +59,7 @@ def judged(
         max_residual_mm=worst,
         dof=dof,
         evidence=agreement,
-        warnings=(*result.warnings, *doubts, *tolerance.doubts(rms, worst)),
+        warnings=(*result.warnings, *doubts, *tolerance.exceeded(rms, worst)),
     )
 
 

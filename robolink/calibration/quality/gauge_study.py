@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from robolink.calibration.core.dispersion import require_positive
+from robolink.calibration.core.least_squares import Floats
 from robolink.calibration.core.pose_checks import require_finite
-from robolink.calibration.core.robust import Floats
 from robolink.calibration.core.statistics import chi_square_quantile, f_exceeded
 from robolink.errors import CalibrationError
 from robolink.messages import tr

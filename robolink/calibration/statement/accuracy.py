@@ -18,10 +18,11 @@ from robolink.calibration.core.accuracy import (
     Accuracy,
     AccuracyFacts,
     AssessedRow,
+    BudgetRow,
     ErrorSource,
+    UncertaintyBudget,
 )
-from robolink.calibration.core.budget import BudgetRow, UncertaintyBudget
-from robolink.calibration.core.pose_checks import leans
+from robolink.calibration.core.pose_checks import tilted
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.statistics import (
     NORMAL_95,
@@ -29,12 +30,12 @@ from robolink.calibration.core.statistics import (
     shifted_half95,
     shifted_region95,
 )
-from robolink.calibration.quality.station_part import StationPart, scatter_covariance, with_station
+from robolink.calibration.quality.station import StationPart, scatter_covariance, with_station
 from robolink.calibration.statement.sentences import SCATTER, basis_words
 from robolink.messages import spoken, tr
 
 if TYPE_CHECKING:
-    from robolink.calibration.core.robust import Floats
+    from robolink.calibration.core.least_squares import Floats
 
 ResultT = TypeVar("ResultT", bound=CalibrationResult)
 
@@ -317,7 +318,7 @@ def _scattering(
     """
     variance = (sigma_mm * result.sigma_gain) ** 2
     variances = [variance] * lengths
-    upright = not any(map(leans, result.inputs))
+    upright = not any(map(tilted, result.inputs))
     if height_mm is not None and upright and result.measured[-1] == "z_mm":
         variances[-1] = (height_mm * result.sigma_gain) ** 2
     halves = (*(NORMAL_95 * math.sqrt(one) for one in variances), *result.half_width95[lengths:])

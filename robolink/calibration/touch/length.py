@@ -20,8 +20,8 @@ from typing import Final, Literal
 from robolink.calibration.core.dispersion import require_positive
 from robolink.calibration.core.pose_checks import require_finite
 from robolink.calibration.core.statistics import NORMAL_95
+from robolink.calibration.quality.doubts import PERSON_SIGMA_Z_MM
 from robolink.calibration.touch.touch_evidence import height_limit_mm
-from robolink.calibration.touch.touch_limits import PERSON_SIGMA_Z_MM
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 

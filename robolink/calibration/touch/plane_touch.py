@@ -8,16 +8,14 @@ known ten times worse unless the plane is known (docs/reference/calibration.md 2
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
-from robolink.calibration.core.least_squares import LinearFit, linear_fit
+from robolink.calibration.core.least_squares import Floats, LinearFit, linear_fit
 from robolink.calibration.core.result import CalibrationResult
-from robolink.calibration.core.robust import Floats
 from robolink.calibration.core.rotations import pose_arrays
-from robolink.calibration.quality.fit_quality import judged
-from robolink.calibration.quality.tolerances import Tolerance
+from robolink.calibration.quality.doubts import Tolerance
 from robolink.calibration.touch.surface_fit import (
     SURFACE_TOLERANCE,
     distinct_touches,
@@ -128,28 +126,21 @@ def solve_plane_touch(
         "the touches over the plane."
     )
     require_told_apart(fit, unknowns, remedy)
-    misses = -fit.residuals[:, None] * state.normal
-    result = tip_result(
+    x, y, z = state.normal.tolist()
+    return tip_result(
+        PlaneTouchResult,
         "plane-touch",
         poses,
         stored=stored,
         tip_mm=state.tip,
         fit=fit,
-        misses=misses,
-        place_mm=(),
-        warnings=warnings,
-    )
-    result = judged(
-        result,
-        fit.residuals[:, None],
-        fit.unit_covariance[:3, :3],
+        across=state.normal,
         unknowns=unknowns,
         sigma_mm=sigma_mm,
         tolerance=tolerance,
+        warnings=warnings,
+        plane=TouchedPlane((x, y, z), state.distance),
     )
-    values = {field.name: getattr(result, field.name) for field in fields(CalibrationResult)}
-    x, y, z = state.normal.tolist()
-    return PlaneTouchResult(**values, plane=TouchedPlane((x, y, z), state.distance))
 
 
 def plane_columns(

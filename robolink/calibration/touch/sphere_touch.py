@@ -6,17 +6,15 @@ place of the sphere will do. Its radius is known from the drawing or found as we
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
 from robolink.calibration.core.dispersion import require_positive
-from robolink.calibration.core.least_squares import LinearFit, linear_fit
+from robolink.calibration.core.least_squares import Floats, LinearFit, linear_fit
 from robolink.calibration.core.result import CalibrationResult
-from robolink.calibration.core.robust import Floats
 from robolink.calibration.core.rotations import pose_arrays
-from robolink.calibration.quality.fit_quality import judged
-from robolink.calibration.quality.tolerances import Tolerance
+from robolink.calibration.quality.doubts import Tolerance
 from robolink.calibration.touch.surface_fit import (
     SURFACE_TOLERANCE,
     distinct_touches,
@@ -111,27 +109,21 @@ def solve_sphere_touch(
     places = p + r @ state.tip - state.centre
     ways = places / np.linalg.norm(places, axis=1)[:, None]
     x, y, z = state.centre.tolist()
-    misses = -fit.residuals[:, None] * ways
-    result = tip_result(
+    return tip_result(
+        SphereTouchResult,
         "sphere-touch",
         poses,
         stored=stored,
         tip_mm=state.tip,
         fit=fit,
-        misses=misses,
-        place_mm=(x, y, z),
-        warnings=warnings,
-    )
-    result = judged(
-        result,
-        fit.residuals[:, None],
-        fit.unit_covariance[:3, :3],
+        across=ways,
         unknowns=unknowns,
         sigma_mm=sigma_mm,
         tolerance=tolerance,
+        warnings=warnings,
+        place_mm=(x, y, z),
+        radius_mm=state.radius,
     )
-    values = {field.name: getattr(result, field.name) for field in fields(CalibrationResult)}
-    return SphereTouchResult(**values, radius_mm=state.radius)
 
 
 def sphere_columns(
@@ -158,11 +150,6 @@ def sphere_columns(
     places = p + r @ np.array(tip.components()[:3]) - np.array(centre_mm)
     ways = places / np.linalg.norm(places, axis=1)[:, None]
     return np.hstack((np.einsum("nij,ni->nj", r, ways), -ways, -np.ones((len(p), 1))))
-
-
-def sphere_through(places_mm: Floats) -> tuple[Floats, float]:
-    """Return centre and radius of the algebraic sphere through four places and more, mm."""
-    return _sphere(places_mm)
 
 
 def _found(
@@ -200,15 +187,18 @@ def _starts(
         tips.append(np.array(stored.components()[:3]))
     starts = []
     for tip in tips:
-        centre, radius = _sphere(p + r @ tip)
+        centre, radius = sphere_through(p + r @ tip)
         starts.append(_State(tip, centre, radius if radius_mm is None else radius_mm))
     return starts
 
 
-def _sphere(places: Floats) -> tuple[Floats, float]:
-    """Return the algebraic sphere through places: |q|^2 = 2 c q + (r^2 - |c|^2)."""
-    middle = places.mean(axis=0)
-    q = places - middle
+def sphere_through(places_mm: Floats) -> tuple[Floats, float]:
+    """Return centre and radius of the algebraic sphere through four places and more, mm.
+
+    It is linear: |q|^2 = 2 c q + (r^2 - |c|^2).
+    """
+    middle = places_mm.mean(axis=0)
+    q = places_mm - middle
     fit = linear_fit(np.column_stack((2 * q, np.ones(len(q)))), (q**2).sum(axis=1))
     centre = fit.x[:3]
     return centre + middle, float(np.sqrt(max(fit.x[3] + centre @ centre, 1e-6)))
@@ -218,7 +208,7 @@ def _require_radius(places: Floats, radius_mm: float | None) -> None:
     """Refuse a stated radius that the places do not have."""
     if radius_mm is None:
         return
-    _, found_mm = _sphere(places)
+    _, found_mm = sphere_through(places)
     if abs(found_mm / radius_mm - 1) > _INSIDE_OUT:
         raise CalibrationError(
             "radius_contradicted",

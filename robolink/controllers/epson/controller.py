@@ -5,37 +5,44 @@ from functools import cached_property
 from typing import ClassVar
 
 from robolink.controllers.controller_core import ControllerCore
-from robolink.controllers.epson.condition import ConditionReader
-from robolink.controllers.epson.io.alarms import EpsonAlarms
-from robolink.controllers.epson.io.bits import EpsonIo
-from robolink.controllers.epson.io.pending_values import PendingValues
-from robolink.controllers.epson.io.raw_statements import RawStatements
-from robolink.controllers.epson.io.variables import EpsonVariables
-from robolink.controllers.epson.io.vision_looks import EpsonLooks
-from robolink.controllers.epson.link.identity import FactReader
-from robolink.controllers.epson.link.line import EpsonLine, open_line
-from robolink.controllers.epson.link.link import EpsonLink
-from robolink.controllers.epson.link.session import EpsonSession
-from robolink.controllers.epson.motion.acts import EpsonActs
-from robolink.controllers.epson.motion.group import EpsonGroup
-from robolink.controllers.epson.motion.positions import EpsonPoints
-from robolink.controllers.epson.tools.preserve import EpsonPreserver
-from robolink.controllers.epson.tools.published import PublishedReader, PublishedTools
-from robolink.controllers.epson.tools.resolve import EpsonResolver
-from robolink.controllers.epson.tools.table import EpsonToolTable
+from robolink.controllers.epson.answers import NOT_EXECUTED
+from robolink.controllers.epson.condition import ConditionReader, EpsonAlarms
+from robolink.controllers.epson.group import EpsonActs, EpsonGroup
+from robolink.controllers.epson.line import EpsonLine, open_line
+from robolink.controllers.epson.link import EpsonLink, FactReader
+from robolink.controllers.epson.preserve import EpsonPreserver, EpsonResolver, PendingValues
+from robolink.controllers.epson.session import EpsonSession, command_class_of
+from robolink.controllers.epson.singularities import EpsonPoints
+from robolink.controllers.epson.tools import EpsonToolTable, PublishedReader, PublishedTools
+from robolink.controllers.epson.values import EpsonIo, EpsonVariables
+from robolink.controllers.epson.vision_looks import EpsonLooks
 from robolink.controllers.registry import ConnectionTerms
-from robolink.errors import JournalError, LoginUnansweredError
+from robolink.errors import (
+    ConfigError,
+    ControllerFaultError,
+    JournalError,
+    LoginUnansweredError,
+    RejectedError,
+)
+from robolink.messages import tr
 from robolink.model import (
     Act,
     Capabilities,
     Controller,
     ControllerFacts,
     ControllerStatus,
+    EntryKind,
+    Marker,
+    MarkerKind,
+    NewEntry,
     OutcomeLog,
     Secret,
     Spot,
+    require_engineer,
 )
-from robolink.protocols.epson_text import Preference
+from robolink.protocols.epson_text import Preference, Refusal, Reply, Request
+from robolink.protocols.spel import Statement
+from robolink.stop_latch import CommandClass
 from robolink.transport import LinkUrl
 
 
@@ -54,8 +61,8 @@ class EpsonController(ControllerCore):
 
     Example:
         >>> from robolink.controllers import EpsonController
-        >>> from robolink.controllers.epson.link.line import open_line
-        >>> from robolink.controllers.epson.link.session import EpsonSession
+        >>> from robolink.controllers.epson.line import open_line
+        >>> from robolink.controllers.epson.session import EpsonSession
         >>> from robolink.journal import memory_journal
         >>> line = open_line("epson+sim://session-example", timeout_s=1)
         >>> session = EpsonSession(line, timeout_s=1)
@@ -306,7 +313,7 @@ def open_epson(
 
     Example:
         >>> from robolink.controllers import open_epson
-        >>> from robolink.controllers.epson.link.line import open_line
+        >>> from robolink.controllers.epson.line import open_line
         >>> from robolink.journal import memory_journal
         >>> line = open_line("epson+sim://login-example", timeout_s=1)
         >>> outcomes = memory_journal("login-example").log("login-example")
@@ -318,10 +325,76 @@ def open_epson(
     try:
         session.login(password)
         if session.outlived:
-            from robolink.controllers.epson.link.in_step import prove_in_step
+            from robolink.controllers.epson.session import prove_in_step
 
             prove_in_step(session)
     except BaseException:
         session.close()
         raise
     return EpsonController(session, outcomes, remote_timeout_s=remote_timeout_s)
+
+
+class RawStatements:
+    """Runs statements as they were typed, each marked before and on record after.
+
+    The one door past the typed builders (docs/reference/rules.md 8).
+    """
+
+    def __init__(self, link: EpsonLink) -> None:
+        self._link = link
+
+    def execute(self, text: str) -> str:
+        """See :meth:`robolink.controllers.EpsonController.execute_raw`."""
+        statement = _typed_statement(text)
+        with self._link.lock.held(statement):
+            # Before an engineer's word for it goes on record.
+            self._link.markers.require_settled(statement)
+            self._link.window.require_ready(statement)
+            if command_class_of(Request("Execute", (statement,))) is CommandClass.ACT:
+                self._link.window.require_abort(statement)
+            require_engineer(
+                self._link.markers.outcomes, tr("run {statement!r} as typed", statement=statement)
+            )
+            with self._link.uninterrupted(), self._link.markers.ledger.block():
+                marker = self._link.markers.begin(MarkerKind.SET, statement, {"raw": True})
+                self._link.forget_robot()
+                with self._link.markers.doubt(statement):
+                    with self._link.markers.unless_stopped(marker):
+                        answer = self._link.session.execute(statement)
+                    self._check(statement, answer, marker)
+                self._link.markers.ledger.proved(marker, None)
+                printed = answer.text or "" if isinstance(answer, Reply) else ""
+                self._link.markers.clear(
+                    marker, _raw_entry(marker, verdict=tr("carried out"), said=printed)
+                )
+        return printed
+
+    def _check(self, statement: Statement, answer: Reply | Refusal, marker: Marker) -> None:
+        """Raise unless it ran; a plain refusal settles the marker."""
+        if isinstance(answer, Reply) and (answer.text is not None or answer.fields == ("0",)):
+            return
+        try:
+            raise self._link.window.failure(statement, answer)
+        except (RejectedError, ControllerFaultError) as error:
+            if error.code in NOT_EXECUTED and isinstance(error, RejectedError):
+                self._link.markers.clear(marker, _raw_entry(marker, verdict=error.what))
+            raise
+
+
+def _typed_statement(text: str) -> Statement:
+    stripped = text.strip()
+    if not stripped or not (stripped.isascii() and stripped.isprintable()):
+        raise ConfigError(
+            tr("{text!r} cannot be sent as a statement.", text=text),
+            remedy=tr("Write one line of printable ASCII."),
+        )
+    return Statement(stripped)
+
+
+def _raw_entry(marker: Marker, *, verdict: str, said: str = "") -> NewEntry:
+    return NewEntry(
+        EntryKind.RAW,
+        operation=marker.operation,
+        verdict=verdict,
+        details={"request": marker.request, "printed": said},
+    )

@@ -1,21 +1,24 @@
-"""A PLC that keeps its tool offsets in registers of the machine builder's own, and opening one."""
+"""A PLC that keeps its tool offsets in registers of the machine builder's own, and opening one.
+
+The inputs that a map names.
+
+Where the flange is, from a PLC that tells it; a person moves.
+"""
 
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, Final, NoReturn
 
 from robolink.controllers.controller_core import ControllerCore
-from robolink.controllers.plc_map.flange import FlangeReader
-from robolink.controllers.plc_map.inputs import MappedInputs
-from robolink.controllers.plc_map.link import MappedPlc
-from robolink.controllers.plc_map.registers import RegisterClient
-from robolink.controllers.plc_map.resolve import RegisterResolver
-from robolink.controllers.plc_map.tools import RegisterToolTable
+from robolink.controllers.motion_group import MotionGroupCore
+from robolink.controllers.plc_map.link import MappedPlc, RegisterClient, Registers
+from robolink.controllers.plc_map.slots import OffsetValues
+from robolink.controllers.plc_map.tools import RegisterResolver, RegisterToolTable
 from robolink.controllers.preserving import Preserver
 from robolink.controllers.registry import ConnectionTerms
-from robolink.errors import ConfigError
+from robolink.errors import ConfigError, RejectedError
 from robolink.messages import tr
 from robolink.model import (
     Act,
@@ -25,11 +28,115 @@ from robolink.model import (
     ControllerStatus,
     Identity,
     OutcomeLog,
+    Pose,
 )
-from robolink.register_maps import RegisterMap, load_map
+from robolink.register_maps import RegisterMap, load_map, span_of
 from robolink.timing import Clock
 from robolink.transport import LinkUrl, open_modbus
 from robolink.ways import Way, way
+
+
+class MappedInputs:
+    """Reads inputs by the number that the map gives them."""
+
+    def __init__(self, registers: Registers, register_map: RegisterMap) -> None:
+        self._registers = registers
+        self._inputs = register_map.inputs
+
+    def names(self) -> dict[int, str]:
+        """Return the inputs of the map and what people call them."""
+        return {number: one.name for number, one in self._inputs.items()}
+
+    def read_input(self, bit: int) -> bool:
+        """Read one input.
+
+        Raises:
+            ConfigError: The map has no such input.
+        """
+        if bit not in self._inputs:
+            raise ConfigError(
+                tr("The map has no input {number}.", number=bit),
+                remedy=tr(
+                    "These are known: {numbers}.",
+                    numbers=", ".join(map(str, self._inputs)) or tr("none"),
+                ),
+            )
+        return self._registers.is_on(self._inputs[bit].signal)
+
+    def set_output(self, bit: int, on: bool) -> NoReturn:  # noqa: ARG002 - the model's form
+        """Refuse: a map has no outputs.
+
+        Raises:
+            RejectedError: Always.
+        """
+        raise RejectedError(
+            tr("Output {number} was not switched: a PLC map has no outputs.", number=bit),
+            remedy=tr("Switch it at the machine."),
+            controller=self._registers.identity,
+        )
+
+    def preview_output(self, bit: int, on: bool) -> NoReturn:
+        """Refuse; see :meth:`set_output`."""
+        self.set_output(bit, on)
+
+
+_FAR_MM: Final = 100_000.0
+_FAR_DEG: Final = 36_000.0
+"""No head stands farther away or is turned more often."""
+
+
+class FlangeReader(MotionGroupCore):
+    """The axis group of a PLC with a map: it may tell where it is, and is never moved."""
+
+    def __init__(self, plc: MappedPlc) -> None:
+        super().__init__(plc)
+        self._plc = plc
+        self._registers = plc.registers
+        self._flange = plc.register_map.flange
+        self._name = plc.register_map.name
+        self._values = OffsetValues(plc.register_map, plc.identity)
+
+    @property
+    def name(self) -> str:
+        """What the map calls the machine."""
+        return self._name
+
+    def pose(self) -> Pose:
+        """Read where the flange is now.
+
+        Raises:
+            RejectedError: The map has no ``[flange]``.
+        """
+        if not self._flange:
+            raise RejectedError(
+                tr("This PLC does not report where the flange is."),
+                remedy=tr(
+                    "Read the poses at the HMI and give them with {poses}; or add [flange] to the "
+                    "map, if the PLC has registers for it.",
+                    poses=way(Way.GIVEN_POSES),
+                ),
+                controller=self._registers.identity,
+            )
+        span = span_of(self._flange)
+        table = self._flange["x"].table
+        words = dict(zip(span, self._registers.read_twice(table, span), strict=True))
+        pose = self._values.numbers(self._flange, words, largest_mm=_FAR_MM, largest_deg=_FAR_DEG)
+        return Pose(*pose, tool=0)
+
+    def move_to(self, *_asked: object, **_how: object) -> NoReturn:
+        """Refuse, and so does all that would move or stop the machine.
+
+        Raises:
+            RejectedError: Always.
+        """
+        raise self._plc.no_motion()
+
+    def require_able(self, purpose: str) -> NoReturn:
+        """Refuse, as :meth:`move_to` does."""
+        self.move_to(purpose)
+
+    move_until_input = requests_until = requests_for = obstacle = terms = stop = move_to
+    deceleration_mm_s2 = run_up_mm = edge_step_mm = move_to
 
 
 class PlcMapController(ControllerCore):

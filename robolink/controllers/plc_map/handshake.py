@@ -7,7 +7,7 @@ stays on until the answer comes. None: what is written counts. Each wait has its
 from contextlib import suppress
 from typing import Final
 
-from robolink.controllers.plc_map.registers import Registers
+from robolink.controllers.plc_map.link import Registers
 from robolink.errors import (
     BusyError,
     NotReadyError,

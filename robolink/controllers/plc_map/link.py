@@ -1,14 +1,311 @@
-"""What every part of this driver works with: registers, the map of them, and when both count."""
+"""What every part of this driver works with: registers, the map of them, and when both count.
 
-from typing import NoReturn
+Reads and writes the places of a map, one exchange at a time.
 
+Whether the PLC is the one of the map: its constant, and the number that it is known by.
+
+Wrong word order and addresses off by one are the mistakes that users of Modbus report most
+(docs/reference/softmotion.md 4.4); both make plausible numbers.
+"""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from itertools import product
+from typing import Final, NoReturn, Protocol
+
+from robolink import ambient
+from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.controllers.driver_link import DriverLink
-from robolink.controllers.plc_map.probe import MapIdentityReader, require_probe
-from robolink.controllers.plc_map.registers import RegisterClient, Registers
-from robolink.errors import NotComparedError, NotReadyError, NotReadyReason, RejectedError
+from robolink.errors import (
+    NotComparedError,
+    NotReadyError,
+    NotReadyReason,
+    RejectedError,
+    RemoteProtocolError,
+)
+from robolink.interrupts import InterruptGate
 from robolink.messages import tr
 from robolink.model import Identity, OutcomeLog
-from robolink.register_maps import Confirmation, MapValue, RegisterMap, confirmation_of
+from robolink.register_maps import (
+    Confirmation,
+    MapProbe,
+    MapValue,
+    Number,
+    RegisterMap,
+    RegisterTable,
+    Signal,
+    Word,
+    confirmation_of,
+    describe_place,
+)
+from robolink.stop_latch import CommandClass, StopLatch
+from robolink.timing import Clock
+
+_TRIES: Final = 3
+
+
+class RegisterClient(Protocol):
+    """What the driver needs of a Modbus client, as ``open_modbus`` returns one."""
+
+    @property
+    def identity(self) -> str:
+        """Which PLC this is."""
+
+    @property
+    def place(self) -> str:
+        """Where it was reached, the same for each spelling of the URL."""
+
+    @property
+    def clock(self) -> Clock:
+        """The clock on which its time passes."""
+
+    @property
+    def most_registers(self) -> int:
+        """How many registers it gives in one read."""
+
+    def read_holding(self, address: int, count: int) -> tuple[int, ...]:
+        """Return holding registers."""
+
+    def read_input(self, address: int, count: int) -> tuple[int, ...]:
+        """Return input registers."""
+
+    def read_coils(self, address: int, count: int) -> tuple[bool, ...]:
+        """Return coils."""
+
+    def read_discrete(self, address: int, count: int) -> tuple[bool, ...]:
+        """Return discrete inputs."""
+
+    def write_registers(self, address: int, values: Sequence[int]) -> None:
+        """Write holding registers in one request."""
+
+    def write_coil(self, address: int, value: bool) -> None:
+        """Write one coil."""
+
+    def close(self) -> None:
+        """Close."""
+
+
+class Registers:
+    """The tables of one PLC.
+
+    Attributes:
+        identity: Which PLC this is.
+        place: Where it was reached, the same for each spelling of the URL.
+        clock: The clock on which its time passes.
+        exchanges: Requests sent so far.
+        gate: Holds Ctrl-C back inside an exchange, and inside whatever else enters it.
+        latch: What holds writes back while a stop is in force.
+    """
+
+    def __init__(self, client: RegisterClient) -> None:
+        self._client = client
+        self.identity, self.place, self.clock = client.identity, client.place, client.clock
+        self.exchanges = 0
+        self.gate = InterruptGate()
+        self.gate.open()
+        self.latch = StopLatch(client.identity)
+        self._writing = ambient.lock()
+
+    def read(self, table: RegisterTable, addresses: range) -> tuple[int, ...]:
+        """Return what stands there: in one request, or in parts where the server gives fewer.
+
+        Parts may be of different moments: whoever needs them to belong together reads twice.
+        """
+        readers = {
+            RegisterTable.HOLDING: self._client.read_holding,
+            RegisterTable.INPUT: self._client.read_input,
+            RegisterTable.COIL: self._client.read_coils,
+            RegisterTable.DISCRETE: self._client.read_discrete,
+        }
+        words = table in (RegisterTable.HOLDING, RegisterTable.INPUT)
+        most = self._client.most_registers if words else len(addresses)
+        found: list[int] = []
+        for start in range(addresses.start, addresses.stop, most):
+            with self.gate:
+                self.exchanges += 1
+                found += map(int, readers[table](start, min(most, addresses.stop - start)))
+        return tuple(found)
+
+    def read_twice(self, table: RegisterTable, addresses: range) -> tuple[int, ...]:
+        """Return what stands there as soon as two reads agree.
+
+        A server may change registers between the words of one answer
+        (docs/reference/softmotion.md 4.1, docs/reference/faults.md F31).
+
+        Raises:
+            RemoteProtocolError: No two reads in a row agree.
+        """
+        found = self.read(table, addresses)
+        for _ in range(_TRIES):
+            before, found = found, self.read(table, addresses)
+            if found == before:
+                return found
+        raise RemoteProtocolError(
+            tr(
+                "The registers from {place} on are different at every reading.",
+                place=describe_place(table, addresses.start),
+            ),
+            remedy=tr(
+                "Compare the addresses in the map with the PLC's register list; or "
+                "another program is writing them now."
+            ),
+            controller=self.identity,
+        )
+
+    def word(self, word: Word) -> int:
+        """Return the number in one register."""
+        return self.read(word.table, range(word.address, word.address + 1))[0]
+
+    def is_on(self, signal: Signal | None) -> bool:
+        """Tell whether a signal is on; one that the map does not have is off."""
+        if signal is None:
+            return False
+        found = self.read(signal.table, range(signal.address, signal.address + 1))[0]
+        if signal.bit is not None:
+            found = found >> signal.bit & 1
+        return found == signal.on
+
+    def switch(self, signal: Signal, on: bool, *, kind: CommandClass = CommandClass.WRITE) -> None:
+        """Switch a coil, or write a whole register.
+
+        Args:
+            signal: Which one.
+            on: Whether on.
+            kind: What that does to the machine; a request that is taken back calms.
+
+        Raises:
+            StoppedError: A stop forbids it; it was not sent.
+        """
+        value = signal.on if on else signal.off
+        with self._admitted(signal.place, kind):
+            self.exchanges += 1
+            if signal.table is RegisterTable.COIL:
+                self._client.write_coil(signal.address, bool(value))
+            else:
+                self._client.write_registers(signal.address, [value])
+
+    def write(self, address: int, words: Sequence[int]) -> None:
+        """Write holding registers in one request (function 16); raises like :meth:`switch`."""
+        with self._admitted(describe_place(RegisterTable.HOLDING, address), CommandClass.WRITE):
+            self.exchanges += 1
+            self._client.write_registers(address, words)
+
+    def close(self) -> None:
+        """Close the link. Idempotent."""
+        self._client.close()
+        self.gate.close()
+
+    @contextmanager
+    def _admitted(self, place: str, kind: CommandClass) -> Iterator[None]:
+        """Hold the lock of a write that no stop forbids."""
+        request = tr("the write to {place}", place=place)
+        checkpoint(Checkpoint.LOCK, request)
+        try:
+            with self.gate, self._writing:
+                checkpoint(Checkpoint.HELD, request)
+                self.latch.admit(kind, request)
+                yield
+        finally:
+            checkpoint(Checkpoint.EXCHANGE, request)
+
+
+_AROUND: Final = 8
+"""How many registers before and behind its place it is looked for."""
+
+
+def require_probe(registers: Registers, probe: MapProbe | None) -> None:
+    """Read the constant, if there is one, and refuse a PLC in which it is another.
+
+    Raises:
+        RemoteProtocolError: It differs; says what the map should say, if that can be found.
+    """
+    if probe is None:
+        return
+    number = probe.number
+    words = registers.read(number.table, number.registers)
+    if words == number.encode(probe.value):
+        return
+    raise RemoteProtocolError(
+        tr(
+            "The probe at {place} should be {value:g}, but reads {found:g}.",
+            place=number.place,
+            value=probe.value,
+            found=number.decode(words),
+        ),
+        remedy=tr("{diagnosis} Nothing was written.", diagnosis=_diagnosis(registers, probe)),
+        controller=registers.identity,
+    )
+
+
+def _diagnosis(registers: Registers, probe: MapProbe) -> str:
+    number = probe.number
+    found = _found(registers, probe)
+    if found is None:
+        return tr("Check the unit in the URL, the map's addresses, and whether the PLC runs.")
+    hints = []
+    if found.address != number.address:
+        hints.append(
+            tr(
+                "It was found at {place}: the addresses of this map are off by {shift:+d}.",
+                place=describe_place(found.table, found.address),
+                shift=number.address - found.address,
+            )
+        )
+    if found.low_word_first != number.low_word_first:
+        order = "low_first" if found.low_word_first else "high_first"
+        hints.append(
+            tr('The words are in the opposite order: word_order = "{order}".', order=order)
+        )
+    if found.swapped_bytes != number.swapped_bytes:
+        order = "little" if found.swapped_bytes else "big"
+        hints.append(tr('The bytes are swapped: byte_order = "{order}".', order=order))
+    return " ".join(hints)
+
+
+def _found(registers: Registers, probe: MapProbe) -> Number | None:
+    """Look for the constant in every order, nearest first."""
+    number = probe.number
+    count = len(number.registers)
+    start = max(0, number.address - _AROUND)
+    stop = min(0x10000, number.registers.stop + _AROUND)
+    try:
+        words = registers.read(number.table, range(start, stop))
+    except RejectedError:  # the table may end sooner; then its own place has to do
+        start, stop = number.registers.start, number.registers.stop
+        words = registers.read(number.table, number.registers)
+    places = sorted(range(start, stop - count + 1), key=lambda at: abs(at - number.address))
+    for at, low_first, swapped in product(places, (True, False), (False, True)):
+        tried = replace(number, address=at, low_word_first=low_first, swapped_bytes=swapped)
+        if words[at - start : at - start + count] == tried.encode(probe.value):
+            return tried
+    return None
+
+
+class MapIdentityReader:
+    """Reads the machine's own number, where the map says where it stands."""
+
+    def __init__(self, registers: Registers, register_map: RegisterMap) -> None:
+        self._registers = registers
+        self._place = register_map.device_id
+
+    def read(self) -> Identity:
+        """Return who it is.
+
+        Raises:
+            TransportError, RemoteProtocolError: The link failed, or the number does not stand
+                still.
+            RejectedError: The PLC has no such registers.
+        """
+        address, place = self._registers.identity, f"plc@{self._registers.place}"
+        if self._place is None:
+            return Identity(place, address, place)
+        words = self._registers.read_twice(self._place.table, self._place.registers)
+        if not any(words):
+            # Zeroed by a watchdog, or the program has not started
+            # (docs/reference/softmotion.md 4.1).
+            return Identity(place, address, place, certain=False)
+        return Identity(f"plc:{''.join(f'{word:04X}' for word in words)}", address, place)
 
 
 class MappedPlc(DriverLink):

@@ -8,19 +8,17 @@ from typing import TYPE_CHECKING, ClassVar, Final
 from robolink import ambient
 from robolink.controllers.controller_core import ControllerCore
 from robolink.controllers.registry import ConnectionTerms
+from robolink.controllers.softmotion.answers import describe
+from robolink.controllers.softmotion.condition import condition_of, status_of
 from robolink.controllers.softmotion.facts import MailboxFacts, set_kinematics
+from robolink.controllers.softmotion.group import SoftMotionGroup
 from robolink.controllers.softmotion.io import SoftMotionIo
-from robolink.controllers.softmotion.link.answers import describe
-from robolink.controllers.softmotion.link.condition import condition_of, status_of
-from robolink.controllers.softmotion.link.device import read_device_id
-from robolink.controllers.softmotion.link.mailbox import Mailbox
-from robolink.controllers.softmotion.link.ownership import take_command
-from robolink.controllers.softmotion.link.snapshots import Snapshots
-from robolink.controllers.softmotion.link.wire import MailboxWire
-from robolink.controllers.softmotion.motion.group import SoftMotionGroup
-from robolink.controllers.softmotion.tools.orientation_images import OrientationImages
-from robolink.controllers.softmotion.tools.resolve import SoftMotionResolver
-from robolink.controllers.softmotion.tools.table import SoftMotionToolTable
+from robolink.controllers.softmotion.kinematics import OrientationImages
+from robolink.controllers.softmotion.mailbox import Mailbox, read_device_id
+from robolink.controllers.softmotion.ownership import take_command
+from robolink.controllers.softmotion.snapshots import Snapshots
+from robolink.controllers.softmotion.tools import SoftMotionResolver, SoftMotionToolTable
+from robolink.controllers.softmotion.wire import MailboxWire
 from robolink.errors import ConfigError, ControllerFaultError, LeaseHeldError
 from robolink.messages import tr
 from robolink.model import (
@@ -44,11 +42,11 @@ from robolink.protocols.mailbox import (
     Response,
 )
 from robolink.timing import Deadline
-from robolink.transport import LinkUrl, MailboxLink, open_mailbox_link, open_quick_link
+from robolink.transport import LinkUrl, MailboxLink, open_mailbox_link
 from robolink.ways import Way, way
 
 if TYPE_CHECKING:
-    from robolink.controllers.softmotion.verify import MailboxFinding
+    from robolink.controllers.softmotion.facts import MailboxFinding
 
 
 _RESETS: Final = (
@@ -133,7 +131,7 @@ class SoftMotionController(ControllerCore):
 
     def verify(self) -> "tuple[MailboxFinding, ...]":
         """Look at everything that can be seen without a command; nothing is written."""
-        from robolink.controllers.softmotion.verify import verify_mailbox
+        from robolink.controllers.softmotion.facts import verify_mailbox
 
         return verify_mailbox(self._mailbox)
 
@@ -287,9 +285,8 @@ def open_softmotion_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
                 record=way(Way.RECORD),
             ),
         )
-    opener = open_quick_link if terms.glance else open_mailbox_link
     url, kinematics = _own_kinematics(url)
-    link = opener(url, timeout_s=terms.timeout_s, clock=terms.clock)
+    link = open_mailbox_link(url, timeout_s=terms.timeout_s, clock=terms.clock)
     return open_softmotion(
         link,
         outcomes=terms.record_of(link),

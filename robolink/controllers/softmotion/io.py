@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 
 from robolink.controllers.driver_link import MarkedCommand
-from robolink.controllers.softmotion.link.answers import describe
-from robolink.controllers.softmotion.link.mailbox import Mailbox
+from robolink.controllers.softmotion.answers import describe
+from robolink.controllers.softmotion.mailbox import Mailbox
 from robolink.protocols.mailbox import Command, Opcode
 
 

@@ -4,10 +4,22 @@ Statements (``statements``) name their values as ``:name``, which SQLite takes a
 the driver's own cursor, so that a commit costs what the disk takes.
 """
 
+import os
 import re
-from collections.abc import Mapping, Sequence
+import sqlite3
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 from typing import Any, ClassVar, Final, TypeAlias
+from urllib.parse import parse_qsl, quote, unquote
+
+from robolink import ambient
+from robolink.errors import JournalError
+from robolink.files.durable import make_folder, sync_folder
+from robolink.journal._places import JournalPlace
+from robolink.messages import tr
+from robolink.timing import Deadline, SystemClock
 
 Values: TypeAlias = Mapping[str, object]
 
@@ -126,3 +138,221 @@ class PostgresqlConnection(DatabaseConnection):
 @lru_cache(maxsize=512)
 def _for_psycopg(statement: str) -> str:
     return re.sub(_PLACE, r"%(\1)s", statement)
+
+
+BUSY_S: Final = 3.0
+"""How long a write waits for another program that writes."""
+
+GLANCE_S: Final = 1.0
+"""How long a look waits for one; after that the journal, opened to write, says what is wrong."""
+
+_AGAIN_S: Final = 0.01
+"""Pause before a new file is asked again for its write-ahead log."""
+
+_PAGE_BYTES: Final = 2048
+"""Of a new file. A commit writes whole pages, six or seven of them for two or three short rows:
+half of SQLite's usual size makes it about 8 % quicker; a quarter hardly more, and then the
+longer entries no longer fit."""
+
+_LOG_PAGES: Final = 200
+"""How long the write-ahead log grows before it is carried over and written from its start again:
+400 KiB, some ten changes of a tool (with SQLite's own 1,000 pages, some fifty). To write over
+blocks that a file has already takes a little more than half the time of making it longer; to carry
+over often and little costs less than that saves (100 and 300 pages were slower)."""
+
+_NOTICED: Final = {
+    "connect_timeout": int(BUSY_S),
+    "tcp_user_timeout": round(BUSY_S * 1000),
+    "keepalives_idle": 1,
+    "keepalives_interval": 1,
+    "keepalives_count": 2,
+}
+"""A server whose network is cut is missed after :data:`BUSY_S`, also in the middle of a transaction
+(docs/reference/faults.md F78); the system's own patience is two hours."""
+
+_SERVER: Final = r"""
+    (?:(?P<user>[^:/]*)(?::(?P<password>[^@]*))?@)?
+    (?:\[(?P<address>[^/?]+)\]|(?P<host>[^/:?]+))?
+    (?::(?P<port>[^/?]*))?
+    (?:/(?P<dbname>[^?]*))?
+    (?:\?(?P<query>.*))?
+    """
+_HOST_AND_PORT: Final = r"([A-Za-z0-9.-]*):([0-9]*)"
+
+
+@dataclass(frozen=True, slots=True)
+class Backend:
+    """One database.
+
+    Attributes:
+        connect: Makes a connection.
+        failures: What it may raise about the database.
+        last_resort: Makes a connection to a file that the first one cannot read; what is being
+            written there does not show.
+        dispose: Ends what outlives the connections: memory.
+    """
+
+    connect: Callable[[], DatabaseConnection]
+    failures: tuple[type[Exception], ...] = (sqlite3.Error,)
+    last_resort: Callable[[], DatabaseConnection] | None = None
+    dispose: Callable[[], None] = lambda: None
+
+
+def backend_of(place: JournalPlace, *, read_only: bool, glance: bool = False) -> Backend:
+    """Return the database at ``place``; no file and no server is opened yet.
+
+    Args:
+        place: Where it is.
+        read_only: Whether nothing is written.
+        glance: Whether that is for one short question: see
+            :class:`~robolink.journal.store.store.Store`.
+
+    Raises:
+        OSError: The file or its folder cannot be made.
+        JournalError: A driver is missing, or the file to read is.
+    """
+    if place.url:
+        return _postgresql(place, read_only=read_only)
+    if place.path is None:
+        memory = _connect("file::memory:")
+        return Backend(lambda: DatabaseConnection(memory, lasting=True), dispose=memory.close)
+    path = place.path
+    if read_only:
+        _require_file(place)
+        if glance:
+            return Backend(lambda: DatabaseConnection(_connect(_uri(path, "mode=ro"), GLANCE_S)))
+        return Backend(
+            lambda: DatabaseConnection(_connect(_uri(path, "mode=ro"))),
+            # A read-only folder has no room for the shared memory that SQLite reads through.
+            last_resort=lambda: DatabaseConnection(_connect(_uri(path, "immutable=1"))),
+        )
+    _make_file(path)
+    return Backend(lambda: _to_write(path))
+
+
+def _to_write(path: Path) -> DatabaseConnection:
+    connection = _connect(_uri(path, "mode=rw"))
+    try:
+        _prepare(connection)
+    except BaseException:
+        connection.close()
+        raise
+    return DatabaseConnection(connection)
+
+
+def _connect(uri: str, wait_s: float | None = None) -> sqlite3.Connection:
+    # Transactions are begun by us, so that a write takes its lock first; one lock of the store
+    # keeps threads apart.
+    return sqlite3.connect(
+        uri, uri=True, timeout=wait_s or BUSY_S, isolation_level=None, check_same_thread=False
+    )
+
+
+def _prepare(connection: sqlite3.Connection) -> None:
+    if connection.execute("PRAGMA journal_mode").fetchone() != ("wal",):
+        connection.execute(f"PRAGMA page_size={_PAGE_BYTES}")  # of no effect in a file with tables
+        _begin_wal(connection)
+    connection.execute("PRAGMA synchronous=FULL")
+    connection.execute(f"PRAGMA wal_autocheckpoint={_LOG_PAGES}")
+    connection.execute("PRAGMA foreign_keys=ON")
+
+
+def _begin_wal(connection: sqlite3.Connection) -> None:
+    """Give a new file its write-ahead log, while others may be about to.
+
+    Each of them reads the file before it wants it alone. SQLite does not let the second one wait
+    for that, which would wait for the first for ever, but refuses it at once, whatever its
+    timeout (https://www.sqlite.org/c3ref/busy_handler.html); a moment later it is done.
+    """
+    deadline = Deadline.after(SystemClock(), BUSY_S)
+    while True:
+        try:
+            connection.execute("PRAGMA journal_mode=WAL")
+        except sqlite3.OperationalError as error:
+            if error.sqlite_errorcode != sqlite3.SQLITE_BUSY or deadline.expired:
+                raise
+            ambient.sleep(_AGAIN_S)
+        else:
+            return
+
+
+def _uri(path: Path, options: str) -> str:
+    return f"file:{quote(path.as_posix())}?{options}"
+
+
+def _require_file(place: JournalPlace) -> None:
+    if place.path is not None and not place.path.exists():
+        raise JournalError(
+            tr("There is no journal {name}.", name=place.name),
+            remedy=tr(
+                "The first change that robolink makes starts one; or name another one "
+                "in ROBOLINK_JOURNAL."
+            ),
+        )
+
+
+def _make_file(path: Path) -> None:
+    make_folder(path.parent)
+    try:
+        descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+    except FileExistsError:
+        return
+    os.close(descriptor)
+    sync_folder(path.parent)
+
+
+def _postgresql(place: JournalPlace, *, read_only: bool) -> Backend:
+    try:
+        import psycopg
+    except ImportError as error:
+        raise JournalError(
+            tr("The package psycopg, which connects to {name}, is missing.", name=place.name),
+            remedy=tr("Install it: pip install 'robolink[postgresql]'."),
+        ) from error
+    settings = [f"SET lock_timeout = {round(BUSY_S * 1000)}", "SET synchronous_commit TO on"]
+    if read_only:
+        settings.append("SET default_transaction_read_only TO on")
+    where: dict[str, Any] = {**parameters_of(place.url), **_NOTICED}
+
+    def connect() -> DatabaseConnection:
+        connection = PostgresqlConnection(psycopg.connect(**where))
+        try:
+            for setting in settings:
+                connection.run(setting)
+            connection.commit()
+        except BaseException:
+            connection.close()
+            raise
+        return connection
+
+    return Backend(connect, failures=(psycopg.Error,))
+
+
+def parameters_of(url: str) -> dict[str, str]:
+    """Return what libpq is told of a server by the URL of a journal.
+
+    User, password and database may have %-escapes; of the query all parameters of libpq are known
+    (https://www.postgresql.org/docs/current/libpq-connect.html). Several hosts stand there, as
+    ``host=a,b&port=1,2`` or ``host=a:1&host=b:2``.
+    """
+    found = re.match(_SERVER, url.partition("://")[2], re.VERBOSE)
+    parts = (
+        {} if found is None else {name: text for name, text in found.groupdict().items() if text}
+    )
+    query = parts.pop("query", "")
+    host = parts.pop("address", "") or parts.pop("host", "")
+    told = {name: text if name == "port" else unquote(text) for name, text in parts.items()}
+    if host:
+        told["host"] = host
+    given: dict[str, list[str]] = {}
+    for name, text in parse_qsl(query):
+        given.setdefault(name, []).append(text)
+    told |= {name: ",".join(texts) for name, texts in given.items()}
+    hosts = given.get("host", [])
+    pairs = [re.fullmatch(_HOST_AND_PORT, text) for text in hosts]
+    if any(pairs) and "port" not in given:
+        told["host"] = ",".join(
+            text if pair is None else pair[1] for text, pair in zip(hosts, pairs, strict=True)
+        )
+        told["port"] = ",".join("" if pair is None else pair[2] for pair in pairs)
+    return told

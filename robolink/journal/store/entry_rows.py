@@ -1,18 +1,57 @@
-"""Statements about entries."""
+"""Statements about entries: what is asked for, and what is given back."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields
+from dataclasses import dataclass, field, fields
 from functools import lru_cache
 from typing import Any, Final, TypeAlias, TypeVar
 
-from robolink.journal._records import Filter
 from robolink.journal.store import statements
 from robolink.journal.store.chain import canonical, digest, storable
 from robolink.journal.store.connection import DatabaseConnection
 from robolink.journal.store.statements import COLUMNS, KIND, NAME
 from robolink.messages import plain
-from robolink.model import PROOFS, NewEntry, Signature
+from robolink.model import PROOFS, EntryKind, NewEntry, Signature
 from robolink.timing import wall_time
+
+
+@dataclass(frozen=True, slots=True)
+class ChainVerification:
+    """Whether the record is whole.
+
+    Attributes:
+        checked: How many entries were read.
+        problems: What is wrong, one sentence each, with the number of the entry.
+        last_number: Number of the last entry, 0 for none.
+        last_hash: Its hash. The chain has no key, so only a hash that is kept elsewhere shows
+            that the whole journal was not made anew.
+    """
+
+    checked: int
+    problems: tuple[str, ...]
+    last_number: int = field(default=0, compare=False)
+    last_hash: str = field(default="", compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Filter:
+    """Which entries are wanted.
+
+    Attributes:
+        controllers: Of the controller with these names only; empty for all.
+        tool: About this tool only.
+        change: Of this tool change only.
+        kinds: Of these kinds only; empty for all.
+        newest_first: In which order.
+        proved_tool: Those only that prove what this tool holds.
+    """
+
+    controllers: tuple[str, ...] = ()
+    tool: int | None = None
+    change: str | None = None
+    kinds: tuple[EntryKind, ...] = ()
+    newest_first: bool = True
+    proved_tool: int | None = None
+
 
 T = TypeVar("T")
 

@@ -14,18 +14,14 @@ from typing import Final
 from robolink import ambient
 from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.errors import JournalError
+from robolink.journal._journal_loss import traces_of
 from robolink.journal._places import JournalPlace
-from robolink.journal._records import Filter
-from robolink.journal._traces import traces_of
 from robolink.journal.store import migrations, statements
 from robolink.journal.store.chain import ChainCheck
-from robolink.journal.store.connection import DatabaseConnection
-from robolink.journal.store.engines import Backend, backend_of
-from robolink.journal.store.entry_rows import EntryRows
+from robolink.journal.store.connection import Backend, DatabaseConnection, backend_of
+from robolink.journal.store.entry_rows import EntryRows, Filter
 from robolink.journal.store.failures import damaged_error, journal_error
-from robolink.journal.store.lease_rows import LeaseRows
-from robolink.journal.store.marker_rows import MarkerRows
-from robolink.journal.store.name_rows import NameRows
+from robolink.journal.store.state_rows import LeaseRows, MarkerRows, NameRows
 from robolink.messages import tr
 
 _NEWEST: Final = 20

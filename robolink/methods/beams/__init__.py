@@ -32,6 +32,7 @@ from robolink.runner import Procedure
 from robolink.stations import BeamStation, StationKind
 
 if TYPE_CHECKING:
+    from robolink.calibration import BeamsResult
     from robolink.methods.beams.procedure import CrossingTest
     from robolink.procedures import KeptProof, TipSource
 
@@ -324,19 +325,11 @@ class BeamsSource(InputSource[BeamsParameters]):
 
         require_run_up(group, self.plan, change_mm)
 
-    def steps(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
+    def steps(self, stored: ToolOffset | None, here: Pose) -> "Procedure[BeamsResult]":
         """Return the steps of the measurement."""
-        from robolink.methods.beams.procedure import measure_beams  # numpy, a look does without
+        from robolink.methods.beams.procedure import cross_beams  # numpy, a look does without
 
-        return measure_beams(
-            self.station,
-            self.plan,
-            here=here,
-            stored=stored,
-            sigma_mm=self.sigma_mm,
-            run_up_mm=self.run_up_mm,
-            step_mm=self.step_mm,
-        )
+        return cross_beams(self, stored, here)
 
     def proof(
         self,
@@ -376,6 +369,55 @@ class BeamsSource(InputSource[BeamsParameters]):
             lean=None if lean is None else (lean.x, lean.y),
             run_up_mm=context.controller.groups[0].run_up_mm(self.plan.crossing_mm_s),
         )
+
+
+def measure_beams(
+    station: BeamStation,
+    plan: BeamsParameters,
+    *,
+    here: Pose,
+    stored: ToolOffset | None,
+    sigma_mm: float | None = None,
+    run_up_mm: float | None = None,
+    step_mm: float | None = None,
+) -> "Procedure[BeamsResult]":
+    """Measure X and Y of a tip with two beams. Runs in Tool 0.
+
+    It goes and ends as :func:`~robolink.procedures.sample_sequentially` says.
+
+    Args:
+        station: Where the beams are.
+        plan: How they are crossed. With a turn, U is turned by it, toward zero, for a second
+            measurement: only the directions of the beams are relied on then, not their places, and
+            the offset is absolute.
+        here: Where the flange is; its U is that of the measurement.
+        stored: The offset stored now; the tip is expected there.
+        sigma_mm: Standard deviation of one crossing's middle, where it is known.
+        run_up_mm: In what way the tip reaches the speed of a crossing, where the controller told
+            it; else an acceleration of 100 mm/s^2 is reckoned with.
+        step_mm: How finely it tells where an edge was, likewise.
+
+    Raises:
+        CalibrationError: ``tilted_pose`` before anything moves; ``no_edge``, ``edge_passed``,
+            ``run_up_too_short``, ``bent_needle``, and those of
+            :func:`~robolink.calibration.solve_crossed_beams`.
+
+    Example:
+        >>> from robolink.calibration import Beam
+        >>> from robolink.methods import BeamsParameters, measure_beams
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.stations import BeamStation
+        >>> from robolink.testing import PaperCell
+        >>> beams = BeamStation((Beam(300, 80, 0), Beam(300, 80, 90)), -30, inputs=(3, 4))
+        >>> here, stored = Pose(300, 100, 20, 0), ToolOffset(12, -3.5, -20)
+        >>> broken = {3: lambda at: abs(at[1] - 80) < 0.4, 4: lambda at: abs(at[0] - 300) < 0.4}
+        >>> cell = PaperCell(here, ToolOffset(12.3, -3.9, -20), switches=broken)
+        >>> found = cell.run(measure_beams(beams, BeamsParameters(), here=here, stored=stored))
+        >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3)
+        (12.3, -3.9)
+    """
+    source = BeamsSource(station, plan, sigma_mm, run_up_mm, step_mm)
+    return source.steps(stored, here)
 
 
 def _source(parameters: BeamsParameters, site: Site) -> "TipSource":

@@ -26,7 +26,7 @@ from robolink.calibration import (
     solve_crossed_beams,
     toward_zero,
 )
-from robolink.methods.beams import BeamsParameters
+from robolink.methods.beams import BeamsParameters, BeamsSource
 from robolink.methods.beams.crossings import CrossingSampler
 from robolink.methods.beams.drive import BeamDrive, BeamTravel
 from robolink.model import Pose, ToolOffset
@@ -38,54 +38,19 @@ REFERENCE_ASIDES_MM: Final = (-12.0, -6.0, 6.0, 12.0)
 """Places along a beam that tell its direction well enough, in a sensor of 30 mm."""
 
 
-def measure_beams(
-    station: BeamStation,
-    plan: BeamsParameters,
-    *,
-    here: Pose,
-    stored: ToolOffset | None,
-    sigma_mm: float | None = None,
-    run_up_mm: float | None = None,
-    step_mm: float | None = None,
+def cross_beams(
+    source: BeamsSource, stored: ToolOffset | None, here: Pose
 ) -> Procedure[BeamsResult]:
-    """Measure X and Y of a tip with two beams. Runs in Tool 0; see :func:`sample_sequentially`.
-
-    Args:
-        station: Where the beams are.
-        plan: How they are crossed. With a turn, U is turned by it, toward zero, for a second
-            measurement: only the directions of the beams are relied on then, not their places, and
-            the offset is absolute.
-        here: Where the flange is; its U is that of the measurement.
-        stored: The offset stored now; the tip is expected there.
-        sigma_mm: Standard deviation of one crossing's middle, where it is known.
-        run_up_mm: In what way the tip reaches the speed of a crossing, where the controller told
-            it; else an acceleration of 100 mm/s^2 is reckoned with.
-        step_mm: How finely it tells where an edge was, likewise.
-
-    Raises:
-        CalibrationError: ``tilted_pose`` before anything moves; ``no_edge``, ``edge_passed``,
-            ``run_up_too_short``, ``bent_needle``, and those of :func:`solve_crossed_beams`.
-
-    Example:
-        >>> from robolink.calibration import Beam
-        >>> from robolink.methods import BeamsParameters, measure_beams
-        >>> from robolink.model import Pose, ToolOffset
-        >>> from robolink.stations import BeamStation
-        >>> from robolink.testing import PaperCell
-        >>> beams = BeamStation((Beam(300, 80, 0), Beam(300, 80, 90)), -30, inputs=(3, 4))
-        >>> here, stored = Pose(300, 100, 20, 0), ToolOffset(12, -3.5, -20)
-        >>> broken = {3: lambda at: abs(at[1] - 80) < 0.4, 4: lambda at: abs(at[0] - 300) < 0.4}
-        >>> cell = PaperCell(here, ToolOffset(12.3, -3.9, -20), switches=broken)
-        >>> found = cell.run(measure_beams(beams, BeamsParameters(), here=here, stored=stored))
-        >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3)
-        (12.3, -3.9)
-    """
+    """Measure as a source says, see :func:`~robolink.methods.measure_beams`."""
     solvable_planes([here], height_of(stored))
-    drive = BeamDrive(station, plan, here, stored or NO_OFFSET, told_run_up_mm=run_up_mm)
+    plan, tip = source.plan, stored or NO_OFFSET
+    drive = BeamDrive(source.station, plan, here, tip, told_run_up_mm=source.run_up_mm)
     turned = None
     if plan.turn_deg:
         turned = replace(drive, frame=replace(here, u_deg=toward_zero(here.u_deg, plan.turn_deg)))
-    crossings = CrossingSampler(BeamTravel(here), drive, turned, stored, sigma_mm, step_mm)
+    crossings = CrossingSampler(
+        BeamTravel(here), drive, turned, stored, source.sigma_mm, source.step_mm
+    )
     scans = crossings.scans
     first = yield from crossings.take(scans[0])
     return (yield from sample_sequentially(crossings, first, scans, plan.sampling))
@@ -111,7 +76,7 @@ def trace_beams(
         tip_sigma_mm: Standard deviation of each coordinate of that offset.
         asides_mm: Where along each beam it is crossed, both ways, from where they meet; two
             places or more, and none so near to it that the pin breaks both.
-        run_up_mm: As for :func:`measure_beams`.
+        run_up_mm: As for :func:`~robolink.methods.measure_beams`.
 
     Raises:
         CalibrationError: ``no_edge``, ``edge_passed``, ``run_up_too_short``, and those of
@@ -163,13 +128,13 @@ def verify_by_crossing(
             to a reference was written.
         lean: By how much the shaft lies beside the tip, X and Y of the frame in mm per mm above
             it: the beams see the shaft.
-        run_up_mm: As for :func:`measure_beams`.
+        run_up_mm: As for :func:`~robolink.methods.measure_beams`.
 
     The drift at an angle is how far from the place of the reference record the tip is found
     there. It ends lifted.
 
     Raises:
-        CalibrationError: As :func:`measure_beams`.
+        CalibrationError: As :func:`~robolink.methods.measure_beams`.
 
     Example:
         >>> from robolink.calibration import Beam

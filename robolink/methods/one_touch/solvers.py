@@ -82,7 +82,7 @@ def find_last_touch(controller: Controller, tool: int, station: str) -> LastTouc
     Example:
         >>> from robolink.methods import PointsSource, find_last_touch
         >>> from robolink.model import Pose, ToolOffset
-        >>> from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
+        >>> from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
         >>> from robolink.testing import MemoryController, MemoryMachine
         >>> class Nobody:  # implements robolink.Operator
         ...     def tell(self, text): ...
@@ -313,7 +313,7 @@ def difference_from_last(
         >>> from robolink.calibration import NeedleLimits
         >>> from robolink.methods import PointsSource, difference_from_last
         >>> from robolink.model import Pose, ToolOffset
-        >>> from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan
+        >>> from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
         >>> from robolink.testing import MemoryController, MemoryMachine
         >>> class Nobody:  # implements robolink.Operator
         ...     def tell(self, text): ...

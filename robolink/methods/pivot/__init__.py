@@ -36,7 +36,7 @@ from robolink.stations import StationKind
 if TYPE_CHECKING:
     from robolink.methods.pivot.procedure import TiltTest
     from robolink.methods.pivot.tilts import Tilt
-    from robolink.procedures import KeptProof, PoseMethod, TipSource
+    from robolink.procedures import KeptProof, TipSource
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -127,7 +127,7 @@ class PivotSource(PinSource):
     ) -> "TiltTest":
         """Return the tilt test; see :class:`~robolink.procedures.KeepsProof`."""
         from robolink.methods.pivot.procedure import TiltTest  # numpy
-        from robolink.procedures.tilting_proof import upright_of
+        from robolink.procedures.tilt_proof import upright_of
 
         x_mm, y_mm, z_mm = result.reference_point_mm
         return TiltTest(
@@ -157,15 +157,8 @@ class PivotSource(PinSource):
         """Return the steps that make one touch again."""
         from robolink.methods.pivot.procedure import retake_pivot  # numpy
 
-        return retake_pivot(
-            self.touch,
-            here=here,
-            taken=taken,
-            again=len(taken) - 1 if again is None else again,
-            tilts=self.tilts,
-            stored=require_known_tip(stored),
-            sigma_mm=self.sigma_mm,
-        )
+        known = require_known_tip(stored)
+        return retake_pivot(self, known, here=here, taken=taken, again=again)
 
     @property
     def _tilt_deg(self) -> float:
@@ -177,17 +170,52 @@ class PivotSource(PinSource):
         Raises:
             ConfigError: Nobody knows about where the tip is, so it cannot be kept off the pin.
         """
-        from robolink.methods.pivot.procedure import (
-            measure_pivot,  # numpy, which a look does without
-        )
+        return self._measured(require_known_tip(stored))
 
-        return measure_pivot(
-            self.touch,
-            tilts=self.tilts,
-            stored=require_known_tip(stored),
-            sigma_mm=self.sigma_mm,
-            sampling=self.sampling,
-        )
+    def _measured(self, known: ToolOffset) -> Procedure[CalibrationResult]:
+        from robolink.methods.pivot.procedure import pivot_then_lift  # numpy
+
+        result, _ = yield from pivot_then_lift(self, known)
+        return result
+
+
+def measure_pivot(
+    plan: TouchPlan,
+    *,
+    tilts: "Sequence[Tilt]",
+    stored: ToolOffset,
+    sigma_mm: float | None = None,
+    sampling: SamplingPolicy = TAKE_ALL,
+) -> Procedure[CalibrationResult]:
+    """Measure a tip on a pin in tilted orientations. Runs in Tool 0.
+
+    It ends lifted, and in the orientation in which it began.
+
+    Args:
+        plan: Lift and clearance.
+        tilts: Orientations of the further touches, counted from the first one; where the arm
+            cannot take them up over this pin, others are chosen.
+        stored: The offset stored now; the approaches use it. Where it is wrong by e, the tip comes
+            down nearer to the pin by up to 2 e sin(tilt / 2).
+        sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
+        sampling: When it ends, and whether a pose may be taken again.
+
+    Raises:
+        CalibrationError: ``not_tilted``; ``not_touched``, ``typed_ahead``, ``touch_not_proven``,
+            ``large_residual``; and as :func:`solve_pivot`.
+
+    Example:
+        >>> from robolink.methods import informative_tilts, measure_pivot
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.procedures import TouchPlan
+        >>> from robolink.testing import PaperCell
+        >>> cell = PaperCell(Pose(300, 100, 20, 0), ToolOffset(12.3, -3.9, -20.6), (310, 95, -40))
+        >>> tilts, stored = informative_tilts(6, tilt_deg=30), ToolOffset(12, -4, -20)
+        >>> found = cell.run(measure_pivot(TouchPlan(), tilts=tilts, stored=stored))
+        >>> [round(length, 3) for length in found.offset.components()[:3]]
+        [12.3, -3.9, -20.6]
+    """
+    return PivotSource(tuple(tilts), plan, sigma_mm, sampling).steps(stored)
 
 
 def require_known_tip(stored: ToolOffset | None) -> ToolOffset:
@@ -208,17 +236,23 @@ def require_known_tip(stored: ToolOffset | None) -> ToolOffset:
 
 
 @dataclass(frozen=True, slots=True)
-class PivotTouches:
-    """Touches of one pin with six axes, the tool tilted and turned.
+class TiltedTouches:
+    """Touches that exist already, the tool turned and tilted.
 
     Attributes:
-        sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
+        sigma_mm: Standard deviation of one touch, where it is known: of one coordinate at a pin,
+            along the normal on a surface.
     """
 
     upright: ClassVar[bool] = False
     needs: ClassVar[tuple[str, ...]] = ("z_mm", "v_deg", "w_deg")
 
     sigma_mm: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class PivotTouches(TiltedTouches):
+    """Touches of one pin with six axes, the tool tilted and turned."""
 
     def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
         """Solve three poses and more; see :class:`~robolink.procedures.PoseMethod`."""
@@ -273,10 +307,6 @@ def _source(parameters: PivotParameters, site: Site) -> "TipSource":
     )
 
 
-def _from_poses(_parameters: PivotParameters, site: Site) -> "PoseMethod":
-    return PivotTouches(site.sigma_mm)
-
-
 def _proof() -> "type[KeptProof]":
     from robolink.methods.pivot.procedure import TiltTest
 
@@ -300,7 +330,7 @@ METHOD = Method(
     measures=("x_mm", "y_mm", "z_mm"),
     needs=Needs(station=StationKind.PIN, named=False, finds_pin=True, tilt=True),
     source=_source,
-    from_poses=_from_poses,
+    from_poses=lambda _parameters, site: PivotTouches(site.sigma_mm),
     pose_help=PoseHelp(
         points=declared("Three points or more taught on the pendant, the tool tilted and turned."),
         typed=declared("A pose X,Y,Z,U,V,W in mm and degrees; give it three times or more."),

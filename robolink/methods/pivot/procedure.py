@@ -18,6 +18,7 @@ from robolink.calibration import (
     tilted_from,
 )
 from robolink.messages import tr
+from robolink.methods.pivot import PivotSource
 from robolink.methods.pivot.tilts import (
     UPRIGHT,
     OverPin,
@@ -31,115 +32,70 @@ from robolink.methods.pivot.tilts import (
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import (
     MOST_MORE,
-    TAKE_ALL,
     DriftProof,
     PinTouches,
-    SamplingPolicy,
     TouchPlan,
     approach_path,
     resume_samples,
     sample_sequentially,
 )
-from robolink.procedures.tilting_proof import TiltingProof, Vector
+from robolink.procedures.tilt_proof import TiltingProof, Vector
 from robolink.runner import Notify, Procedure, TouchedAt
 
 
-def measure_pivot(
-    plan: TouchPlan,
-    *,
-    tilts: Sequence[Tilt],
-    stored: ToolOffset,
-    sigma_mm: float | None = None,
-    sampling: SamplingPolicy = TAKE_ALL,
-) -> Procedure[CalibrationResult]:
-    """Measure a tip on a pin in tilted orientations. Runs in Tool 0.
-
-    It ends lifted, and in the orientation in which it began.
+def pivot_then_lift(
+    source: PivotSource, stored: ToolOffset
+) -> Procedure[tuple[CalibrationResult, Pose]]:
+    """Measure as a source says; return the pose of the lifted flange as well.
 
     Args:
-        plan: Lift and clearance.
-        tilts: Orientations of the further touches, counted from the first one; where the arm
-            cannot take them up over this pin, others are chosen.
-        stored: The offset stored now; the approaches use it. Where it is wrong by e, the tip comes
-            down nearer to the pin by up to 2 e sin(tilt / 2).
-        sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
-        sampling: When it ends, and whether a pose may be taken again.
-
-    Raises:
-        CalibrationError: ``not_tilted``; ``not_touched``, ``typed_ahead``, ``touch_not_proven``,
-            ``large_residual``; and as :func:`solve_pivot`.
-
-    Example:
-        >>> from robolink.methods import informative_tilts, measure_pivot
-        >>> from robolink.model import Pose, ToolOffset
-        >>> from robolink.procedures import TouchPlan
-        >>> from robolink.testing import PaperCell
-        >>> cell = PaperCell(Pose(300, 100, 20, 0), ToolOffset(12.3, -3.9, -20.6), (310, 95, -40))
-        >>> tilts, stored = informative_tilts(6, tilt_deg=30), ToolOffset(12, -4, -20)
-        >>> found = cell.run(measure_pivot(TouchPlan(), tilts=tilts, stored=stored))
-        >>> [round(length, 3) for length in found.offset.components()[:3]]
-        [12.3, -3.9, -20.6]
+        source: What is measured, and how.
+        stored: The offset stored now.
     """
-    result, _ = yield from pivot_then_lift(
-        plan, tilts=tilts, stored=stored, sigma_mm=sigma_mm, sampling=sampling
-    )
-    return result
-
-
-def pivot_then_lift(
-    plan: TouchPlan,
-    *,
-    tilts: Sequence[Tilt],
-    stored: ToolOffset,
-    sigma_mm: float | None,
-    sampling: SamplingPolicy,
-) -> Procedure[tuple[CalibrationResult, Pose]]:
-    """Do what :func:`measure_pivot` does; return the pose of the lifted flange as well."""
+    plan = source.touch
     touches = PinTouches(plan, planar=False, retakes=True)
     first = yield from touches.first(UPRIGHT)
     over = OverPin.touched(first, stored)
-    tilts = yield from tilts_in_reach(over, tilts, plan.lift_mm)
+    tilts = yield from tilts_in_reach(over, source.tilts, plan.lift_mm)
     swing = _Swing(plan, over, touches)
-    tilting = _PivotSampler(swing, stored, sigma_mm)
-    result = yield from sample_sequentially(tilting, first, [UPRIGHT, *tilts], sampling)
+    tilting = _PivotSampler(swing, stored, source.sigma_mm)
+    result = yield from sample_sequentially(tilting, first, [UPRIGHT, *tilts], source.sampling)
     yield from swing.to(UPRIGHT)
     touches.require_made()
     return result, swing.over.pose(UPRIGHT, plan.lift_mm)
 
 
 def retake_pivot(
-    plan: TouchPlan,
+    source: PivotSource,
+    stored: ToolOffset,
     *,
     here: Pose,
     taken: Sequence[TouchedAt],
-    again: int,
-    tilts: Sequence[Tilt],
-    stored: ToolOffset,
-    sigma_mm: float | None = None,
+    again: int | None,
 ) -> Procedure[CalibrationResult]:
-    """Make one touch of :func:`measure_pivot` again. Runs in Tool 0, ends as it does.
+    """Make one touch of a measurement again. Runs in Tool 0, ends as it does.
 
     Args:
-        plan: Lift and clearance.
+        source: What was measured, and how.
+        stored: The offset stored now.
         here: Where the flange is, upright.
         taken: The touches of the measurement.
-        again: Index of the one that is made again.
-        tilts: Orientations of the plan.
-        stored: The offset stored now.
-        sigma_mm: Standard deviation of one coordinate of one touch, where it is known.
+        again: Index of the one that is made again; ``None`` for the last one.
 
     Raises:
-        CalibrationError: As :func:`measure_pivot`.
+        CalibrationError: As :func:`~robolink.methods.measure_pivot`.
     """
+    plan = source.touch
     over = OverPin.touched(taken[0], stored)
-    places = [UPRIGHT, *(yield from tilts_in_reach(over, tilts, plan.lift_mm))][: len(taken)]
+    places = [UPRIGHT, *(yield from tilts_in_reach(over, source.tilts, plan.lift_mm))][: len(taken)]
     touches = PinTouches(plan, planar=False, retakes=True)
     touches.adopt(dict(zip(places, taken, strict=True)))
     yield from approach_path(
         over.pose(UPRIGHT, plan.lift_mm), here=here, purpose=tr("Moving above the pin.")
     )
     swing = _Swing(plan, over, touches)
-    tilting = _PivotSampler(swing, stored, sigma_mm)
+    tilting = _PivotSampler(swing, stored, source.sigma_mm)
+    again = len(taken) - 1 if again is None else again
     result = yield from resume_samples(tilting, places, taken, again)
     yield from swing.to(UPRIGHT)
     touches.require_made()

@@ -70,8 +70,7 @@ class OverPin:
 
     def moved_to(self, pose: Pose) -> "OverPin":
         """Return it for the place where the tip is with the frame in a pose."""
-        x, y, z = (rotation_of(pose) @ self.tip.components()[:3]).tolist()
-        return replace(self, pin_mm=(pose.x_mm + x, pose.y_mm + y, pose.z_mm + z))
+        return replace(self, pin_mm=tip_place(pose, self.tip))
 
     def pose(self, tilt: Tilt, above_mm: float) -> Pose:
         """Return the pose of the frame with the tip so far above the pin."""
@@ -83,6 +82,12 @@ class OverPin:
         x, y, z = (np.array(self.pin_mm) - turned @ self.tip.components()[:3]).tolist()
         u, v, w = uvw_deg(turned)
         return replace(self.first, x_mm=x, y_mm=y, z_mm=z + above_mm, u_deg=u, v_deg=v, w_deg=w)
+
+
+def tip_place(pose: Pose, tip: ToolOffset) -> tuple[float, float, float]:
+    """Return where a tip is, base, with its frame in a pose; only its place in the frame counts."""
+    x, y, z = (np.array(pose.coordinates()[:3]) + rotation_of(pose) @ tip.components()[:3]).tolist()
+    return x, y, z
 
 
 def informative_tilts(count: int, tilt_deg: float) -> tuple[Tilt, ...]:

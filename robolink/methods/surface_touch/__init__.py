@@ -3,11 +3,10 @@
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Any, Generic, Self
+from typing import TYPE_CHECKING, Annotated, Generic, Self
 
 from annotated_types import Ge, Le
 
-from robolink.calibration import CalibrationResult
 from robolink.messages import declared
 from robolink.methods.method import DEGREES, MM, Help, InputNumber, Option
 from robolink.methods.pivot import require_known_tip
@@ -15,6 +14,7 @@ from robolink.methods.shared_parameters import PinParameters, Retake
 from robolink.methods.surface_touch.survey import SurveyT
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import TAKE_ALL, SamplingPolicy, TouchPlan, TouchSource
+from robolink.procedures.samples import ResultT
 from robolink.runner import Procedure, TouchedAt
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ class SurfaceParameters(PinParameters):
 
 
 @dataclass(frozen=True, slots=True)
-class SurfaceTouchSource(TouchSource, Generic[SurveyT]):
+class SurfaceTouchSource(TouchSource, Generic[SurveyT, ResultT]):
     """Measures by touching one surface with the tool upright and tilted.
 
     Attributes:
@@ -93,7 +93,7 @@ class SurfaceTouchSource(TouchSource, Generic[SurveyT]):
         """Return the source whose steps are only shown."""
         return replace(TouchSource.foreseen(self), sampling=TAKE_ALL)
 
-    def steps(self, stored: ToolOffset | None) -> Procedure[CalibrationResult]:
+    def steps(self, stored: ToolOffset | None) -> Procedure[ResultT]:
         """Return the steps; they end lifted, over the place touched last, as upright as they began.
 
         Raises:
@@ -101,10 +101,7 @@ class SurfaceTouchSource(TouchSource, Generic[SurveyT]):
         """
         from robolink.methods.surface_touch.drive import measure_surface  # numpy
 
-        found: CalibrationResult = yield from measure_surface(
-            self, self._kind(), require_known_tip(stored)
-        )
-        return found
+        return (yield from measure_surface(self, self._kind(), require_known_tip(stored)))
 
     @property
     def adds_touch(self) -> bool:
@@ -113,20 +110,21 @@ class SurfaceTouchSource(TouchSource, Generic[SurveyT]):
 
     def further_steps(
         self, here: Pose, taken: Sequence[TouchedAt], again: int | None, stored: ToolOffset | None
-    ) -> Procedure[CalibrationResult]:
+    ) -> Procedure[ResultT]:
         """Return the steps that make one touch again."""
         from robolink.methods.surface_touch.drive import retake_on_surface  # numpy
 
-        found: CalibrationResult = yield from retake_on_surface(
-            self,
-            self._kind(),
-            require_known_tip(stored),
-            here=here,
-            taken=taken,
-            again=len(taken) - 1 if again is None else again,
+        return (
+            yield from retake_on_surface(
+                self,
+                self._kind(),
+                require_known_tip(stored),
+                here=here,
+                taken=taken,
+                again=len(taken) - 1 if again is None else again,
+            )
         )
-        return found
 
     @abstractmethod
-    def _kind(self) -> "SurfaceKind[SurveyT, Any]":
+    def _kind(self) -> "SurfaceKind[SurveyT, ResultT]":
         """Return what the surface is."""

@@ -18,6 +18,7 @@ from robolink.methods.pivot.tilts import (
     TiltedNames,
     apart_deg,
     tilt_in_air,
+    tip_place,
 )
 from robolink.methods.surface_touch import SurfaceTouchSource
 from robolink.methods.surface_touch.survey import SurveyT, Vector
@@ -169,13 +170,7 @@ def in_turn(spots: Iterable[SurfaceSpot]) -> list[SurfaceSpot]:
 
 def places_of(touches: Sequence[Pose], tip: ToolOffset) -> list[Vector]:
     """Return where a tip was at touches, base."""
-    places = []
-    for touch in touches:
-        x, y, z = (
-            np.array(touch.coordinates()[:3]) + rotation_of(touch) @ tip.components()[:3]
-        ).tolist()
-        places.append((x, y, z))
-    return places
+    return [tip_place(touch, tip) for touch in touches]
 
 
 def proving_spots(over: OverPin, possible: Sequence[SurfaceSpot]) -> tuple[SurfaceSpot, ...]:
@@ -260,7 +255,7 @@ class SurfaceSampler(TiltedNames, ABC, Generic[SurveyT, ResultT]):
 
     def __init__(
         self,
-        source: SurfaceTouchSource[SurveyT],
+        source: SurfaceTouchSource[SurveyT, ResultT],
         stored: ToolOffset,
         touches: SurfaceTouches,
         first: TouchedAt,
@@ -381,14 +376,16 @@ class SurfaceKind(Generic[SurveyT, ResultT]):
     """
 
     sampler: Callable[
-        [SurfaceTouchSource[SurveyT], ToolOffset, SurfaceTouches, TouchedAt],
+        [SurfaceTouchSource[SurveyT, ResultT], ToolOffset, SurfaceTouches, TouchedAt],
         SurfaceSampler[SurveyT, ResultT],
     ]
     asked: Callable[[], str]
 
 
 def measure_surface(
-    source: SurfaceTouchSource[SurveyT], kind: SurfaceKind[SurveyT, ResultT], stored: ToolOffset
+    source: SurfaceTouchSource[SurveyT, ResultT],
+    kind: SurfaceKind[SurveyT, ResultT],
+    stored: ToolOffset,
 ) -> Procedure[ResultT]:
     """Measure a tip on a surface. Runs in Tool 0.
 
@@ -407,7 +404,7 @@ def measure_surface(
 
 
 def retake_on_surface(
-    source: SurfaceTouchSource[SurveyT],
+    source: SurfaceTouchSource[SurveyT, ResultT],
     kind: SurfaceKind[SurveyT, ResultT],
     stored: ToolOffset,
     *,

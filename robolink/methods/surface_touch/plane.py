@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated
 
 from annotated_types import Ge, Le
 
@@ -10,6 +10,7 @@ from robolink.calibration import HIGHEST_MM, CalibrationResult
 from robolink.files.toml import Problem
 from robolink.messages import declared, tr
 from robolink.methods.method import MM, Check, Help, Method, Needs, Option, PoseHelp, Site
+from robolink.methods.pivot import TiltedTouches
 from robolink.methods.surface_touch import SurfaceParameters, SurfaceTouchSource
 from robolink.methods.surface_touch.survey import PlaneSurvey
 from robolink.model import Pose, ToolOffset
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from robolink.calibration import PlaneTouchResult
     from robolink.methods.surface_touch.drive import SurfaceKind
     from robolink.methods.surface_touch.plane_procedure import PlaneTest
-    from robolink.procedures import KeptProof, PoseMethod, TipSource
+    from robolink.procedures import KeptProof, TipSource
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,7 +78,7 @@ class PlaneTouchParameters(SurfaceParameters):
 
 
 @dataclass(frozen=True, slots=True)
-class PlaneTouchSource(SurfaceTouchSource[PlaneSurvey]):
+class PlaneTouchSource(SurfaceTouchSource[PlaneSurvey, "PlaneTouchResult"]):
     """Measures by touching one plane with the tool upright and tilted."""
 
     @property
@@ -111,7 +112,7 @@ class PlaneTouchSource(SurfaceTouchSource[PlaneSurvey]):
         """
         from robolink.calibration import PlaneTouchResult
         from robolink.methods.surface_touch.plane_procedure import PlaneTest  # numpy
-        from robolink.procedures.tilting_proof import upright_of
+        from robolink.procedures.tilt_proof import upright_of
 
         if not isinstance(result, PlaneTouchResult):
             raise TypeError("the plane that was touched is a part of the result")
@@ -142,7 +143,7 @@ def measure_plane_touch(
     axes: int = 0,
     sigma_mm: float | None = None,
     sampling: SamplingPolicy = TAKE_ALL,
-) -> Procedure[CalibrationResult]:
+) -> "Procedure[PlaneTouchResult]":
     """Measure a tip on a plane. Runs in Tool 0.
 
     It ends lifted, over the place that was touched last, in the orientation in which it began.
@@ -179,17 +180,8 @@ def measure_plane_touch(
 
 
 @dataclass(frozen=True, slots=True)
-class PlaneTouches:
-    """Touches of one plane, the tool upright, turned and tilted.
-
-    Attributes:
-        sigma_mm: Standard deviation of one touch along the normal, where it is known.
-    """
-
-    upright: ClassVar[bool] = False
-    needs: ClassVar[tuple[str, ...]] = ("z_mm", "v_deg", "w_deg")
-
-    sigma_mm: float | None = None
+class PlaneTouches(TiltedTouches):
+    """Touches of one plane, the tool upright, turned and tilted."""
 
     def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
         """Solve seven poses and more; see :class:`~robolink.procedures.PoseMethod`."""
@@ -209,10 +201,6 @@ def _source(parameters: PlaneTouchParameters, site: Site) -> "TipSource":
         sigma_mm=site.sigma_mm,
         sampling=parameters.sampling,
     )
-
-
-def _from_poses(_parameters: PlaneTouchParameters, site: Site) -> "PoseMethod":
-    return PlaneTouches(site.sigma_mm)
 
 
 def _proof() -> "type[KeptProof]":
@@ -238,7 +226,7 @@ METHOD = Method(
     measures=("x_mm", "y_mm", "z_mm"),
     needs=Needs(station=StationKind.TOUCH, named=False, tilt=True),
     source=_source,
-    from_poses=_from_poses,
+    from_poses=lambda _parameters, site: PlaneTouches(site.sigma_mm),
     pose_help=PoseHelp(
         points=declared("Seven points or more taught on the pendant, the tool upright and tilted."),
         typed=declared("A pose X,Y,Z,U,V,W in mm and degrees; give it seven times or more."),

@@ -29,7 +29,7 @@ from robolink.calibration import (
 )
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.methods.pivot.tilts import UPRIGHT, OverPin, Tilt, free_tilts
+from robolink.methods.pivot.tilts import UPRIGHT, OverPin, Tilt, free_tilts, tip_place
 from robolink.methods.surface_touch.drive import (
     FAINT,
     SIX,
@@ -47,7 +47,7 @@ from robolink.methods.surface_touch.drive import (
 )
 from robolink.methods.surface_touch.survey import PlaneSurvey, Vector
 from robolink.model import Pose, ToolOffset
-from robolink.procedures.tilting_proof import TiltingProof
+from robolink.procedures.tilt_proof import TiltingProof
 from robolink.runner import Procedure
 
 _LEAST_ALTITUDE = 0.3
@@ -250,7 +250,7 @@ def _under(here: Pose, tip: ToolOffset, plane: TouchedPlane) -> tuple[Vector, Ve
     """Return the upward normal of the plane, and its place straight below the tip."""
     sign = 1.0 if plane.normal[2] > 0 else -1.0
     nx, ny, nz = (sign * part for part in plane.normal)
-    x, y, z = (np.array(here.coordinates()[:3]) + rotation_of(here) @ tip.components()[:3]).tolist()
+    x, y, z = tip_place(here, tip)
     above_mm = x * nx + y * ny + z * nz - sign * plane.distance_mm
     return (nx, ny, nz), (x, y, z - above_mm / nz)
 

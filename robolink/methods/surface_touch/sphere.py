@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated
 
 from annotated_types import Ge, Le
 
@@ -10,6 +10,7 @@ from robolink.calibration import HIGHEST_MM, CalibrationResult
 from robolink.files.toml import Problem
 from robolink.messages import declared, tr
 from robolink.methods.method import MM, Check, Help, Method, Needs, Option, PoseHelp, Site
+from robolink.methods.pivot import TiltedTouches
 from robolink.methods.surface_touch import SurfaceParameters, SurfaceTouchSource
 from robolink.methods.surface_touch.survey import SphereSurvey
 from robolink.model import Pose, ToolOffset
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from robolink.calibration import SphereTouchResult
     from robolink.methods.surface_touch.drive import SurfaceKind
     from robolink.methods.surface_touch.sphere_procedure import SphereTest
-    from robolink.procedures import KeptProof, PoseMethod, TipSource
+    from robolink.procedures import KeptProof, TipSource
 
 
 _USUAL_MM = 10.0
@@ -84,7 +85,7 @@ class SphereTouchParameters(SurfaceParameters):
 
 
 @dataclass(frozen=True, slots=True)
-class SphereTouchSource(SurfaceTouchSource[SphereSurvey]):
+class SphereTouchSource(SurfaceTouchSource[SphereSurvey, "SphereTouchResult"]):
     """Measures by touching one sphere from several sides, the tool upright and tilted."""
 
     @property
@@ -121,7 +122,7 @@ class SphereTouchSource(SurfaceTouchSource[SphereSurvey]):
             SphereTest,
             TouchedSphere,
         )
-        from robolink.procedures.tilting_proof import upright_of
+        from robolink.procedures.tilt_proof import upright_of
 
         if not isinstance(result, SphereTouchResult):
             raise TypeError("the sphere that was touched is a part of the result")
@@ -153,7 +154,7 @@ def measure_sphere_touch(
     axes: int = 0,
     sigma_mm: float | None = None,
     sampling: SamplingPolicy = TAKE_ALL,
-) -> Procedure[CalibrationResult]:
+) -> "Procedure[SphereTouchResult]":
     """Measure a tip on a sphere. Runs in Tool 0.
 
     It ends lifted, over the place that was touched last, in the orientation in which it began.
@@ -193,17 +194,8 @@ def measure_sphere_touch(
 
 
 @dataclass(frozen=True, slots=True)
-class SphereTouches:
-    """Touches of one sphere from several sides, the tool upright, turned and tilted.
-
-    Attributes:
-        sigma_mm: Standard deviation of one touch along the normal, where it is known.
-    """
-
-    upright: ClassVar[bool] = False
-    needs: ClassVar[tuple[str, ...]] = ("z_mm", "v_deg", "w_deg")
-
-    sigma_mm: float | None = None
+class SphereTouches(TiltedTouches):
+    """Touches of one sphere from several sides, the tool upright, turned and tilted."""
 
     def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
         """Solve eight poses and more; see :class:`~robolink.procedures.PoseMethod`."""
@@ -223,10 +215,6 @@ def _source(parameters: SphereTouchParameters, site: Site) -> "TipSource":
         sigma_mm=site.sigma_mm,
         sampling=parameters.sampling,
     )
-
-
-def _from_poses(_parameters: SphereTouchParameters, site: Site) -> "PoseMethod":
-    return SphereTouches(site.sigma_mm)
 
 
 def _proof() -> "type[KeptProof]":
@@ -252,7 +240,7 @@ METHOD = Method(
     measures=("x_mm", "y_mm", "z_mm"),
     needs=Needs(station=StationKind.TOUCH, named=False, tilt=True),
     source=_source,
-    from_poses=_from_poses,
+    from_poses=lambda _parameters, site: SphereTouches(site.sigma_mm),
     pose_help=PoseHelp(
         points=declared(
             "Eight points or more taught on the pendant from several sides, the tool tilted."

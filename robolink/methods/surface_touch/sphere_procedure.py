@@ -43,7 +43,7 @@ from robolink.model import Pose, ToolOffset
 from robolink.procedures import (
     SurfaceTouches,
 )
-from robolink.procedures.tilting_proof import TiltingProof
+from robolink.procedures.tilt_proof import TiltingProof
 from robolink.runner import Procedure
 
 _LEAST_ALONG = 0.5

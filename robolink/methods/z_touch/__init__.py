@@ -31,6 +31,7 @@ from robolink.runner import Procedure
 from robolink.stations import StationKind, TouchStation
 
 if TYPE_CHECKING:
+    from robolink.calibration import ZTouchResult
     from robolink.methods.z_touch.procedure import ProbeTest
     from robolink.procedures import KeptProof, TipSource
 
@@ -211,19 +212,11 @@ class ZTouchSource(InputSource[ZTouchParameters]):
         )
         return InputSource.measure(told, context, tool, stored)
 
-    def steps(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
+    def steps(self, stored: ToolOffset | None, here: Pose) -> "Procedure[ZTouchResult]":
         """Return the steps of the measurement."""
-        from robolink.methods.z_touch.procedure import measure_z_touch  # numpy, late
+        from robolink.methods.z_touch.procedure import touch_surface  # numpy, late
 
-        return measure_z_touch(
-            self.station,
-            self.plan,
-            here=here,
-            stored=stored,
-            sigma_mm=self.sigma_mm,
-            deceleration_mm_s2=self.deceleration_mm_s2,
-            step_mm=self.step_mm,
-        )
+        return touch_surface(self, stored, here)
 
     def proof(
         self,
@@ -252,6 +245,49 @@ class ZTouchSource(InputSource[ZTouchParameters]):
             deceleration_mm_s2=_told_braking(context),
             step_mm=_told_step(context, self.plan),
         )
+
+
+def measure_z_touch(
+    station: TouchStation,
+    plan: ZTouchParameters,
+    *,
+    here: Pose,
+    stored: ToolOffset | None,
+    sigma_mm: float | None = None,
+    deceleration_mm_s2: float | None = None,
+    step_mm: float | None = None,
+) -> "Procedure[ZTouchResult]":
+    """Measure Z of a tip by touching a surface. Runs in Tool 0.
+
+    It goes and ends as :func:`~robolink.procedures.sample_sequentially` says.
+
+    Args:
+        station: Where the surface is.
+        plan: How it is touched.
+        here: Where the flange is.
+        stored: The offset stored now; the tip is expected there.
+        sigma_mm: Standard deviation of one touch, where it is known.
+        deceleration_mm_s2: How the robot brakes, where its controller told it.
+        step_mm: How finely it tells where the input switched, at the fastest touch, likewise.
+
+    Raises:
+        CalibrationError: ``tilted_pose`` before anything moves; ``no_edge``, ``edge_passed``, and
+            those of :func:`~robolink.calibration.solve_z_touch`.
+
+    Example:
+        >>> from robolink.methods import ZTouchParameters, measure_z_touch
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.stations import TouchStation
+        >>> from robolink.testing import PaperCell
+        >>> plate = TouchStation(x_mm=320, y_mm=60, z_mm=-50, input=5)
+        >>> here, stored = Pose(300, 100, 20, 0), ToolOffset(12, -4, -20)
+        >>> cell = PaperCell(here, ToolOffset(12, -4, -20.4), switches={5: lambda at: at[2] < -50})
+        >>> found = cell.run(measure_z_touch(plate, ZTouchParameters(), here=here, stored=stored))
+        >>> round(found.offset.z_mm, 3)
+        -20.4
+    """
+    source = ZTouchSource(station, plan, sigma_mm, deceleration_mm_s2, step_mm)
+    return source.steps(stored, here)
 
 
 def _told_braking(context: MeasurementContext) -> float | None:

@@ -19,7 +19,7 @@ from robolink.calibration import (
     touch_sigma_gain,
 )
 from robolink.messages import tr
-from robolink.methods.z_touch import ZTouchParameters
+from robolink.methods.z_touch import ZTouchParameters, ZTouchSource
 from robolink.model import Path, Pose, ToolOffset
 from robolink.procedures import (
     NO_OFFSET,
@@ -33,48 +33,15 @@ from robolink.runner import Move, Procedure, Seek
 from robolink.stations import TouchStation
 
 
-def measure_z_touch(
-    station: TouchStation,
-    plan: ZTouchParameters,
-    *,
-    here: Pose,
-    stored: ToolOffset | None,
-    sigma_mm: float | None = None,
-    deceleration_mm_s2: float | None = None,
-    step_mm: float | None = None,
+def touch_surface(
+    source: ZTouchSource, stored: ToolOffset | None, here: Pose
 ) -> Procedure[ZTouchResult]:
-    """Measure Z of a tip by touching a surface. Runs in Tool 0; see :func:`sample_sequentially`.
-
-    Args:
-        station: Where the surface is.
-        plan: How it is touched.
-        here: Where the flange is.
-        stored: The offset stored now; the tip is expected there.
-        sigma_mm: Standard deviation of one touch, where it is known.
-        deceleration_mm_s2: How the robot brakes, where its controller told it.
-        step_mm: How finely it tells where the input switched, at the fastest touch, likewise.
-
-    Raises:
-        CalibrationError: ``tilted_pose`` before anything moves; ``no_edge``, ``edge_passed``, and
-            those of :func:`solve_z_touch`.
-
-    Example:
-        >>> from robolink.methods import ZTouchParameters, measure_z_touch
-        >>> from robolink.model import Pose, ToolOffset
-        >>> from robolink.stations import TouchStation
-        >>> from robolink.testing import PaperCell
-        >>> plate = TouchStation(x_mm=320, y_mm=60, z_mm=-50, input=5)
-        >>> here, stored = Pose(300, 100, 20, 0), ToolOffset(12, -4, -20)
-        >>> cell = PaperCell(here, ToolOffset(12, -4, -20.4), switches={5: lambda at: at[2] < -50})
-        >>> found = cell.run(measure_z_touch(plate, ZTouchParameters(), here=here, stored=stored))
-        >>> round(found.offset.z_mm, 3)
-        -20.4
-    """
+    """Measure as a source says, see :func:`~robolink.methods.measure_z_touch`."""
     solvable_planes([here], height_of(stored))
-    probing = _ZTouchSampler(station, plan, here, stored or NO_OFFSET, here, stored, sigma_mm, here)
-    probing.deceleration_mm_s2, probing.step_mm = deceleration_mm_s2, step_mm
-    first = yield from probing.take(plan.speeds_mm_s[0])
-    return (yield from sample_sequentially(probing, first, plan.speeds_mm_s, plan.sampling))
+    probing = _ZTouchSampler(source, here, stored or NO_OFFSET, here, stored, here)
+    speeds_mm_s = source.plan.speeds_mm_s
+    first = yield from probing.take(speeds_mm_s[0])
+    return (yield from sample_sequentially(probing, first, speeds_mm_s, source.plan.sampling))
 
 
 def verify_by_touching(
@@ -98,11 +65,11 @@ def verify_by_touching(
         tolerance_mm: Largest drift that passes.
         aside: Where the tip is expected, seen from the frame in force; not 0 where a difference
             to a reference was written.
-        deceleration_mm_s2: As for :func:`measure_z_touch`.
+        deceleration_mm_s2: As for :func:`~robolink.methods.measure_z_touch`.
         step_mm: Likewise.
 
     Raises:
-        CalibrationError: As :func:`measure_z_touch`.
+        CalibrationError: As :func:`~robolink.methods.measure_z_touch`.
 
     Example:
         >>> from robolink.methods import ZTouchParameters, verify_by_touching
@@ -118,10 +85,9 @@ def verify_by_touching(
         >>> shown.heights_only, round(shown.max_drift_mm, 3)
         (True, 0.02)
     """
-    drifts = []
+    source, drifts = ZTouchSource(station, plan, None, deceleration_mm_s2, step_mm), list[Drift]()
     for angle_deg in angles_deg:
-        probing = _ZTouchSampler(station, plan, replace(here, u_deg=angle_deg), aside, here)
-        probing.deceleration_mm_s2, probing.step_mm = deceleration_mm_s2, step_mm
+        probing = _ZTouchSampler(source, replace(here, u_deg=angle_deg), aside, here)
         touches = []
         for speed_mm_s in plan.speeds_mm_s:
             touches.append((yield from probing.take(speed_mm_s)))
@@ -137,27 +103,21 @@ class _ZTouchSampler:
     """Touches of a surface, each at a speed; implements ``SequentialSampler``.
 
     Attributes:
-        station, plan: Where and how.
+        source: Where and how.
         frame: A pose of the frame: its angles, hand, local and tool.
         tip: Where the tip is expected, seen from the frame.
         here: Where the frame is.
-        stored, sigma_mm: As for :func:`measure_z_touch`.
+        stored: The offset stored now, in a measurement.
         flange: A pose of the flange, where the frame is the flange: Z is along its axis.
-        deceleration_mm_s2: How the robot brakes, where its controller told it.
-        step_mm: How finely it tells where the input switched, likewise.
         near: Whether the frame is at the clearance or below, not above the surface.
     """
 
-    station: TouchStation
-    plan: ZTouchParameters
+    source: ZTouchSource
     frame: Pose
     tip: ToolOffset
     here: Pose
     stored: ToolOffset | None = None
-    sigma_mm: float | None = None
     flange: Pose | None = None
-    deceleration_mm_s2: float | None = None
-    step_mm: float | None = None
     near: bool = False
 
     @property
@@ -176,12 +136,11 @@ class _ZTouchSampler:
                 self._above, Path.STRAIGHT, tr("Lowering to just above the place.")
             )
             self.near = True
-        end = offset_z(self._above, -self.plan.clearance_mm - self.plan.beyond_mm)
-        step = Seek(end, self.station.edge, place, tr("Looking for the surface."))
+        plan, edge = self.source.plan, self.source.station.edge
+        end = offset_z(self._above, -plan.clearance_mm - plan.beyond_mm)
+        step = Seek(end, edge, place, tr("Looking for the surface."))
         touch = yield from seek_or_retract(step, here=self.here, safe_z_mm=self._safe.z_mm)
-        self.here = yield Move(
-            offset_z(touch, self.plan.back_off_mm), Path.STRAIGHT, tr("Backing off.")
-        )
+        self.here = yield Move(offset_z(touch, plan.back_off_mm), Path.STRAIGHT, tr("Backing off."))
         return Touch(touch.z_mm, place)
 
     def away(self) -> Procedure[None]:
@@ -192,13 +151,13 @@ class _ZTouchSampler:
     def solve(self, touches: Sequence[Touch]) -> ZTouchResult:
         return solve_z_touch(
             touches,
-            self.station.z_mm,
+            self.source.station.z_mm,
             stored=self.stored,
             flange=self.flange,
-            sigma_mm=self.sigma_mm,
-            deceleration_mm_s2=self.deceleration_mm_s2 or USUAL_DECELERATION_MM_S2,
-            deceleration_told=self.deceleration_mm_s2 is not None,
-            step_mm=self.step_mm,
+            sigma_mm=self.source.sigma_mm,
+            deceleration_mm_s2=self.source.deceleration_mm_s2 or USUAL_DECELERATION_MM_S2,
+            deceleration_told=self.source.deceleration_mm_s2 is not None,
+            step_mm=self.source.step_mm,
         )
 
     def foreseen(self, place: float) -> Touch:
@@ -216,14 +175,14 @@ class _ZTouchSampler:
     @property
     def _above(self) -> Pose:
         """The frame's pose with the tip where it begins to seek."""
-        station = self.station
-        at = (station.x_mm, station.y_mm, station.z_mm + self.plan.clearance_mm)
+        station = self.source.station
+        at = (station.x_mm, station.y_mm, station.z_mm + self.source.plan.clearance_mm)
         return carrying(self.frame, self.tip, at)
 
     @property
     def _safe(self) -> Pose:
         """The frame's pose with the tip above the surface, where it may turn."""
-        return offset_z(self._above, self.plan.lift_mm - self.plan.clearance_mm)
+        return offset_z(self._above, self.source.plan.lift_mm - self.source.plan.clearance_mm)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,8 +9,15 @@ from typing import TYPE_CHECKING
 
 from robolink.lazy_exports import old_names
 from robolink.protocols.epson_binary._codec import EpsonBinaryCodec
-from robolink.protocols.epson_binary._dialect import Dialect, Letters, NakCode, Numbers
-from robolink.protocols.epson_binary._letters import LETTERS, Letter, letter_of
+from robolink.protocols.epson_binary._frames import (
+    LETTERS,
+    Dialect,
+    Letter,
+    Letters,
+    NakCode,
+    Numbers,
+    letter_of,
+)
 
 __all__ = [
     "Dialect",

@@ -6,18 +6,177 @@ in the data may be 02, 03, 06 or 15, so no byte is ever searched for where the l
 long the data is. Text has no length; it ends at the first ETX behind which the right check sum
 stands, a quoted one only behind its closing quote. What a frame is therefore never depends on how
 the stream was cut into chunks.
+
+What the manuals leave open about Remote RS232, each as an option with its evidence.
+
+Source: docs/reference/epson.md 2.
+
+Every command that has a letter on Remote RS232, and what stands behind it.
+
+Source: docs/reference/epson.md 2.2. A command that is missing has no letter in any manual: the
+queries about the controller itself and the alarms.
 """
 
 from dataclasses import dataclass
+from enum import Enum, StrEnum, auto
 from functools import reduce
 from operator import xor
-from typing import Final
+from types import MappingProxyType
+from typing import Final, Literal
 
 from robolink.errors import RemoteProtocolError
 from robolink.messages import tr
 from robolink.protocols._role import Role
-from robolink.protocols.epson_binary._dialect import Dialect, Numbers
-from robolink.protocols.epson_binary._letters import BY_BYTE, Data, Letter
+
+
+class Numbers(StrEnum):
+    """How a number of one or two bytes is written.
+
+    Three of the four languages of the manual print Start main as ``02 47 00 03 44``, one prints
+    ``02 47 30 30 03 44``. Equal pairs cancel in an XOR, so the check sum of no published example
+    tells them apart.
+    """
+
+    BINARY = "binary"
+    """Most significant byte first."""
+    ASCII_HEX = "ascii_hex"
+    """Two hexadecimal digits for each byte."""
+
+
+class NakCode(StrEnum):
+    """How the two bytes of a refusal's code are written; the manual says only how many."""
+
+    DIGITS = "digits"
+    """Two decimal digits, as the code of GetStatus is four of them."""
+    BINARY = "binary"
+    """One number, most significant byte first."""
+
+
+class Letters(StrEnum):
+    """Which letters are sent."""
+
+    DOCUMENTED = "documented"
+    """Only those that a manual prints."""
+    GUESSED = "guessed"
+    """Also the upper-case twins of readers for their setters, and A for Abort: a pattern, seen in
+    each pair that is printed and stated nowhere."""
+
+
+@dataclass(frozen=True, slots=True)
+class Dialect:
+    """One reading of the manual, the same at both ends of a line.
+
+    Attributes:
+        numbers: How numbers are written.
+        nak_code: How the code of a refusal is written.
+        letters: Which letters may be sent.
+        status_flags: How many flags a device tells: ten with RC+ 5, whose manual prints them;
+            eleven, with Test, are likely since RC+ 7. A host takes both.
+        word_port_bytes: Of how many bytes the number of a port of words is; one is printed for a
+            port of bytes, nothing for a port of words.
+    """
+
+    numbers: Numbers = Numbers.BINARY
+    nak_code: NakCode = NakCode.DIGITS
+    letters: Letters = Letters.DOCUMENTED
+    status_flags: Literal[10, 11] = 10
+    word_port_bytes: Literal[1, 2] = 1
+
+
+class Data(Enum):
+    """What one part of a message is."""
+
+    BYTE = auto()
+    """A number of one byte."""
+    WORD = auto()
+    """A number of two bytes."""
+    WORD_PORT = auto()
+    """The number of a port of words; how long it is, the dialect says."""
+    HEX_BYTE = auto()
+    """One byte that Remote Ethernet prints as two hexadecimal digits."""
+    HEX_WORD = auto()
+    """Two bytes that Remote Ethernet prints as four hexadecimal digits."""
+    TEXT = auto()
+    """Text to the end of the message."""
+    QUOTED = auto()
+    """Text between quotes, or nothing."""
+    STATUS = auto()
+    """Flags, one byte each, and four decimal digits."""
+
+
+@dataclass(frozen=True, slots=True)
+class Letter:
+    """One command.
+
+    Attributes:
+        name: Its name on Remote Ethernet.
+        byte: The byte on the wire.
+        request: What follows in a request.
+        reply: What follows in a success.
+        documented: Whether a manual prints the letter; else it follows a pattern.
+    """
+
+    name: str
+    byte: int
+    request: tuple[Data, ...] = ()
+    reply: tuple[Data, ...] = ()
+    documented: bool = True
+
+
+def _letter(
+    name: str, letter: str, request: tuple[Data, ...] = (), reply: tuple[Data, ...] = ()
+) -> Letter:
+    return Letter(name, ord(letter), request, reply)
+
+
+def _guessed(name: str, letter: str, request: tuple[Data, ...] = ()) -> Letter:
+    return Letter(name, ord(letter), request, documented=False)
+
+
+_BYTE, _WORD, _TEXT, _WORD_PORT = (Data.BYTE,), (Data.WORD,), (Data.TEXT,), (Data.WORD_PORT,)
+
+LETTERS: Final[tuple[Letter, ...]] = (
+    _letter("Login", "L", _TEXT),
+    _letter("Logout", "l"),
+    _letter("Start", "G", _BYTE),
+    _letter("Stop", "Q"),
+    _letter("Pause", "P"),
+    _letter("Continue", "C"),
+    _letter("Reset", "R"),
+    _letter("SetMotorsOn", "M", _BYTE),
+    _letter("SetMotorsOff", "N", _BYTE),
+    _letter("SetCurRobot", "Y", _BYTE),
+    _letter("GetCurRobot", "y", (), _BYTE),
+    _letter("Home", "H", _BYTE),
+    _letter("GetIO", "i", _WORD, _BYTE),
+    _letter("SetIO", "I", (Data.WORD, Data.BYTE)),
+    _letter("GetMemIO", "o", _WORD, _BYTE),
+    _letter("GetIOByte", "b", _BYTE, (Data.HEX_BYTE,)),
+    _letter("GetMemIOByte", "t", _BYTE, (Data.HEX_BYTE,)),
+    _letter("GetIOWord", "w", _WORD_PORT, (Data.HEX_WORD,)),
+    _letter("GetMemIOWord", "u", _WORD_PORT, (Data.HEX_WORD,)),
+    _letter("GetStatus", "S", (), (Data.STATUS,)),
+    _letter("Execute", "X", (Data.QUOTED,), (Data.QUOTED,)),
+    # The manual's table prints u once more, which is taken; in the pattern it is v.
+    Letter("GetVariable", ord("v"), _TEXT, _TEXT, documented=False),
+    _guessed("SetMemIO", "O", (Data.WORD, Data.BYTE)),
+    _guessed("SetIOByte", "B", (Data.BYTE, Data.BYTE)),
+    _guessed("SetMemIOByte", "T", (Data.BYTE, Data.BYTE)),
+    _guessed("SetIOWord", "W", (Data.WORD_PORT, Data.WORD)),
+    _guessed("SetMemIOWord", "U", (Data.WORD_PORT, Data.WORD)),
+    _guessed("Abort", "A"),
+)
+"""The table, in the order of docs/reference/epson.md 2.2."""
+
+_BY_NAME: Final = MappingProxyType({letter.name.lower(): letter for letter in LETTERS})
+BY_BYTE: Final = MappingProxyType({letter.byte: letter for letter in LETTERS})
+"""The table by the byte on the wire."""
+
+
+def letter_of(name: str) -> Letter | None:
+    """Return the letter of a command, ``None`` where Remote RS232 has none."""
+    return _BY_NAME.get(name.lower())
+
 
 STX: Final = 0x02
 ETX: Final = 0x03

@@ -22,12 +22,14 @@ from robolink.protocols.epson_text._events import (
     Reply,
     Request,
 )
-from robolink.protocols.epson_text._preferences import (
+from robolink.protocols.epson_text._status import (
     Preference,
+    StatusFlags,
     parse_preferences,
+    parse_status,
     preferences_field,
+    status_fields,
 )
-from robolink.protocols.epson_text._status import StatusFlags, parse_status, status_fields
 
 __all__ = [
     "BadRequest",

@@ -13,7 +13,7 @@ from math import atan2, cos, degrees, hypot, radians, sin
 from operator import eq
 from typing import Final
 
-from robolink.protocols.mailbox.blocks.layout import Six
+from robolink.protocols.mailbox._layout import Six
 
 _UM_PER_MM: Final = 1000.0
 _SINGULAR: Final = 1e-12

@@ -1,9 +1,13 @@
 """SPEL+ as text: typed statements out, printed values in, and the formatting twins."""
 
 from robolink.protocols.spel._queries import (
+    PrintedWhere,
     RobotType,
+    format_where,
     list_tools,
+    parse_base,
     parse_robot_type,
+    parse_where,
     print_braking,
     print_here,
     print_joint_angle,
@@ -37,22 +41,20 @@ from robolink.protocols.spel._statements import (
     clear_tool,
     go,
     move,
+    move_find,
+    move_till,
     power_high,
     power_low,
+    print_found_position,
+    print_input,
     print_joint_of,
+    print_position_found,
     print_reachable,
+    print_till_on,
     select_tool,
     set_tool,
     speed,
     speed_s,
-)
-from robolink.protocols.spel._until import (
-    move_find,
-    move_till,
-    print_found_position,
-    print_input,
-    print_position_found,
-    print_till_on,
 )
 from robolink.protocols.spel._values import (
     Layout,
@@ -67,7 +69,6 @@ from robolink.protocols.spel._values import (
     parse_tool_listing,
     posture_marks,
 )
-from robolink.protocols.spel._where import PrintedWhere, format_where, parse_base, parse_where
 
 __all__ = [
     "Layout",

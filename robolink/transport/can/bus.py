@@ -3,10 +3,16 @@
 python-can's Notifier reads in a thread that ends without a word at the first bus error
 (docs/reference/faults.md F50). Here whoever waits for an answer reads the bus itself, so an
 error reaches the one who waits, and there is no thread to stop.
+
+One CANopen node as it is seen from outside: heads, heartbeat, restarts.
+
+Identifiers are those of the predefined connection set (CiA 301).
 """
 
 import logging
+import struct
 import threading
+from collections import deque
 from typing import Any, Final
 
 import can
@@ -14,14 +20,15 @@ import can
 from robolink.errors import (
     ConfigError,
     ConnectError,
+    RemoteProtocolError,
     TransportBrokenError,
     TransportClosedError,
     TransportError,
 )
 from robolink.messages import tr
-from robolink.timing import Deadline
-from robolink.transport._url import LinkUrl
-from robolink.transport._url_options import UrlOptions
+from robolink.timing import NS_PER_S, Clock, Deadline
+from robolink.transport._mailbox_link import MailboxHead
+from robolink.transport._url import LinkUrl, UrlOptions
 
 # It writes to standard error when nobody listens; every failure is an exception here.
 logging.getLogger("can").addHandler(logging.NullHandler())
@@ -151,5 +158,177 @@ class CanLine:
                 "Too many transmissions failed: check bit rate, wiring and terminators, bring "
                 "the interface up again, then connect again."
             ),
+            controller=self._identity,
+        )
+
+
+TPDO1: Final = 0x180
+RPDO1: Final = 0x200
+SDO_ANSWER: Final = 0x580
+SDO_REQUEST: Final = 0x600
+HEARTBEAT: Final = 0x700
+
+_NMT: Final = 0x000
+_START: Final = 1
+_BOOT_UP: Final = 0
+"""What a node's first heartbeat says."""
+
+_HEAD: Final = struct.Struct("<HBBHH")
+"""TPDO1: ack, state, group_state, error_class, heartbeat (docs/reference/softmotion.md 4.7)."""
+_MISSED: Final = 3
+_SHORTEST_LOSS_S: Final = 0.5
+
+_MOST_WAITING: Final = 10_000
+"""Frames that may have come while nobody listened: more than a second of a full bus at 1 Mbit/s
+(about 9,000), and a reader is many times faster than that."""
+_MOST_ANSWERS: Final = 64
+"""SDO answers kept; each transfer begins with none and asks for one at a time."""
+
+
+def identifiers(node: int) -> tuple[int, ...]:
+    """Return what has to be heard from ``node``."""
+    return (TPDO1 + node, SDO_ANSWER + node, HEARTBEAT + node)
+
+
+class NodeWatch:
+    """Sorts what one node sends, and notices when it falls silent or starts anew.
+
+    Args:
+        line: The bus, owned by the caller.
+        node: Node identifier.
+        identity: Names the far end in errors.
+        clock: Tells how old a heartbeat is, and for how long somebody listened.
+    """
+
+    def __init__(self, line: CanLine, node: int, identity: str, clock: Clock) -> None:
+        self._line = line
+        self._node = node
+        self._identity = identity
+        self._clock = clock
+        self._period_s = 0.0
+        self._heard_ns = 0
+        self._listened_ns = 0
+        self._head: MailboxHead | None = None
+        self.answers: deque[bytes] = deque(maxlen=_MOST_ANSWERS)
+
+    def expect_heartbeat(self, period_s: float) -> None:
+        """Supervise a heartbeat of this period from now on; 0 means there is none."""
+        self._period_s = period_s
+        self._note_heartbeat()
+
+    def take_head(self) -> MailboxHead | None:
+        """Return the newest head that was not taken yet."""
+        head, self._head = self._head, None
+        return head
+
+    def drain(self) -> None:
+        """Sort what has arrived while nobody listened; a node that was silent is listened for.
+
+        Raises:
+            RemoteProtocolError: It does not end.
+            TransportError: As :meth:`pump`.
+        """
+        for _ in range(_MOST_WAITING):
+            if not self._take(Deadline(self._clock, 0)):
+                self._listen_if_silent()
+                return
+        raise RemoteProtocolError(
+            tr(
+                "Node {node} of {identity} sends without a pause: {count} frames were waiting.",
+                node=self._node,
+                identity=self._identity,
+                count=_MOST_WAITING,
+            ),
+            remedy=tr("Look for a second device with its node number, or one that is defective."),
+            controller=self._identity,
+        )
+
+    def pump(self, deadline: Deadline) -> None:
+        """Sort what arrives within a short slice of time.
+
+        Raises:
+            TransportBrokenError: The bus failed, the heartbeat stopped, the node restarted.
+            TransportClosedError: The line was closed.
+        """
+        if not self._take(deadline):
+            self._require_heartbeat()
+
+    def ask(self, request: bytes) -> None:
+        """Send a frame to the node's SDO server."""
+        self._line.send(SDO_REQUEST + self._node, request)
+
+    def start_node(self) -> None:
+        """Make the node operational, so that it sends and takes PDOs."""
+        self._line.send(_NMT, bytes([_START, self._node]))
+
+    def beat(self, word: int) -> None:
+        """Send RPDO1, which holds the client's heartbeat."""
+        self._line.send(RPDO1 + self._node, word.to_bytes(2, "little"))
+
+    def _take(self, deadline: Deadline) -> bool:
+        begun_ns = self._clock.now_ns()
+        message = self._line.receive(deadline)
+        self._listened_ns += min(self._clock.now_ns() - begun_ns, round(SLICE_S * NS_PER_S))
+        if message is None:
+            return False
+        if message.is_error_frame:
+            return True
+        data = bytes(message.data)
+        kind = message.arbitration_id - self._node
+        if kind == SDO_ANSWER:
+            self.answers.append(data)
+        elif kind == TPDO1 and len(data) == _HEAD.size:
+            ack, state, group_state, error_class, heartbeat = _HEAD.unpack(data)
+            self._head = MailboxHead(ack, state, error_class, group_state, heartbeat)
+        elif kind == HEARTBEAT and data:
+            self._note_heartbeat()
+            if data[0] == _BOOT_UP:
+                raise self._restarted()
+        return True
+
+    def _note_heartbeat(self) -> None:
+        self._heard_ns = self._clock.now_ns()
+        self._listened_ns = 0
+
+    def _listen_if_silent(self) -> None:
+        """Wait for a heartbeat that is overdue, before anything is sent to the node.
+
+        On a computer that is busy this thread, or the one that hands frames over, may not run for
+        longer than a node may be silent. So a node is lost when nothing came for as long as that
+        while somebody listened.
+        """
+        while self._silent_s() > self._limit_s() > 0:
+            if not self._take(Deadline.after(self._clock, SLICE_S)):
+                self._require_heartbeat()
+
+    def _limit_s(self) -> float:
+        """Return for how long the node may be silent; 0 for as long as it likes."""
+        return max(_MISSED * self._period_s, _SHORTEST_LOSS_S) if self._period_s else 0.0
+
+    def _silent_s(self) -> float:
+        return (self._clock.now_ns() - self._heard_ns) / NS_PER_S
+
+    def _require_heartbeat(self) -> None:
+        limit_s = self._limit_s()
+        if limit_s and self._listened_ns / NS_PER_S > limit_s:
+            raise TransportBrokenError(
+                tr(
+                    "Node {node} of {identity} lost its heartbeat: one is due every "
+                    "{period_s:g} s, none came for {silent_s:.1f} s.",
+                    node=self._node,
+                    identity=self._identity,
+                    period_s=self._period_s,
+                    silent_s=self._silent_s(),
+                ),
+                remedy=tr("Check cable, power and state of the PLC, then try again."),
+                controller=self._identity,
+            )
+
+    def _restarted(self) -> TransportBrokenError:
+        return TransportBrokenError(
+            tr(
+                "Node {node} of {identity} has restarted.", node=self._node, identity=self._identity
+            ),
+            remedy=tr("Connect again, then check what was under way."),
             controller=self._identity,
         )

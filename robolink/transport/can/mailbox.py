@@ -24,10 +24,8 @@ from robolink.transport._mailbox_link import (
     require_slot,
     require_words,
 )
-from robolink.transport._url import LinkUrl
-from robolink.transport._url_options import UrlOptions
-from robolink.transport.can.bus import CanLine, open_can_bus
-from robolink.transport.can.node import NodeWatch, identifiers
+from robolink.transport._url import LinkUrl, UrlOptions
+from robolink.transport.can.bus import CanLine, NodeWatch, identifiers, open_can_bus
 from robolink.transport.can.sdo import SdoTransfer
 
 COMMAND_OBJECT: Final = 0x2100

@@ -16,8 +16,9 @@ from robolink.errors import (
 )
 from robolink.messages import tr
 from robolink.timing import Clock, Deadline
+from robolink.transport.byte_stream import Transport
 from robolink.transport.modbus.errors import refused
-from robolink.transport.modbus.messages import (
+from robolink.transport.modbus.frames import (
     MOST_BITS_READ,
     MOST_REGISTERS_READ,
     MOST_REGISTERS_WRITTEN,
@@ -27,7 +28,6 @@ from robolink.transport.modbus.messages import (
     ModbusReply,
     ModbusRequest,
 )
-from robolink.transport.stream.contract import Transport
 
 _RETRY_S: Final = 0.75
 """How long all repeats of a question that was not answered may take together."""

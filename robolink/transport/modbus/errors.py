@@ -16,7 +16,7 @@ from robolink.errors import (
     TransportTimeoutError,
 )
 from robolink.messages import tr
-from robolink.transport.modbus.messages import ModbusRequest
+from robolink.transport.modbus.frames import ModbusRequest
 
 _SHOWN_BYTES: Final = 256
 _GATEWAY_NO_PATH: Final = 0x0A

@@ -20,11 +20,10 @@ from robolink.transport._mailbox_link import (
     require_slot,
     require_words,
 )
-from robolink.transport._url import LinkUrl
-from robolink.transport._url_options import UrlOptions
+from robolink.transport._url import LinkUrl, UrlOptions
 from robolink.transport.modbus.client import ModbusClient
-from robolink.transport.modbus.messages import Area
-from robolink.transport.modbus.opening import TCP_MEDIUM, Probe, open_client
+from robolink.transport.modbus.frames import Area
+from robolink.transport.modbus.opening import Probe, open_client
 
 _HEAD_WORDS: Final = max(HEAD_PLACES) + 1
 _REGISTERS: Final = 0x10000
@@ -49,7 +48,7 @@ class MailboxPlaces:
 
 
 def open_modbus_link(
-    url: LinkUrl, *, timeout_s: float, clock: Clock | None = None, registers_only: bool = False
+    url: LinkUrl, *, timeout_s: float, clock: Clock | None = None
 ) -> "ModbusMailboxLink":
     """Open a mailbox over Modbus TCP or RTU.
 
@@ -59,8 +58,6 @@ def open_modbus_link(
             (``holding`` reads response and slots from holding registers, function 3).
         timeout_s: Longest wait for the connection, and for each answer.
         clock: Keeps the deadlines.
-        registers_only: Whether it is opened for a stop or a look, which wait for no pymodbus;
-            over TCP nothing of a mailbox ever does (docs/decisions/0012).
 
     Raises:
         ConfigError: The URL or an option is wrong.
@@ -70,10 +67,7 @@ def open_modbus_link(
     options = UrlOptions(url)
     places = _take_places(options)
     probe = Probe(places.area, places.response)
-    own_frames = registers_only or url.medium == TCP_MEDIUM
-    client = open_client(
-        url, options, probe=probe, timeout_s=timeout_s, clock=clock, registers_only=own_frames
-    )
+    client = open_client(url, options, probe=probe, timeout_s=timeout_s, clock=clock)
 
     if client.most_registers < RESPONSE_WORDS:
         client.close()

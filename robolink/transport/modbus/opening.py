@@ -6,18 +6,14 @@ from typing import TYPE_CHECKING, Final
 from robolink.errors import ConfigError, ConnectError, TransportTimeoutError
 from robolink.messages import tr
 from robolink.timing import Clock, Deadline, SystemClock
-from robolink.transport._url import LinkUrl
-from robolink.transport._url_options import UrlOptions
+from robolink.transport._url import LinkUrl, UrlOptions
 from robolink.transport.modbus.client import ModbusClient
-from robolink.transport.modbus.framing import Framing
-from robolink.transport.modbus.messages import MOST_REGISTERS_READ, Area
-from robolink.transport.modbus.register_frames import RegisterRtuFraming, RegisterTcpFraming
+from robolink.transport.modbus.frames import MOST_REGISTERS_READ, Area, RtuFraming, TcpFraming
 from robolink.transport.modbus.tcp import TcpExchange
-from robolink.transport.stream.dial import dial
-from robolink.transport.stream.tcp import TcpTransport
+from robolink.transport.tcp import TcpTransport, dial
 
 if TYPE_CHECKING:
-    from robolink.transport.stream.serial_port import SerialSettings
+    from robolink.transport.serial_port import SerialSettings
 
 MOST_REGISTERS: Final = "most_registers"
 """Option of a URL: how many registers the server gives in one read."""
@@ -79,35 +75,15 @@ def open_client(
     probe: Probe,
     timeout_s: float,
     clock: Clock | None,
-    registers_only: bool = False,
 ) -> ModbusClient:
-    """Open a client; ``options`` are those that the caller has left. See :func:`open_modbus`.
-
-    With ``registers_only`` it reads and writes registers and nothing else, and loads no pymodbus.
-    """
+    """Open a client; ``options`` are those that the caller has left. See :func:`open_modbus`."""
     clock = clock or SystemClock()
     if url.medium == TCP_MEDIUM:
-        wrapped: Framing = RegisterTcpFraming() if registers_only else _tcp_framing()
-        return _open_tcp(url, options, wrapped, timeout_s=timeout_s, clock=clock)
-    wrapped = RegisterRtuFraming() if registers_only else _rtu_framing()
-    return _open_rtu(url, options, wrapped, probe=probe, timeout_s=timeout_s, clock=clock)
+        return _open_tcp(url, options, timeout_s=timeout_s, clock=clock)
+    return _open_rtu(url, options, probe=probe, timeout_s=timeout_s, clock=clock)
 
 
-def _tcp_framing() -> Framing:
-    from robolink.transport.modbus.frames import TcpFraming  # here, because it loads pymodbus
-
-    return TcpFraming()
-
-
-def _rtu_framing() -> Framing:
-    from robolink.transport.modbus.frames import RtuFraming  # here, because it loads pymodbus
-
-    return RtuFraming()
-
-
-def _open_tcp(
-    url: LinkUrl, options: UrlOptions, framing: Framing, *, timeout_s: float, clock: Clock
-) -> ModbusClient:
+def _open_tcp(url: LinkUrl, options: UrlOptions, *, timeout_s: float, clock: Clock) -> ModbusClient:
     unit = options.take_int("unit", _DEFAULT_UNITS[TCP_MEDIUM], 0, 255)
     most = options.take_int(MOST_REGISTERS, MOST_REGISTERS_READ, 4, MOST_REGISTERS_READ)
     options.finish()
@@ -120,7 +96,7 @@ def _open_tcp(
     deadline = Deadline.after(clock, timeout_s)
     transport = TcpTransport(dial(server, timeout_s=timeout_s, deadline=deadline), server, clock)
     identity = _identity(server, unit)
-    exchange = TcpExchange(transport, identity, framing)
+    exchange = TcpExchange(transport, identity, TcpFraming())
     return ModbusClient(
         transport,
         exchange,
@@ -134,7 +110,6 @@ def _open_tcp(
 def _open_rtu(
     url: LinkUrl,
     options: UrlOptions,
-    framing: Framing,
     *,
     probe: Probe,
     timeout_s: float,
@@ -142,7 +117,7 @@ def _open_rtu(
 ) -> ModbusClient:
     # Here, because over TCP nothing of a serial line is needed.
     from robolink.transport.modbus.rtu import RtuExchange, RtuLine
-    from robolink.transport.stream.serial_port import open_serial, take_settings
+    from robolink.transport.serial_port import open_serial, take_settings
 
     unit = options.take_int("unit", _DEFAULT_UNITS[RTU_MEDIUM], 1, 247)
     settings = take_settings(options, baud=19_200, parity="even", stop_bits_without_parity="2")
@@ -160,7 +135,7 @@ def _open_rtu(
     )
     transport = open_serial(url, settings, timeout_s=timeout_s, clock=clock)
     identity = _identity(url, unit)
-    exchange = RtuExchange(transport, identity, line, framing)
+    exchange = RtuExchange(transport, identity, line, RtuFraming())
     try:
         exchange.get_in_step(unit, Deadline.after(clock, timeout_s))
     except TransportTimeoutError as error:

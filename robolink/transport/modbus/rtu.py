@@ -13,10 +13,16 @@ from typing import Final
 
 from robolink.errors import RemoteProtocolError, TransportTimeoutError
 from robolink.timing import NS_PER_S, Deadline
+from robolink.transport.byte_stream import Transport
 from robolink.transport.modbus import errors as errors
-from robolink.transport.modbus.framing import FrameError, Framing
-from robolink.transport.modbus.messages import WRITE_COIL, Area, ModbusReply, ModbusRequest
-from robolink.transport.stream.contract import Transport
+from robolink.transport.modbus.frames import (
+    WRITE_COIL,
+    Area,
+    FrameError,
+    Framing,
+    ModbusReply,
+    ModbusRequest,
+)
 
 _AROUND: Final = 3
 """The unit in front of a frame and its checksum behind."""

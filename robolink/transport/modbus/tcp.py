@@ -4,10 +4,9 @@ from typing import Final
 
 from robolink.errors import TransportTimeoutError
 from robolink.timing import Deadline
+from robolink.transport.byte_stream import Transport
 from robolink.transport.modbus import errors as errors
-from robolink.transport.modbus.framing import FrameError, Framing
-from robolink.transport.modbus.messages import ModbusReply, ModbusRequest
-from robolink.transport.stream.contract import Transport
+from robolink.transport.modbus.frames import FrameError, Framing, ModbusReply, ModbusRequest
 
 _MOST_UNASKED_BYTES: Final = 16_384
 """Sixty of the longest frames. Late answers are fewer: after a time-out the link is closed. Who

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 from typing import Any, Final
 from urllib.parse import urlsplit
 
-from robolink.closing import ClosedAtExit
 from robolink.errors import ConfigError, RobolinkError
+from robolink.interrupts import ClosedAtExit
 from robolink.messages import tr
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.cell.habits import PersonManner

@@ -8,8 +8,8 @@ from socket import MSG_PEEK, socket
 from typing import Any, Final
 from urllib.parse import urlsplit
 
-from robolink.closing import ClosedAtExit
 from robolink.errors import ConfigError, ConnectError, RemoteProtocolError, RobolinkError
+from robolink.interrupts import ClosedAtExit
 from robolink.messages import tr
 from robolink_simulators.client_errors import (
     ended_unanswered,

@@ -18,8 +18,8 @@ from importlib.resources import files
 from typing import Any, Final
 from urllib.parse import parse_qsl, urlsplit
 
-from robolink.closing import ClosedAtExit
 from robolink.errors import ConfigError, RobolinkError
+from robolink.interrupts import ClosedAtExit
 from robolink.messages import tr
 from robolink_simulators.control.acts.registry import (
     ACTS,

@@ -26,19 +26,18 @@ from robolink_simulators.epson.panel import EpsonMishaps, EpsonPanel
 from robolink_simulators.epson.remote.command_window import SpelWindow
 from robolink_simulators.epson.remote.commands import Alarms, CommandDesk
 from robolink_simulators.epson.remote.link import ClientSlot, EpsonServerLink, OpenLinks
-from robolink_simulators.epson.remote.requests import Service
 from robolink_simulators.epson.spel import Interpreter
-from robolink_simulators.epson.spel.programs.loading import load_project
+from robolink_simulators.epson.spel.programs.program_load import load_project
 from robolink_simulators.epson.spel.tasks.ports import Ports
 from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
-from robolink_simulators.epson.time_stepping import Companion, TimeStepping
+from robolink_simulators.epson.stepped_controller import Companion, SteppedController
 from robolink_simulators.epson.world import World
 from robolink_simulators.faults import Fault, FaultPlan
 from robolink_simulators.faults.links import EPSON_LINKS
 from robolink_simulators.state_files import StateNotKeptError, drawn_serial
 
 
-class EpsonSimulator(TimeStepping):
+class EpsonSimulator(SteppedController):
     r"""Implements ``hosting.addresses.WireDevice``.
 
     Args:
@@ -176,14 +175,10 @@ class EpsonSimulator(TimeStepping):
         self.program = None
         self._window = SpelWindow(interpreter, self.condition, self.options)
         self._slot = ClientSlot(self.options.remote_timeout_s, self.wire_time)
-        options, condition, window, slot = self.options, self.condition, self._window, self._slot
         held = (self.variables, self.alarms, self.card)
-        self._desk = CommandDesk(self.machine, condition, *held, options=options)
-        self._service = Service(
-            self._desk, window, slot, condition, options=options, password=self._password
-        )
-        parts = (self.machine, condition, window, slot, self.alarms)
-        self.panel = EpsonPanel(*parts, options=options, acting=self.acting)
+        self._desk = CommandDesk(self.machine, self.condition, *held, options=self.options)
+        parts = (self.machine, self.condition, self._window, self._slot, self.alarms)
+        self.panel = EpsonPanel(*parts, options=self.options, acting=self.acting)
         self._mishaps = EpsonMishaps(self.panel, self.restart)
 
     @property

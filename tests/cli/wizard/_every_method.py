@@ -35,8 +35,8 @@ from robolink_simulators.assist.port import InProcessEyes
 from wcwidth import wcswidth
 
 import robolink
+from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan, WriteSubject
 from robolink.model import ControllerState, ToolOffset
-from robolink.nozzle_change import ChangePlan, NozzleChange, ToolPlan, WriteSubject
 from robolink.runner import FitSubject, MoveSubject
 from tests.contract.test_calibrate_pivot import QUICK
 from tests.contract.test_proof_after_a_break import CASES

@@ -26,9 +26,7 @@ from robolink.calibration import (
     assessed,
     solve_two_pose,
 )
-from robolink.messages import tr
-from robolink.model import Pose, ToolOffset
-from robolink.nozzle_change import (
+from robolink.calibration_run import (
     Attended,
     LimitVerdict,
     Proposal,
@@ -36,7 +34,9 @@ from robolink.nozzle_change import (
     WriteSubject,
     told_of_contradiction,
 )
-from robolink.nozzle_change._turn_question import asked_what_follows
+from robolink.calibration_run._turn_test import asked_what_follows
+from robolink.messages import tr
+from robolink.model import Pose, ToolOffset
 from robolink.runner import FitRow, FitSubject, JogSubject, Question, TouchSubject
 
 ARRIVAL = Pose(249.992, 200.004, -81.563, 90.0, tool=0)

@@ -10,9 +10,9 @@ from robolink_cli.wizard.host import _shown, guided
 from robolink_cli.wizard.state import WizardState
 from robolink_cli.wizard.work import Desk, Work
 
+from robolink.calibration_run import ChangeReport, ToolReport
 from robolink.errors import ConfigError, DeclinedError
 from robolink.model import ToolReceipt
-from robolink.nozzle_change import ChangeReport, ToolReport
 from robolink.runner import Question
 from tests.cli.wizard._people import HEADER, write_subject
 

@@ -39,6 +39,7 @@ from robolink.calibration import (
     impact_on,
     turn_claim,
 )
+from robolink.calibration_run import ChangeReport, ToolReport
 from robolink.errors import (
     CalibrationError,
     ConfigError,
@@ -52,7 +53,6 @@ from robolink.messages import spoken, tr
 from robolink.methods import find_method
 from robolink.model import Path as Way
 from robolink.model import Pose, ToolOffset, ToolReceipt, WorkBox
-from robolink.nozzle_change import ChangeReport, ToolReport
 from robolink.runner import AngleShown, JogRange, MoveSubject, Question
 from robolink.standing import Standing, note_standing
 from tests.cli.wizard._people import (

@@ -8,7 +8,7 @@ from typing import Any
 import click
 import pytest
 from robolink_cli import main
-from robolink_cli.commands.measure import recipe_events
+from robolink_cli.commands.measure import recalibration
 from robolink_cli.commands.measure.choosing import choose_recipe
 from robolink_cli.commands.measure.recalibrate import _chosen_anew, steps_of
 from robolink_cli.options.shared import GIVEN, TYPED
@@ -39,12 +39,12 @@ from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 import robolink
 from robolink.backup import keep_first_backup, load, save
+from robolink.calibration_run import ChangeReport, Moment
 from robolink.config import find_cell
 from robolink.errors import ConfigError, DeclinedError, NotReadyError
 from robolink.journal import memory_journal, open_log
 from robolink.model import EntryKind, NewEntry, Pose, Signature, ToolOffset, describe_offset
 from robolink.model import Path as Way
-from robolink.nozzle_change import ChangeReport, Moment
 from robolink.recipe import load_recipe
 from robolink.runner import MoveSubject, Question
 from robolink.stations import StationKind
@@ -510,9 +510,9 @@ def test_a_screen_is_not_headed_twice_and_says_which_of_several_tools(
 ):
     told: list[str] = []
     nothing = click.Context(click.Command("x"))
-    monkeypatch.setattr(recipe_events, "drawn_elsewhere", lambda: drawn)
-    monkeypatch.setattr(recipe_events, "note", told.append)
-    progress = recipe_events.Progress(recipe_events.EventStream(nothing, on=False), tools)
+    monkeypatch.setattr(recalibration, "drawn_elsewhere", lambda: drawn)
+    monkeypatch.setattr(recalibration, "note", told.append)
+    progress = recalibration.Progress(recalibration.EventStream(nothing, on=False), tools)
     bench: Any = None
     progress.moment(Moment.BEFORE_MEASURE, bench, 2)
     progress.moment(Moment.BEFORE_WRITE, bench)

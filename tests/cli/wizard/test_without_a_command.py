@@ -140,7 +140,7 @@ def test_after_a_tool_the_next_one_begins_with_the_choice_and_nothing_moves_befo
 @pytest.mark.parametrize("tools", [1, 2])
 def test_each_id_is_asked_once_and_not_again_at_its_moment(tools):
     from robolink.recipe import Answers
-    from robolink.recipe.file.recipe import Recipe
+    from robolink.recipe._recipe import Recipe
 
     more = "".join(f"[[tools]]\nnumber = {number}\n" for number in range(2, tools + 1))
     prompts = [("before_measure", "nozzle", "N?"), ("start", "lot", "L?"), ("start", "yes", "Y?")]

@@ -15,8 +15,7 @@ import pytest
 from robolink import ambient
 from robolink.errors import JournalError
 from robolink.journal import ChainVerification, memory_journal, open_journal
-from robolink.journal.store.connection import NOTHING, DatabaseConnection
-from robolink.journal.store.engines import _begin_wal
+from robolink.journal.store.connection import NOTHING, DatabaseConnection, _begin_wal
 from robolink.journal.store.entry_rows import EntryRows
 from robolink.model import EntryKind, NewEntry
 from tests.contract.journal._acts import marker
@@ -249,7 +248,7 @@ def test_what_may_not_be_written_is_read(public, open_anew, of_folder, of_file, 
 
 @pytest.mark.fault("F63")
 def test_a_locked_journal_is_read_and_not_written(filled, open_anew, monkeypatch):
-    monkeypatch.setattr("robolink.journal.store.engines.BUSY_S", 0.1)
+    monkeypatch.setattr("robolink.journal.store.connection.BUSY_S", 0.1)
     holder = sqlite3.connect(filled, isolation_level=None)
     try:
         holder.execute("PRAGMA locking_mode = EXCLUSIVE")

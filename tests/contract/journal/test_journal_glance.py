@@ -13,7 +13,7 @@ from robolink_simulators.hosting.streams.epson import serve_tcp
 
 import robolink
 from robolink.journal import close_files, default_location, nothing_is_open, open_journal
-from robolink.journal._opening import _opened
+from robolink.journal._connections import _opened
 from robolink.model import EntryKind, Marker, MarkerKind, NewEntry
 
 
@@ -91,12 +91,18 @@ def test_a_look_at_a_journal_in_order_leaves_the_file_as_it_is(address, tmp_path
     assert entry.verdict == "kept"
 
 
+def test_who_does_not_say_that_it_only_looks_has_the_journal_open_from_the_beginning(address):
+    close_files()
+    with robolink.connect(address):
+        assert len(_opened) == 1
+
+
 def test_what_others_are_writing_does_not_show_so_a_look_believes_nothing(
     address, tmp_path, monkeypatch
 ):
     """A journal that somebody keeps to himself can be read, but only without its log."""
     for patience in ("BUSY_S", "GLANCE_S"):
-        monkeypatch.setattr(f"robolink.journal.store.engines.{patience}", 0.02)
+        monkeypatch.setattr(f"robolink.journal.store.connection.{patience}", 0.02)
     close_files()
     holder = sqlite3.connect(tmp_path / "journal.db", isolation_level=None)
     with closing(holder):
@@ -108,7 +114,7 @@ def test_what_others_are_writing_does_not_show_so_a_look_believes_nothing(
     assert nothing_is_open(address)
 
 
-HEAVY = "numpy pydantic pymodbus rich asyncio robolink.calibration robolink.nozzle_change"
+HEAVY = "numpy pydantic pymodbus rich asyncio robolink.calibration robolink.calibration_run"
 
 PROBE = """
 import sys

@@ -222,7 +222,7 @@ def test_a_database_of_something_else_is_left_alone(location, journal, open_anew
 
 @pytest.mark.fault("F63")
 def test_a_write_that_another_program_holds_up_is_refused_in_time(location, open_anew, monkeypatch):
-    monkeypatch.setattr("robolink.journal.store.engines.BUSY_S", 0.2)
+    monkeypatch.setattr("robolink.journal.store.connection.BUSY_S", 0.2)
     journal, other = open_anew(location), open_anew(location)
     with other._store.write() as tables:
         tables.connection.run("UPDATE head SET hash = hash")

@@ -30,8 +30,8 @@ def main(wanted: list[str]) -> int:
     listener = Listener()
     # An expression that speaks of soak brings those that take long as well (tests/conftest.py).
     everything = ["-m", "fault and (soak or not soak)", "--quiet", "--no-header", "-r", "fE"]
-    everything += ["--timeout", str(_TEST_S)]
-    ended = pytest.main([*everything, "-n", "2", *nodes], plugins=[listener]) if nodes else 0
+    everything += ["--timeout", str(_TEST_S), "--processes", "2"]
+    ended = pytest.main([*everything, *nodes], plugins=[listener]) if nodes else 0
     verdicts = [judged(row, showings(), listener.ends) for row in chosen]
     print("\n".join(["", *(verdict.line for verdict in verdicts), ""]))
     count = Counter(verdict.word for verdict in verdicts)

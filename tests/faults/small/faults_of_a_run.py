@@ -6,14 +6,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cache
 
-from robolink.controllers.softmotion.link.snapshots import read_block
+from robolink.controllers.softmotion.snapshots import read_block
 from robolink.errors import RobolinkError
 from robolink.protocols import NEED_DATA, Role
 from robolink.protocols.epson_text import EpsonTextCodec, Reply, parse_status
 from robolink.protocols.mailbox import BlockError, decode_slot
 from robolink.protocols.spel import parse_point, parse_tool_listing
-from robolink.transport.modbus.frames import TcpFraming
-from robolink.transport.modbus.framing import FrameError
+from robolink.transport.modbus.frames import FrameError, TcpFraming
 from tests.faults.small.cells import Steps, calibrated, wired_cell
 from tests.faults.small.judging import judge
 from tests.faults.small.wire import Act, SmallFault

@@ -13,9 +13,8 @@ from robolink_simulators.softmotion.mailbox.image import Bank
 from robolink.timing import Clock
 from robolink.transport import LinkUrl
 from robolink.transport.modbus.client import ModbusClient
-from robolink.transport.modbus.frames import TcpFraming
+from robolink.transport.modbus.frames import Area, TcpFraming
 from robolink.transport.modbus.mailbox import MailboxPlaces, ModbusMailboxLink
-from robolink.transport.modbus.messages import Area
 from robolink.transport.modbus.tcp import TcpExchange
 from tests.faults.small.wire import ModbusFrames, Wire
 

@@ -14,12 +14,12 @@ from unittest import mock
 
 from robolink.controllers.controller_core import ControllerCore
 from robolink.controllers.epson.controller import EpsonController
-from robolink.controllers.epson.motion.group import EpsonGroup
-from robolink.controllers.epson.motion.movement import EpsonMotion
+from robolink.controllers.epson.group import EpsonGroup
+from robolink.controllers.epson.movement import EpsonMotion
 from robolink.controllers.motion_group import MotionGroupCore
 from robolink.controllers.softmotion.controller import SoftMotionController
-from robolink.controllers.softmotion.motion.group import SoftMotionGroup
-from robolink.controllers.softmotion.motion.movement import SoftMotionMotion
+from robolink.controllers.softmotion.group import SoftMotionGroup
+from robolink.controllers.softmotion.movement import SoftMotionMotion
 from robolink.controllers.tool_table import ToolTableCore
 from robolink.model import Marker, Motion, MotionOutcome, Pose, ToolOffset, ToolReceipt, WorkBox
 from tests.soak.adversary.computer import VirtualProcess

@@ -16,7 +16,7 @@ from robolink_cli.console.ways import SHELL_WAYS
 from robolink_simulators.hosting.in_process import epson, softmotion
 
 from robolink.errors import OutcomeUnknownError
-from robolink.journal._opening import close_files
+from robolink.journal._connections import close_files
 from robolink.model import Controller
 from robolink.ways import speaking
 from tests.soak.adversary.command_lines import ASSIST, FOLDER

@@ -10,6 +10,7 @@ from robolink_cli.prompts.operator import AssistedOperator
 from robolink_simulators.assist.port import InProcessEyes
 from robolink_simulators.cell.world_parameters import WorldParameters
 
+from robolink.calibration_run import ChangePlan, ChangeReport, NozzleChange, ToolPlan
 from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.errors import NotReadyError, RobolinkError
 from robolink.model import (
@@ -22,7 +23,6 @@ from robolink.model import (
     WorkBox,
     read_offset,
 )
-from robolink.nozzle_change import ChangePlan, ChangeReport, NozzleChange, ToolPlan
 from robolink.runner import Question
 from robolink.timing import Clock
 from robolink.transaction import Wanted, change_tools, plan_undo, recover, undo

@@ -11,7 +11,7 @@ from dataclasses import replace
 import pytest
 
 from robolink.controllers import Jog
-from robolink.controllers.softmotion.link.turns import Turns
+from robolink.controllers.softmotion.heartbeat import Turns
 from robolink.errors import (
     BusyError,
     ConfigError,

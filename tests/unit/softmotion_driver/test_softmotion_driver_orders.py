@@ -5,7 +5,7 @@ from itertools import count
 
 import pytest
 
-from robolink.controllers.softmotion.link import answers
+from robolink.controllers.softmotion import answers
 from robolink.errors import (
     ConfigError,
     ControllerFaultError,

@@ -19,7 +19,7 @@ from robolink_cli.options.simulation import ProjectOptions
 
 if TYPE_CHECKING:
     from robolink_simulators.epson import EpsonSimulator
-    from robolink_simulators.epson.spel.programs.loading import CheckedProject
+    from robolink_simulators.epson.spel.programs.program_load import CheckedProject
     from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
     from robolink_simulators.epson.spel.tasks.task import TaskFailure
 
@@ -46,7 +46,7 @@ def check(*, files: _Files, points: _PointFiles = (), encoding: Encoding = None)
     files, IOLabels.dat and UserErrors.dat that lie beside them are read for the names in them.
     Nothing runs and no controller is asked.
     """
-    from robolink_simulators.epson.spel.programs.loading import check_project
+    from robolink_simulators.epson.spel.programs.program_load import check_project
     from robolink_simulators.epson.spel.source_text import ProgramRefused
 
     checked = check_project(files, points, encoding=encoding)

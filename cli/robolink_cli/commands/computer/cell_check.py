@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import click
 
+from robolink.calibration_run import RecipeRun
 from robolink.config import Cell
 from robolink.errors import ConfigError, DeclinedError, NotReadyError, RobolinkError
 from robolink.inspection import InspectionFinding, measured_findings
 from robolink.messages import tr
 from robolink.model import Controller
-from robolink.recipe import LoadedRecipe, RecipeRun, load_recipe
+from robolink.recipe import LoadedRecipe, load_recipe
 from robolink_cli.access.cell import complete_cell
 from robolink_cli.console.exit_codes import DIFFERENT, exit_code
 from robolink_cli.console.render import note, say

@@ -71,8 +71,7 @@ def recalibrate(
     Without RECIPE, on a terminal, cell and recipe are chosen from lists.
     """
     from robolink_cli.commands.measure.choosing import nobody_to_ask
-    from robolink_cli.commands.measure.recalibration import Recalibration
-    from robolink_cli.commands.measure.recipe_events import EventStream
+    from robolink_cli.commands.measure.recalibration import EventStream, Recalibration, RunOptions
     from robolink_cli.console.output import may_be_guided
     from robolink_cli.console.render import note
     from robolink_cli.options.recipe_answers import answers_from
@@ -95,31 +94,22 @@ def recalibrate(
         prepared = answers_from(
             loaded.recipe, texts=answers, z_mm=z_mm, nozzle=nozzle, lot=lot, yes=yes
         )
-        Recalibration(
-            at,
-            loaded,
+        options = RunOptions(
             prepared,
-            events=events,
             assist_url=assist,
             take_reference=reference,
             accepted_change_mm=accepted_change_mm,
             sensor=sensor,
             order=order,
-        ).run(dry_run=dry_run)
+            dry_run=dry_run,
+        )
+        Recalibration(at, loaded, options, events).run()
 
     def another() -> None:
         # What was typed is about the tool before: neither its needle nor a consent holds again.
         at, loaded = told(*_chosen_anew(reached[-1]))
-        Recalibration(
-            at,
-            loaded,
-            answers_from(loaded.recipe, texts=(), z_mm=(), nozzle=None, lot=None, yes=False),
-            events=events,
-            assist_url=assist,
-            take_reference=False,
-            accepted_change_mm=None,
-            sensor=None,
-        ).run(dry_run=False)
+        nothing = answers_from(loaded.recipe, texts=(), z_mm=(), nozzle=None, lot=None, yes=False)
+        Recalibration(at, loaded, RunOptions(nothing), events).run()
 
     with events.closing():
         # An order comes from a program, also where that has a terminal.

@@ -1,17 +1,26 @@
-"""One run of a recipe from the command line."""
+"""One run of a recipe from the command line: events for a script, headings for a person."""
 
-from collections.abc import Callable, Mapping
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import click
 
 from robolink.backup import keep_first_backup
-from robolink.errors import DeclinedError
+from robolink.calibration import VerifyResult
+from robolink.calibration_run import ChangeReport, Listener, Moment, Proposal, RecipeRun, preview
+from robolink.errors import CalibrationError, DeclinedError
 from robolink.messages import tr
-from robolink.model import AnsweredBy, Controller
-from robolink.nozzle_change import ChangeReport, preview
-from robolink.recipe import Answers, LoadedRecipe, RecipeRun, require_answers
+from robolink.model import AnsweredBy, Controller, ToolReceipt
+from robolink.procedures import MeasurementContext
+from robolink.recipe import Answers, LoadedRecipe, require_answers
+from robolink.runner import Ask, Confirm, Notify, StepDone, TakenStep
 from robolink.transaction import Order
 from robolink_cli.access.capabilities import io_of
-from robolink_cli.commands.measure.recipe_events import EventStream, Progress
-from robolink_cli.console.render import note, say
+from robolink_cli.console.exit_codes import error_body, exit_code
+from robolink_cli.console.output import drawn_elsewhere, hand_over
+from robolink_cli.console.render import note, say, switch_json_on
 from robolink_cli.prompts.operator import operator_at
 from robolink_cli.prompts.present import present_desk
 from robolink_cli.prompts.questions import asked, keep_answer, on_terminal
@@ -20,119 +29,259 @@ from robolink_cli.session.context import CliContext
 from robolink_cli.session.motion_consent import agree_to_motion, motion_question
 from robolink_cli.session.opening import open_controller
 from robolink_cli.session.ordering import ordered, show_done, with_order
+from robolink_cli.views.documents import (
+    pose_payload,
+    proposal_payload,
+    receipt_payload,
+    verification_payload,
+)
 from robolink_cli.views.fit import report_payload, show_report
 from robolink_cli.views.planned_steps import steps_payload
 
-_Show = Callable[[dict[str, object]], None]
-"""Shows a document to a person."""
 
-
-class Recalibration:
-    """Runs one recipe on the controller of a command.
+class EventStream:
+    """Writes one JSON line for each event, where that is wanted.
 
     Args:
-        context: What the command was told.
-        loaded: The recipe.
+        context: Click's, so that text for people goes to stderr.
+        on: Whether it is wanted.
+    """
+
+    def __init__(self, context: click.Context, *, on: bool) -> None:
+        self.on = on
+        if on:
+            switch_json_on(context)
+
+    def emit(self, event: str, **payload: object) -> None:
+        """Write one event."""
+        if self.on:
+            line = {"schema": "robolink/recalibration-event/1", "event": event, **payload}
+            hand_over(json.dumps(line, allow_nan=False))
+
+    @contextmanager
+    def closing(self) -> Iterator[None]:
+        """End the stream with ``error`` when the block does; ``result`` is the block's own."""
+        try:
+            yield
+        except (Exception, KeyboardInterrupt) as error:
+            self.emit("error", error=error_body(error), exit_code=exit_code(error))
+            raise
+
+
+class Progress(Listener):
+    """Tells a person and a script what happens.
+
+    Attributes:
+        tool: Number of the tool at work.
+
+    Args:
+        events: The stream of a script.
+        tools: How many tools the recipe has.
+    """
+
+    def __init__(self, events: EventStream, tools: int) -> None:
+        self._events, self._tools = events, tools
+        self.tool = 0
+
+    def moment(self, moment: Moment, bench: MeasurementContext, tool: int | None = None) -> None:  # noqa: ARG002 - a phase is a phase
+        """Say which phase begins."""
+        if tool is not None:
+            self.tool = tool
+        if not drawn_elsewhere():
+            heading = _heading(moment, self.tool)
+        elif self._tools > 1 and moment is Moment.BEFORE_MEASURE:
+            heading = tr("Tool {tool} is measured now.", tool=self.tool)
+        else:
+            heading = ""  # the screen has one of its own
+        if heading:
+            note(heading)
+        self._events.emit("phase", phase=moment, tool=tool)
+
+    def step(self, tool: int, done: StepDone) -> None:
+        """Tell of one step."""
+        self.tool = tool
+        kind, text = _in_words(done.step)
+        pose = pose_payload(done.pose) if done.pose else None
+        self._events.emit("step", tool=tool, kind=kind, text=text, pose=pose)
+
+    def refused(self, tool: int, error: CalibrationError, *, again: bool) -> None:
+        """Tell of a measurement that is not believed."""
+        if again:
+            note(tr("Tool {tool}: {error} It is measured again.", tool=tool, error=error))
+        self._events.emit(
+            "refused", tool=tool, code=error.code, what=error.what, remedy=error.remedy, again=again
+        )
+
+    def proposed(self, proposals: Sequence[Proposal]) -> None:
+        """Show what was measured, next to what is stored."""
+        from robolink_cli.views.fit import show_proposal
+
+        for proposal in proposals:
+            show_proposal(proposal)
+            self._events.emit("proposal", **proposal_payload(proposal))
+
+    def wrote(self, receipt: ToolReceipt) -> None:
+        """Tell of a write."""
+        from robolink_cli.views.fit import tell_written
+
+        tell_written(receipt)
+        self.tool = receipt.tool
+        self._events.emit("write", **receipt_payload(receipt))
+
+    def verified(self, tool: int, result: VerifyResult) -> None:
+        """Tell of a verification."""
+        self._events.emit("verification", tool=tool, **(verification_payload(result) or {}))
+
+    def told(self, sentence: str) -> None:
+        """Pass on what a person was told."""
+        self._events.emit("note", text=sentence)
+
+
+def _in_words(step: TakenStep) -> tuple[str, str]:
+    """Return what kind of step it is, and what it says."""
+    match step:
+        case Ask():
+            return "touch", step.instruction
+        case Notify():
+            return "remark", step.text
+        case Confirm():
+            return "offer", step.question
+        case _:
+            return "move", step.purpose
+
+
+def _heading(moment: Moment, tool: int) -> str:
+    """Return the line over what comes next, empty for none."""
+    if moment is Moment.BEFORE_MEASURE:
+        return tr("-- tool {tool}: measure", tool=tool)
+    if moment is Moment.BEFORE_WRITE:
+        return tr("-- propose and write")
+    return tr("-- done") if moment is Moment.END else ""
+
+
+@dataclass(frozen=True, slots=True)
+class RunOptions:
+    """What was typed for one run of a recipe.
+
+    Attributes:
         answers: What was answered beforehand.
-        events: Where events go.
         assist_url: A simulator's stand-in for the person.
         take_reference: Whether only a reference is taken.
         accepted_change_mm: A larger jump that an engineer accepts this time.
         sensor: The camera, in place of the recipe's.
         order: Id of the line computer's order; ``None`` without one.
+        dry_run: Whether the run is only shown.
     """
 
-    def __init__(
-        self,
-        context: CliContext,
-        loaded: LoadedRecipe,
-        answers: Answers,
-        *,
-        events: EventStream,
-        assist_url: str | None,
-        take_reference: bool,
-        accepted_change_mm: float | None,
-        sensor: str | None,
-        order: str | None = None,
-    ) -> None:
-        self._context = context
-        self._loaded = loaded
-        self._answers = answers
-        self._events = events
-        self._assist_url = assist_url
-        self._take_reference = take_reference
-        self._accepted_change_mm = accepted_change_mm
-        self._sensor = sensor
-        self._order = order
+    answers: Answers
+    assist_url: str | None = None
+    take_reference: bool = False
+    accepted_change_mm: float | None = None
+    sensor: str | None = None
+    order: str | None = None
+    dry_run: bool = False
 
-    def run(self, *, dry_run: bool) -> None:
+    @property
+    def alone(self) -> bool:
+        """Whether nobody, and no simulator either, could answer a question."""
+        return self.assist_url is None and not on_terminal()
+
+
+@dataclass(frozen=True, slots=True)
+class Recalibration:
+    """Runs one recipe on the controller of a command.
+
+    Attributes:
+        context: What the command was told.
+        loaded: The recipe.
+        options: What was typed for this run.
+        events: Where events go.
+    """
+
+    context: CliContext
+    loaded: LoadedRecipe
+    options: RunOptions
+    events: EventStream
+
+    def run(self) -> None:
         """Carry the recipe out, or only show it.
 
         Raises:
             RobolinkError: It ended early; the old values are in force, or it says which are not.
         """
-        if not dry_run and self._assist_url is None and not on_terminal():
-            require_answers(self._answers, self._loaded.recipe)
-        progress = Progress(self._events, len(self._loaded.recipe.tools))
-        answers, loaded = self._answers, self._loaded
+        dry_run = self.options.dry_run
+        if not dry_run and self.options.alone:
+            require_answers(self.options.answers, self.loaded.recipe)
+        with self._opened() as (controller, order):
+            if order is not None and order.done is not None:
+                document = dict(order.done.result)
+                show_done(order)
+            else:
+                with self._prepared(controller, order) as run:
+                    if dry_run:
+                        document = self._plan(controller, run)
+                    else:
+                        self._consent(controller, run)
+                        document = self._told(controller, run, run.run())
+        payload = with_order(document, order)
+        self.events.emit("result", **payload)
+        if not self.events.on:
+            self.context.emit(
+                "recalibration", payload, lambda: _show_plan(payload) if dry_run else None
+            )
+
+    @contextmanager
+    def _opened(self) -> Iterator[tuple[Controller, Order | None]]:
+        """Give the controller, and the order that the run carries out."""
+        answers, loaded = self.options.answers, self.loaded
         with (
             open_controller(
-                self._context,
-                changes=not dry_run,
+                self.context,
+                changes=not self.options.dry_run,
                 usual_change_mm=loaded.recipe.tolerances.jump_mm,
             ) as controller,
             ordered(
                 controller,
-                self._order,
+                self.options.order,
                 "change",
                 recipe=loaded.sha256,
                 nozzle=answers.nozzle,
                 lot=answers.lot,
             ) as order,
         ):
-            if order is not None and order.done is not None:
-                done: tuple[Mapping[str, object], _Show] = (order.done.result, _nothing)
-                show_done(order)
-            else:
-                done = self._run(controller, order, progress, dry_run=dry_run)
-        payload, show = with_order(done[0], order), done[1]
-        self._events.emit("result", **payload)
-        if not self._events.on:
-            self._context.emit("recalibration", payload, lambda: show(payload))
+            yield controller, order
 
-    def _run(
-        self, controller: Controller, order: Order | None, progress: Progress, *, dry_run: bool
-    ) -> tuple[Mapping[str, object], _Show]:
-        """Return the document of the run, and how a person is shown it."""
-        with operator_at(self._assist_url, lambda: progress.tool, controller.clock) as operator:
+    @contextmanager
+    def _prepared(self, controller: Controller, order: Order | None) -> Iterator[RecipeRun]:
+        """Give the run, with whoever answers it, once nothing speaks against it."""
+        options = self.options
+        progress = Progress(self.events, len(self.loaded.recipe.tools))
+        with operator_at(options.assist_url, lambda: progress.tool, controller.clock) as operator:
             run = RecipeRun(
                 controller,
-                self._loaded,
+                self.loaded,
                 operator=operator,
-                answers=self._answers,
+                answers=options.answers,
                 audience=progress,
-                take_reference=self._take_reference,
-                accepted_change_mm=self._accepted_change_mm,
-                ask_before_write=not self._answers.yes,
-                sensor=self._sensor,
-                cell=self._context.cell,
+                take_reference=options.take_reference,
+                accepted_change_mm=options.accepted_change_mm,
+                ask_before_write=not options.answers.yes,
+                sensor=options.sensor,
+                cell=self.context.cell,
                 order=order,
                 describe=lambda report: self._document(controller, report),
             )
             run.preflight()
             self._start(controller, run)
-            if dry_run:
-                return self._dry_run(controller, run), _shown_plan
-            self._consent(controller, run)
-            return self._carry_out(controller, run), _nothing
+            yield run
 
     def _start(self, controller: Controller, run: RecipeRun) -> None:
         for change in run.changed:
             note(change.sentence)
-        self._events.emit(
+        self.events.emit(
             "start",
-            recipe=self._loaded.name,
-            recipe_hash=self._loaded.sha256,
+            recipe=self.loaded.name,
+            recipe_hash=self.loaded.sha256,
             controller=controller.identity,
             tools=[plan.tool for plan in run.plan.tools],
             takes_reference=run.takes_reference,
@@ -149,7 +298,7 @@ class Recalibration:
         moves = run.plan.moves
         question = None if not moves or self._at_desk else self._question(controller, run)
         if run.takes_reference:
-            if self._take_reference:
+            if self.options.take_reference:
                 keep_answer(_which_is_mounted(), True, AnsweredBy.OPTION)
             else:
                 self._explain_reference()
@@ -158,7 +307,7 @@ class Recalibration:
             self._require_writer(run)
             return
         if question is not None:
-            agree_to_motion(question, yes=self._answers.yes)
+            agree_to_motion(question, yes=self.options.answers.yes)
             return
         name_the_needle(controller, run.ask_ids)
         steps = preview(controller, run.plan)
@@ -168,7 +317,7 @@ class Recalibration:
             moves=sum(step.target is not None for step in steps),
             speed_mm_s=run.plan.limits.speed_mm_s,
             box_mm=run.plan.limits.box.x_max_mm,
-            at=self._loaded.recipe.source.of_method.needs.station,
+            at=self.loaded.recipe.source.of_method.needs.station,
             tools=[plan.tool for plan in run.plan.tools],
         )
 
@@ -183,12 +332,12 @@ class Recalibration:
 
     @property
     def _at_desk(self) -> bool:
-        return present_desk() is not None and not self._answers.yes
+        return present_desk() is not None and not self.options.answers.yes
 
     def _purpose(self, run: RecipeRun) -> str:
         return tr(
             "as {recipe!r} says for tool {tools}",
-            recipe=self._loaded.name,
+            recipe=self.loaded.name,
             tools=", ".join(str(plan.tool) for plan in run.plan.tools),
         )
 
@@ -215,21 +364,21 @@ class Recalibration:
 
     def _require_writer(self, run: RecipeRun) -> None:
         """Refuse to write values that nobody watched being measured without a yes."""
-        nobody = not self._answers.yes and self._assist_url is None and not on_terminal()
+        nobody = not self.options.answers.yes and self.options.alone
         if nobody and not run.takes_reference:
             raise DeclinedError(
                 tr("Tools would be written, but there is nobody to ask."),
                 remedy=tr("Nothing was written. Add --yes, or run it on a terminal."),
             )
 
-    def _dry_run(self, controller: Controller, run: RecipeRun) -> dict[str, object]:
-        recipe = self._loaded.recipe
+    def _plan(self, controller: Controller, run: RecipeRun) -> dict[str, object]:
+        recipe = self.loaded.recipe
         return {
             "dry_run": True,
-            "recipe": self._loaded.name,
+            "recipe": self.loaded.name,
             "tools": [plan.tool for plan in run.plan.tools],
             "takes_reference": run.takes_reference,
-            "old_names": list(self._loaded.notes),
+            "old_names": list(self.loaded.notes),
             "steps": steps_payload(controller, preview(controller, run.plan)),
             "prompts": [{"at": prompt.at, "text": prompt.text} for prompt in recipe.prompts],
             "outputs": [
@@ -243,8 +392,10 @@ class Recalibration:
             ],
         }
 
-    def _carry_out(self, controller: Controller, run: RecipeRun) -> dict[str, object]:
-        report = run.run()
+    def _told(
+        self, controller: Controller, run: RecipeRun, report: ChangeReport
+    ) -> dict[str, object]:
+        """Show a person what was done; return the document of it."""
         # Now, because Ctrl-C may come before the logout is answered.
         desk = present_desk()
         if desk is not None:
@@ -265,32 +416,22 @@ class Recalibration:
         self, controller: Controller, report: ChangeReport, *, reference_taken: bool = False
     ) -> dict[str, object]:
         return {
-            "recipe": self._loaded.name,
-            "recipe_hash": self._loaded.sha256,
+            "recipe": self.loaded.name,
+            "recipe_hash": self.loaded.sha256,
             "controller": controller.identity,
-            **_payload(report),
-            "old_names": list(self._loaded.notes),
+            "change": report.change,
+            "simulated": report.simulated,
+            "tools": [report_payload(one) for one in report.tools],
+            "old_names": list(self.loaded.notes),
             "reference_taken": reference_taken,
         }
-
-
-def _payload(report: ChangeReport) -> dict[str, object]:
-    return {
-        "change": report.change,
-        "simulated": report.simulated,
-        "tools": [report_payload(one) for one in report.tools],
-    }
 
 
 def _which_is_mounted() -> str:
     return tr("Is the nozzle mounted that the points were taught with?")
 
 
-def _nothing(_payload: dict[str, object]) -> None:
-    """Everything was said as it happened."""
-
-
-def _shown_plan(payload: dict[str, object]) -> None:
+def _show_plan(payload: dict[str, object]) -> None:
     from robolink_cli.views.fit import show_steps
 
     say(tr("Dry run; nothing is sent. The recipe {recipe!r}:", recipe=payload["recipe"]))

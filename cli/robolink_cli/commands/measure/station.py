@@ -108,8 +108,8 @@ def learn(
     A pin is touched by a person, twice; beams and surfaces are looked for near the place in the
     cell file. No tool is written. An error in the tool's offset shifts the station by as much.
     """
+    from robolink.calibration_run import Limits, usual_box
     from robolink.model import InputEdge
-    from robolink.nozzle_change import Limits, usual_box
     from robolink.procedures import TouchPlan
     from robolink_cli.commands.measure.station_learning import learn as learn_it
 

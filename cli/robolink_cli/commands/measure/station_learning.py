@@ -2,11 +2,7 @@
 
 from dataclasses import replace
 
-from robolink.errors import ConfigError, DeclinedError, UndefinedToolError
-from robolink.messages import tr
-from robolink.methods import learn_station
-from robolink.model import Controller, EntryKind, ToolOffset
-from robolink.nozzle_change import (
+from robolink.calibration_run import (
     Limits,
     flange_now,
     foresee,
@@ -16,6 +12,10 @@ from robolink.nozzle_change import (
     tip_sigma_mm,
     touching_as_recorded,
 )
+from robolink.errors import ConfigError, DeclinedError, UndefinedToolError
+from robolink.messages import tr
+from robolink.methods import learn_station
+from robolink.model import Controller, EntryKind, ToolOffset
 from robolink.procedures import MeasurementContext, TouchPlan
 from robolink.runner import ArmAhead, inputs_of
 from robolink.stations import (

@@ -41,7 +41,7 @@ def chosen_at_desk(controller: Controller) -> str | None:
     Raises:
         DeclinedError: The person leaves; everything stays as it is.
     """
-    from robolink.nozzle_change import open_turn_tests, untested_sentences
+    from robolink.calibration_run import open_turn_tests, untested_sentences
 
     desk = present_desk()
     if desk is None:

@@ -18,7 +18,7 @@ from robolink_cli.views.documents import finding_payload, pose_payload
 
 if TYPE_CHECKING:
     from robolink.calibration import VerifyResult
-    from robolink.nozzle_change import OpenTurnTest
+    from robolink.calibration_run import OpenTurnTest
 
 DECLINED: Final = 9
 LEFT: Final = 6
@@ -76,7 +76,7 @@ class Guide:
 
     def _tell_untested(self) -> None:
         """Say of each new value that no turn test can prove now why, and what does."""
-        from robolink.nozzle_change import untested_sentences
+        from robolink.calibration_run import untested_sentences
 
         for sentence in untested_sentences(self._controller):
             note(sentence)
@@ -231,7 +231,7 @@ class TurnTests:
     """
 
     def __init__(self, controller: Controller) -> None:
-        from robolink.nozzle_change import open_turn_tests
+        from robolink.calibration_run import open_turn_tests
 
         self._controller = controller
         self._tests = open_turn_tests(controller)
@@ -249,7 +249,7 @@ class TurnTests:
             VerifyError: One did not pass; the old values are back.
             RobolinkError: Anything else that ended it.
         """
-        from robolink.nozzle_change import finish_by_turn_test
+        from robolink.calibration_run import finish_by_turn_test
 
         for operation, tests in self._tests.items():
             self._agreed(tests)

@@ -17,11 +17,7 @@ from robolink_simulators.hosting.streams.epson import serve_tcp
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 import robolink
-from robolink.errors import CalibrationError, VerifyError
-from robolink.journal import memory_journal
-from robolink.messages import tr
-from robolink.model import Controller, ToolOffset
-from robolink.nozzle_change import (
+from robolink.calibration_run import (
     ChangePlan,
     Listener,
     NozzleChange,
@@ -29,6 +25,10 @@ from robolink.nozzle_change import (
     ToolPlan,
     ToolReport,
 )
+from robolink.errors import CalibrationError, VerifyError
+from robolink.journal import memory_journal
+from robolink.messages import tr
+from robolink.model import Controller, ToolOffset
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.options.declaration import Option

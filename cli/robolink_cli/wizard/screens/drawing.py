@@ -2,8 +2,8 @@
 
 from dataclasses import replace
 
+from robolink.calibration_run import WriteSubject
 from robolink.messages import tr
-from robolink.nozzle_change import WriteSubject
 from robolink.runner import FitSubject, Question
 from robolink_cli.wizard.screens.choosing import check_screen, choice_screen
 from robolink_cli.wizard.screens.ending import ended_screen

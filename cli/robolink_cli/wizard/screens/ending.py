@@ -7,6 +7,7 @@ from robolink.calibration import (
     turn_test_headline,
     turn_test_sentences,
 )
+from robolink.calibration_run import ChangeReport, ToolReport, next_steps
 from robolink.errors import (
     CalibrationError,
     DeclinedError,
@@ -16,7 +17,6 @@ from robolink.errors import (
 )
 from robolink.messages import joined, tr
 from robolink.model import PersonRole, describe_offset, describe_standing
-from robolink.nozzle_change import ChangeReport, ToolReport, next_steps
 from robolink.standing import UNTOUCHED, standing_after
 from robolink_cli.access.warnings import way_back
 from robolink_cli.console.exit_codes import next_of, was_refused

@@ -2,10 +2,10 @@
 
 import math
 
+from robolink.calibration_run import WriteSubject
 from robolink.locale.languages import ENGLISH
 from robolink.messages import joined, tr
 from robolink.model import describe_pose
-from robolink.nozzle_change import WriteSubject
 from robolink.runner import FitSubject, Question, TouchSubject
 from robolink_cli.wizard.screens.choosing import language_label, mark_of
 from robolink_cli.wizard.screens.fitting import fit_lines

@@ -4,9 +4,9 @@ import math
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
+from robolink.calibration_run import LimitVerdict, Proposal, WriteSubject
 from robolink.messages import tr
 from robolink.model import ToolOffset, angle_difference_deg
-from robolink.nozzle_change import LimitVerdict, Proposal, WriteSubject
 from robolink_cli.console.tables import padded
 from robolink_cli.wizard.screens.layout import (
     BODY,

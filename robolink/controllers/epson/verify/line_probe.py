@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final
 
-from robolink.controllers.epson.link.line import SERIAL
-from robolink.controllers.epson.link.serial_opening import take_dialect
+from robolink.controllers.epson.line import SERIAL
+from robolink.controllers.epson.serial_opening import take_dialect
 from robolink.errors import ConfigError, RemoteProtocolError
 from robolink.messages import tr
 from robolink.protocols import NEED_DATA, Role

@@ -1,17 +1,16 @@
-"""One verification, from login to logout."""
+"""One verification, from login to logout.
+
+What cannot be settled by reading, and why. Nothing here talks to the controller.
+"""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from robolink.controllers.epson.controller import EpsonController
-from robolink.controllers.epson.link.line import SERIAL, EpsonLine, open_line
-from robolink.controllers.epson.link.session import EpsonSession
-from robolink.controllers.epson.verify import text_facts as text
-from robolink.controllers.epson.verify import wire_facts as wire
-from robolink.controllers.epson.verify.interview import Interview
-from robolink.controllers.epson.verify.not_tried import not_tried
-from robolink.controllers.epson.verify.serial_facts import serial_facts
-from robolink.controllers.epson.verify.verification import Fact, Verification
+from robolink.controllers.epson.line import SERIAL, EpsonLine, open_line
+from robolink.controllers.epson.session import EpsonSession
+from robolink.controllers.epson.verify import facts
+from robolink.controllers.epson.verify.verification import Fact, Interview, Verification
 from robolink.journal import memory_journal
 from robolink.messages import tr
 from robolink.model import ControllerFacts, Secret
@@ -21,6 +20,47 @@ from robolink.transport import DialogueLog, LinkUrl, TraceSink, parse_url
 
 if TYPE_CHECKING:
     from robolink.protocols.epson_binary import Dialect
+
+
+def not_tried() -> tuple[Fact, ...]:
+    """Return the facts that would need a motion, a write, an error or a long wait."""
+    error = tr("not tried: it would leave the controller in error")
+    moving = tr("not tried: something would have to run and be stopped")
+    minutes = tr("not tried: it takes minutes")
+    setup = tr("cannot be read over the wire: look at the controller's setup")
+    monitoring = tr("not tried: no command is sent in that mode")
+    disturbing = tr("not tried: it could end this connection")
+    writing = tr("not tried: it would change something")
+    many = tr("not tried: it takes many readings")
+    why_not = (
+        (tr("TLSet(n) of an undefined tool"), error, "tlset_of_undefined"),
+        (tr("answer to a statement that fails"), error, "execute_failure"),
+        (tr("code of that answer"), error, "execute_failure_code"),
+        (tr("order of the answers around an Abort"), moving, "abort_reply_first"),
+        (tr("a statement whose client vanishes"), moving, "execute_on_disconnect"),
+        (tr("Logout while a task runs"), moving, "logout_while_running"),
+        (tr("refusal while only monitoring"), monitoring, "monitoring_refusal"),
+        (tr("Move ... Till whose input is on already"), moving, "till_already_met"),
+        (tr("remote time-out while only monitoring"), minutes, "monitoring_timeout"),
+        (tr("a second client"), disturbing, "second_client"),
+        (tr("TLClr of the selected tool"), writing, "clear_selected_tool"),
+        (tr("XYLim limits the tip or the flange"), writing, "xylim_counts"),
+        (
+            tr("a failed statement without the error state"),
+            error,
+            "error_state_after_failed_execute",
+        ),
+        (tr("Login without a parameter"), disturbing, "login_without_parameter"),
+        (tr("a robot's number left out"), writing, "missing_robot_number"),
+        (tr("SetCurRobot,0"), writing, "robot_zero"),
+        (tr("assignment to a variable"), writing, "variable_assignment"),
+        (tr("If ... Then in a statement"), error, "single_line_if"),
+        (tr("Accel above 100 percent"), error, "accel_max"),
+        (tr("time allowed before the login"), minutes, "login_timeout_s"),
+        (tr("remote time-out"), setup, "remote_timeout_s"),
+        (tr("noise of the measured position"), many, "real_pos_noise_mm"),
+    )
+    return tuple(Fact(name, finding, option) for name, finding, option in why_not)
 
 
 def verify_epson(
@@ -59,21 +99,21 @@ def verify_epson(
     try:
         session.login(password)
         if session.outlived:
-            from robolink.controllers.epson.link.in_step import prove_in_step
+            from robolink.controllers.epson.session import prove_in_step
 
             prove_in_step(session)
         # It only reads, and the login sees to it that nobody else is there.
         outcomes = memory_journal(session.identity).log(session.identity)
         controller = EpsonController(session, outcomes, remote_timeout_s=0.0)
         try:
-            about, facts = _found_out(
+            about, found = _found_out(
                 Interview(controller, session, line.transport, log), _dialect_of(line)
             )
         finally:
             controller.close()
     finally:
         session.close()
-    return Verification(session.identity, about, facts, log.dialogue)
+    return Verification(session.identity, about, found, log.dialogue)
 
 
 def _dialect_of(line: EpsonLine) -> "Dialect | None":
@@ -96,33 +136,37 @@ def _found_out(
     interview: Interview, dialect: "Dialect | None"
 ) -> tuple[ControllerFacts, tuple[Fact, ...]]:
     about = interview.controller.facts()
-    facts = [
-        *(_of_remote_ethernet(interview) if dialect is None else serial_facts(interview, dialect)),
+    shown = [
+        *(
+            _of_remote_ethernet(interview)
+            if dialect is None
+            else facts.serial_facts(interview, dialect)
+        ),
         _served(interview),
-        text.closing_quote(interview),
-        text.number_lead_blank(interview),
-        text.point_coordinates(interview),
-        text.point_flags(interview),
-        text.where_width(interview),
-        text.base(interview),
-        text.comma_blank(interview),
-        *text.tool_facts(interview),
+        facts.closing_quote(interview),
+        facts.number_lead_blank(interview),
+        facts.point_coordinates(interview),
+        facts.point_flags(interview),
+        facts.where_width(interview),
+        facts.base(interview),
+        facts.comma_blank(interview),
+        *facts.tool_facts(interview),
         _while_executing(interview),
     ]
     if dialect is not None:
         interview.log_out()
-        return about, (*facts, *not_tried())
-    end = (wire.terminator(interview), wire.unfinished_request(interview.leave()))
-    return about, (*facts, *end, *not_tried())
+        return about, (*shown, *not_tried())
+    end = (facts.terminator(interview), facts.unfinished_request(interview.leave()))
+    return about, (*shown, *end, *not_tried())
 
 
 def _of_remote_ethernet(interview: Interview) -> tuple[Fact, ...]:
     return (
-        wire.status_flags(interview),
-        wire.case_echo(interview),
-        wire.extended_queries(interview),
-        wire.command_set(interview),
-        *wire.preferences(interview),
+        facts.status_flags(interview),
+        facts.case_echo(interview),
+        facts.extended_queries(interview),
+        facts.command_set(interview),
+        *facts.preferences(interview),
     )
 
 

@@ -5,7 +5,7 @@ Who is logged in, and for how long silence is tolerated (docs/reference/epson.md
 On a serial line nothing is connected: EOT begins, and silence ends a request that was cut short.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final, Protocol
 
@@ -180,7 +180,7 @@ _ACK: Final = b"\x06"
 _TERMINATORS: Final = {"crlf": b"\r\n", "cr": b"\r", "lf": b"\n"}
 
 
-class ServedRequest(Protocol):
+class RequestHandler(Protocol):
     """The controller, as its connections see it."""
 
     options: EpsonOptions
@@ -239,7 +239,7 @@ class EpsonServerLink:
     )
 
     def __init__(
-        self, controller: ServedRequest, now_ns: int, *, dialect: Dialect | None = None
+        self, controller: RequestHandler, now_ns: int, *, dialect: Dialect | None = None
     ) -> None:
         options = controller.options
         self._controller = controller
@@ -284,9 +284,13 @@ class EpsonServerLink:
             self._leave()
             return
         try:
-            self._read(data)
+            self._codec.receive_data(data)
+            for request in self._requests():
+                self._controller.take(self, request)
         except RemoteProtocolError:
             self.cut()
+            return
+        self._note_silence()
 
     @property
     def drained(self) -> bool:
@@ -367,7 +371,8 @@ class EpsonServerLink:
             if not self.over:
                 self._controller.take_late(self, event)
         try:
-            self._serve()
+            for request in self._requests():
+                self._controller.take(self, request)
         except RemoteProtocolError:
             self.cut()
         self._leave()
@@ -381,9 +386,8 @@ class EpsonServerLink:
         if not self._outbox.depart(departures, self._controller.now_ns):
             self._end()
 
-    def _read(self, data: bytes) -> None:
-        self._codec.receive_data(data)
-        self._serve()
+    def _note_silence(self) -> None:
+        """Count from now how long nothing comes behind the beginning of a request."""
         if not (self._serial or self._controller.options.requests_end_with_silence):
             return
         begun = self._codec.bytes_held
@@ -395,9 +399,11 @@ class EpsonServerLink:
         broken = self._codec.end_of_request()
         if isinstance(broken, (Request, BadRequest)) and self._turned_on:
             self._controller.take(self, broken)
-        self._serve()
+        for request in self._requests():
+            self._controller.take(self, request)
 
-    def _serve(self) -> None:
+    def _requests(self) -> Iterator[Request | BadRequest]:
+        """Yield what has come whole, while this connection carries anything."""
         while not (self.over or self._stalled or self._outbox.half_open):
             if (event := self._codec.next_event()) is NEED_DATA:
                 return
@@ -406,7 +412,7 @@ class EpsonServerLink:
                 if self._controller.options.rs232_eot_answer == "ack":
                     self.push(_ACK)
             elif isinstance(event, (Request, BadRequest)) and self._turned_on:
-                self._controller.take(self, event)
+                yield event
 
     def _end(self) -> None:
         self.over = True

@@ -16,7 +16,6 @@ from robolink.protocols.epson_text import (
     BadRequest,
     EpsonTextCodec,
     ErrorCode,
-    RemoteCommand,
     Request,
     find_command,
 )
@@ -25,7 +24,7 @@ from robolink_simulators.epson.condition import Condition, RequestRefused, Task
 from robolink_simulators.epson.flash import Flash
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.remote.command_window import SpelWindow
-from robolink_simulators.epson.remote.commands import CommandDesk
+from robolink_simulators.epson.remote.commands import CommandDesk, Fields
 from robolink_simulators.epson.remote.link import (
     ClientSlot,
     EpsonServerLink,
@@ -136,123 +135,6 @@ def _on_the_wire(event: Request | BadRequest) -> bytes:
     return ",".join((f"${event.name}", *event.parameters)).encode("latin-1", "replace")
 
 
-class Service:
-    """Carries requests out, and answers all but an Execute at once.
-
-    Args:
-        desk: Serves what is done at once.
-        window: Runs statements.
-        slot: Who is logged in.
-        condition: The state that a bad logout changes.
-        options: The controller's habits.
-        password: What Login must carry; empty for none.
-    """
-
-    __slots__ = (
-        "_condition",
-        "_desk",
-        "_options",
-        "_password",
-        "_slot",
-        "_window",
-    )
-
-    def __init__(
-        self,
-        desk: CommandDesk,
-        window: SpelWindow,
-        slot: ClientSlot,
-        condition: Condition,
-        *,
-        options: EpsonOptions,
-        password: str,
-    ) -> None:
-        self._desk = desk
-        self._window = window
-        self._slot = slot
-        self._condition = condition
-        self._options = options
-        self._password = password
-
-    @property
-    def unfinished(self) -> bool:
-        """Whether a statement or a task runs."""
-        return self._window.busy or self._condition.task is not Task.NONE
-
-    def carry_out(
-        self,
-        link: EpsonServerLink,
-        exchange: PendingRequest,
-        event: Request | BadRequest,
-        now_ns: int,
-    ) -> None:
-        """Do what a request asks, or refuse it."""
-        logged_in = self._slot.client is link
-        if logged_in:
-            self._slot.heard(now_ns)
-        try:
-            if isinstance(event, BadRequest):
-                raise RequestRefused(event.code)
-            command = find_command(event.name)
-            if command is None:
-                raise RequestRefused(ErrorCode.UNKNOWN_COMMAND)
-            self._desk.admit(command, logged_in=logged_in, executing=self._window.busy)
-            self._dispatch(link, exchange, command, event, now_ns=now_ns)
-        except RequestRefused as refused:
-            exchange.refuse(refused.code)
-
-    def _dispatch(
-        self,
-        link: EpsonServerLink,
-        exchange: PendingRequest,
-        command: RemoteCommand,
-        request: Request,
-        *,
-        now_ns: int,
-    ) -> None:
-        match command.name:
-            case "GetStatus":
-                exchange.reply(*self._desk.status(executing=self._window.busy))
-            case "Execute":
-                self._window.start(request.parameters[0], exchange, now_ns)
-            case "Home":
-                # It answers when the arm is there, as a motion of Execute does (assumed).
-                self._desk.check_home(request.parameters)
-                self._window.start("Home", exchange, now_ns)
-            case "Abort":
-                self._window.abort(exchange, now_ns)
-            case "Login":
-                self._login(link, request, now_ns)
-                exchange.reply()
-            case "Logout":
-                self._logout(link, now_ns)
-                exchange.reply()
-            case _:
-                exchange.reply(*self._desk.serve(request))
-
-    def _login(self, link: EpsonServerLink, request: Request, now_ns: int) -> None:
-        bare = not request.parameters
-        if bare and self._options.login_without_parameter == "error_12":
-            raise RequestRefused(ErrorCode.MALFORMED)
-        password = "" if bare else request.parameters[0]
-        # That a controller without a password takes an empty one only is assumed.
-        if password != self._password:
-            raise RequestRefused(ErrorCode.WRONG_PASSWORD)
-        self._slot.admit(link, now_ns)
-        link.logged_in(True, now_ns)
-
-    def _logout(self, link: EpsonServerLink, now_ns: int) -> None:
-        if self.unfinished:
-            # Logging out while a task runs raises an error (documented,
-            # docs/reference/epson.md 1.1); that the error ends what runs, as errors do, is assumed.
-            self._window.interrupt(now_ns)
-            self._condition.raise_error(self._options.numbers.logged_out_in_task)
-            if self._options.logout_while_running == "refused":
-                raise RequestRefused(ErrorCode.NOT_READY)
-        self._slot.free()
-        link.logged_in(False, now_ns)
-
-
 class PlannedMishaps(Protocol):
     """What goes wrong around the controller, at once or later."""
 
@@ -263,8 +145,10 @@ class PlannedMishaps(Protocol):
         """Have something done some time from now."""
 
 
-class RequestTaking(HostedDevice, ABC):
-    """Implements :class:`~robolink_simulators.epson.remote.link.ServedRequest`.
+class RequestService(HostedDevice, ABC):
+    """Implements :class:`~robolink_simulators.epson.remote.link.RequestHandler`.
+
+    It answers all but an Execute at once.
 
     Attributes:
         options: The controller's habits.
@@ -275,8 +159,10 @@ class RequestTaking(HostedDevice, ABC):
     options: EpsonOptions
     condition: Condition
     faults: FaultPlan
+    _password: str
+    """What Login must carry; empty for none."""
     _slot: ClientSlot
-    _service: Service
+    _desk: CommandDesk
     _window: SpelWindow
     _mishaps: PlannedMishaps
     _flash: Flash
@@ -333,8 +219,84 @@ class RequestTaking(HostedDevice, ABC):
             if self.on_request is not None:
                 self.on_request(exchange.number, shown)
         finally:
-            self._service.carry_out(link, exchange, event, self.now_ns)
+            self._serve(link, exchange, event)
             self._flash.save_changes()
+
+    def _serve(
+        self, link: EpsonServerLink, exchange: PendingRequest, event: Request | BadRequest
+    ) -> None:
+        """Do what a request asks, or refuse it."""
+        try:
+            name, request = self._admitted(link, event)
+            if name == "Execute":
+                self._window.start(request.parameters[0], exchange, self.now_ns)
+            elif name == "Home":
+                # It answers when the arm is there, as a motion of Execute does (assumed).
+                self._desk.check_home(request.parameters)
+                self._window.start("Home", exchange, self.now_ns)
+            elif name == "Abort":
+                self._window.abort(exchange, self.now_ns)
+            else:
+                exchange.reply(*self._answer(link, name, request))
+        except RequestRefused as refused:
+            exchange.refuse(refused.code)
+
+    def _admitted(self, link: EpsonServerLink, event: Request | BadRequest) -> tuple[str, Request]:
+        """Return a request that may be served now, with the name of its command.
+
+        Raises:
+            RequestRefused: It may not.
+        """
+        logged_in = self._slot.client is link
+        if logged_in:
+            self._slot.heard(self.now_ns)
+        if isinstance(event, BadRequest):
+            raise RequestRefused(event.code)
+        command = find_command(event.name)
+        if command is None:
+            raise RequestRefused(ErrorCode.UNKNOWN_COMMAND)
+        self._desk.admit(command, logged_in=logged_in, executing=self._window.busy)
+        return command.name, event
+
+    def _answer(self, link: EpsonServerLink, name: str, request: Request) -> Fields:
+        match name:
+            case "GetStatus":
+                return self._desk.status(executing=self._window.busy)
+            case "Login":
+                return self._login(link, request)
+            case "Logout":
+                return self._logout(link)
+            case _:
+                return self._desk.serve(request)
+
+    def _login(self, link: EpsonServerLink, request: Request) -> Fields:
+        bare = not request.parameters
+        if bare and self.options.login_without_parameter == "error_12":
+            raise RequestRefused(ErrorCode.MALFORMED)
+        password = "" if bare else request.parameters[0]
+        # That a controller without a password takes an empty one only is assumed.
+        if password != self._password:
+            raise RequestRefused(ErrorCode.WRONG_PASSWORD)
+        self._slot.admit(link, self.now_ns)
+        link.logged_in(True, self.now_ns)
+        return ()
+
+    def _logout(self, link: EpsonServerLink) -> Fields:
+        if self._unfinished:
+            # Logging out while a task runs raises an error (documented,
+            # docs/reference/epson.md 1.1); that the error ends what runs, as errors do, is assumed.
+            self._window.interrupt(self.now_ns)
+            self.condition.raise_error(self.options.numbers.logged_out_in_task)
+            if self.options.logout_while_running == "refused":
+                raise RequestRefused(ErrorCode.NOT_READY)
+        self._slot.free()
+        link.logged_in(False, self.now_ns)
+        return ()
+
+    @property
+    def _unfinished(self) -> bool:
+        """Whether a statement or a task runs."""
+        return self._window.busy or self.condition.task is not Task.NONE
 
     def leaving(self, exchange: PendingRequest, reply: bytes) -> Sequence[Departure]:
         """Count a reply and return what of it leaves, when."""
@@ -362,7 +324,7 @@ class RequestTaking(HostedDevice, ABC):
         self._settled_ns = -1
         if self._slot.client is link:
             # Production that another device started is not this client's to supervise.
-            own = self._service.unfinished and not self.condition.monitoring_only
+            own = self._unfinished and not self.condition.monitoring_only
             self._slot.lost(unfinished=own)
             if self.options.execute_on_disconnect == "stops":
                 self._window.interrupt(self.now_ns)

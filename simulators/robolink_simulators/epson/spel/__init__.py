@@ -1,6 +1,6 @@
 """SPEL+, the language of EPSON controllers: command-window statements, simulated.
 
-Parsing (``parse``, ``grammar.lark``) knows no machine; evaluation (``expressions``) changes none;
+Parsing (``parser``, ``grammar.lark``) knows no machine; evaluation (``expressions``) changes none;
 statements (``statements``, ``execution``) do; the interpreter runs them one after the other in
 simulated time.
 """

@@ -15,8 +15,8 @@ from robolink.timing import NS_PER_S
 from robolink_simulators.epson.arm.trajectory import Leg
 from robolink_simulators.epson.condition import RefusalKind, RequestRefused, SpelRefusal
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
-from robolink_simulators.epson.spel.expressions.printing import (
+from robolink_simulators.epson.spel.expressions.evaluator import Evaluator
+from robolink_simulators.epson.spel.expressions.print_format import (
     CRLF,
     LONGEST_PRINT_TO,
     joined,
@@ -51,8 +51,8 @@ from robolink_simulators.epson.spel.tree import (
 )
 
 
-def effect(evaluator: Evaluator, statement: Statement) -> StatementOutcome:
-    """Carry a statement out at once.
+def effect(evaluator: Evaluator, statement: Statement) -> str:
+    """Carry out a statement that takes no time and is no keyword's; return what it prints.
 
     Raises:
         Refusal: It cannot be carried out.
@@ -62,9 +62,7 @@ def effect(evaluator: Evaluator, statement: Statement) -> StatementOutcome:
             session = evaluator.session
             values = [evaluator.shown(item) for item in items]
             text = joined(values, session.options, session.machine.model)
-            return StatementOutcome(text + (CRLF if newline else ""))
-        case KeywordStatement():
-            return run_command(evaluator, statement)
+            return text + (CRLF if newline else "")
         case MotionStatement("curve"):
             store_curve(evaluator, statement)
         case PrintTo():
@@ -81,7 +79,7 @@ def effect(evaluator: Evaluator, statement: Statement) -> StatementOutcome:
             _assign(evaluator, name, evaluator.value(expression))
         case _:
             raise AssertionError(statement)
-    return StatementOutcome()
+    return ""
 
 
 def _store(evaluator: Evaluator, statement: AssignPoint | AssignCoordinate) -> None:
@@ -147,8 +145,8 @@ class StatementExecution:
         >>> import random
         >>> from robolink_simulators.epson import EpsonOptions, EpsonSimulator
         >>> from robolink_simulators.epson.spel import Interpreter, StatementExecution
-        >>> from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
-        >>> from robolink_simulators.epson.spel.parse import parse
+        >>> from robolink_simulators.epson.spel.expressions.evaluator import Evaluator
+        >>> from robolink_simulators.epson.spel.parser import parse
         >>> machine = EpsonSimulator().machine
         >>> session = Interpreter(machine, EpsonOptions(), random.Random(1)).session
         >>> line = StatementExecution(Evaluator(session), parse("Wait 2; On 5"), now_ns=0)
@@ -224,10 +222,10 @@ class StatementExecution:
             options = replace(motion.options, words=motion.options.words - {"sync"})
             self._pending.append(replace(motion, options=options))
             self._busy_until_ns = now_ns
-            self._attempt(now_ns)
+            self._take_up(now_ns)
 
     def suspend(self, now_ns: int) -> None:
-        """Stop the motion where it is; nothing is done until :meth:`go_on`."""
+        """Stop the motion where it is; nothing is done until :meth:`resume`."""
         if self._reserved is not None:
             self._held = True
         elif self.travels:
@@ -235,7 +233,7 @@ class StatementExecution:
         elif now_ns >= self._busy_until_ns:  # else the safeguard has stopped it just now
             self._aim = None
 
-    def go_on(self, now_ns: int) -> None:
+    def resume(self, now_ns: int) -> None:
         """Go on after :meth:`suspend`; a timed wait begins anew (docs/reference/spel.md 4.6).
 
         What is left of a motion is travelled point to point, of a straight one in a straight
@@ -244,11 +242,11 @@ class StatementExecution:
         machine = self._evaluator.session.machine
         self._seen_ns = now_ns
         try:
-            self._resume(machine, now_ns)
+            self._restart(machine, now_ns)
         except SpelRefusal as refusal:
             self.refuse(refusal)
 
-    def _resume(self, machine: Machine, now_ns: int) -> None:
+    def _restart(self, machine: Machine, now_ns: int) -> None:
         if self._reserved is not None:
             self._held = False
             if self._released:
@@ -267,44 +265,54 @@ class StatementExecution:
         while not self._done and now_ns >= (change_ns := self._change_ns):
             arm.advance(change_ns)
             self._evaluator.session.machine.timed_bits.advance(change_ns)
-            self._attempt(change_ns)
+            self._take_up(change_ns)
             self._seen_ns = change_ns
         arm.advance(now_ns)
         self._seen_ns = max(self._seen_ns, now_ns)
 
     def _take_up(self, change_ns: int) -> None:
         """Do what is due: an end of waiting, an edge, or the next statement."""
-        if self._waiting is not None:
-            if self._waiting.is_over(change_ns):
-                self._waiting, self._busy_until_ns = None, change_ns
-            return
-        if self._meanwhile is not None and self._meanwhile.due_ns(self._seen_ns) <= change_ns:
-            self._go_on_meanwhile(change_ns)
-            return
+        try:
+            if self._waiting is not None:
+                if self._waiting.is_over(change_ns):
+                    self._waiting, self._busy_until_ns = None, change_ns
+            elif (
+                self._meanwhile is not None
+                and self._meanwhile.next_poll_ns(self._seen_ns) <= change_ns
+            ):
+                self._advance_meanwhile(change_ns)
+            elif not self._met_an_edge(change_ns):
+                self._evaluator.session.machine.robot.guard.require_no_error()
+                self._done = not self._pending
+                if self._pending:
+                    self._aim = None
+                    self._run(self._pending.pop())
+        except SpelRefusal as refusal:
+            self.refuse(refusal)
+        except RecursionError:
+            self.refuse(SpelRefusal(RefusalKind.SYNTAX, "Expression too deeply nested"))
+
+    def _met_an_edge(self, change_ns: int) -> bool:
+        """Return whether an edge is met, or the next statement waits for what is inside ``!...!``.
+
+        Source: docs/reference/spel.md 7.1.
+        """
         watch, self._watch = self._watch, None
         if watch is not None and watch.edge_after(self._seen_ns) == change_ns:
             rest_ns = watch.meet(change_ns)
             self._busy_until_ns = self._busy_until_ns if rest_ns is None else rest_ns
-        elif self._meanwhile is not None:
-            # The next statement waits for what stands inside !...! (docs/reference/spel.md 7.1).
-            self._busy_until_ns = self._meanwhile.due_ns(self._seen_ns)
-        else:
-            self._evaluator.session.machine.robot.guard.require_no_error()
-            self._begin_next()
+            return True
+        if self._meanwhile is not None:
+            self._busy_until_ns = self._meanwhile.next_poll_ns(self._seen_ns)
+            return True
+        return False
 
-    def _begin_next(self) -> None:
-        if self._pending:
-            self._aim = None
-            self._run(self._pending.pop())
-        else:
-            self._done = True
-
-    def due_ns(self, seen_ns: int) -> int:
+    def next_poll_ns(self, seen_ns: int) -> int:
         """Return when it has to be looked at again."""
         self.saw(seen_ns)
         return seen_ns + 1 if self._done else self._change_ns
 
-    def _go_on_meanwhile(self, now_ns: int) -> None:
+    def _advance_meanwhile(self, now_ns: int) -> None:
         """Carry out what is due of that which stands inside ``!...!``."""
         meanwhile = self._meanwhile
         if meanwhile is None:
@@ -321,7 +329,7 @@ class StatementExecution:
     def step(self, now_ns: int) -> None:
         """Carry out what is due, without moving the arm through time."""
         while not self._done and now_ns >= (change_ns := self._change_ns):
-            self._attempt(change_ns)
+            self._take_up(change_ns)
             self._seen_ns = change_ns
 
     def next_change(self) -> int | None:
@@ -336,13 +344,13 @@ class StatementExecution:
         if self._reserved is not None:
             return NEVER_NS
         if self._waiting is not None:
-            return self._waiting.next_look(self._seen_ns)
+            return self._waiting.next_poll_ns(self._seen_ns)
         change_ns = self._busy_until_ns
         if self._watch is not None:
             edge_ns = self._watch.edge_after(self._seen_ns)
             change_ns = change_ns if edge_ns is None else min(edge_ns, change_ns)
         if self._meanwhile is not None:
-            change_ns = min(change_ns, self._meanwhile.due_ns(self._seen_ns))
+            change_ns = min(change_ns, self._meanwhile.next_poll_ns(self._seen_ns))
         return change_ns
 
     def abort(self, now_ns: int) -> None:
@@ -369,16 +377,28 @@ class StatementExecution:
         session.memory.last_error = getattr(session.options.numbers, refusal.kind)
         self._fail(SpelError(session.memory.last_error, refusal.text))
 
-    def _attempt(self, change_ns: int) -> None:
-        try:
-            self._take_up(change_ns)
-        except SpelRefusal as refusal:
-            self.refuse(refusal)
-        except RecursionError:
-            self.refuse(SpelRefusal(RefusalKind.SYNTAX, "Expression too deeply nested"))
-
     def _run(self, statement: Statement) -> None:
-        outcome = self._outcome(statement)
+        """Begin a statement; what takes no time is done when this returns."""
+        match statement:
+            case KeywordStatement("wait"):
+                outcome = self._wait(statement)
+            case KeywordStatement("recover"):
+                outcome = StatementOutcome(duration_ns=recover(self._evaluator, statement))
+            case KeywordStatement():
+                outcome = run_command(self._evaluator, statement)
+            case If():
+                outcome = self._branch(statement)
+            case MotionStatement(verb) if verb != "curve":
+                reserves = "sync" in statement.options.words
+                outcome = self._reserve(statement) if reserves else self._begin(statement)
+            case Distance(percent):
+                outcome = self._wait_for_distance(percent)
+            case _:
+                outcome = StatementOutcome(effect(self._evaluator, statement))
+        self._note(outcome)
+
+    def _note(self, outcome: StatementOutcome) -> None:
+        """Take up what a statement has begun, and how long it lasts."""
         start_ns, machine = self._busy_until_ns, self._evaluator.session.machine
         self.output += outcome.output
         if outcome.timed is not None:
@@ -445,19 +465,3 @@ class StatementExecution:
         holds = truth(self._evaluator.value(statement.condition))
         self._pending += reversed(statement.then if holds else statement.otherwise)
         return StatementOutcome()
-
-    def _outcome(self, statement: Statement) -> StatementOutcome:
-        match statement:
-            case KeywordStatement("wait"):
-                return self._wait(statement)
-            case KeywordStatement("recover"):
-                return StatementOutcome(duration_ns=recover(self._evaluator, statement))
-            case If():
-                return self._branch(statement)
-            case MotionStatement(verb) if verb != "curve":
-                reserves = "sync" in statement.options.words
-                return self._reserve(statement) if reserves else self._begin(statement)
-            case Distance(percent):
-                return self._wait_for_distance(percent)
-            case _:
-                return effect(self._evaluator, statement)

@@ -22,7 +22,7 @@ from robolink.messages import tr
 from robolink.model import Elbow, Hand, Posture, Wrist
 from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 from robolink_simulators.epson.memory.points import HIGHEST_LOCAL, HIGHEST_POINT, Point
-from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
+from robolink_simulators.epson.spel.expressions.evaluator import Evaluator
 from robolink_simulators.epson.spel.expressions.values import as_text
 from robolink_simulators.epson.spel.file_folder import FileFolder
 from robolink_simulators.epson.spel.session import PointFile

@@ -11,8 +11,8 @@ from robolink_simulators.epson.spel.execution import SpelError as SpelError
 from robolink_simulators.epson.spel.execution import (
     StatementExecution as StatementExecution,
 )
-from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
-from robolink_simulators.epson.spel.parse import parse
+from robolink_simulators.epson.spel.expressions.evaluator import Evaluator
+from robolink_simulators.epson.spel.parser import parse
 from robolink_simulators.epson.spel.session import Session, WindowMemory
 
 

@@ -22,7 +22,7 @@ from robolink_simulators.epson.arm.trajectory import Leg
 from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.robot import DrivenRobot
-from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
+from robolink_simulators.epson.spel.expressions.evaluator import Evaluator
 from robolink_simulators.epson.spel.legs import go_leg
 from robolink_simulators.epson.spel.session import Session
 from robolink_simulators.epson.spel.statements.conditions import DescentWatch, Watch

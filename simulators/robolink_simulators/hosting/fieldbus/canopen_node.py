@@ -13,8 +13,8 @@ import canopen
 from canopen import LocalNode
 from canopen.sdo.server import SdoServer
 
-from robolink.closing import ClosedAtExit
 from robolink.errors import ConfigError, ConnectError
+from robolink.interrupts import ClosedAtExit
 from robolink.messages import tr
 from robolink.protocols.mailbox import COMMAND
 from robolink.timing import NS_PER_S

@@ -3,7 +3,7 @@
 from typing import Final
 from urllib.parse import urlencode
 
-from robolink.closing import ClosedAtExit
+from robolink.interrupts import ClosedAtExit
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.faults import LinkKind
 from robolink_simulators.hosting.addresses import cannot_listen, require_loopback

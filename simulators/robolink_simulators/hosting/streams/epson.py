@@ -7,7 +7,7 @@ from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import serial_dialect
 from robolink_simulators.epson.remote.link import EpsonServerLink
-from robolink_simulators.epson.spel.parse import prepare
+from robolink_simulators.epson.spel.parser import prepare
 from robolink_simulators.hosting.streams.serial_host import LineHost, no_pseudo_terminal
 from robolink_simulators.hosting.streams.tcp_host import TcpHost as TcpHost
 

@@ -4,7 +4,7 @@ from abc import abstractmethod
 from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING
 
-from robolink.closing import ClosedAtExit
+from robolink.interrupts import ClosedAtExit
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.hosting.addresses import WireDevice
 from robolink_simulators.hosting.streams.serving_loop import (

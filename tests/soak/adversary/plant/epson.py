@@ -18,8 +18,8 @@ from robolink_simulators.hosting.in_process.transport import LinePort
 from robolink_simulators.hosting.streams.epson import SerialFace
 
 from robolink.controllers import open_epson
-from robolink.controllers.epson.link.line import EpsonLine, text_line
-from robolink.controllers.epson.link.serial_opening import turn_on
+from robolink.controllers.epson.line import EpsonLine, text_line
+from robolink.controllers.epson.serial_opening import turn_on
 from robolink.errors import TransportError
 from robolink.model import Controller, OutcomeLog, Secret, ToolOffset
 from robolink.protocols import Role
@@ -114,7 +114,7 @@ class EpsonPlant(PlantWithWorld):
 
         # In this order: what imports the other one must not meet its stand-in.
         package = "robolink.controllers.epson"
-        return {f"{package}.verify.run.open_line": opened, f"{package}.link.line.open_line": opened}
+        return {f"{package}.verify.run.open_line": opened, f"{package}.line.open_line": opened}
 
     def hang_up(self, process: VirtualProcess) -> None:
         """Close the connection of a process that died."""

@@ -14,8 +14,8 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.plc.device import PlcSimulator
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
+from robolink.calibration_run import ChangeReport
 from robolink.model import Controller, OutcomeLog, ToolOffset
-from robolink.nozzle_change import ChangeReport
 from tests.soak.adversary.computer import VirtualProcess
 from tests.soak.adversary.history import CountedActs, Disturbance, Habit, Hour
 from tests.soak.adversary.people import Tell, carry_out, put_right

@@ -15,9 +15,9 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
 
+from robolink.calibration_run import ChangeReport
 from robolink.errors import JournalError, NotReadyError, NotReadyReason, RobolinkError
 from robolink.model import Controller, OutcomeLog, Pose, ToolOffset
-from robolink.nozzle_change import ChangeReport
 from robolink.timing import NS_PER_S
 from tests.soak.adversary.computer import VirtualProcess
 from tests.soak.adversary.history import CountedActs, Disturbance, Habit, Hindrance, Hour

@@ -278,29 +278,29 @@ class TappedRegisters:
         self.most_registers = client.most_registers
 
     def read_holding(self, address: int, count: int) -> tuple[int, ...]:
-        """See :class:`robolink.controllers.plc_map.registers.RegisterClient`."""
+        """See :class:`robolink.controllers.plc_map.link.RegisterClient`."""
         self._asks(3, address)
         words = self._client.read_holding(address, count)
         self._plant.tap.passed(self._process, f"wire received {words}")
         return words
 
     def read_input(self, address: int, count: int) -> tuple[int, ...]:
-        """See :class:`robolink.controllers.plc_map.registers.RegisterClient`."""
+        """See :class:`robolink.controllers.plc_map.link.RegisterClient`."""
         self._asks(4, address)
         return self._client.read_input(address, count)
 
     def read_coils(self, address: int, count: int) -> tuple[bool, ...]:
-        """See :class:`robolink.controllers.plc_map.registers.RegisterClient`."""
+        """See :class:`robolink.controllers.plc_map.link.RegisterClient`."""
         self._asks(1, address)
         return self._client.read_coils(address, count)
 
     def read_discrete(self, address: int, count: int) -> tuple[bool, ...]:
-        """See :class:`robolink.controllers.plc_map.registers.RegisterClient`."""
+        """See :class:`robolink.controllers.plc_map.link.RegisterClient`."""
         self._asks(2, address)
         return self._client.read_discrete(address, count)
 
     def write_registers(self, address: int, values: Sequence[int]) -> None:
-        """See :class:`robolink.controllers.plc_map.registers.RegisterClient`."""
+        """See :class:`robolink.controllers.plc_map.link.RegisterClient`."""
         text = f"fc16 {address} {' '.join(f'{value:04x}' for value in values)}"
         tool = address // 100 if address // 100 in _TOOLS else None
         kind = SentKind.OTHER if tool is None else SentKind.WRITE
@@ -309,7 +309,7 @@ class TappedRegisters:
         self._plant.tap.passed(self._process, f"wire sent {text}")
 
     def write_coil(self, address: int, value: bool) -> None:
-        """See :class:`robolink.controllers.plc_map.registers.RegisterClient`."""
+        """See :class:`robolink.controllers.plc_map.link.RegisterClient`."""
         text = f"fc5 {address} {int(value)}"
         self._plant.leaves(self._process, SentRequest(SentKind.OTHER, text))
         self._client.write_coil(address, value)

@@ -25,9 +25,8 @@ from robolink.transport import MailboxLink, parse_url
 from robolink.transport.can.bus import CanLine
 from robolink.transport.can.mailbox import CanopenMailboxLink
 from robolink.transport.modbus.client import Exchange, ModbusClient
-from robolink.transport.modbus.frames import RtuFraming, TcpFraming
+from robolink.transport.modbus.frames import Area, RtuFraming, TcpFraming
 from robolink.transport.modbus.mailbox import MailboxPlaces, ModbusMailboxLink
-from robolink.transport.modbus.messages import Area
 from robolink.transport.modbus.rtu import RtuExchange, RtuLine
 from robolink.transport.modbus.tcp import TcpExchange
 from tests.soak.adversary.computer import VirtualProcess
@@ -170,7 +169,7 @@ class SoftMotionPlant(PlantWithWorld):
         def opened(_url: object, **_terms: object) -> MailboxLink:
             return self.tapped(self.link(), process)
 
-        return {"robolink.transport.open_quick_link": opened}
+        return {"robolink.transport.open_mailbox_link": opened}
 
     def announce(self, text: str, words: Sequence[int] = ()) -> None:
         """Count a request before it leaves; a rival's block may take the place of this one."""

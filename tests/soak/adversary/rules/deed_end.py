@@ -7,6 +7,7 @@ from typing import Final
 
 from robolink_cli.console.exit_codes import BUG, UNKNOWN, exit_code
 
+from robolink.calibration_run import ChangeReport
 from robolink.errors import (
     ConfigError,
     LeaseLostError,
@@ -15,7 +16,6 @@ from robolink.errors import (
     TransportError,
 )
 from robolink.model import ToolOffset
-from robolink.nozzle_change import ChangeReport
 from robolink.standing import Effect, standing_after
 from tests.soak.adversary.books import BookedMarker
 from tests.soak.adversary.command_lines import selects

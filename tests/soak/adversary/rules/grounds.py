@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Final
 
+from robolink.calibration_run import ChangeReport
 from robolink.model import ToolOffset
-from robolink.nozzle_change import ChangeReport
 from tests.soak.adversary.books import BookedMarker, Books
 from tests.soak.adversary.history import Hour, Story
 from tests.soak.adversary.people import Wish

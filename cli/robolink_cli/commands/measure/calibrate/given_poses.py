@@ -5,11 +5,7 @@ from functools import partial
 
 from robolink.backup import keep_first_backup
 from robolink.calibration import ToolFit, known_doubts
-from robolink.errors import DeclinedError
-from robolink.messages import tr
-from robolink.methods import PointsSource
-from robolink.model import Controller
-from robolink.nozzle_change import (
+from robolink.calibration_run import (
     ChangePlan,
     ChangeReport,
     DescribeReport,
@@ -20,6 +16,10 @@ from robolink.nozzle_change import (
     ToolReport,
     assessed_in_cell,
 )
+from robolink.errors import DeclinedError
+from robolink.messages import tr
+from robolink.methods import PointsSource
+from robolink.model import Controller
 from robolink.procedures import MeasurementContext, PoseMethod
 from robolink.transaction import Order, earlier_corrections
 from robolink_cli.access.warnings import note_change

@@ -1,8 +1,8 @@
 """Shows a calibration as it goes, and collects it for a report."""
 
 from robolink.calibration import Impact, VerifyResult
+from robolink.calibration_run import AcceptanceCriteria, ChangeReport, Listener, Proposal
 from robolink.model import Controller, Pose, ToolReceipt
-from robolink.nozzle_change import AcceptanceCriteria, ChangeReport, Listener, Proposal
 from robolink_cli.options.impact import ImpactRequest, judge
 from robolink_cli.options.report import ReportDraft
 from robolink_cli.prompts.present import present_desk

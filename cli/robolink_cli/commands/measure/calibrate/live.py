@@ -5,19 +5,18 @@ from functools import partial
 
 from robolink.backup import keep_first_backup
 from robolink.calibration import known_doubts
-from robolink.messages import tr
-from robolink.methods import find_method
-from robolink.model import Controller
-from robolink.nozzle_change import (
+from robolink.calibration_run import (
     ChangePlan,
     ChangeReport,
     NozzleChange,
     Proposal,
-    ToolReport,
     preview,
     require_inside,
     require_ready,
 )
+from robolink.messages import tr
+from robolink.methods import find_method
+from robolink.model import Controller
 from robolink.procedures import TipSource
 from robolink.transaction import Order, earlier_corrections
 from robolink_cli.access.warnings import note_change
@@ -55,97 +54,15 @@ class _LiveListener(CalibrationListener):
         if self.impact is not None:
             show_impact(proposal.tool, self.impact)
 
-
-class LiveCalibration:
-    """One calibration of one tool by the robot, as a command runs it."""
-
-    def __init__(
-        self,
-        controller: Controller,
-        plan: ChangePlan,
-        *,
-        draft: ReportDraft,
-        assist_url: str | None = None,
-        impact: ImpactRequest | None = None,
-        order: Order | None = None,
-    ) -> None:
-        self._controller = controller
-        self._order = order
-        self._plan = plan
-        self._assist_url = assist_url
-        self._listener = _LiveListener(draft, plan, impact)
-        self._report: ToolReport | None = None
-
-    @property
-    def tool(self) -> int:
-        """Number of the tool."""
-        return self._plan.tools[0].tool
-
-    def require_writable(self) -> None:
-        """Refuse before anything moves what would be refused at the write; back up first.
-
-        Raises:
-            CalibrationError: A camera is not there, or means nothing.
-            ConfigError: The backup before the first write cannot be stored.
-            NotReadyError: The state forbids it.
-        """
-        require_ready(self._controller, self._plan)
-        note_change(self._controller, self.tool, self._controller.tools.read(self.tool))
-        keep_first_backup(self._controller, tell=note)
-
-    def dry_run(self) -> dict[str, object]:
-        """Return the foreseen steps with their requests and limit checks; reads only."""
-        steps = steps_payload(self._controller, preview(self._controller, self._plan))
-        return {"dry_run": True, "tool": self.tool, "steps": steps}
-
-    def check_limits(self) -> int:
-        """Show how it will go, and refuse a course that leads outside the limits; reads only.
-
-        Returns how many movements are foreseen.
-
-        Raises:
-            LimitError: Names the step.
-        """
-        steps = preview(self._controller, self._plan)
-        require_inside(self._controller, steps)
-        show_course(steps)
-        return sum(step.target is not None for step in steps)
-
-    def run(self) -> dict[str, object]:
-        """Measure, propose, write, verify; return the document of the whole."""
-        self._listener.read_points(self._controller)
-        with operator_at(self._assist_url, lambda: self.tool, self._controller.clock) as operator:
-            change = NozzleChange(
-                self._controller,
-                self._plan,
-                operator=operator,
-                listener=self._listener,
-                earlier=partial(earlier_corrections, self._controller),
-                order=self._order,
-                describe=self._document,
-            )
-            whole = change.run()
-            self._listener.note_proved(whole)
-            (self._report,) = whole.tools
-        desk = present_desk()
-        if desk is not None:
-            desk.regard(whole)
-        return self._document(whole)
-
-    def _document(self, report: ChangeReport) -> dict[str, object]:
-        impact = self._listener.impact
+    def document(self, report: ChangeReport) -> dict[str, object]:
+        """Return the document of what was done."""
         return {
             **report_payload(report.tools[0]),
             "simulated": report.simulated,
             "source": {"kind": "live"},
-            "impact": impact_payload(impact) if impact else None,
+            "impact": impact_payload(self.impact) if self.impact else None,
             "report": None,
         }
-
-    def show_end(self) -> None:
-        """Say how it ended."""
-        if self._report is not None and present_desk() is None:
-            show_report(self._report)
 
 
 def calibrate_live(frame: CalibrationRequest, source: Callable[[Controller], TipSource]) -> None:
@@ -191,29 +108,68 @@ def _measure(
     """Carry it out, or look how it would go; return the document."""
     with reporting(frame.report, controller) as draft:
         remark_on_pin(frame, controller)
-        live = LiveCalibration(
+        if frame.dry_run:
+            steps = steps_payload(controller, preview(controller, plan))
+            return {"dry_run": True, "tool": frame.tool, "steps": steps}
+        _agree(controller, frame, plan)
+        listener = _LiveListener(draft, plan, frame.impact)
+        payload = _change(controller, frame, plan, listener, order)
+    return {**payload, "report": draft.saved}
+
+
+def _agree(controller: Controller, frame: CalibrationRequest, plan: ChangePlan) -> None:
+    """Have the person agree; refuse before that what would be refused later, and back up.
+
+    Raises:
+        CalibrationError: A camera is not there, or means nothing.
+        ConfigError: The backup before the first write cannot be stored.
+        DeclinedError: The answer was no, or nobody could be asked.
+        LimitError: The foreseen course leads outside the limits.
+        NotReadyError: The state forbids it.
+    """
+    require_ready(controller, plan)
+    note_change(controller, frame.tool, controller.tools.read(frame.tool))
+    keep_first_backup(controller, tell=note)
+    steps = preview(controller, plan)
+    require_inside(controller, steps)
+    show_course(steps)
+    agree_to_procedure(
+        controller,
+        tr("to measure tool {tool}", tool=frame.tool),
+        moves=sum(step.target is not None for step in steps),
+        speed_mm_s=frame.limits.speed_mm_s,
+        box_mm=frame.limits.box.x_max_mm,
+        yes=frame.yes,
+        at=find_method(frame.method).needs.station,
+        tools=(frame.tool,),
+    )
+
+
+def _change(
+    controller: Controller,
+    frame: CalibrationRequest,
+    plan: ChangePlan,
+    listener: _LiveListener,
+    order: Order | None,
+) -> dict[str, object]:
+    """Measure, propose, write, verify; return the document of the whole."""
+    listener.read_points(controller)
+    with operator_at(frame.assist, lambda: frame.tool, controller.clock) as operator:
+        change = NozzleChange(
             controller,
             plan,
-            draft=draft,
-            assist_url=frame.assist,
-            impact=frame.impact,
+            operator=operator,
+            listener=listener,
+            earlier=partial(earlier_corrections, controller),
             order=order,
+            describe=listener.document,
         )
-        if frame.dry_run:
-            return live.dry_run()
-        live.require_writable()
-        moves = live.check_limits()
-        agree_to_procedure(
-            controller,
-            tr("to measure tool {tool}", tool=live.tool),
-            moves=moves,
-            speed_mm_s=frame.limits.speed_mm_s,
-            box_mm=frame.limits.box.x_max_mm,
-            yes=frame.yes,
-            at=find_method(frame.method).needs.station,
-            tools=(live.tool,),
-        )
-        payload = live.run()
-        # Now, because Ctrl-C may come before the logout is answered.
-        live.show_end()
-    return {**payload, "report": draft.saved}
+        report = change.run()
+        listener.note_proved(report)
+    # Now, because Ctrl-C may come before the logout is answered.
+    desk = present_desk()
+    if desk is None:
+        show_report(report.tools[0])
+    else:
+        desk.regard(report)
+    return listener.document(report)

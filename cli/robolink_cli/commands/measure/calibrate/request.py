@@ -21,9 +21,9 @@ from robolink_cli.session.ordering import OrderId, require_no_dry_run
 
 if TYPE_CHECKING:
     from robolink.calibration import RowFact
+    from robolink.calibration_run import AcceptanceCriteria, ChangePlan, Limits, ToolPlan
     from robolink.methods import LengthRule
     from robolink.model import Controller
-    from robolink.nozzle_change import AcceptanceCriteria, ChangePlan, Limits, ToolPlan
     from robolink.procedures import TipSource
     from robolink.stations import Station
 
@@ -95,8 +95,8 @@ class CalibrationRequest:
 
     def plan(self, source: "TipSource", controller: "Controller") -> "ChangePlan":
         """Return what is to be done with the measurements of ``source``."""
+        from robolink.calibration_run import ChangePlan
         from robolink.model import AnsweredBy
-        from robolink.nozzle_change import ChangePlan
 
         one = self.tool_plan(source, controller, verify=self.verify)
         return ChangePlan(
@@ -132,7 +132,7 @@ class CalibrationRequest:
             controller: The controller, whose record tells of the station.
             verify: Whether the new tip is proved after the write.
         """
-        from robolink.nozzle_change import ToolPlan
+        from robolink.calibration_run import ToolPlan
 
         stated = self._stated()
         return ToolPlan(
@@ -220,7 +220,7 @@ def request_from(
         ReservedToolError, ToolIndexError: There is no such tool to calibrate.
         ConfigError: Options exclude each other, or the report cannot be written.
     """
-    from robolink.nozzle_change import AcceptanceCriteria, Limits, usual_box
+    from robolink.calibration_run import AcceptanceCriteria, Limits, usual_box
 
     _require_tool(tool)
     require_no_dry_run(order, dry_run=dry_run)

@@ -16,12 +16,11 @@ from robolink_cli.commands.measure.solve.case import (
     read_poses,
     unusable,
 )
-from robolink_cli.commands.measure.solve.methods import SEEING_METHODS
-from robolink_cli.commands.measure.solve.more_methods import MORE_METHODS
-from robolink_cli.commands.measure.solve.pose_methods import POSE_METHODS
-from robolink_cli.commands.measure.solve.station_methods import STATION_METHODS
-from robolink_cli.commands.measure.solve.study_methods import STUDY_METHODS
-from robolink_cli.commands.measure.solve.touch_methods import TOUCH_METHODS
+from robolink_cli.commands.measure.solve.pose_cases import POSE_METHODS
+from robolink_cli.commands.measure.solve.sighting_cases import SEEING_METHODS
+from robolink_cli.commands.measure.solve.station_cases import STATION_METHODS
+from robolink_cli.commands.measure.solve.tip_cases import MORE_METHODS
+from robolink_cli.commands.measure.solve.touch_cases import STUDY_METHODS, TOUCH_METHODS
 from robolink_cli.views.solve import SOLVED
 
 CASE_SCHEMA: Final = "robolink-calibration-vectors/1"

@@ -13,7 +13,7 @@ from collections.abc import Callable
 from typing import Final
 
 from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
-from robolink_simulators.epson.spel.expressions.printing import formatted, number_text
+from robolink_simulators.epson.spel.expressions.print_format import formatted, number_text
 from robolink_simulators.epson.spel.expressions.values import (
     LONGEST_STRING,
     Value,

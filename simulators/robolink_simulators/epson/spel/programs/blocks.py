@@ -24,7 +24,7 @@ from robolink_simulators.epson.spel.programs.operations import (
     repeat,
 )
 from robolink_simulators.epson.spel.source_text import ProgramFault, SourcePlace
-from robolink_simulators.epson.spel.tasks.compiled import JumpTarget
+from robolink_simulators.epson.spel.tasks.compiled_program import JumpTarget
 from robolink_simulators.epson.spel.tree import Expression
 
 DEEPEST_FOR = 10

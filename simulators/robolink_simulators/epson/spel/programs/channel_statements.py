@@ -25,10 +25,10 @@ from robolink_simulators.epson.spel.line_tree import ChannelStatement
 from robolink_simulators.epson.spel.programs.emitter import Emitter
 from robolink_simulators.epson.spel.programs.scope import Reference
 from robolink_simulators.epson.spel.tasks.channels import USUAL_WINDOW
-from robolink_simulators.epson.spel.tasks.compiled import Operation
+from robolink_simulators.epson.spel.tasks.compiled_program import Operation
 from robolink_simulators.epson.spel.tasks.ports import PortSettings, SerialFormat
 from robolink_simulators.epson.spel.tasks.task import SpelTask
-from robolink_simulators.epson.spel.tasks.waits import Blocking
+from robolink_simulators.epson.spel.tasks.waits import WaitUntil
 from robolink_simulators.epson.spel.tree import ByReference, Expression, Name
 
 _TERMINATORS: Final = {"cr": b"\r", "lf": b"\n", "crlf": b"\r\n"}
@@ -136,7 +136,7 @@ def _await(emitter: Emitter, node: ChannelStatement) -> Operation:
     number = channel_number(emitter, node)
     limit = emitter.run(node.items[0]) if node.items else None
 
-    def go(t: SpelTask) -> Blocking:
+    def go(t: SpelTask) -> WaitUntil:
         at = number(t)
         seconds = t.session.memory.wait_limit_s if limit is None else as_number(limit(t))
         unlimited = limit is None and not seconds
@@ -146,7 +146,7 @@ def _await(emitter: Emitter, node: ChannelStatement) -> Operation:
                 raise SpelRefusal(RefusalKind.NET_WAIT_TIMED_OUT, "The time of TMOut ran out")
             _timed(t, True)
 
-        return Blocking(
+        return WaitUntil(
             lambda: t.runner.ports.connected(at),
             lambda: _timed(t, False),
             end_ns=None if unlimited else t.now_ns + round(float(seconds) * NS_PER_S),
@@ -157,7 +157,9 @@ def _await(emitter: Emitter, node: ChannelStatement) -> Operation:
     return go
 
 
-def _reading(t: SpelTask, at: int, ready: Callable[[], bool], take: Callable[[], None]) -> Blocking:
+def _reading(
+    t: SpelTask, at: int, ready: Callable[[], bool], take: Callable[[], None]
+) -> WaitUntil:
     """Return a read that waits for what it needs, for the port's time, or for the link's end."""
     seconds = t.runner.channels.of(at).timeout_s(at)
 
@@ -165,10 +167,10 @@ def _reading(t: SpelTask, at: int, ready: Callable[[], bool], take: Callable[[],
         raise SpelRefusal(RefusalKind.PORT_TIMED_OUT, f"Port {at}: nothing came in time")
 
     end_ns = t.now_ns + round(seconds * NS_PER_S) if seconds else None
-    return Blocking(ready, take, end_ns=end_ns, out_of_time=late, polled=True)
+    return WaitUntil(ready, take, end_ns=end_ns, out_of_time=late, polled=True)
 
 
-def _line(t: SpelTask, at: int, take: Callable[[str], None]) -> Blocking:
+def _line(t: SpelTask, at: int, take: Callable[[str], None]) -> WaitUntil:
     ports = t.runner.channels.of(at)
 
     def ready() -> bool:
@@ -200,7 +202,7 @@ def _input(emitter: Emitter, node: ChannelStatement) -> Operation:
     number = _window_or(emitter, node)
     references = [emitter.variable_for(item) for item in node.items]
 
-    def go(t: SpelTask) -> Blocking:
+    def go(t: SpelTask) -> WaitUntil:
         variables = [reference(t) for reference in references]
 
         def take(line: str) -> None:
@@ -246,14 +248,14 @@ def _line_input(emitter: Emitter, node: ChannelStatement) -> Operation:
     number = _window_or(emitter, node)
     reference = emitter.variable_for(node.items[0])
 
-    def go(t: SpelTask) -> Blocking:
+    def go(t: SpelTask) -> WaitUntil:
         variable = reference(t)
         return _line(t, number(t), lambda line: _store(variable, line))
 
     return go
 
 
-def _bytes(t: SpelTask, at: int, count: int, take: Callable[[bytes], None]) -> Blocking:
+def _bytes(t: SpelTask, at: int, count: int, take: Callable[[bytes], None]) -> WaitUntil:
     ports = t.runner.channels.of(at)
 
     def ready() -> bool:
@@ -273,7 +275,7 @@ def _read(emitter: Emitter, node: ChannelStatement) -> Operation:
     number, (item, amount) = channel_number(emitter, node), _two(emitter, node)
     reference, count = emitter.variable_for(item), emitter.run(amount)
 
-    def go(t: SpelTask) -> Blocking:
+    def go(t: SpelTask) -> WaitUntil:
         variable, wanted = reference(t), as_integer(count(t))
         return _bytes(t, number(t), wanted, lambda data: _store(variable, data.decode("latin-1")))
 
@@ -299,7 +301,7 @@ def _read_binary(emitter: Emitter, node: ChannelStatement) -> Operation:
     reference = _holder(emitter, node.items[0])
     count = emitter.run(node.items[1]) if len(node.items) > 1 else None
 
-    def go(t: SpelTask) -> Blocking:
+    def go(t: SpelTask) -> WaitUntil:
         variable = reference(t)
         t.runner.channels.of(number(t)).require_binary(number(t), t)
         wanted = 1 if count is None else as_integer(count(t))

@@ -12,7 +12,7 @@ from robolink_simulators.epson.spel.expressions.values import DataType, Variable
 from robolink_simulators.epson.spel.programs.operations import enter
 from robolink_simulators.epson.spel.programs.scope import Reference
 from robolink_simulators.epson.spel.source_text import ProgramFault, SourcePlace
-from robolink_simulators.epson.spel.tasks.compiled import (
+from robolink_simulators.epson.spel.tasks.compiled_program import (
     CompiledFunction,
     JumpTarget,
     LocalSlot,

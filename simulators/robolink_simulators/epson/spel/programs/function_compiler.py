@@ -28,7 +28,7 @@ from robolink_simulators.epson.spel.line_tree import (
     VisionRun,
     VisionStatement,
 )
-from robolink_simulators.epson.spel.parse import WINDOW_ONLY
+from robolink_simulators.epson.spel.parser import WINDOW_ONLY
 from robolink_simulators.epson.spel.programs.blocks import BlockCompiler
 from robolink_simulators.epson.spel.programs.channel_statements import (
     CHANNEL_STATEMENTS,
@@ -61,7 +61,7 @@ from robolink_simulators.epson.spel.programs.vision_statements import (
     compile_run,
 )
 from robolink_simulators.epson.spel.source_text import ProgramFault, SourcePlace
-from robolink_simulators.epson.spel.tasks.compiled import JumpTarget, LocalSlot, Operation
+from robolink_simulators.epson.spel.tasks.compiled_program import JumpTarget, LocalSlot, Operation
 from robolink_simulators.epson.spel.tasks.task import SpelTask
 from robolink_simulators.epson.spel.tasks.task_steps import require_advanced
 from robolink_simulators.epson.spel.tree import (

@@ -18,7 +18,7 @@ from robolink_simulators.epson.spel.expressions.values import (
     truth,
 )
 from robolink_simulators.epson.spel.programs.scope import Reference
-from robolink_simulators.epson.spel.tasks.compiled import (
+from robolink_simulators.epson.spel.tasks.compiled_program import (
     CompiledFunction,
     JumpTarget,
     Operation,

@@ -38,7 +38,7 @@ from robolink_simulators.epson.spel.line_tree import (
     FunctionHeader,
     LineNode,
 )
-from robolink_simulators.epson.spel.parse import label_of, parsed
+from robolink_simulators.epson.spel.parser import label_of, parsed
 from robolink_simulators.epson.spel.programs.emitter import Emitter
 from robolink_simulators.epson.spel.programs.function_compiler import (
     FunctionCompiler,
@@ -55,7 +55,7 @@ from robolink_simulators.epson.spel.source_text import (
     SourceLine,
     SourcePlace,
 )
-from robolink_simulators.epson.spel.tasks.compiled import (
+from robolink_simulators.epson.spel.tasks.compiled_program import (
     CompiledFunction,
     LocalSlot,
     SpelProject,

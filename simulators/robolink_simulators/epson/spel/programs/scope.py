@@ -10,8 +10,8 @@ from typing import Final
 from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.closures import Run, Surroundings, closure
 from robolink_simulators.epson.spel.expressions.values import DataType, Value, Variable
-from robolink_simulators.epson.spel.parse import UNSIMULATED_FAMILIES, UNSIMULATED_FUNCTIONS
-from robolink_simulators.epson.spel.tasks.compiled import LocalSlot, SpelProject
+from robolink_simulators.epson.spel.parser import UNSIMULATED_FAMILIES, UNSIMULATED_FUNCTIONS
+from robolink_simulators.epson.spel.tasks.compiled_program import LocalSlot, SpelProject
 from robolink_simulators.epson.spel.tasks.task_functions import task_function
 from robolink_simulators.epson.spel.tree import Expression
 

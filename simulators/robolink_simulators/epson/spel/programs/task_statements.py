@@ -21,7 +21,11 @@ from robolink_simulators.epson.spel.expressions.closures import Run
 from robolink_simulators.epson.spel.expressions.values import as_integer, as_number, out_of_range
 from robolink_simulators.epson.spel.line_tree import Call, TaskStatement, Trap
 from robolink_simulators.epson.spel.programs.emitter import Emitter
-from robolink_simulators.epson.spel.tasks.compiled import CompiledFunction, JumpTarget, Operation
+from robolink_simulators.epson.spel.tasks.compiled_program import (
+    CompiledFunction,
+    JumpTarget,
+    Operation,
+)
 from robolink_simulators.epson.spel.tasks.task import (
     EVENTS,
     HIGHEST_TRAP,
@@ -32,7 +36,7 @@ from robolink_simulators.epson.spel.tasks.task import (
 )
 from robolink_simulators.epson.spel.tasks.task_functions import number_of_function
 from robolink_simulators.epson.spel.tasks.task_steps import require_advanced, require_unbound
-from robolink_simulators.epson.spel.tasks.waits import Blocking
+from robolink_simulators.epson.spel.tasks.waits import WaitUntil
 from robolink_simulators.epson.spel.tree import Expression, Name, names_in
 
 _KINDS: Final = {
@@ -166,7 +170,7 @@ def _resume(emitter: Emitter, node: TaskStatement) -> Operation:
                 task.now_ns = max(task.now_ns, t.now_ns)
                 if task.waiting is not None:
                     with task.runner.table.robot_of(task):
-                        task.waiting.go_on(t.now_ns)
+                        task.waiting.resume(t.now_ns)
 
     return go
 
@@ -174,9 +178,9 @@ def _resume(emitter: Emitter, node: TaskStatement) -> Operation:
 def _await_task(emitter: Emitter, node: TaskStatement) -> Operation:
     which = _which(emitter, _one(emitter, node))
 
-    def go(t: SpelTask) -> Blocking:
+    def go(t: SpelTask) -> WaitUntil:
         awaited = which(t)
-        return Blocking(lambda: all(task.ended for task in awaited), lambda: None)
+        return WaitUntil(lambda: all(task.ended for task in awaited), lambda: None)
 
     return go
 
@@ -207,7 +211,7 @@ def _timed(t: SpelTask, out: bool) -> None:
 def _lock(emitter: Emitter, node: TaskStatement) -> Operation:
     runs = _numbers(emitter, node, 2)
 
-    def go(t: SpelTask) -> Blocking:
+    def go(t: SpelTask) -> WaitUntil:
         sharing, number = t.runner.sharing, as_integer(runs[0](t))
         sharing.may_lock(number, t)
 
@@ -215,7 +219,7 @@ def _lock(emitter: Emitter, node: TaskStatement) -> Operation:
             sharing.lock(number, t)
             _timed(t, False)
 
-        return Blocking(
+        return WaitUntil(
             lambda: sharing.may_lock(number, t),
             take,
             end_ns=_until(t, runs),
@@ -238,7 +242,7 @@ def _signal(emitter: Emitter, node: TaskStatement) -> Operation:
 def _await_signal(emitter: Emitter, node: TaskStatement) -> Operation:
     runs = _numbers(emitter, node, 2)
 
-    def go(t: SpelTask) -> Blocking:
+    def go(t: SpelTask) -> WaitUntil:
         sharing, number = t.runner.sharing, as_integer(runs[0](t))
         sharing.await_signal(number, t)
 
@@ -246,7 +250,7 @@ def _await_signal(emitter: Emitter, node: TaskStatement) -> Operation:
             sharing.cease(number, t)
             _late(t, runs)
 
-        return Blocking(
+        return WaitUntil(
             lambda: sharing.signalled(number, t),
             lambda: _timed(t, False),
             end_ns=_until(t, runs),

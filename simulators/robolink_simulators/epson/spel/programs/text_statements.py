@@ -7,7 +7,7 @@ from typing import Final
 
 from robolink.messages import tr
 from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
-from robolink_simulators.epson.spel.expressions.printing import CRLF, formatted
+from robolink_simulators.epson.spel.expressions.print_format import CRLF, formatted
 from robolink_simulators.epson.spel.expressions.values import (
     LONGEST_STRING,
     as_integer,
@@ -15,14 +15,14 @@ from robolink_simulators.epson.spel.expressions.values import (
     as_text,
 )
 from robolink_simulators.epson.spel.line_tree import Call
-from robolink_simulators.epson.spel.parse import parse
+from robolink_simulators.epson.spel.parser import parse
 from robolink_simulators.epson.spel.programs.emitter import Emitter
-from robolink_simulators.epson.spel.tasks.compiled import Operation
+from robolink_simulators.epson.spel.tasks.compiled_program import Operation
 from robolink_simulators.epson.spel.tasks.task import SpelTask
 from robolink_simulators.epson.spel.tasks.waits import (
-    OneAfterAnother,
-    StatementWaiting,
-    TaskWaiting,
+    StatementWait,
+    TaskWait,
+    WaitSequence,
 )
 from robolink_simulators.epson.spel.tree import ByReference, Expression, KeywordStatement, Name
 
@@ -125,11 +125,11 @@ def evaluated(emitter: Emitter, arguments: Sequence[Expression], slot: int) -> O
             text = f"!Error: {number}" if number else said.removesuffix(CRLF)
             reply(t).values[0] = text[:LONGEST_STRING]
 
-    def carrying_out(t: SpelTask, text: str) -> Iterator[TaskWaiting]:
+    def carrying_out(t: SpelTask, text: str) -> Iterator[TaskWait]:
         said = ""
         try:
             for statement in parse(text):
-                running = StatementWaiting(t.runner.steps.carried_out(t, statement))
+                running = StatementWait(t.runner.steps.carried_out(t, statement))
                 yield running
                 said += running.execution.output
                 t.now_ns = max(t.now_ns, running.execution.ended_ns)
@@ -141,10 +141,10 @@ def evaluated(emitter: Emitter, arguments: Sequence[Expression], slot: int) -> O
             return
         finish(t, 0, said)
 
-    def go(t: SpelTask) -> TaskWaiting | None:
+    def go(t: SpelTask) -> TaskWait | None:
         steps = carrying_out(t, as_text(command(t)))
         first = next(steps, None)
-        return None if first is None else OneAfterAnother(chain((first,), steps))
+        return None if first is None else WaitSequence(chain((first,), steps))
 
     return go
 
@@ -153,14 +153,14 @@ def recovered(_: Emitter, arguments: Sequence[Expression], slot: int) -> Operati
     """Recover([robot | All[, way]]) as a function: carried out, and whether it came to its end."""
     command = KeywordStatement("recover", tuple(arguments), open_ended=False)
 
-    def carrying_out(t: SpelTask, running: StatementWaiting) -> Iterator[TaskWaiting]:
+    def carrying_out(t: SpelTask, running: StatementWait) -> Iterator[TaskWait]:
         yield running
         t.now_ns = max(t.now_ns, running.execution.ended_ns)
         t.results[slot] = running.execution.error is None
 
-    def go(t: SpelTask) -> TaskWaiting:
-        running = StatementWaiting(t.runner.steps.carried_out(t, command))
-        return OneAfterAnother(carrying_out(t, running))
+    def go(t: SpelTask) -> TaskWait:
+        running = StatementWait(t.runner.steps.carried_out(t, command))
+        return WaitSequence(carrying_out(t, running))
 
     return go
 

@@ -16,14 +16,14 @@ from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.spel.expressions.values import as_integer, as_text
 from robolink_simulators.epson.spel.line_tree import VisionAccess, VisionRun, VisionStatement
 from robolink_simulators.epson.spel.programs.emitter import Emitter
-from robolink_simulators.epson.spel.tasks.compiled import Operation
+from robolink_simulators.epson.spel.tasks.compiled_program import Operation
 from robolink_simulators.epson.spel.tasks.task import SpelTask
 from robolink_simulators.epson.spel.tasks.task_steps import require_unbound
 from robolink_simulators.epson.spel.tasks.waits import (
-    Blocking,
-    OneAfterAnother,
-    StatementWaiting,
-    TaskWaiting,
+    StatementWait,
+    TaskWait,
+    WaitSequence,
+    WaitUntil,
 )
 from robolink_simulators.epson.spel.tree import (
     Expression,
@@ -81,10 +81,10 @@ def compile_run(emitter: Emitter, node: VisionRun) -> Operation:
     """
     name = named(emitter, node.sequence)
 
-    def go(t: SpelTask) -> Blocking:
+    def go(t: SpelTask) -> WaitUntil:
         t.session.machine.advance(t.now_ns)
         took_ms = vision_of(t).run(name(t))
-        return Blocking(lambda: False, lambda: None, end_ns=t.now_ns + took_ms * _NS_PER_MS)
+        return WaitUntil(lambda: False, lambda: None, end_ns=t.now_ns + took_ms * _NS_PER_MS)
 
     return go
 
@@ -177,23 +177,23 @@ def _calibrate(emitter: Emitter, node: VisionStatement) -> Operation:
     """``VCal name``: the robot goes to each taught pose, with the tool in force."""
     name = named(emitter, node.items[0])
 
-    def go(t: SpelTask) -> TaskWaiting:
+    def go(t: SpelTask) -> TaskWait:
         wanted = name(t)
-        return OneAfterAnother(_calibrating(t, wanted, vision_of(t).taught_poses(wanted)))
+        return WaitSequence(_calibrating(t, wanted, vision_of(t).taught_poses(wanted)))
 
     return go
 
 
-def _calibrating(t: SpelTask, name: str, poses: tuple[Pose, ...]) -> Iterator[TaskWaiting]:
+def _calibrating(t: SpelTask, name: str, poses: tuple[Pose, ...]) -> Iterator[TaskWait]:
     pixels, places = list[Pixel](), list[tuple[float, float]]()
     vision, machine = vision_of(t), t.session.machine
     for pose in poses:
-        going = StatementWaiting(t.runner.steps.carried_out(t, _go_to(pose)))
+        going = StatementWait(t.runner.steps.carried_out(t, _go_to(pose)))
         yield going
         if going.execution.error is not None:
             raise RaisedError(going.execution.error.number, going.execution.error.text)
         t.now_ns = max(t.now_ns, going.execution.ended_ns)
-        yield Blocking(lambda: False, lambda: None, end_ns=t.now_ns + _SETTLING_NS)
+        yield WaitUntil(lambda: False, lambda: None, end_ns=t.now_ns + _SETTLING_NS)
         t.now_ns += _SETTLING_NS
         machine.advance(t.now_ns)
         pixels.append(vision.target())

@@ -14,8 +14,8 @@ from robolink_simulators.epson.arm.trajectory import Leg
 from robolink_simulators.epson.condition import OutOfReach, RefusalKind, SpelRefusal
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.points import Point
-from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
-from robolink_simulators.epson.spel.expressions.printing import CRLF
+from robolink_simulators.epson.spel.expressions.evaluator import Evaluator
+from robolink_simulators.epson.spel.expressions.print_format import CRLF
 from robolink_simulators.epson.spel.expressions.setting_functions import outside_limits_mm
 from robolink_simulators.epson.spel.expressions.values import Number, as_integer, out_of_range
 from robolink_simulators.epson.spel.session import Session

@@ -20,8 +20,8 @@ from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.inputs import InputsAsked, first_between
 from robolink_simulators.epson.memory.points import Point
-from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
-from robolink_simulators.epson.spel.expressions.printing import number_text
+from robolink_simulators.epson.spel.expressions.evaluator import Evaluator
+from robolink_simulators.epson.spel.expressions.print_format import number_text
 from robolink_simulators.epson.spel.expressions.values import truth
 from robolink_simulators.epson.spel.tree import (
     Binary,
@@ -121,7 +121,7 @@ class Waiting:
         """
         return truth(self._evaluator.value(self._condition))
 
-    def next_look(self, seen_ns: int) -> int:
+    def next_poll_ns(self, seen_ns: int) -> int:
         """Return when it has to be looked at again."""
         try:
             if self.holds():

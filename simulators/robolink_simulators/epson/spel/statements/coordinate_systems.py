@@ -35,8 +35,8 @@ from robolink_simulators.epson.arm.coordinate_systems import (
 from robolink_simulators.epson.arm.robots import wrapped
 from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 from robolink_simulators.epson.machine import Machine
-from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
-from robolink_simulators.epson.spel.expressions.printing import CRLF
+from robolink_simulators.epson.spel.expressions.evaluator import Evaluator
+from robolink_simulators.epson.spel.expressions.print_format import CRLF
 from robolink_simulators.epson.spel.expressions.values import Number, out_of_range
 from robolink_simulators.epson.spel.statements.points import point_argument
 from robolink_simulators.epson.spel.tree import (

@@ -13,7 +13,7 @@ from robolink_simulators.epson.arm.robots import Joints
 from robolink_simulators.epson.arm.trajectory import Leg
 from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 from robolink_simulators.epson.memory.bits import BitBank
-from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
+from robolink_simulators.epson.spel.expressions.evaluator import Evaluator
 from robolink_simulators.epson.spel.expressions.joint_functions import (
     JOINT_COUNTS,
     another_robot,
@@ -21,7 +21,7 @@ from robolink_simulators.epson.spel.expressions.joint_functions import (
     pulses_of,
 )
 from robolink_simulators.epson.spel.expressions.machine_functions import clock_of, hours_of
-from robolink_simulators.epson.spel.expressions.printing import CRLF, number_text
+from robolink_simulators.epson.spel.expressions.print_format import CRLF, number_text
 from robolink_simulators.epson.spel.expressions.values import out_of_range
 from robolink_simulators.epson.spel.file_commands import FILE_COMMANDS, POINT_FILE_COMMANDS
 from robolink_simulators.epson.spel.legs import go_leg

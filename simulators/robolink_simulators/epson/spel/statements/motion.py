@@ -34,7 +34,7 @@ from robolink_simulators.epson.arm.trajectory import JointLeg, Leg
 from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.points import Point
-from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
+from robolink_simulators.epson.spel.expressions.evaluator import Evaluator
 from robolink_simulators.epson.spel.expressions.joint_functions import least_motion
 from robolink_simulators.epson.spel.expressions.motion_functions import (
     LEAST_TURN_DEG,

@@ -8,7 +8,7 @@ from typing import Final
 
 from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 from robolink_simulators.epson.memory.points import HIGHEST_POINT, Point
-from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
+from robolink_simulators.epson.spel.expressions.evaluator import Evaluator
 from robolink_simulators.epson.spel.expressions.joint_functions import (
     FLAG_FUNCTIONS,
     require_singular_angle,
@@ -16,7 +16,7 @@ from robolink_simulators.epson.spel.expressions.joint_functions import (
     with_singular_angle,
 )
 from robolink_simulators.epson.spel.expressions.machine_functions import coordinates_of
-from robolink_simulators.epson.spel.expressions.printing import CRLF, number_text, point_line
+from robolink_simulators.epson.spel.expressions.print_format import CRLF, number_text, point_line
 from robolink_simulators.epson.spel.expressions.values import as_number, as_text
 from robolink_simulators.epson.spel.tree import Expression, KeywordStatement
 

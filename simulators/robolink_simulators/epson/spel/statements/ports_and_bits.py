@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import Final
 
 from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
-from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
-from robolink_simulators.epson.spel.expressions.printing import CRLF
+from robolink_simulators.epson.spel.expressions.evaluator import Evaluator
+from robolink_simulators.epson.spel.expressions.print_format import CRLF
 from robolink_simulators.epson.spel.expressions.values import out_of_range
 from robolink_simulators.epson.spel.tree import KeywordStatement
 

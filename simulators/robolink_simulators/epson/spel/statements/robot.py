@@ -27,7 +27,7 @@ from robolink_simulators.epson.spel.expressions.joint_functions import (
     another_robot,
     pulses_of,
 )
-from robolink_simulators.epson.spel.expressions.printing import CRLF, number_text
+from robolink_simulators.epson.spel.expressions.print_format import CRLF, number_text
 from robolink_simulators.epson.spel.expressions.values import Number, out_of_range
 from robolink_simulators.epson.spel.statements.areas import LIMIT_SETTINGS
 from robolink_simulators.epson.spel.statements.coordinate_systems import ARM_SETTINGS

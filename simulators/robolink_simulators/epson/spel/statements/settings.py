@@ -34,7 +34,7 @@ from robolink_simulators.epson.arm.torques import DriveObserver, DriveQuantity
 from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.robot import DrivenRobot
-from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
+from robolink_simulators.epson.spel.expressions.evaluator import Evaluator
 from robolink_simulators.epson.spel.expressions.joint_functions import another_robot
 from robolink_simulators.epson.spel.expressions.machine_functions import hours_of
 from robolink_simulators.epson.spel.expressions.motion_functions import (
@@ -42,7 +42,7 @@ from robolink_simulators.epson.spel.expressions.motion_functions import (
     DriveValue,
     joint_number,
 )
-from robolink_simulators.epson.spel.expressions.printing import CRLF, number_text
+from robolink_simulators.epson.spel.expressions.print_format import CRLF, number_text
 from robolink_simulators.epson.spel.expressions.setting_functions import NS_PER_HOUR
 from robolink_simulators.epson.spel.expressions.values import Number, out_of_range
 from robolink_simulators.epson.spel.tree import KeywordStatement

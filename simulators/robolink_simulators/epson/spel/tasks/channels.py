@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import IO, TYPE_CHECKING, Final
 
 from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
-from robolink_simulators.epson.spel.expressions.printing import CRLF
+from robolink_simulators.epson.spel.expressions.print_format import CRLF
 from robolink_simulators.epson.spel.expressions.values import LONGEST_STRING
 from robolink_simulators.epson.spel.file_folder import FileFolder
 from robolink_simulators.epson.spel.tasks.ports import Ports

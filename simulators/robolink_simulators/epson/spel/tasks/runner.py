@@ -12,9 +12,9 @@ from robolink_simulators.epson.spel.expressions.values import Variable
 from robolink_simulators.epson.spel.session import Session
 from robolink_simulators.epson.spel.statements.conditions import NEVER_NS
 from robolink_simulators.epson.spel.tasks.channels import NumberedChannels
-from robolink_simulators.epson.spel.tasks.compiled import CompiledFunction, SpelProject
+from robolink_simulators.epson.spel.tasks.compiled_program import CompiledFunction, SpelProject
 from robolink_simulators.epson.spel.tasks.ports import Ports
-from robolink_simulators.epson.spel.tasks.shared import TaskSharing
+from robolink_simulators.epson.spel.tasks.shared_state import TaskSharing
 from robolink_simulators.epson.spel.tasks.task import (
     SpelTask,
     TaskFailure,
@@ -78,7 +78,7 @@ class TaskTable:
             due_ns = task.now_ns
             if waiting is not None:
                 with self.robot_of(task):
-                    due_ns = waiting.due_ns(seen_ns)
+                    due_ns = waiting.next_poll_ns(seen_ns)
             if due_ns < first_ns:
                 first, first_ns, second_ns = task, due_ns, first_ns
             elif due_ns < second_ns:
@@ -102,14 +102,14 @@ class TaskTable:
             with self.robot_of(task):
                 task.pause(now_ns)
 
-    def go_on(self, now_ns: int) -> None:
+    def resume(self, now_ns: int) -> None:
         """Let them go on."""
         self.paused = False
         for task in self._pausing():
             task.now_ns = max(task.now_ns, now_ns)
             if task.waiting is not None:
                 with self.robot_of(task):
-                    task.waiting.go_on(now_ns)
+                    task.waiting.resume(now_ns)
 
     def _pausing(self) -> list[SpelTask]:
         return [t for t in self.tasks.values() if t.kind is TaskKind.NORMAL and not t.halted]
@@ -240,11 +240,11 @@ class ProgramRunner:
         self._heed()
         while self.tasks:
             task, due_ns, others_ns = self.table.first_due(self._seen_ns)
-            look_ns = self.traps.next_look(self._seen_ns)
-            if look_ns is not None and look_ns < due_ns and look_ns <= now_ns:
-                self.session.machine.advance(look_ns)
-                self._seen_ns = look_ns
-                self.traps.look(look_ns)
+            poll_ns = self.traps.next_poll_ns(self._seen_ns)
+            if poll_ns is not None and poll_ns < due_ns and poll_ns <= now_ns:
+                self.session.machine.advance(poll_ns)
+                self._seen_ns = poll_ns
+                self.traps.poll(poll_ns)
                 continue
             if task is None or due_ns > now_ns:
                 break
@@ -253,21 +253,21 @@ class ProgramRunner:
                     limit_ns = min(now_ns, others_ns, task.now_ns + BURST_NS)
                     self.steps.burst(task, max(limit_ns, task.now_ns))
                 else:
-                    self.steps.look(task, task.waiting, due_ns)
+                    self.steps.poll(task, task.waiting, due_ns)
             self._seen_ns = max(self._seen_ns, due_ns, min(task.now_ns, now_ns))
             self._tidy()
-            self.traps.look(self._seen_ns)
+            self.traps.poll(self._seen_ns)
         self._seen_ns = max(self._seen_ns, now_ns)
-        self.traps.look(self._seen_ns)
+        self.traps.poll(self._seen_ns)
 
     def next_change(self) -> int | None:
         """Return when a task next does something by itself."""
         if not self.tasks:
             return None
         task, due_ns, _ = self.table.first_due(self._seen_ns)
-        look_ns = self.traps.next_look(self._seen_ns)
-        if look_ns is not None and look_ns < due_ns:
-            return look_ns
+        poll_ns = self.traps.next_poll_ns(self._seen_ns)
+        if poll_ns is not None and poll_ns < due_ns:
+            return poll_ns
         if task is None or due_ns >= NEVER_NS:
             return None
         return due_ns if task.waiting is not None else due_ns + BURST_NS
@@ -351,7 +351,7 @@ class ProgramRunner:
             self.table.pause(now_ns)
             self.traps.happen("sgopen" if self._condition.guard_open else "pause", now_ns)
         elif state is Task.RUNNING and self.table.paused:
-            self.table.go_on(now_ns)
+            self.table.resume(now_ns)
 
     def _stop(self, *, background: bool) -> None:
         """End the normal tasks; with ``background``, those go on that stops do not touch."""

@@ -10,16 +10,20 @@ from typing import Any, Final
 
 from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 from robolink_simulators.epson.spel.expressions.closures import Run
-from robolink_simulators.epson.spel.expressions.evaluate import Evaluator
+from robolink_simulators.epson.spel.expressions.evaluator import Evaluator
 from robolink_simulators.epson.spel.expressions.values import Variable, truth
 from robolink_simulators.epson.spel.session import Session, WindowMemory
 from robolink_simulators.epson.spel.statements.conditions import LOOK_NS, follows_robot
-from robolink_simulators.epson.spel.tasks.compiled import CompiledFunction, JumpTarget, Operation
+from robolink_simulators.epson.spel.tasks.compiled_program import (
+    CompiledFunction,
+    JumpTarget,
+    Operation,
+)
 from robolink_simulators.epson.spel.tasks.waits import (
-    Blocking,
-    OneAfterAnother,
-    StatementWaiting,
-    TaskWaiting,
+    StatementWait,
+    TaskWait,
+    WaitSequence,
+    WaitUntil,
 )
 
 DEEPEST_CALL: Final = 200
@@ -138,7 +142,7 @@ class SpelTask(Evaluator):
         self.now_ns = now_ns
         self.started_ns = now_ns
         self.frames: list[CallFrame] = []
-        self.waiting: TaskWaiting | None = None
+        self.waiting: TaskWait | None = None
         self.halted = False
         self.ended = False
         self.failure: TaskFailure | None = None
@@ -152,7 +156,7 @@ class SpelTask(Evaluator):
     @property
     def held_by_pause(self) -> bool:
         """Whether nothing of it goes on in a pause; QP Off lets a motion under way end."""
-        ends = isinstance(self.waiting, StatementWaiting) and self.waiting.finishing
+        ends = isinstance(self.waiting, StatementWait) and self.waiting.finishing
         return self.kind is TaskKind.NORMAL and not ends
 
     def pause(self, now_ns: int) -> None:
@@ -163,10 +167,10 @@ class SpelTask(Evaluator):
         if self.waiting is None:
             return
         waiting = self.waiting
-        if isinstance(waiting, OneAfterAnother):
+        if isinstance(waiting, WaitSequence):
             waiting = waiting.present
         if (
-            isinstance(waiting, StatementWaiting)
+            isinstance(waiting, StatementWait)
             and waiting.execution.travels
             and not self.session.machine.robot.drives.is_on("qp")
         ):
@@ -177,9 +181,9 @@ class SpelTask(Evaluator):
     def carries(self, statement: object) -> bool:
         """Tell whether it still waits for a statement that it has begun."""
         waiting = self.waiting
-        if isinstance(waiting, OneAfterAnother):
+        if isinstance(waiting, WaitSequence):
             waiting = waiting.present
-        waits = isinstance(waiting, StatementWaiting) and waiting.execution is statement
+        waits = isinstance(waiting, StatementWait) and waiting.execution is statement
         return waits and not self.ended
 
     @property
@@ -229,9 +233,9 @@ class SpelTask(Evaluator):
         caller.results[frame.slot] = frame.variables[0].values[0]
         self._take_up(caller)
 
-    def turn(self) -> TaskWaiting:
+    def turn(self) -> TaskWait:
         """Return a wait that is over at once, after the other tasks have had their turn."""
-        return Blocking(lambda: True, lambda: None)
+        return WaitUntil(lambda: True, lambda: None)
 
     def write_to(self, channel: int, text: str, *, ends: bool) -> None:
         """Print to a port or a file.
@@ -369,7 +373,7 @@ class Traps:
         if function is not None:
             self._start(function, now_ns, about)
 
-    def look(self, now_ns: int) -> None:
+    def poll(self, now_ns: int) -> None:
         """Fire the traps whose condition holds; each fires once (documented)."""
         for number, trap in list(self._conditions.items()):
             if trap.task.ended and not trap.starts:
@@ -381,7 +385,7 @@ class Traps:
             if holds and self._conditions.pop(number, None) is not None:
                 self._fire(trap, now_ns)
 
-    def next_look(self, seen_ns: int) -> int | None:
+    def next_poll_ns(self, seen_ns: int) -> int | None:
         """Return when to look again because a robot moves, ``None`` where nothing asks for that."""
         machine = self._runner.session.machine
         following = any(follows_robot(trap.names, machine) for trap in self._conditions.values())

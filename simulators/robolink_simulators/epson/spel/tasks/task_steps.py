@@ -11,7 +11,12 @@ from robolink_simulators.epson.condition import RaisedError, RefusalKind, SpelRe
 from robolink_simulators.epson.spel.execution import StatementExecution
 from robolink_simulators.epson.spel.session import Session
 from robolink_simulators.epson.spel.tasks.task import SpelTask, TaskKind
-from robolink_simulators.epson.spel.tasks.waits import StatementWaiting, TaskWaiting
+from robolink_simulators.epson.spel.tasks.waits import (
+    StatementWait,
+    TaskWait,
+    WaitSequence,
+    WaitUntil,
+)
 from robolink_simulators.epson.spel.tree import KeywordStatement, MotionStatement, Name, Statement
 
 _WORDS = """
@@ -115,12 +120,12 @@ class TaskSteps:
     def _take_up(self, task: SpelTask, outcome: object) -> bool:
         """Deal with what an operation gave; tell whether the task goes on at once."""
         if isinstance(outcome, Statement):
-            waiting: TaskWaiting = StatementWaiting(self.carried_out(task, outcome))
-        elif hasattr(outcome, "look"):
-            waiting = outcome  # type: ignore[assignment]
+            waiting: TaskWait = StatementWait(self.carried_out(task, outcome))
+        elif isinstance(outcome, (WaitUntil, WaitSequence, StatementWait)):
+            waiting = outcome
         else:
             return not task.ended
-        self.look(task, waiting, task.now_ns)
+        self.poll(task, waiting, task.now_ns)
         if isinstance(outcome, KeywordStatement) and outcome.name == "wait":
             return False  # Wait 0 gives the others a turn (documented)
         return task.waiting is None and not task.ended and not task.halted
@@ -143,17 +148,17 @@ class TaskSteps:
             self.movers[number] = task
         return StatementExecution(task, (statement,), task.now_ns)
 
-    def look(self, task: SpelTask, waiting: TaskWaiting, now_ns: int) -> None:
+    def poll(self, task: SpelTask, waiting: TaskWait, now_ns: int) -> None:
         """Look at what a task waits for, and let it go on if that is over."""
         task.waiting = waiting
         try:
-            over = waiting.look(max(now_ns, task.now_ns))
+            over = waiting.poll(max(now_ns, task.now_ns))
             if not over:
                 return
             task.waiting = None
             task.loop_passes = 0
             task.now_ns = max(task.now_ns, now_ns)
-            if isinstance(waiting, StatementWaiting):
+            if isinstance(waiting, StatementWait):
                 self._finish(task, waiting.execution)
         except SpelRefusal as refusal:
             task.waiting = None

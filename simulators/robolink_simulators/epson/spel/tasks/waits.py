@@ -13,14 +13,14 @@ A condition that holds for less than 0.01 s may be missed (docs/reference/spel.m
 """
 
 
-class TaskWaiting(Protocol):
+class TaskWait(Protocol):
     """Something that a task waits for."""
 
-    def due_ns(self, seen_ns: int) -> int:
+    def next_poll_ns(self, seen_ns: int) -> int:
         """Return when it has to be looked at again; nothing came before ``seen_ns``."""
         ...
 
-    def look(self, now_ns: int) -> bool:
+    def poll(self, now_ns: int) -> bool:
         """Look at it; tell whether it is over.
 
         Raises:
@@ -32,12 +32,12 @@ class TaskWaiting(Protocol):
         """Hold it while the task is paused."""
         ...
 
-    def go_on(self, now_ns: int) -> None:
+    def resume(self, now_ns: int) -> None:
         """Let it go on."""
         ...
 
 
-class StatementWaiting:
+class StatementWait:
     """A statement of the machine that takes time.
 
     Attributes:
@@ -50,11 +50,11 @@ class StatementWaiting:
         self.execution = execution
         self.finishing = False
 
-    def due_ns(self, seen_ns: int) -> int:
+    def next_poll_ns(self, seen_ns: int) -> int:
         """Return when something of it happens next."""
-        return self.execution.due_ns(seen_ns)
+        return self.execution.next_poll_ns(seen_ns)
 
-    def look(self, now_ns: int) -> bool:
+    def poll(self, now_ns: int) -> bool:
         """Carry out what is due."""
         self.execution.advance(now_ns)
         return self.execution.done
@@ -64,31 +64,31 @@ class StatementWaiting:
         self.finishing = False
         self.execution.suspend(now_ns)
 
-    def go_on(self, now_ns: int) -> None:
+    def resume(self, now_ns: int) -> None:
         """Go on with its motion, or begin its time anew."""
         if not self.finishing:
-            self.execution.go_on(now_ns)
+            self.execution.resume(now_ns)
         self.finishing = False
 
 
-class OneAfterAnother:
+class WaitSequence:
     """Waits that follow each other; between two of them something is done.
 
     Args:
         steps: Gives the next wait once the one before is over. There is at least one.
     """
 
-    def __init__(self, steps: Iterator[TaskWaiting]) -> None:
+    def __init__(self, steps: Iterator[TaskWait]) -> None:
         self._steps = steps
         self._present = next(steps)
 
-    def due_ns(self, seen_ns: int) -> int:
+    def next_poll_ns(self, seen_ns: int) -> int:
         """Return when something of the present one happens next."""
-        return self._present.due_ns(seen_ns)
+        return self._present.next_poll_ns(seen_ns)
 
-    def look(self, now_ns: int) -> bool:
+    def poll(self, now_ns: int) -> bool:
         """Look at the present one, and at those after it that are over at once."""
-        while self._present.look(now_ns):
+        while self._present.poll(now_ns):
             following = next(self._steps, None)
             if following is None:
                 return True
@@ -99,17 +99,17 @@ class OneAfterAnother:
         """Hold the present one."""
         self._present.suspend(now_ns)
 
-    def go_on(self, now_ns: int) -> None:
+    def resume(self, now_ns: int) -> None:
         """Let the present one go on."""
-        self._present.go_on(now_ns)
+        self._present.resume(now_ns)
 
     @property
-    def present(self) -> TaskWaiting:
+    def present(self) -> TaskWait:
         """The one that is waited for now."""
         return self._present
 
 
-class Blocking:
+class WaitUntil:
     """Waits until something is ready, or its time is up.
 
     Args:
@@ -135,7 +135,7 @@ class Blocking:
         self._out_of_time = out_of_time
         self._polled = polled
 
-    def due_ns(self, seen_ns: int) -> int:
+    def next_poll_ns(self, seen_ns: int) -> int:
         """Return when it is ready or its time is up, as far as is known.
 
         What became ready outside did so after the last look: an instant that has been dealt
@@ -145,7 +145,7 @@ class Blocking:
             return seen_ns + 1
         return min(self._end_ns, seen_ns + POLL_NS) if self._polled else self._end_ns
 
-    def look(self, now_ns: int) -> bool:
+    def poll(self, now_ns: int) -> bool:
         """Take what is ready, or note that its time is up."""
         if self._ready():
             self._take()
@@ -159,5 +159,5 @@ class Blocking:
     def suspend(self, now_ns: int) -> None:
         """Wait on: signals and locks of other tasks do not stop for a pause (assumed)."""
 
-    def go_on(self, now_ns: int) -> None:
+    def resume(self, now_ns: int) -> None:
         """Wait on."""

@@ -1,1 +1,0 @@
-"""What poses on one point show about themselves, beyond the offset that they give."""

@@ -1,0 +1,249 @@
+"""The nozzle change on paper: every step with its target, before anything moves."""
+
+from collections.abc import Callable, Generator, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+from robolink.calibration import flange_of
+from robolink.calibration_run._plan import (
+    ChangePlan,
+    require_clearance,
+    require_inputs,
+    require_measurable,
+    require_motion,
+)
+from robolink.errors import LimitError
+from robolink.messages import tr
+from robolink.model import (
+    Controller,
+    InputEdge,
+    MotionGroup,
+    MotionProfile,
+    Path,
+    Pose,
+    ToolOffset,
+)
+from robolink.procedures import MovingSource, approach_path
+from robolink.runner import (
+    ArmAhead,
+    Ask,
+    ForeseenStep,
+    Look,
+    Move,
+    Procedure,
+    RunSettings,
+    Seek,
+    TeachPrompt,
+    foreseen_steps,
+    nothing_in_the_way,
+)
+
+Foreseen = Generator[ForeseenStep, None, tuple[Pose, bool]]
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedStep:
+    """One step of the measurement as it is foreseen.
+
+    Attributes:
+        text: What is done.
+        target: Where the flange goes, ``None`` for a step that moves nothing.
+        profile: How it goes there.
+        edge: The input that ends the step on the way, ``None`` for none.
+        refusal: Why the limits forbid it, empty when they do not.
+        shown: What a person has to show, ``None`` where nobody is asked.
+    """
+
+    text: str
+    target: Pose | None = None
+    profile: MotionProfile | None = None
+    edge: InputEdge | None = None
+    refusal: str = ""
+    shown: TeachPrompt | None = None
+
+    def target_is(self, place: Pose) -> bool:
+        """Tell whether it ends at a place."""
+        return self.target is not None and self.target.coordinates() == place.coordinates()
+
+    def requests(self, group: MotionGroup) -> tuple[str, ...]:
+        """Return what the step would send besides its reads, as it stands on the wire."""
+        if self.target is None or self.profile is None:
+            return ()
+        if self.edge is None:
+            return group.requests_for(self.target, self.profile)
+        return group.requests_until(self.target, self.edge, speed_mm_s=self.profile.speed_mm_s)
+
+
+def preview(controller: Controller, plan: ChangePlan) -> tuple[PlannedStep, ...]:
+    """Return the steps of the measurements from where the robot stands now.
+
+    Reads only. The person's part is foreseen as no movement at all, but where the step says
+    about where it leads. Where the robot stops beside a pin is drawn in the run: the limits are
+    looked at all around. Where the places are known, the arm is asked whether it gets there, and
+    past its singular places.
+
+    Raises:
+        ConfigError: A clearance is below the largest change that is believed, or an input is to
+            show contact where there are none.
+        RejectedError: The machine's kinematics could not be told what would be measured.
+        CalibrationError: The robot moves too fast for what is measured.
+    """
+    require_clearance(plan)
+    require_inputs(controller, plan)
+    require_measurable(controller, plan)
+    if not plan.moves:
+        return ()
+    require_motion(controller, plan)
+    return tuple(_foresee(controller, plan, flange_now(controller)))
+
+
+def foresee(
+    procedure: Procedure[object], *, here: Pose, settings: RunSettings, arm: ArmAhead | None = None
+) -> tuple[PlannedStep, ...]:
+    """Return the steps of one procedure that begins with the flange at ``here``.
+
+    Args:
+        procedure: What is foreseen; it is used up.
+        here: Where the flange is.
+        settings: The limits.
+        arm: Is asked about movements; ``None`` for asking nobody.
+
+    Example:
+        >>> from robolink.methods import measure_two_pose
+        >>> from robolink.model import Pose, ToolOffset, WorkBox
+        >>> from robolink.calibration_run import foresee
+        >>> from robolink.procedures import TouchPlan
+        >>> from robolink.runner import RunSettings
+        >>> course = measure_two_pose(TouchPlan(nominal=True), stored=ToolOffset(12, -4, -20))
+        >>> settings = RunSettings(WorkBox(z_max_mm=-12))  # 8 mm above the touch; it lifts by 10
+        >>> steps = foresee(course, here=Pose(298, 99, -20, 0), settings=settings)
+        >>> [bool(step.refusal) for step in steps]
+        [False, True, True, False, False, True]
+    """
+    steps = foreseen_steps(procedure, here, consider=arm.considered if arm else nothing_in_the_way)
+    return tuple(_planned_steps(steps, settings, arm))
+
+
+def flange_now(controller: Controller) -> Pose:
+    """Read where the flange is, whatever tool is in force."""
+    here = controller.groups[0].pose()
+    selected = controller.tools.read(here.tool) if here.tool else None
+    return flange_of(here, selected or ToolOffset())
+
+
+def require_inside(controller: Controller, steps: Sequence[PlannedStep]) -> None:
+    """Refuse steps whose targets lie outside the limits.
+
+    Raises:
+        LimitError: Names the first of them.
+    """
+    for step in steps:
+        if step.refusal:
+            raise LimitError(
+                tr("{step} {refusal}", step=step.text, refusal=step.refusal),
+                remedy=tr(
+                    "The allowed area is around where the robot stands at the start: jog the "
+                    "tip closer to where it is measured ('robolink robot jog'), or widen the "
+                    "area. Where the arm cannot reach, put the station elsewhere, or turn the "
+                    "tool another way."
+                ),
+                controller=controller.identity,
+            )
+
+
+def _foresee(controller: Controller, plan: ChangePlan, start: Pose) -> Iterator[PlannedStep]:
+    settings = plan.limits.settings(start, None)
+    here, known, arm = start, True, ArmAhead.of(controller)
+    for goal, procedure in _procedures(controller, plan):
+        steps = foreseen_steps(procedure(here), here, known=known, consider=arm.considered)
+        here, known = yield from _planned_steps(steps, settings, arm, goal)
+
+
+def _procedures(
+    controller: Controller, plan: ChangePlan
+) -> Iterator[tuple[Pose | None, Callable[[Pose], Procedure[object]]]]:
+    """Yield what runs before the write, each to be made from where the one before ended.
+
+    The pose is where it ends, of one that does so wherever it begins.
+    """
+    yield plan.safe, partial(_journey, plan.safe, tr("Moving to the safe pose."))
+    for one in plan.tools:
+        tool, source = one.tool, one.moving
+        if source is None:
+            continue
+        stored = controller.tools.read(tool)
+        there = tr("Moving to where tool {tool} is measured.", tool=tool)
+        yield one.approach, partial(_journey, one.approach, there)
+        yield None, partial(_measurement, source, stored)
+        away = tr("Moving away from where tool {tool} is measured.", tool=tool)
+        yield one.retreat, partial(_journey, one.retreat, away)
+
+
+def _journey(target: Pose | None, purpose: str, here: Pose) -> Procedure[object]:
+    if target is not None:
+        there = Pose(*target.coordinates(), tool=0, local=here.local)
+        goal = replace(there, hand=here.hand, posture=here.posture)
+        yield from approach_path(goal, here=here, purpose=purpose)
+    return None
+
+
+def _measurement(source: MovingSource, stored: ToolOffset | None, here: Pose) -> Procedure[object]:
+    return (yield from source.procedure(stored, here))
+
+
+def _planned_steps(
+    steps: Foreseen, settings: RunSettings, arm: ArmAhead | None, goal: Pose | None = None
+) -> Generator[PlannedStep, None, tuple[Pose, bool]]:
+    """Yield steps with what forbids them, and return where they lead.
+
+    Args:
+        steps: As they are foreseen.
+        settings: The limits.
+        arm: Is asked about movements whose places are known.
+        goal: Where they end, wherever they begin; ``None`` where that is not so.
+
+    Raises:
+        CalibrationError: They are refused before the first of them.
+        LimitError: There is no way.
+    """
+    while True:
+        try:
+            one = next(steps)
+        except StopIteration as ended:
+            end: tuple[Pose, bool] = ended.value
+            return end
+        step, move = one.step, one.move
+        if isinstance(step, Ask):
+            refusal = _refusal(step.foreseen, settings) if step.foreseen else ""
+            yield PlannedStep(step.instruction, refusal=refusal, shown=step.shown)
+        elif isinstance(step, Look):
+            yield PlannedStep(step.purpose)
+        else:
+            planned = _planned(step, settings)
+            arrives = goal is not None and planned.target_is(goal)
+            if arm and move and not planned.refusal and (one.known or arrives):
+                start = one.start if one.known else None
+                planned = replace(planned, refusal=arm.obstacle(move, start))
+            yield planned
+
+
+def _planned(step: Move | Seek, settings: RunSettings) -> PlannedStep:
+    if isinstance(step, Move):
+        profile = MotionProfile(step.path, settings.speed_percent, settings.speed_mm_s)
+        edge = None
+    else:
+        profile, edge = MotionProfile(Path.STRAIGHT, speed_mm_s=step.speed_mm_s), step.edge
+    aside_mm = step.aside_mm if isinstance(step, Move) else 0.0
+    refusal = _refusal(step.target, settings, aside_mm=aside_mm)
+    return PlannedStep(step.purpose, step.target, profile, edge, refusal)
+
+
+def _refusal(target: Pose, settings: RunSettings, *, aside_mm: float = 0.0) -> str:
+    """Return why the limits forbid a target, or one so far beside it; empty when they do not."""
+    try:
+        for dx_mm, dy_mm in ((aside_mm, aside_mm), (-aside_mm, -aside_mm)):
+            beside = replace(target, x_mm=target.x_mm + dx_mm, y_mm=target.y_mm + dy_mm)
+            settings.box.check(beside)
+    except LimitError as error:
+        return error.what
+    return ""

@@ -1,0 +1,167 @@
+"""What the controller's answers mean: refusals, status flags, held-back commands."""
+
+from robolink.errors import (
+    NotReadyError,
+    NotReadyReason,
+    RejectedError,
+)
+from robolink.messages import tr
+from robolink.model import ControllerStatus
+from robolink.protocols.epson_text import ErrorCode, Refusal, StatusFlags
+
+NOT_EXECUTED = frozenset({10, 11, 12, 13, 14, 15, 16, 20, 21})
+"""Refusals that say that nothing was carried out (docs/reference/epson.md 1.6); 19 and 99 do not
+say so."""
+
+
+def rejected(refusal: Refusal, *, controller: str, request: str = "") -> RejectedError:
+    """Return the error for a refusal, in words, with what to do about it."""
+    try:
+        meaning = ErrorCode(refusal.code).meaning
+    except ValueError:
+        meaning = tr("a code that is not in the manual")
+    return RejectedError(
+        tr(
+            "The controller refused {name} with code {code}: {meaning}.",
+            name=request or refusal.name,
+            code=refusal.code,
+            meaning=meaning,
+        ),
+        code=refusal.code,
+        remedy=_remedy(refusal.code),
+        controller=controller,
+        request=request or refusal.name,
+    )
+
+
+def _remedy(code: int) -> str:
+    if code == 20:
+        return tr("Run 'robolink status' to see which condition is missing.")
+    if code == 21:
+        return tr("Wait for the running statement, or stop it.")
+    if code == 11:
+        return tr(
+            "Connect again to log in. If it is refused again, this firmware does not know "
+            "the command."
+        )
+    return tr("Nothing was repeated. Read the status before you go on.")
+
+
+def status_from_flags(flags: StatusFlags, code: int) -> ControllerStatus:
+    """Translate EPSON's flags into the words all controllers share.
+
+    Source: docs/reference/epson.md 1.4.
+    """
+    return ControllerStatus(
+        remote=flags.auto,
+        ready=flags.ready,
+        running=flags.running,
+        paused=flags.paused,
+        fault=flags.error,
+        serious_fault=flags.serious_error,
+        emergency_stop=flags.emergency_stop,
+        guard_open=flags.safeguard,
+        warning=flags.warning,
+        teach=flags.teach,
+        test=flags.test,
+        code=code,
+    )
+
+
+def require_ready(status: ControllerStatus, *, controller: str, request: str) -> None:
+    """Hold back an Execute that the controller would refuse, naming the state.
+
+    Raises:
+        NotReadyError: The worst condition that stands in the way (docs/reference/epson.md 1.2:
+            Auto, Ready, no error, no emergency stop, guard closed).
+    """
+    found = _obstacle(status)
+    if found is None:
+        return
+    reason, what, remedy = found
+    raise NotReadyError(
+        what,
+        reason=reason,
+        code=status.code,
+        remedy=remedy,
+        controller=controller,
+        request=request,
+    )
+
+
+def _obstacle(status: ControllerStatus) -> tuple[NotReadyReason, str, str] | None:
+    stopped = _stopped(status)
+    if stopped is not None:
+        return stopped
+    if status.teach:
+        return (
+            NotReadyReason.TEACH,
+            tr("The controller is in TEACH: a PC cannot move it."),
+            tr("Turn the key to AUTO, or teach the points on the pendant."),
+        )
+    if status.test:
+        return (
+            NotReadyReason.TEST,
+            tr("The controller is in Test mode."),
+            tr("Turn the mode selector to AUTO."),
+        )
+    if not status.remote:
+        return (
+            NotReadyReason.NOT_REMOTE,
+            tr("The controller does not listen to this PC (the Auto flag is off)."),
+            tr(
+                "Set Control Device = Remote Ethernet, switch to AUTO and leave program mode in "
+                "RC+; with 'use only for monitoring' ticked, only reading is possible."
+            ),
+        )
+    return _occupied(status)
+
+
+def _stopped(status: ControllerStatus) -> tuple[NotReadyReason, str, str] | None:
+    if status.serious_fault:
+        return (
+            NotReadyReason.SERIOUS_FAULT,
+            tr("The controller reports a serious error ({code:04d}).", code=status.code),
+            tr("A reset does not clear it: switch the controller off and on."),
+        )
+    if status.emergency_stop:
+        return (
+            NotReadyReason.EMERGENCY_STOP,
+            tr("The emergency stop is pressed, or was released without a reset."),
+            tr("Remove the danger, release the emergency stop, then run 'robolink robot reset'."),
+        )
+    if status.fault:
+        return (
+            NotReadyReason.FAULT,
+            tr("The controller reports an error ({code:04d}).", code=status.code),
+            tr("Remove the cause, then run 'robolink robot reset'. It can switch outputs off."),
+        )
+    if status.guard_open:
+        return (
+            NotReadyReason.GUARD_OPEN,
+            tr("The safety guard is open."),
+            tr("Leave the cell and close the guard."),
+        )
+    return None
+
+
+def _occupied(status: ControllerStatus) -> tuple[NotReadyReason, str, str] | None:
+    if status.running:
+        return (
+            NotReadyReason.RUNNING,
+            tr("A program is running on the controller."),
+            tr("Wait for its end, or stop the cell; robolink does not stop it for you."),
+        )
+    if status.paused:
+        return (
+            NotReadyReason.PAUSED,
+            tr("A program is paused on the controller."),
+            tr("Let it run to its end, or stop the cell."),
+        )
+    if not status.ready:
+        return (
+            NotReadyReason.STARTING,
+            tr("The controller is not ready yet."),
+            tr("Wait until it has started, then try again."),
+        )
+    return None

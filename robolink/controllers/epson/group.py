@@ -1,0 +1,384 @@
+"""The robot arm of an EPSON controller: where it is, and how it is told to go elsewhere.
+
+What a person asks of the whole controller: stop, reset, switch the motors.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Final
+
+from robolink.controllers.epson.answers import require_ready
+from robolink.controllers.epson.link import EpsonLink
+from robolink.controllers.epson.movement import (
+    EpsonMotion,
+    EpsonMotionUntilInput,
+    Settings,
+    read_input,
+    statement_until,
+)
+from robolink.controllers.epson.rest import bring_to_rest
+from robolink.controllers.epson.session import as_sent, executes
+from robolink.controllers.epson.singularities import SingularPlaces, read_position
+from robolink.controllers.motion_group import MotionGroupCore
+from robolink.errors import (
+    ControllerFaultError,
+    NotReadyError,
+    NotReadyReason,
+    ReadBackError,
+    StoppedError,
+)
+from robolink.messages import joined, tr
+from robolink.model import (
+    Act,
+    ControllerStatus,
+    InputEdge,
+    MotionProfile,
+    MotionTerms,
+    Path,
+    Pose,
+    WorkBox,
+)
+from robolink.protocols import spel
+from robolink.protocols.epson_text import Request
+from robolink.ways import Way, way
+
+_PRINTED_MM: Final = 0.001
+"""A position is printed with three decimals (docs/reference/spel.md 5.6)."""
+
+
+class EpsonGroup(MotionGroupCore):
+    """The robot that the controller's Execute acts on.
+
+    Attributes:
+        settings: Power and speed of this robot.
+
+    Args:
+        link: The controller.
+        remote_timeout_s: The remote time-out set on it, as a person states it.
+    """
+
+    def __init__(self, link: EpsonLink, *, remote_timeout_s: float) -> None:
+        super().__init__(link)
+        self._link = link
+        self.settings = Settings(link.window, identity=link.identity)
+        self._remote_timeout_s = remote_timeout_s
+        self._current: EpsonMotion | None = None
+
+    @property
+    def name(self) -> str:
+        """``robot``: the one in force on the controller."""
+        return "robot"
+
+    def pose(self) -> Pose:
+        """Read the measured position of the tool in force (RealPos)."""
+        window = self._link.window
+        window.require_ready("Print RealPos")
+        return read_position(window, spel.print_real_position())
+
+    def motors_on(self) -> bool:
+        """Read whether the motors are on."""
+        return spel.parse_integer(self._link.window.printed(spel.print_motor())) != 0
+
+    def joints(self) -> spel.PrintedWhere:
+        """Read the commanded position in all three notations (Where)."""
+        self._link.window.require_ready("Where")
+        return spel.parse_where(self._link.window.printed(spel.where()))
+
+    def move_to(self, target: Pose, profile: MotionProfile, *, box: WorkBox) -> EpsonMotion:
+        """Start one movement; see :class:`robolink.model.MotionGroup`."""
+        box.check(target)
+        return self._start(target, profile, self._statement_for(target, profile))
+
+    def move_until_input(
+        self, target: Pose, edge: InputEdge, *, speed_mm_s: float, box: WorkBox
+    ) -> EpsonMotionUntilInput:
+        """Start a straight movement until an input switches; see the model."""
+        box.check(target)
+        link, window = self._link, self._link.window
+        statement = self._statement_until(target, edge)
+
+        def look_at_input() -> None:
+            link.preferences.require_real_inputs(statement)
+            on = read_input(window, edge.number)
+            edge.require_ahead(on, controller=link.identity, request=statement)
+
+        profile = MotionProfile(Path.STRAIGHT, speed_mm_s=speed_mm_s)
+        motion = self._start(target, profile, statement, last_look=look_at_input)
+        return EpsonMotionUntilInput(motion, edge, window, identity=link.identity)
+
+    def requests_until(
+        self, target: Pose, edge: InputEdge, *, speed_mm_s: float
+    ) -> tuple[str, ...]:
+        """Return what :meth:`move_until_input` would send besides its reads."""
+        profile = MotionProfile(Path.STRAIGHT, speed_mm_s=speed_mm_s)
+        return executes((*self.settings.statements(profile), self._statement_until(target, edge)))
+
+    def requests_for(self, target: Pose, profile: MotionProfile) -> tuple[str, ...]:
+        """Return what :meth:`move_to` would send besides its reads, as it stands on the wire."""
+        return executes((*self.settings.statements(profile), self._statement_for(target, profile)))
+
+    def obstacle(self, target: Pose, path: Path, *, start: Pose | None = None) -> str:
+        """Return why six axes, or an RS, could not go there so; other arms are not asked."""
+        singular = self._singular
+        if singular is None:
+            return ""
+        begin = None if start is None else self._flagged(start)
+        return singular.obstacle(self._flagged(target), path, begin)
+
+    def deceleration_mm_s2(self) -> float:
+        """Read AccelS: ``Till`` brakes with it (docs/reference/spel.md 7.1)."""
+        return spel.parse_number(self._link.window.printed(spel.print_braking()))
+
+    def run_up_mm(self, speed_mm_s: float) -> float:
+        """Read AccelS, the less of both: straight movements speed up and brake with it."""
+        window = self._link.window
+        faster = spel.parse_number(window.printed(spel.print_speeding_up()))
+        return speed_mm_s**2 / (2 * min(faster, self.deceleration_mm_s2()))
+
+    def edge_step_mm(self, speed_mm_s: float) -> float:  # noqa: ARG002 - it is the digits printed
+        """Return the last digit of a position as it is printed."""
+        return _PRINTED_MM
+
+    def require_able(self, purpose: str) -> None:
+        """Refuse what no movement could begin in now; see :class:`robolink.model.MotionGroup`."""
+        self._require_supervision(purpose)
+        self._link.window.require_ready(purpose)
+        self._require_motors(purpose)
+
+    def terms(self) -> MotionTerms:
+        """Read what a person must know before the robot moves."""
+        (number,) = self._link.session.exchange("GetCurRobot").fields
+        watch = tr(
+            "The controller stops when this PC is silent for {timeout:g} s.",
+            timeout=self._remote_timeout_s,
+        )
+        base = self.base()
+        if base is not None and any(base):
+            moved = tr(
+                "The controller's base (Base) is at {place} in the robot: positions "
+                "taught or learnt with another base are somewhere else now.",
+                place=" ".join(f"{axis} {at:g}" for axis, at in zip("XYZUVW", base, strict=True)),
+            )
+            watch = joined(" ", (watch, moved))
+        return MotionTerms(
+            tr("Robot {number}, in Power Low,", number=spel.parse_integer(number)),
+            watch,
+            tr("Emergency stop released, guard closed, no program running"),
+        )
+
+    def low_power(self) -> bool:
+        """Read whether the controller is in Power Low, as it is for each movement from here."""
+        return not self.settings.power_high()
+
+    def base(self) -> tuple[float, ...] | None:
+        """Read where the base stands that positions count from.
+
+        Returns:
+            X, Y, Z in mm and U, V, W in degrees, seen from the robot; ``None`` where the
+            controller shows something else than such numbers.
+
+        Raises:
+            RobolinkError: The controller does not take the statement now.
+        """
+        return spel.parse_base(self._link.window.printed(spel.show_base()))
+
+    def axes(self) -> dict[str, tuple[float, ...]]:
+        """Read the commanded joints and pulses."""
+        printed = self.joints()
+        return {"joints": tuple(printed.joints), "pulses": tuple(printed.pulses)}
+
+    def stop(self) -> None:
+        """Bring everything to rest; from here on nothing acts before ``release_stop``.
+
+        Raises:
+            RejectedError: The controller takes no Stop from here.
+            OutcomeUnknownError: It did not come to rest in time.
+        """
+        link = self._link
+        with link.latch.stopping():
+            bring_to_rest(link.session.exchange, link.clock, controller=link.identity)
+
+    def abort_unfinished(self) -> None:
+        """Abort the last movement if nobody has seen its end."""
+        if self._current is not None and not self._current.settled:
+            self._current.abort()
+
+    def _start(
+        self,
+        target: Pose,
+        profile: MotionProfile,
+        statement: spel.Statement,
+        *,
+        last_look: Callable[[], None] = lambda: None,
+    ) -> EpsonMotion:
+        link, window = self._link, self._link.window
+        try:
+            with link.lock.held(statement):
+                # Before power and speed are set for it.
+                link.markers.require_settled(statement)
+                self._require_supervision(statement)
+                window.require_ready(statement)
+                link.preferences.require_real_motion(statement)
+                self._require_motors(statement)
+                found = spel.parse_integer(window.printed(spel.print_selected_tool()))
+                self._require_tool(target, found, statement)
+                singular = self._singular
+                if singular is not None:
+                    singular.require_clear(self._flagged(target), profile.path)
+                self.settings.slow_down(profile)
+                last_look()
+                with link.uninterrupted():
+                    self._current = self._started(target, statement, found)
+                return self._current
+        except (KeyboardInterrupt, StoppedError):
+            # Nobody will be given this motion to wait on.
+            self.abort_unfinished()
+            raise
+
+    def _started(self, target: Pose, statement: spel.Statement, selected: int) -> EpsonMotion:
+        session, markers = self._link.session, self._link.markers
+        marker = self._marked(target, statement, selected=selected)
+        if session.interrupted:
+            # Ctrl-C came while the marker was stored: nothing begins to move after it.
+            markers.clear(marker)
+            raise KeyboardInterrupt
+        with markers.doubt(statement), markers.unless_stopped(marker):
+            pending = session.start_execute(statement)
+        return EpsonMotion(target, pending, marker, link=self._link)
+
+    def _statement_for(self, target: Pose, profile: MotionProfile) -> spel.Statement:
+        build = spel.move if profile.path is Path.STRAIGHT else spel.go
+        return build(self._flagged(target), six_axes=self._six_axes)
+
+    def _statement_until(self, target: Pose, edge: InputEdge) -> spel.Statement:
+        return statement_until(self._flagged(target), edge, six_axes=self._six_axes)
+
+    @property
+    def _six_axes(self) -> bool:
+        return self._link.robot.read().six_axes
+
+    @property
+    def _singular(self) -> SingularPlaces | None:
+        """What the arm has to keep clear of, ``None`` for one without singular places."""
+        robot = self._link.robot.read()
+        if not robot.six_axes and not robot.folds:
+            return None
+        return SingularPlaces(self._link.window, robot.six_axes)
+
+    def _flagged(self, target: Pose) -> Pose:
+        """Return a target of six axes with the present hand, elbow and wrist where it has none.
+
+        Left out, the controller would take its own defaults and might turn the wrist over.
+        """
+        if not self._six_axes or (target.hand is not None and target.posture is not None):
+            return target
+        here = self.pose()
+        return replace(
+            target, hand=target.hand or here.hand, posture=target.posture or here.posture
+        )
+
+    def _require_supervision(self, statement: str) -> None:
+        # With a remote time-out of 0 the robot may keep moving when this PC is gone
+        # (docs/reference/epson.md 1.1). The value cannot be read over the wire; a person states it.
+        if self._remote_timeout_s <= 0:
+            raise NotReadyError(
+                tr("The remote time-out of this controller is stated as 0 (never)."),
+                reason=NotReadyReason.NO_REMOTE_TIMEOUT,
+                remedy=tr(
+                    "Set a time-out on the controller's Remote Ethernet page and state it with "
+                    "{timeout}; without it a lost link leaves a moving robot unwatched.",
+                    timeout=way(Way.REMOTE_TIMEOUT),
+                ),
+                controller=self._link.identity,
+                request=statement,
+            )
+        self._link.window.require_abort(statement)
+
+    def _require_motors(self, statement: str) -> None:
+        if not self.motors_on():
+            raise NotReadyError(
+                tr("The motors are off."),
+                reason=NotReadyReason.MOTORS_OFF,
+                remedy=tr("Run 'robolink robot motors on' when the cell is clear."),
+                controller=self._link.identity,
+                request=statement,
+            )
+
+
+class EpsonActs:
+    """Carries them out and proves them."""
+
+    def __init__(self, link: EpsonLink, group: EpsonGroup) -> None:
+        self._link = link
+        self._session = link.session
+        self._window = link.window
+        self._group = group
+
+    def reset(self) -> None:
+        """See :meth:`~robolink.controllers.EpsonController.reset_fault`."""
+        with self._link.lock.held("Reset", calming=True), self._link.latch.restoring():
+            self._require_resettable(self._window.status())
+            self._session.exchange("Reset")
+            status = self._window.status()
+            if status.emergency_stop:
+                raise ControllerFaultError(
+                    tr("The emergency stop is still pressed after the reset."),
+                    code=status.code,
+                    remedy=tr("Release the button, then reset again."),
+                    controller=self._link.identity,
+                    request="Reset",
+                )
+            if status.fault or status.serious_fault:
+                raise ControllerFaultError(
+                    tr("The reset did not clear error {code:04d}.", code=status.code),
+                    code=status.code,
+                    remedy=tr("Remove the cause; a serious error needs the power switched off."),
+                    controller=self._link.identity,
+                    request="Reset",
+                )
+            if status.remote and status.ready:
+                self._group.settings.slow_down(MotionProfile())
+
+    def motors(self, on: bool) -> None:
+        """See :meth:`~robolink.controllers.EpsonController.motors`."""
+        name = "SetMotorsOn" if on else "SetMotorsOff"
+        with self._link.lock.held(name, calming=not on):
+            self._window.require_ready(name)
+            self._session.exchange(name, str(self.robot_number()))
+            if on:
+                self._group.settings.slow_down(MotionProfile())
+            if self._group.motors_on() is not on:
+                raise ReadBackError(
+                    tr("The motors are not on.") if on else tr("The motors are not off."),
+                    remedy=tr("Look at the controller; nothing was repeated."),
+                    controller=self._link.identity,
+                    request=name,
+                )
+
+    def robot_number(self) -> int:
+        """Read which robot motors and statements act on."""
+        (number,) = self._session.exchange("GetCurRobot").fields
+        return spel.parse_integer(number)
+
+    def preview(self, act: Act) -> tuple[str, ...]:
+        """Return the requests of an act, as they stand on the wire."""
+        if act is Act.STOP:
+            return tuple(as_sent(Request(request)) for request in ("Abort", "Stop"))
+        if act is Act.RESET:
+            return (as_sent(Request("Reset")),)
+        name = "SetMotorsOn" if act is Act.MOTORS_ON else "SetMotorsOff"
+        return (as_sent(Request(name, (str(self.robot_number()),))),)
+
+    def _require_resettable(self, status: ControllerStatus) -> None:
+        # The flag of an emergency stop stays on after its release until the reset
+        # (docs/reference/epson.md 1.7), so it cannot hold the reset back.
+        if status.serious_fault or status.running or not status.remote:
+            require_ready(status, controller=self._link.identity, request="Reset")
+        if status.guard_open:
+            raise NotReadyError(
+                tr("The safety guard is open."),
+                reason=NotReadyReason.GUARD_OPEN,
+                remedy=tr("Close it before the reset."),
+                controller=self._link.identity,
+                request="Reset",
+            )

@@ -1,1 +1,0 @@
-"""Bits, variables, alarms and typed statements of an EPSON controller."""

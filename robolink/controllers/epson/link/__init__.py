@@ -1,1 +1,0 @@
-"""One login on an EPSON controller, and what is said over it."""

@@ -1,1 +1,0 @@
-"""Moving the robot of an EPSON controller, and switching it."""

@@ -1,0 +1,309 @@
+"""A movement under way: one pending Execute, watched by GetStatus, ended by Abort.
+
+A straight movement until an input switches: ``Move ... Till`` or ``Find``.
+
+Source: docs/reference/spel.md 7.1.
+
+Power and speed: set and read back, remembered and put back.
+"""
+
+from contextlib import suppress
+from dataclasses import dataclass
+
+from robolink.controllers.epson.link import EpsonLink
+from robolink.controllers.epson.session import PendingExecute
+from robolink.controllers.epson.singularities import read_position
+from robolink.controllers.epson.window import CommandWindow
+from robolink.controllers.motion_group import not_ended_in_time, stopped_before_edge
+from robolink.errors import (
+    ControllerFaultError,
+    NotReadyError,
+    NotReadyReason,
+    RejectedError,
+    RemoteProtocolError,
+    RobolinkError,
+    TransportError,
+    TransportTimeoutError,
+    UnclearAnswerError,
+)
+from robolink.messages import tr
+from robolink.model import InputEdge, Marker, MotionOutcome, MotionProfile, Pose
+from robolink.protocols import spel
+from robolink.protocols.epson_text import ErrorCode, Refusal
+from robolink.timing import Deadline
+
+POLL_S = 0.1
+"""How often the status is read while the robot moves."""
+
+
+class EpsonMotion:
+    """A movement under way. Wait on it.
+
+    Attributes:
+        target: Where it goes.
+        statement: What was sent.
+    """
+
+    def __init__(
+        self,
+        target: Pose,
+        pending: PendingExecute,
+        marker: Marker,
+        *,
+        link: EpsonLink,
+    ) -> None:
+        self.target = target
+        self.statement = pending.statement
+        self._pending = pending
+        self._marker = marker
+        self._link = link
+
+    @property
+    def settled(self) -> bool:
+        """Whether its end was seen and taken."""
+        return self._link.session.pending is not self._pending
+
+    def wait(self, *, timeout_s: float) -> MotionOutcome:
+        """Wait for the end; see :class:`robolink.model.Motion`.
+
+        Raises:
+            StoppedError: A stop came, whatever the movement did.
+        """
+        with self._link.latch.ending(self.statement), self._link.awaited():
+            return self._awaited(timeout_s)
+
+    def _awaited(self, timeout_s: float) -> MotionOutcome:
+        try:
+            with self._link.markers.doubt(self.statement):
+                arrived = self._watch(Deadline.after(self._link.clock, timeout_s))
+        except KeyboardInterrupt:
+            self.abort()
+            raise
+        if not arrived:
+            self.abort()
+            raise not_ended_in_time(self._link.identity, self.statement, timeout_s)
+        return self._settle()
+
+    def abort(self) -> None:
+        """Send Abort once and await the end of the movement.
+
+        Raises:
+            OutcomeUnknownError: No end was seen; the marker stays.
+        """
+        session = self._link.session
+        with session.uninterrupted():
+            with self._link.markers.doubt(self.statement):
+                if self._pending.answer is None:
+                    # A refusal may mean that it has just ended by itself; its end is awaited.
+                    with suppress(RejectedError):
+                        session.exchange("Abort")
+                    self._end_within(session.timeout_s)
+            self._take_answer()
+
+    def _watch(self, deadline: Deadline) -> bool:
+        """Poll until the statement answers; False when the deadline passes first."""
+        session = self._link.session
+        while self._pending.answer is None:
+            if deadline.expired:
+                return False
+            try:
+                status = self._link.window.status()
+                if status.emergency_stop or status.guard_open or status.fault:
+                    # The controller ends the statement by itself; its answer must follow soon.
+                    self._end_within(session.timeout_s)
+                    break
+                session.await_pending(wait_s=min(POLL_S, deadline.remaining_s()))
+            except (TransportError, RemoteProtocolError):
+                if self._pending.answer is None:
+                    raise
+                break  # the session was over after the end of the movement was announced
+        return True
+
+    def _end_within(self, timeout_s: float) -> None:
+        session = self._link.session
+        deadline = Deadline.after(session.clock, timeout_s)
+        while self._pending.answer is None:
+            if deadline.expired:
+                session.close()
+                raise TransportTimeoutError(
+                    tr("The controller did not announce the end of the statement."),
+                    controller=session.identity,
+                    request=self.statement,
+                )
+            session.await_pending(wait_s=min(POLL_S, deadline.remaining_s()))
+
+    def _take_answer(self) -> None:
+        with self._link.session.uninterrupted():
+            self._link.session.finish(self._pending)
+            self._link.markers.clear(self._marker)
+
+    def _runs_on(self) -> bool:
+        """Whether something runs on the controller although the statement was refused."""
+        return not self._pending.abort_requested and self._link.window.status().running
+
+    def _settle(self) -> MotionOutcome:
+        pending, answer = self._pending, self._pending.answer
+        assert answer is not None  # noqa: S101 - _watch returned True
+        with self._link.session.uninterrupted():
+            self._link.session.finish(pending)
+            # A controller that only gave up waiting (docs/reference/epson.md 1.6) may be moving
+            # still; so may one that refuses while it runs, because the answer was to something
+            # else, and one whose flags cannot be asked any more. The marker stays then.
+            gave_up = isinstance(answer, Refusal) and answer.code == ErrorCode.TIMED_OUT
+            failed: RobolinkError | None = None
+            with self._link.markers.doubt(self.statement):
+                try:
+                    self._link.window.check(self.statement, answer)
+                except UnclearAnswerError as error:
+                    if gave_up and not pending.abort_requested:
+                        raise self._link.markers.unproved(self.statement, error) from error
+                    failed = error
+                except (RejectedError, ControllerFaultError) as error:
+                    if isinstance(error, RejectedError) and self._runs_on():
+                        raise self._link.markers.unproved(self.statement, error) from error
+                    failed = error
+            self._link.markers.clear(self._marker)
+        # How an aborted statement is answered is not documented (docs/reference/epson.md 1.6).
+        aborted = pending.abort_requested
+        if failed is not None and not (aborted and not isinstance(failed, ControllerFaultError)):
+            raise failed
+        return MotionOutcome.STOPPED if aborted else MotionOutcome.ARRIVED
+
+
+class EpsonMotionUntilInput:
+    """Implements :class:`robolink.model.MotionUntilInput`.
+
+    With ``run_on`` the position is the one that ``Find`` kept at the edge. Without, ``Till``
+    keeps none: it is the measured position at rest, past the edge by the way of braking.
+    """
+
+    def __init__(
+        self, motion: EpsonMotion, edge: InputEdge, window: CommandWindow, *, identity: str
+    ) -> None:
+        self._motion = motion
+        self._edge = edge
+        self._window = window
+        self._identity = identity
+
+    def wait(self, *, timeout_s: float) -> Pose | None:
+        """Wait for the end; see :class:`robolink.model.MotionUntilInput`."""
+        if self._motion.wait(timeout_s=timeout_s) is not MotionOutcome.ARRIVED:
+            raise stopped_before_edge(self._identity, self._motion.statement)
+        if self._edge.run_on:
+            met, position = spel.print_position_found(), spel.print_found_position()
+        else:
+            met, position = spel.print_till_on(), spel.print_real_position()
+        if not spel.parse_boolean(self._window.printed(met)):
+            return None
+        return read_position(self._window, position)
+
+
+def statement_until(target: Pose, edge: InputEdge, *, six_axes: bool) -> spel.Statement:
+    """Return the move that waits for an edge.
+
+    Raises:
+        LocalProtocolError: No such input, or a target that cannot be written.
+    """
+    build = spel.move_find if edge.run_on else spel.move_till
+    return build(target, edge.number, on=not edge.falling, six_axes=six_axes)
+
+
+def read_input(window: CommandWindow, bit: int) -> bool:
+    """Read one input through Execute, as the statement that follows will see it."""
+    return spel.parse_integer(window.printed(spel.print_input(bit))) != 0
+
+
+_SLACK = 0.0005
+
+
+@dataclass(frozen=True, slots=True)
+class PowerAndSpeed:
+    """What was in force: power, Speed (percent) and SpeedS (mm/s), each with its
+    departure and approach values (docs/reference/spel.md 7.2).
+    """  # noqa: D205 - one sentence over two lines
+
+    power_high: bool
+    speed_percent: tuple[int, int, int]
+    speed_s_mm_s: tuple[float, float, float]
+
+
+class Settings:
+    """Reads, limits and restores power and speed."""
+
+    def __init__(self, window: CommandWindow, *, identity: str) -> None:
+        self._window = window
+        self._identity = identity
+
+    def read(self) -> PowerAndSpeed:
+        """Read what is in force."""
+        speed = (self._speed_percent(1), self._speed_percent(2), self._speed_percent(3))
+        speed_s = (self._speed_s_mm_s(1), self._speed_s_mm_s(2), self._speed_s_mm_s(3))
+        return PowerAndSpeed(self.power_high(), speed, speed_s)
+
+    def statements(self, profile: MotionProfile) -> tuple[spel.Statement, ...]:
+        """Return what :meth:`slow_down` sends."""
+        return (
+            spel.power_low(),
+            spel.speed(profile.speed_percent),
+            spel.speed_s(profile.speed_mm_s),
+        )
+
+    def slow_down(self, profile: MotionProfile) -> None:
+        """Set Power Low and the profile's speeds, and prove it.
+
+        Motor On and Reset put them back, a login and Abort perhaps too (docs/reference/spel.md
+        6.3), so this is done anew before each move. What the moves of this driver go by is read
+        back; departure and approach values count for Jump alone, which it never sends.
+
+        Raises:
+            NotReadyError: The controller does not show what was set; nothing may move.
+        """
+        for statement in self.statements(profile):
+            self._window.command(statement)
+        speed_percent, speed_mm_s = self._speed_percent(1), self._speed_s_mm_s(1)
+        if (
+            self.power_high()
+            or speed_percent != profile.speed_percent
+            or abs(speed_mm_s - profile.speed_mm_s) > _SLACK
+        ):
+            raise NotReadyError(
+                tr("The controller does not confirm low power and the speed that was set."),
+                reason=NotReadyReason.HIGH_POWER,
+                remedy=tr("Nothing was moved. Check the power mode on the controller."),
+                controller=self._identity,
+                request=spel.power_low(),
+            )
+
+    def restore(self, before: PowerAndSpeed) -> None:
+        """Put ``before`` back and prove it; nothing is sent when it is in force already.
+
+        Raises:
+            NotReadyError: Another value is read back.
+        """
+        if self.read() == before:
+            return
+        for statement in (
+            spel.speed(*before.speed_percent),
+            spel.speed_s(*before.speed_s_mm_s),
+            spel.power_high() if before.power_high else spel.power_low(),
+        ):
+            # One garbled acknowledgement must not keep the rest from being put back.
+            with suppress(UnclearAnswerError):
+                self._window.command(statement)
+        if self.read() != before:
+            raise NotReadyError(
+                tr("The previous power mode and speed could not be put back."),
+                reason=NotReadyReason.HIGH_POWER,
+                remedy=tr("Check Power, Speed and SpeedS before you start the cell."),
+                controller=self._identity,
+            )
+
+    def power_high(self) -> bool:
+        """Read the power mode."""
+        return spel.parse_integer(self._window.printed(spel.print_power())) != 0
+
+    def _speed_percent(self, which: int) -> int:
+        return spel.parse_integer(self._window.printed(spel.print_speed(which)))
+
+    def _speed_s_mm_s(self, which: int) -> float:
+        return spel.parse_number(self._window.printed(spel.print_speed_s(which)))

@@ -1,0 +1,282 @@
+"""The tool table of an EPSON controller: TLSet, TLClr, Tool (docs/reference/epson.md 3.1).
+
+The tool table as the companion program publishes it: robolink_tools.prg.
+
+Execute is not available while production runs, nor to a client that may only monitor; the
+project's variables are (docs/reference/epson.md 1.3). So the project itself copies its tools into
+Global Preserve variables, and they are read with GetVariable, which changes nothing.
+"""
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Final
+
+from robolink.controllers.epson.link import EpsonLink
+from robolink.controllers.epson.session import as_sent
+from robolink.controllers.epson.values import EpsonVariables
+from robolink.controllers.tool_table import ToolTableCore
+from robolink.controllers.tool_writing import ToolWrite
+from robolink.errors import RejectedError, RemoteProtocolError, ToolError
+from robolink.messages import tr
+from robolink.model import Expected, ToolOffset, ToolReceipt
+from robolink.protocols import spel
+from robolink.protocols.epson_text import ErrorCode, Request, VariableType
+
+DECIMALS: Final = 3
+"""Places that a printed point shows (docs/reference/epson.md 3.3, from a real capture)."""
+
+TOLERANCE: Final = 0.5 * 10**-DECIMALS
+"""Two values that this controller prints alike are equal."""
+
+_TOOLS: Final = range(1, 16)
+
+
+class EpsonToolTable(ToolTableCore):
+    """Tools 1 to 15 in the controller's flash, and the selected one.
+
+    Every write is compare-and-set and read back. A value that is stored already is not
+    written again: TLSet wears the flash (docs/reference/epson.md 3.1).
+    """
+
+    def __init__(self, link: EpsonLink) -> None:
+        super().__init__(link)
+        self._link = link
+        self._window = link.window
+
+    def indices(self) -> Sequence[int]:
+        """Return 1 to 15; Tool 0 is the flange."""
+        return _TOOLS
+
+    def same(self, a: ToolOffset | None, b: ToolOffset | None) -> bool:
+        """Tell whether this controller prints both alike; undefined equals undefined only."""
+        if a is None or b is None:
+            return a is b
+        return a.matches(b, TOLERANCE)
+
+    def read_all(self) -> dict[int, ToolOffset | None]:
+        """Read all fifteen from one TLSet listing; it is empty when none is defined."""
+        self._window.require_ready("TLSet")
+        listed = spel.parse_tool_listing(self._listing())
+        return {tool: listed.get(tool) for tool in self.indices()}
+
+    def selected(self) -> int | None:
+        """Read which tool is in force; the selection survives power-off.
+
+        Source: docs/reference/epson.md 3.1.
+        """
+        self._window.require_ready("Print Tool")
+        return super().selected()
+
+    def _set(self, tool: int, requested: ToolOffset | None, expected: Expected) -> ToolReceipt:
+        name = f"TLClr {tool}" if requested is None else f"TLSet {tool}"
+        with self._link.lock.held(name):
+            if requested is not None:
+                self._link.robot.read(name)
+                self._link.preferences.require_real(name)
+            statement = self._statement(tool, requested)
+            return _FlashWrite(self, self._link, tool, requested, statement).change(expected)
+
+    def _statement(self, tool: int, requested: ToolOffset | None) -> spel.Statement:
+        if requested is None:
+            return spel.clear_tool(tool)
+        six_axes = self._link.robot.read().six_axes
+        if not six_axes and (requested.v_deg or requested.w_deg):
+            raise ToolError(
+                tr("This robot has four axes: a tool's V and W must be 0."),
+                remedy=tr("Leave V and W out."),
+            )
+        return spel.set_tool(tool, requested, six_axes=six_axes)
+
+    def _request(self, tool: int, requested: ToolOffset | None) -> str:
+        return self._statement(tool, requested)
+
+    def _as_sent(self, request: str) -> str:
+        return as_sent(Request("Execute", (request,)))
+
+    def _storable(self, tool: int, offset: ToolOffset) -> ToolOffset:  # noqa: ARG002 - alike for all
+        return offset.rounded(DECIMALS)
+
+    def _require_readable(self, tool: int) -> None:
+        self._window.require_ready(f"TLSet {tool}")
+
+    def _require_clearable(self, tool: int) -> None:
+        self._link.preferences.require_real(f"TLClr {tool}")
+
+    def _require_selectable(self, request: str) -> None:
+        self._window.require_ready(request)
+
+    def _stored(self, tool: int) -> ToolOffset | None:
+        # What TLSet(n) gives for an undefined tool is not documented, so that is asked first.
+        defined = self._window.printed(spel.print_tool_defined(tool))
+        return self.printed(tool) if spel.parse_boolean(defined) else None
+
+    def stored(self, tool: int) -> ToolOffset | None:
+        """Read a tool for the proof of its write."""
+        return self._stored(tool)
+
+    def printed(self, tool: int) -> ToolOffset:
+        """Read a tool that is known to be defined."""
+        point = spel.parse_point(self._window.printed(spel.print_tool(tool)))
+        return ToolOffset(*point.coordinates)
+
+    def before(
+        self, tool: int, requested: ToolOffset | None, expected: Expected
+    ) -> ToolOffset | None:
+        """Read what a write replaces.
+
+        The list of all tools takes one question, and whatever is in it is defined. How it looks
+        is not documented, so it is believed only where it confirms what was expected to the last
+        digit; and not on six axes, where it may leave V and W out.
+        """
+        with self._window.proving_ready(f"TLSet {tool}"):
+            if isinstance(expected, ToolOffset) and not self._link.robot.read().six_axes:
+                listing = self._listing()
+                with suppress(RemoteProtocolError):
+                    listed = spel.parse_tool_listing(listing).get(tool)
+                    if self.same(listed, expected) and not self.same(listed, requested):
+                        return listed
+            return self._stored(tool)
+
+    def _listing(self) -> str:
+        return self._window.printed(spel.list_tools(), may_be_nothing=True)
+
+    def _select_request(self, tool: int) -> str:
+        return spel.select_tool(tool)
+
+    def _send_selection(self, tool: int) -> None:
+        self._window.command(spel.select_tool(tool))
+
+    def _selected(self) -> int:
+        return spel.parse_integer(self._window.printed(spel.print_selected_tool()))
+
+    def _known(self, lowest: int) -> str:
+        return tr("EPSON controllers have tools {lowest} to 15.", lowest=lowest)
+
+
+class _FlashWrite(ToolWrite):
+    """TLSet or TLClr of one tool."""
+
+    def __init__(
+        self,
+        table: EpsonToolTable,
+        link: EpsonLink,
+        tool: int,
+        requested: ToolOffset | None,
+        statement: spel.Statement,
+    ) -> None:
+        super().__init__(link, tool, requested, statement, same=table.same)
+        self._table = table
+        self._window = link.window
+        self._statement = statement
+
+    def read_before(self, expected: Expected) -> ToolOffset | None:
+        return self._table.before(self.tool, self.requested, expected)
+
+    def send(self) -> None:
+        self._window.command(self._statement)
+
+    def read_back(self) -> ToolOffset | None:
+        # A tool that was set just now is defined.
+        return self.read_doubted() if self.requested is None else self._table.printed(self.tool)
+
+    def read_doubted(self) -> ToolOffset | None:
+        return self._table.stored(self.tool)
+
+
+LAYOUT: Final = 1
+"""Number of the arrangement below; the program writes it into its state."""
+
+_BEGIN: Final = "robolink_begin"
+_END: Final = "robolink_end"
+_STATE: Final = "robolink_state"
+_TABLE: Final = "robolink_tool"
+_STATE_COUNT: Final = 19
+_TABLE_COUNT: Final = 90
+_ATTEMPTS: Final = 3
+
+
+@dataclass(frozen=True, slots=True)
+class PublishedTools:
+    """The tools as the project last published them.
+
+    Attributes:
+        tools: Every tool by number; an undefined one is ``None``.
+        selected: The tool in force then, 0 for the flange.
+        robot: The robot whose tools they are.
+        publication: A count that grows with each publication of something new.
+    """
+
+    tools: Mapping[int, ToolOffset | None]
+    selected: int
+    robot: int
+    publication: int
+
+
+class PublishedReader:
+    """Reads the companion's variables, and a torn table again."""
+
+    def __init__(self, variables: EpsonVariables) -> None:
+        self._variables = variables
+
+    def read(self) -> PublishedTools | None:
+        """Return the table, ``None`` where the project publishes none.
+
+        Raises:
+            ToolError: It was being changed at every attempt, or was arranged by another
+                version of the companion.
+            RejectedError: The controller refused for another reason.
+        """
+        try:
+            for _ in range(_ATTEMPTS):
+                # The program counts up the one before and the other after it changes the
+                # table; read the other way about, equal counts enclose a whole table.
+                publication = self._whole(_END)
+                state = self._wholes()
+                table = self._numbers()
+                if self._whole(_BEGIN) == publication:
+                    return _understood(publication, state, table)
+        except RejectedError as error:
+            if error.code == ErrorCode.NO_SUCH_VARIABLE:
+                return None
+            raise
+        raise ToolError(
+            tr("The published tool table was being changed at each of {n} readings.", n=_ATTEMPTS),
+            remedy=tr(
+                "Try again. If it stays so, the program was stopped in the middle of "
+                "RobolinkPublish; its next call puts that right."
+            ),
+        )
+
+    def _whole(self, name: str) -> int:
+        return int(self._variables.read(name, VariableType.LONG))
+
+    def _wholes(self) -> tuple[int, ...]:
+        values = self._variables.read_array(_STATE, (0,), VariableType.LONG, count=_STATE_COUNT)
+        return tuple(int(value) for value in values)
+
+    def _numbers(self) -> tuple[float, ...]:
+        values = self._variables.read_array(_TABLE, (0,), VariableType.DOUBLE, count=_TABLE_COUNT)
+        return tuple(float(value) for value in values)
+
+
+def _understood(
+    publication: int, state: tuple[int, ...], table: tuple[float, ...]
+) -> PublishedTools | None:
+    layout, robot, selected, _, *defined = state
+    if layout == 0:
+        return None  # declared, but the program has not run since the project was loaded
+    if layout != LAYOUT:
+        raise ToolError(
+            tr(
+                "The project publishes its tools in layout {found}; this robolink reads {own}.",
+                found=layout,
+                own=LAYOUT,
+            ),
+            remedy=tr("Export the companion again with 'robolink expert spel export' and rebuild."),
+        )
+    tools: dict[int, ToolOffset | None] = {}
+    for tool, there in zip(_TOOLS, defined, strict=True):
+        start = (tool - 1) * 6
+        tools[tool] = ToolOffset(*table[start : start + 6]) if there else None
+    return PublishedTools(tools, selected, robot, publication)

@@ -1,1 +1,0 @@
-"""The tools of an EPSON controller: read, written, preserved, settled."""

@@ -1,0 +1,449 @@
+"""Values that a request of their own sets: outputs, memory bits, variables.
+
+Class SET of docs/reference/rules.md 1: nothing is sent when the value is there already; a durable
+marker stands before the request leaves; the request is sent once; the value is read back. Ctrl-C
+waits for the end of that.
+
+Inputs, outputs and memory bits (docs/reference/epson.md 1.2, notes 2 and 5).
+
+Global Preserve variables.
+
+Source: docs/reference/epson.md 1.2 note 4; ranges: docs/reference/spel.md 2.
+"""
+
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from operator import eq
+from typing import Final, Generic
+
+from robolink.controllers.driver_link import MarkedCommand
+from robolink.controllers.epson.link import EpsonLink
+from robolink.controllers.epson.session import EpsonSession, as_sent
+from robolink.errors import ConfigError, ReadBackError, RejectedError, RemoteProtocolError
+from robolink.messages import tr
+from robolink.model import Marker, NewEntry, Value, ValueReceipt, ValueT
+from robolink.protocols import spel
+from robolink.protocols.epson_text import Reply, Request, VariableType
+
+
+@dataclass(frozen=True, slots=True)
+class Change(Generic[ValueT]):
+    """One value to set.
+
+    Attributes:
+        request: What sets it.
+        item: What it is, in plain values, for whoever settles a doubt later.
+        requested: The new value.
+        read: Reads the value that is there.
+        same: Tells whether two values are equal for this controller.
+    """
+
+    request: Request
+    item: tuple[str, ...]
+    requested: ValueT
+    read: Callable[[], ValueT]
+    same: Callable[[ValueT, ValueT], bool]
+
+
+class ValueSetter:
+    """Carries out a :class:`Change`."""
+
+    def __init__(self, link: EpsonLink) -> None:
+        self._link = link
+
+    def preview(self, change: Change[ValueT]) -> tuple[str, ...]:
+        """Return the requests that :meth:`carry_out` would send besides its reads."""
+        request = as_sent(change.request)
+        self._link.window.require_ready(request)
+        return () if change.same(change.read(), change.requested) else (request,)
+
+    def carry_out(self, change: Change[ValueT]) -> ValueReceipt[ValueT]:
+        """Set the value and prove it.
+
+        Raises:
+            NotReadyError: The state forbids it, monitoring only included.
+            RejectedError: The controller refused; nothing was set.
+            ReadBackError: Another value is there afterwards.
+            OutcomeUnknownError: No answer came; motion is blocked until ``recover``.
+        """
+        request = as_sent(change.request)
+        with self._link.lock.held(request):
+            self._link.window.require_ready(request)
+            before = change.read()
+            if change.same(before, change.requested):
+                return ValueReceipt(request, before, change.requested, before, skipped=True)
+            found = self._link.carry_out(_Setting(change, request, before, self._link.session))
+        if not change.same(found, change.requested):
+            raise ReadBackError(
+                tr(
+                    "{request} was accepted, but reads back as {found!r} instead of {requested!r}.",
+                    request=request,
+                    found=found,
+                    requested=change.requested,
+                ),
+                remedy=tr("A program or the PLC may set it too. Nothing was repeated."),
+                controller=self._link.identity,
+                request=request,
+            )
+        return ValueReceipt(request, before, change.requested, found, skipped=False)
+
+
+class _Setting(MarkedCommand[ValueT]):
+    """The sending of one value."""
+
+    def __init__(
+        self, change: Change[ValueT], request: str, before: ValueT, session: EpsonSession
+    ) -> None:
+        super().__init__(request)
+        self._change = change
+        self._before = before
+        self._session = session
+
+    @property
+    def details(self) -> Mapping[str, object]:
+        change = self._change
+        item = list(change.item)
+        return {"item": item, "before": self._before, "requested": change.requested}
+
+    def send(self) -> None:
+        self._session.exchange(self._change.request.name, *self._change.request.parameters)
+
+    def read(self) -> ValueT:
+        return self._change.read()
+
+    def refusal(self, marker: Marker, error: RejectedError) -> Iterable[NewEntry]:  # noqa: ARG002 - none is kept
+        return ()
+
+
+_HIGHEST: Final = 0xFFFF
+"""Two bytes carry a bit or port number (docs/reference/epson.md 2.2); which exist depends on the
+hardware."""
+
+_BIT: Final = re.compile("[01]")
+_BYTE: Final = re.compile("[0-9A-Fa-f]{2}")
+_WORD: Final = re.compile("[0-9A-Fa-f]{4}")
+
+
+class EpsonIo:
+    """Bits, counted from 0; a byte is eight of them, a word sixteen, lowest bit first.
+
+    Reading inputs and memory is legal at any time, while production runs and for a client
+    that may only monitor. Outputs are read through Execute, because Remote Ethernet has no
+    request for it, so they are read and switched only while Execute is available.
+
+    Every method raises ConfigError for a number that cannot exist, and RejectedError for one
+    that this controller does not have.
+    """
+
+    def __init__(self, link: EpsonLink) -> None:
+        self._session = link.session
+        self._window = link.window
+        self._setter = ValueSetter(link)
+
+    def read_input(self, bit: int) -> bool:
+        """Read one input."""
+        return self._number("GetIO", bit, _BIT) == 1
+
+    def read_input_byte(self, port: int) -> int:
+        """Read inputs 8 x ``port`` and the seven after it, as 0 to 255."""
+        return self._number("GetIOByte", port, _BYTE)
+
+    def read_input_word(self, port: int) -> int:
+        """Read inputs 16 x ``port`` and the fifteen after it, as 0 to 65535."""
+        return self._number("GetIOWord", port, _WORD)
+
+    def read_memory(self, bit: int) -> bool:
+        """Read one memory bit."""
+        return self._number("GetMemIO", bit, _BIT) == 1
+
+    def read_memory_byte(self, port: int) -> int:
+        """Read memory bits 8 x ``port`` and the seven after it, as 0 to 255."""
+        return self._number("GetMemIOByte", port, _BYTE)
+
+    def read_memory_word(self, port: int) -> int:
+        """Read memory bits 16 x ``port`` and the fifteen after it, as 0 to 65535."""
+        return self._number("GetMemIOWord", port, _WORD)
+
+    def read_output(self, bit: int) -> bool:
+        """Read one output, through Execute.
+
+        Raises:
+            NotReadyError: Execute is not available now.
+        """
+        query = spel.print_output(_checked(bit))
+        self._window.require_ready(query)
+        return spel.parse_integer(self._window.printed(query)) != 0
+
+    def set_output(self, bit: int, on: bool) -> ValueReceipt[bool]:
+        """Switch one output and read it back.
+
+        Raises:
+            NotReadyError: The state forbids it.
+            ReadBackError: It is not as asked: a program, or an output assigned to a remote
+                function.
+            OutcomeUnknownError: No answer came.
+        """
+        return self._setter.carry_out(self._output(bit, on))
+
+    def preview_output(self, bit: int, on: bool) -> tuple[str, ...]:
+        """Return what :meth:`set_output` would send besides its reads; reads only."""
+        return self._setter.preview(self._output(bit, on))
+
+    def set_memory(self, bit: int, on: bool) -> ValueReceipt[bool]:
+        """Switch one memory bit and read it back; raises as :meth:`set_output`."""
+        return self._setter.carry_out(self._memory(bit, on))
+
+    def preview_memory(self, bit: int, on: bool) -> tuple[str, ...]:
+        """Return what :meth:`set_memory` would send besides its reads; reads only."""
+        return self._setter.preview(self._memory(bit, on))
+
+    def _output(self, bit: int, on: bool) -> Change[bool]:
+        request = _switch("SetIO", bit, on)
+        return Change(request, ("output", str(bit)), on, lambda: self.read_output(bit), eq)
+
+    def _memory(self, bit: int, on: bool) -> Change[bool]:
+        request = _switch("SetMemIO", bit, on)
+        return Change(request, ("memory", str(bit)), on, lambda: self.read_memory(bit), eq)
+
+    def _number(self, name: str, at: int, form: re.Pattern[str]) -> int:
+        reply = self._session.exchange(name, str(_checked(at)))
+        if len(reply.fields) == 1 and form.fullmatch(reply.fields[0]):
+            return int(reply.fields[0], 16)
+        raise self._unreadable(name, reply)
+
+    def _unreadable(self, name: str, reply: Reply) -> RemoteProtocolError:
+        return RemoteProtocolError(
+            tr("The controller answered {name} with {answer!r}.", name=name, answer=reply.fields),
+            remedy=tr("Keep this text and report it with the controller's firmware version."),
+            controller=self._session.identity,
+            request=name,
+            raw=",".join(reply.fields).encode("utf-8", "backslashreplace"),
+        )
+
+
+def _switch(name: str, bit: int, on: bool) -> Request:
+    return Request(name, (str(_checked(bit)), str(int(on))))
+
+
+def _checked(number: int) -> int:
+    if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number <= _HIGHEST:
+        raise ConfigError(
+            tr("There is no bit or port {number!r}.", number=number),
+            remedy=tr("Bits and ports are counted from 0."),
+        )
+    return number
+
+
+MOST_ELEMENTS: Final = 100
+"""Elements of an array that one request may ask for (docs/reference/epson.md 1.2 note 4)."""
+
+_NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,31}\$?", re.ASCII)
+# Commas, quotes and parentheses would be cut elsewhere; the rest is left out because nothing
+# says how it fares.
+_TEXT: Final = re.compile(r"[A-Za-z0-9_.:/+-](?:[A-Za-z0-9 _.:/+-]{0,253}[A-Za-z0-9_.:/+-])?")
+_MOST_SUBSCRIPTS: Final = 3
+_LARGEST_REAL: Final = 3.4028235e38
+_RANGES: Final = {
+    VariableType.BYTE: (-(2**7), 2**7 - 1),
+    VariableType.INTEGER: (-(2**15), 2**15 - 1),
+    VariableType.LONG: (-(2**31), 2**31 - 1),
+}
+_RELATIVE: Final = {VariableType.REAL: 5e-6, VariableType.DOUBLE: 5e-14}
+"""Half of the last of the valid digits, 6 and 14 (docs/reference/spel.md 2)."""
+
+
+class EpsonVariables:
+    """Variables that the project in the controller declares Global Preserve.
+
+    Reading is legal at any time, while production runs and for a client that may only
+    monitor. Names hold letters, digits and underscores, with a ``$`` at the end of a
+    string's; nothing else that a person typed goes into a request.
+
+    Every method raises ConfigError for a name, a type or a value that cannot be, and
+    RejectedError (15) for a variable that this controller does not have.
+    """
+
+    def __init__(self, link: EpsonLink) -> None:
+        self._session = link.session
+        self._setter = ValueSetter(link)
+
+    def text(self, name: str) -> str:
+        """Read a variable of any type, as the controller writes it."""
+        return ",".join(self._session.exchange("GetVariable", _checked_name(name)).fields)
+
+    def read(self, name: str, kind: VariableType | str) -> Value:
+        """Read one variable."""
+        kind = variable_type(kind)
+        reply = self._session.exchange("GetVariable", _checked_name(name), kind)
+        return _from_text(",".join(reply.fields), kind)
+
+    def read_array(
+        self, name: str, indices: Sequence[int], kind: VariableType | str, *, count: int = 1
+    ) -> tuple[Value, ...]:
+        """Read ``count`` elements from ``indices`` on; the last subscript runs.
+
+        Args:
+            name: Name of the array.
+            indices: Subscripts of the first element.
+            kind: Type of its elements.
+            count: How many, 1 to 100.
+
+        Raises:
+            ConfigError: Strings cannot be read so, nor more than 100 elements at once.
+
+        Example:
+            >>> import robolink
+            >>> with robolink.connect("epson+sim://variables-example") as controller:
+            ...     controller.variables.read_array("g_Real_table", (2, 1), "Real", count=3)
+            (0.0, 0.0, 0.0)
+        """
+        kind = variable_type(kind)
+        if kind is VariableType.STRING:
+            raise ConfigError(
+                tr("Arrays of strings cannot be read."), remedy=tr("Read single strings.")
+            )
+        if not 1 <= count <= MOST_ELEMENTS:
+            raise ConfigError(
+                tr("{count} elements cannot be read at once.", count=count),
+                remedy=tr("Ask for 1 to {most}.", most=MOST_ELEMENTS),
+            )
+        element = f"{_checked_name(name)}({_subscripts(indices)})"
+        fields = self._session.exchange("GetVariable", element, kind, str(count)).fields
+        if len(fields) != count:
+            raise RemoteProtocolError(
+                tr(
+                    "{count} elements of {name} were requested, but {found} arrived.",
+                    count=count,
+                    name=name,
+                    found=len(fields),
+                ),
+                remedy=tr("Keep this text and report it with the controller's firmware version."),
+                controller=self._session.identity,
+                request=f"GetVariable,{element}",
+            )
+        return tuple(_from_text(field, kind) for field in fields)
+
+    def write(self, name: str, value: Value, kind: VariableType | str) -> ValueReceipt[Value]:
+        """Set one variable and read it back.
+
+        Raises:
+            NotReadyError: The state forbids it, monitoring only included.
+            ReadBackError: Another value is there afterwards.
+            OutcomeUnknownError: No answer came.
+        """
+        return self._setter.carry_out(self._change(name, value, variable_type(kind)))
+
+    def preview_write(self, name: str, value: Value, kind: VariableType | str) -> tuple[str, ...]:
+        """Return what :meth:`write` would send besides its reads; reads only."""
+        return self._setter.preview(self._change(name, value, variable_type(kind)))
+
+    def _change(self, name: str, value: Value, kind: VariableType) -> Change[Value]:
+        request = Request("SetVariable", (_checked_name(name), _to_text(value, kind), kind))
+        return Change(
+            request,
+            ("variable", name, kind),
+            value,
+            lambda: self.read(name, kind),
+            lambda a, b: equal_values(a, b, kind),
+        )
+
+
+def variable_type(text: str) -> VariableType:
+    """Return the type called ``text`` in any case.
+
+    Raises:
+        ConfigError: There is none.
+    """
+    for kind in VariableType:
+        if kind.lower() == text.lower():
+            return kind
+    raise ConfigError(
+        tr("There is no variable type {text!r}.", text=text),
+        remedy=tr("These are known: {names}.", names=", ".join(VariableType)),
+    )
+
+
+def typed_value(text: str, kind: VariableType | str) -> Value:
+    """Return what a person typed as a value of ``kind``.
+
+    Raises:
+        ConfigError: It is none.
+    """
+    kind = variable_type(kind)
+    try:
+        value = _from_text(text, kind)
+    except RemoteProtocolError as error:
+        raise _unfit(text, kind) from error
+    _to_text(value, kind)
+    return value
+
+
+def equal_values(a: object, b: object, kind: VariableType | str = "") -> bool:
+    """Tell whether two values are equal to a controller that keeps 6 or 14 digits."""
+    tolerance = _RELATIVE.get(variable_type(kind), 0.0) if kind else 0.0
+    if isinstance(a, (int, float)) and isinstance(b, (int, float)):
+        return math.isclose(a, b, rel_tol=tolerance, abs_tol=0.0)
+    return a == b
+
+
+def _checked_name(name: str) -> str:
+    if not _NAME.fullmatch(name):
+        raise ConfigError(
+            tr("{name!r} is not a variable's name.", name=name),
+            remedy=tr("Names hold letters, digits and underscores; a string's ends in $."),
+        )
+    return name
+
+
+def _subscripts(indices: Sequence[int]) -> str:
+    plain = all(isinstance(i, int) and not isinstance(i, bool) and i >= 0 for i in indices)
+    if not (plain and 1 <= len(indices) <= _MOST_SUBSCRIPTS):
+        raise ConfigError(
+            tr("{indices} are not subscripts.", indices=list(indices)),
+            remedy=tr("Give one to three whole numbers, each 0 or more."),
+        )
+    return ",".join(str(index) for index in indices)
+
+
+def _from_text(text: str, kind: VariableType) -> Value:
+    if kind is VariableType.STRING:
+        return text
+    if kind is VariableType.BOOLEAN:
+        return spel.parse_boolean(text)
+    return spel.parse_number(text) if kind in _RELATIVE else spel.parse_integer(text)
+
+
+def _to_text(value: Value, kind: VariableType) -> str:
+    """Return ``value`` as SetVariable takes it; that it takes 1 for True is assumed."""
+    if isinstance(value, str):
+        if kind is VariableType.STRING and _TEXT.fullmatch(value):
+            return value
+    elif isinstance(value, bool):
+        if kind is VariableType.BOOLEAN:
+            return str(int(value))
+    elif kind in _RELATIVE:
+        largest = _LARGEST_REAL if kind is VariableType.REAL else math.inf
+        if math.isfinite(value) and abs(value) <= largest:
+            return format(Decimal(repr(value)), "f")
+    elif kind in _RANGES and isinstance(value, int):
+        low, high = _RANGES[kind]
+        if low <= value <= high:
+            return str(value)
+    raise _unfit(value, kind)
+
+
+def _unfit(value: Value, kind: VariableType) -> ConfigError:
+    takes = {
+        VariableType.STRING: tr("1 to 255 letters, digits, blanks and _ . : / + -"),
+        VariableType.BOOLEAN: tr("true or false"),
+    }
+    low, high = _RANGES.get(kind, (0, 0))
+    whole = tr("a whole number from {low} to {high}", low=low, high=high)
+    number = tr("a decimal number")
+    return ConfigError(
+        tr("{value!r} is not a value of type {kind}.", value=value, kind=kind.value),
+        remedy=tr("It takes {what}.", what=takes.get(kind, whole if low else number)),
+    )

@@ -1,0 +1,238 @@
+"""Statements run through Execute, as if typed in the controller's command window."""
+
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
+from functools import lru_cache
+
+from robolink.controllers.epson.answers import (
+    NOT_EXECUTED,
+    rejected,
+    require_ready,
+    status_from_flags,
+)
+from robolink.controllers.epson.session import EpsonSession
+from robolink.errors import (
+    ControllerFaultError,
+    NotReadyError,
+    NotReadyReason,
+    RejectedError,
+    RemoteProtocolError,
+    UnclearAnswerError,
+)
+from robolink.messages import tr
+from robolink.model import (
+    ControllerStatus,
+)
+from robolink.protocols.epson_text import Refusal, Reply, parse_status
+from robolink.protocols.spel import Statement
+
+_NOT_READY = 20
+
+
+class CommandWindow:
+    """Runs typed SPEL+ statements that do not move the robot, and explains failures.
+
+    How a failed statement is answered is not documented (docs/reference/epson.md 1.5): anything but
+    ``0`` for a command, or but printed text for a query, counts as failure, and the status tells
+    the rest.
+    """
+
+    def __init__(self, session: EpsonSession) -> None:
+        self._session = session
+        self._was_ready = False
+
+    def uninterrupted(self) -> AbstractContextManager[None]:
+        """Hold Ctrl-C back over statements that belong together; it is raised at their end."""
+        return self._session.uninterrupted()
+
+    def status(self) -> ControllerStatus:
+        """Read the flags; legal at any time after the login."""
+        return _status(self._session.exchange("GetStatus"))
+
+    def require_ready(self, request: str) -> ControllerStatus:
+        """Read the flags and hold ``request`` back if Execute would be refused.
+
+        Raises:
+            NotReadyError: Names the condition.
+        """
+        self._was_ready = False
+        status = self.status()
+        require_ready(status, controller=self._session.identity, request=request)
+        self._was_ready = True
+        return status
+
+    def require_abort(self, request: str) -> None:
+        """Hold back what could not be ended over this line once it runs.
+
+        While a statement runs, Abort alone ends it (docs/reference/epson.md 1.5), and no manual
+        prints its letter on Remote RS232 (docs/reference/epson.md 2.2).
+
+        Raises:
+            NotReadyError: This line has no Abort.
+        """
+        if self._session.carries("Abort"):
+            return
+        raise NotReadyError(
+            tr("What is started over this serial line could not be stopped over it."),
+            reason=NotReadyReason.NO_ABORT,
+            remedy=tr(
+                "Nothing was sent. Move over Remote Ethernet; or see with 'robolink "
+                "expert verify-controller' that the controller knows the letter A, "
+                "and write letters=guessed into the URL."
+            ),
+            controller=self._session.identity,
+            request=request,
+        )
+
+    @contextmanager
+    def proving_ready(self, request: str) -> Iterator[None]:
+        """Hold ``request`` back unless the queries of a block are answered.
+
+        Execute needs what :meth:`require_ready` looks for (docs/reference/epson.md 1.2), so an
+        answer proves it, and later than the flags could. So they are read first only until they
+        once were right: nothing is sent to a controller that was not seen ready. They are read
+        again when a query is refused, to name what is missing.
+
+        Raises:
+            NotReadyError: Names the condition.
+        """
+        if not self._was_ready:
+            self.require_ready(request)
+        try:
+            yield
+        except (RejectedError, ControllerFaultError):
+            self.require_ready(request)
+            raise
+
+    def command(self, statement: Statement) -> None:
+        """Run a statement that prints nothing.
+
+        Raises:
+            RejectedError: It was refused and not carried out.
+            ControllerFaultError: It failed and put the controller in error.
+            UnclearAnswerError: The answer says neither.
+        """
+        self.check(statement, self._session.execute(statement))
+
+    def printed(self, query: Statement, *, may_be_nothing: bool = False) -> str:
+        """Run a statement that prints, and return what it printed.
+
+        Args:
+            query: The statement.
+            may_be_nothing: Whether printing nothing is an answer, as for an empty list.
+
+        Raises:
+            RejectedError, ControllerFaultError: As for :meth:`command`.
+        """
+        answer = self._session.execute(query)
+        if isinstance(answer, Reply) and answer.text is not None:
+            # A failed statement may be answered by a text too; the flags would show it.
+            if not answer.text.lstrip().startswith("!"):
+                return answer.text
+        elif isinstance(answer, Reply) and answer.fields == ("0",):
+            if may_be_nothing:
+                return ""
+            raise RemoteProtocolError(
+                tr("{query} printed nothing.", query=query),
+                remedy=tr("This controller's SPEL+ differs from the documented one; report it."),
+                controller=self._session.identity,
+                request=query,
+            )
+        raise self.failure(query, answer, asked=True)
+
+    def check(self, statement: Statement, answer: Reply | Refusal) -> None:
+        """Raise unless ``answer`` says that ``statement`` ran."""
+        if not (isinstance(answer, Reply) and answer.text is None and answer.fields == ("0",)):
+            raise self.failure(statement, answer)
+
+    def failure(
+        self, statement: Statement, answer: Reply | Refusal, *, asked: bool = False
+    ) -> RejectedError | ControllerFaultError | UnclearAnswerError:
+        """Find out what became of ``statement``, which was not answered as it should be.
+
+        Args:
+            statement: What was sent.
+            answer: What came.
+            asked: Whether it only asks, so that nothing is in doubt but its answer.
+        """
+        self._was_ready = False
+        controller = self._session.identity
+        code = answer.code if isinstance(answer, Refusal) else 0
+        # 20 says that a condition is missing; the flags say which (docs/reference/epson.md 1.6).
+        if code in NOT_EXECUTED and code != _NOT_READY and isinstance(answer, Refusal):
+            return rejected(answer, controller=controller, request=statement)
+        status = self.status()
+        if status.fault or status.emergency_stop or status.guard_open or status.serious_fault:
+            return self.fault(status, statement)
+        if code in NOT_EXECUTED and isinstance(answer, Refusal):
+            return rejected(answer, controller=controller, request=statement)
+        if asked:
+            return RejectedError(
+                tr("The controller did not answer {statement!r}.", statement=statement),
+                code=code or status.code,
+                remedy=tr("It said: {answer}.", answer=_shown(answer)),
+                controller=controller,
+                request=statement,
+            )
+        return UnclearAnswerError(
+            tr(
+                "The answer to {statement!r} says neither that it ran nor that it was refused: "
+                "{answer}.",
+                statement=statement,
+                answer=_shown(answer),
+            ),
+            remedy=tr("Nothing was repeated. Read what it should have changed before you go on."),
+            controller=controller,
+            request=statement,
+        )
+
+    def fault(self, status: ControllerStatus, statement: str) -> ControllerFaultError:
+        """Return the error for a controller that stopped ``statement``."""
+        if status.emergency_stop:
+            cause, remedy = tr("the emergency stop was pressed"), tr("Release it, then reset.")
+        elif status.guard_open:
+            cause, remedy = tr("the safety guard was opened"), tr("Close it, then reset.")
+        else:
+            cause = tr("error {code:04d}", code=status.code)
+            text = self.error_text(status.code)
+            cause = f"{cause} ({text})" if text else cause
+            remedy = tr(
+                "Remove the cause, then run 'robolink robot reset'. It can switch outputs off."
+            )
+        return ControllerFaultError(
+            tr(
+                "{statement!r} was ended by the controller: {cause}.",
+                statement=statement,
+                cause=cause,
+            ),
+            code=status.code,
+            remedy=tr("Nothing was repeated. {remedy}", remedy=remedy),
+            controller=self._session.identity,
+            request=statement,
+        )
+
+    def error_text(self, code: int) -> str:
+        """Return the controller's own text for ``code``, empty where it has none.
+
+        GetErrMsg exists on newer firmware only (docs/reference/epson.md 1.8); older ones refuse it.
+        """
+        if not code or (self._session.pending and self._session.pending.answer is None):
+            return ""
+        try:
+            reply = self._session.exchange("GetErrMsg", str(code), "0")
+        except RejectedError:
+            return ""
+        return ",".join(reply.fields).strip()
+
+
+@lru_cache(maxsize=256)
+def _status(reply: Reply) -> ControllerStatus:
+    """Read a status; a poll sees the same few over and over."""
+    return status_from_flags(*parse_status(reply))
+
+
+def _shown(answer: Reply | Refusal) -> str:
+    if isinstance(answer, Refusal):
+        return f"!{answer.name},{answer.code}"
+    said = f'"{answer.text}"' if answer.text is not None else ",".join(answer.fields)
+    return f"#{answer.name},{said}"

@@ -1,0 +1,478 @@
+"""Telling the PLC something, once, and knowing what became of it.
+
+Source: docs/mailbox.md, "When a command counts".
+
+A command goes out with a number that is new, the owner's token, the epoch and the PLC start
+that was met. Its answer counts as ours only when owner, number and opcode are ours; an answer
+to somebody else in its place leaves it unknown. A block is written again in one case only: the
+PLC counts one more damaged block and has acknowledged nothing since. Never after a time-out.
+
+Bringing the axis group behind a mailbox to rest, and knowing that it rests.
+
+Stop (opcode 2003) needs neither ownership nor the machine's permit (docs/mailbox.md, "What ends by
+itself"). Its block is done when the group stands (docs/reference/softmotion.md 2.2). A group that
+is disabled, in error or held by an earlier stop refuses it, and may yet be braking, so there the
+axes themselves are compared.
+"""
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from typing import Final
+
+from robolink import ambient
+from robolink.checkpoints import Checkpoint, checkpoint
+from robolink.controllers.softmotion.answers import (
+    DISPOSSESSED,
+    Ended,
+    command_ended_early,
+    describe,
+    motion_failure,
+    refused,
+)
+from robolink.controllers.softmotion.ownership import Bystanders, Ownership
+from robolink.controllers.softmotion.snapshots import Snapshots
+from robolink.controllers.softmotion.wire import MailboxWire, has_ended
+from robolink.errors import (
+    ConfigError,
+    ControllerError,
+    OutcomeUnknownError,
+    RejectedError,
+    RemoteProtocolError,
+    StoppedError,
+    TransportTimeoutError,
+    UnclearAnswerError,
+)
+from robolink.messages import tr
+from robolink.protocols.mailbox import (
+    OPCODES,
+    Bits,
+    BlockError,
+    Command,
+    CommandState,
+    ErrorClass,
+    Finished,
+    Opcode,
+    Response,
+    Words,
+    encode_command,
+    next_number,
+)
+from robolink.stop_latch import CommandClass
+from robolink.timing import Clock, Deadline
+
+_CLASSES: Final = {
+    Opcode.OWNERSHIP: CommandClass.LOOK,
+    Opcode.READ_TOOL: CommandClass.LOOK,
+    Opcode.READ_INPUT: CommandClass.LOOK,
+    Opcode.STOP: CommandClass.CALM,
+    Opcode.HALT: CommandClass.CALM,
+    Opcode.INTERRUPT: CommandClass.CALM,
+    Opcode.RESET: CommandClass.RESET,
+    Opcode.DISABLE: CommandClass.CALM,
+    Opcode.SELECT_TOOL: CommandClass.RESTORE,
+    Opcode.WRITE_TOOL: CommandClass.WRITE,
+    Opcode.CLEAR_TOOL: CommandClass.WRITE,
+}
+"""Every other opcode acts."""
+
+
+def command_class_of(command: Command) -> CommandClass:
+    """Return what ``command`` does.
+
+    An end of a jog, both masks 0, calms. To release a held stop, 2003 with i0 = 1, is to reset it.
+    """
+    if command.opcode == Opcode.STOP and command.operands[0]:
+        return CommandClass.RESET
+    if command.opcode == Opcode.JOG and not any(command.operands[:2]):
+        return CommandClass.CALM
+    return _CLASSES.get(Opcode(command.opcode), CommandClass.ACT)
+
+
+COMPLETION_S: Final = 10.0
+"""Longest time between the acknowledgement and the end of what is not a movement."""
+
+_WRITES: Final = 3
+_OVERTAKEN: Final = frozenset({Opcode.STOP, Opcode.HALT})
+"""Commands whose end another stop or halt may hide: it does the same, and rest is looked for."""
+
+
+class CommandSender:
+    """Sends commands. Drafts carry no sequence, owner, epoch or boot_id; they are added here.
+
+    Attributes:
+        ownership: Of the mailbox; taken by the first command that needs it.
+
+    Args:
+        wire: The session.
+        snapshots: Reads.
+        bystanders: Who has to do with the ownership besides the PLC.
+    """
+
+    def __init__(
+        self, wire: MailboxWire, snapshots: Snapshots, bystanders: Bystanders | None = None
+    ) -> None:
+        self._wire = wire
+        self._snapshots = snapshots
+        self._lock = ambient.reentrant_lock()
+        self._last = 0
+        self.ownership = Ownership(wire, self._to_end, bystanders or Bystanders())
+
+    def carry_out(self, draft: Command) -> Response:
+        """Send a command that is no movement and return the snapshot that shows its end.
+
+        Raises:
+            RejectedError: The PLC refused it; it did nothing.
+            ControllerFaultError: It was ended before it was done.
+            LeaseHeldError, LeaseLostError: Another client owns the mailbox; nothing was sent.
+            ConfigError: A value does not fit; nothing was sent.
+            TransportError, RemoteProtocolError: The session is over; it may have been done.
+        """
+        with self._wire.uninterrupted():
+            self._possess(draft)
+            end = self._to_end(draft)
+            return self._taken(end)
+
+    def stop(self) -> Callable[[Response], bool]:
+        """Send 2003, and return what tells by a later snapshot whether it is done.
+
+        What it returns raises like :meth:`carry_out`.
+        """
+        with self._wire.uninterrupted():
+            command, now = self._send(Command(0, Opcode.STOP))
+
+        def done(now: Response) -> bool:
+            end = self._end_of(command, now)
+            return end is not None and self._taken(end) is not None
+
+        done(now)
+        return done
+
+    def _taken(self, end: Ended) -> Response:
+        """Return the snapshot of a command that is done; raise for one that is not."""
+        if end.state == CommandState.ERROR:
+            raise self._refusal(end.command, end.now, end.error_class)
+        if end.state == CommandState.ABORTED:
+            raise command_ended_early(end.command)
+        return end.now
+
+    def start(self, draft: Command) -> Command:
+        """Send a movement or a jog and return it as it was accepted; raises like the other.
+
+        Raises:
+            KeyboardInterrupt: Ctrl-C came before a movement was sent; it was not.
+        """
+        # Who begins a movement is there; at most four begin before one has to be waited on.
+        with self._wire.uninterrupted(), self._wire.attended():
+            self._possess(draft)
+            command, now = self._send(draft, ride=draft.opcode != Opcode.JOG)
+            if now.state == CommandState.ERROR:
+                self._wire.motions.forget(command.sequence)
+                raise self._refusal(command, now, now.error_class)
+            # On a slow line the answer took its time; who waits now begins with a whole patience.
+            self._wire.beat()
+            return command
+
+    def motion_failure(self, request: str, now: Response, error_class: int) -> ControllerError:
+        """Return the error for a movement or jog of ours that did not end as it should.
+
+        Where another client took the mailbox over, nothing more is sent that needs it.
+
+        Args:
+            request: The movement in words.
+            now: The snapshot that shows its end.
+            error_class: That of the end.
+        """
+        if error_class in DISPOSSESSED:
+            self.ownership.lose()
+        return motion_failure(request, now, error_class)
+
+    def _possess(self, draft: Command) -> None:
+        if draft.needs_owner:
+            self.ownership.require(describe(draft))
+
+    def _refusal(self, command: Command, now: Response, error_class: int) -> RejectedError:
+        if error_class in DISPOSSESSED and command.opcode != Opcode.OWNERSHIP:
+            self.ownership.lose()
+        return refused(command, now, error_class)
+
+    def _to_end(self, draft: Command) -> Ended:
+        if draft.only_ends:
+            with self._wire.ahead():
+                return self._seen_to_end(draft)
+        return self._seen_to_end(draft)
+
+    def _seen_to_end(self, draft: Command) -> Ended:
+        command, now = self._send(draft)
+        begun_ns = self._wire.clock.now_ns()
+        deadline = Deadline.after(self._wire.clock, COMPLETION_S)
+        while (end := self._end_of(command, now)) is None:
+            if deadline.expired:
+                raise self._wire.ended(
+                    self._silence(
+                        command,
+                        tr("{request!r} began, and has not ended.", request=describe(command)),
+                    )
+                )
+            now = self._snapshots.news(now, begun_ns=begun_ns)
+        return end
+
+    def _end_of(self, command: Command, now: Response) -> Ended | None:
+        if is_own(command, now):
+            if not has_ended(now.state):
+                return None
+            return Ended(command, now.state, now.error_class, now)
+        if _has_taken(command, now):
+            return Ended(command, CommandState.DONE, ErrorClass.NONE, now)
+        if now.ack_owner != command.owner:
+            raise self._wire.ended(self._overtaken(command, now))
+        # Our own stop or halt was accepted after it, from another thread.
+        ends = (end for end in now.finished if end.sequence == command.sequence)
+        end = next((Ended(command, end.state, end.error_class, now) for end in ends), None)
+        if end is None and command.opcode not in _OVERTAKEN:
+            raise self._unseen(command)
+        return end or Ended(command, CommandState.DONE, ErrorClass.NONE, now)
+
+    def _send(self, draft: Command, *, ride: bool = False) -> tuple[Command, Response]:
+        """Write a command and return it with the snapshot that acknowledges it."""
+        request = describe(draft)
+        with self._exchanging(request):
+            before = self._before(draft)
+            self._require_able(draft, before)
+            command = self._addressed(draft, before)
+            words = self._encode(command)
+            if ride and self._wire.interrupted:
+                raise KeyboardInterrupt  # held back until here: nothing begins to move after it
+            if ride:
+                self._wire.motions.begin(command.sequence)
+            for _ in range(_WRITES):
+                try:
+                    self._wire.latch.admit(command_class_of(command), request)
+                    self._wire.write(words)
+                except (RejectedError, StoppedError):
+                    self._wire.motions.forget(command.sequence)
+                    raise
+                try:
+                    before, accepted = self._await_acknowledgement(command, before)
+                except RejectedError:
+                    self._wire.motions.forget(command.sequence)
+                    raise
+                if accepted:
+                    return command, before
+            raise self._wire.ended(
+                RemoteProtocolError(
+                    tr("{request!r} arrived damaged each time.", request=describe(command)),
+                    remedy=tr("Look for a gateway that changes registers, or a bad line."),
+                )
+            )
+
+    def _before(self, draft: Command) -> Response:
+        """Return a snapshot of before a command.
+
+        What ends a movement of ours on a slow line does not wait for one: whoever waited on the
+        movement has read the last one, and beats no more.
+        """
+        if draft.only_ends and self._wire.motions.unfinished and self._wire.whole_look_s > 0:
+            return self._snapshots.latest
+        return self._snapshots.take()
+
+    @contextmanager
+    def _exchanging(self, request: str) -> Iterator[None]:
+        """Hold the lock from the look at the latch to the acknowledgement."""
+        checkpoint(Checkpoint.LOCK, request)
+        try:
+            with self._lock:
+                checkpoint(Checkpoint.HELD, request)
+                yield
+        finally:
+            checkpoint(Checkpoint.EXCHANGE, request)
+
+    def _await_acknowledgement(self, command: Command, before: Response) -> tuple[Response, bool]:
+        """Return the snapshot that shows the acknowledgement, or the damage, of a block."""
+        deadline = Deadline.after(self._wire.clock, self._wire.timeout_s)
+        now = before
+        while True:
+            now = self._snapshots.news(now)
+            if is_own(command, now) or _has_taken(command, now):
+                return now, True
+            if _came_too_early(command, before, now):
+                raise refused(command, now, ErrorClass.BUSY)
+            if (now.ack_head, now.ack_owner) != (before.ack_head, before.ack_owner):
+                raise self._wire.ended(self._overtaken(command, now))
+            if now.rejected != before.rejected:
+                return now, False
+            if deadline.expired:
+                silence = self._silence(
+                    command, tr("{request!r} was not acknowledged.", request=describe(command))
+                )
+                # Something stronger must be able to follow what should have ended a movement.
+                raise silence if command.only_ends else self._wire.ended(silence)
+
+    def _addressed(self, draft: Command, before: Response) -> Command:
+        taken = {before.ack_head, before.active_movement}
+        taken |= {end.sequence for end in before.finished}
+        number = next_number(self._last or before.ack_head)
+        while number in taken or self._wire.motions.holds(number):
+            number = next_number(number)
+        self._last = number
+        return replace(
+            draft,
+            sequence=number,
+            owner=self._wire.owner,
+            epoch=self._wire.epoch,
+            boot_id=before.boot_id,
+        )
+
+    def _encode(self, command: Command) -> Words:
+        try:
+            return encode_command(command, heartbeat=self._wire.next_beat())
+        except BlockError as error:
+            raise ConfigError(
+                tr("{request!r} cannot be sent: {cause}.", request=describe(command), cause=error),
+                remedy=tr("Correct the value; nothing was sent."),
+                controller=self._wire.identity,
+            ) from error
+
+    def _require_able(self, draft: Command, before: Response) -> None:
+        opcode = Opcode(draft.opcode)
+        if OPCODES[opcode].capability not in before.capabilities:
+            raise refused(draft, before, ErrorClass.UNKNOWN_OPCODE)
+
+    def _silence(self, command: Command, said: str) -> TransportTimeoutError:
+        return TransportTimeoutError(
+            said,
+            remedy=tr("Look at the PLC; the command may still be carried out."),
+            request=describe(command),
+        )
+
+    def _unseen(self, command: Command) -> UnclearAnswerError:
+        # Only what a stop ends is kept among the last ends; what had ended before it, well or
+        # not, is not shown any more (docs/mailbox.md, "When a command counts").
+        return UnclearAnswerError(
+            tr("A stop came before the end of {request!r} was read.", request=describe(command)),
+            remedy=tr("Read again what it should have changed."),
+            controller=self._wire.identity,
+            request=describe(command),
+        )
+
+    def _overtaken(self, command: Command, now: Response) -> RemoteProtocolError:
+        return RemoteProtocolError(
+            tr(
+                "The PLC acknowledged command {number} of another client ({owner:08X}) in place of "
+                "{request!r}.",
+                number=now.ack_head,
+                owner=now.ack_owner,
+                request=describe(command),
+            ),
+            remedy=tr("Find the other client; one at a time may command this mailbox."),
+            request=describe(command),
+        )
+
+
+def is_own(command: Command, now: Response) -> bool:
+    """Whether a snapshot acknowledges this very command: owner, number and opcode."""
+    return (now.ack_owner, now.ack_head, now.opcode_echo) == (
+        command.owner,
+        command.sequence,
+        command.opcode,
+    )
+
+
+def _came_too_early(command: Command, before: Response, now: Response) -> bool:
+    """Whether the PLC held a command back, which it then never carries out.
+
+    Source: docs/mailbox.md, "When a command counts".
+
+    Its number was in none of the ends when it was sent, so an end of that number is its own.
+    """
+    early = Finished(command.sequence, CommandState.ERROR, ErrorClass.BUSY)
+    return early in now.finished and early not in before.finished
+
+
+def _has_taken(command: Command, now: Response) -> bool:
+    """Whether a take succeeded although the answer to it is gone already.
+
+    Another client that asked for the mailbox just after it was refused, and the answer to him
+    names the holder and the epoch.
+    """
+    take_command = command.opcode == Opcode.OWNERSHIP and command.operands[0] == 1
+    return (
+        take_command
+        and now.opcode_echo == Opcode.OWNERSHIP
+        and now.ack_owner != command.owner
+        and now.answer.holder == command.owner
+        and now.answer.epoch != 0
+    )
+
+
+REST_S: Final = 5.0
+"""Longest time from the stop to a state that shows rest (docs/reference/rules.md 5)."""
+
+_ALREADY: Final = frozenset({ErrorClass.STOPPING, ErrorClass.DISABLED, ErrorClass.ERRORSTOP})
+_LOOK_S: Final = 0.1
+_STILL: Final = 0.05
+"""An axis that changed by less than this, in its units, in :data:`_LOOK_S` stands: drives hold
+a position within microns and millidegrees, and robolink moves no slower than 1 mm/s."""
+
+
+def bring_group_to_rest(
+    commands: CommandSender, snapshots: Snapshots, clock: Clock, *, controller: str
+) -> Response:
+    """Send 2003 and return a snapshot that shows rest.
+
+    Args:
+        commands: Commands of the mailbox.
+        snapshots: Reads of it.
+        clock: The clock on which the PLC's time passes.
+        controller: Its name in errors.
+
+    Raises:
+        RejectedError: The PLC knows no stop: its program moves nothing.
+        OutcomeUnknownError: The group does not come to rest within :data:`REST_S`.
+        TransportError, RemoteProtocolError: The link is over; whether it stops is not known.
+    """
+    deadline = Deadline.after(clock, REST_S)
+    try:
+        done = commands.stop()
+        now = snapshots.take()
+        while not done(now):
+            if deadline.expired:
+                raise _restless(controller)
+            now = snapshots.news(now)
+        # A stop of another thread that came meanwhile ends ours before the group stands.
+        stands = not now.bits & Bits.BUSY
+    except RejectedError as error:
+        if error.code not in _ALREADY:
+            raise
+        now, stands = snapshots.take(), False
+    # Here, because nothing may stand before the frame of a stop (docs/reference/rules.md 5).
+    from robolink.controllers.softmotion.condition import is_moving
+
+    while is_moving(now) or not stands:
+        if deadline.expired:
+            raise _restless(controller)
+        before, looked = now, Deadline.after(clock, _LOOK_S)
+        while not looked.expired:
+            now = snapshots.news(now, wait_s=looked.remaining_s())
+        stands = stands or _still(before, now)
+    return now
+
+
+def _still(before: Response, now: Response) -> bool:
+    return before.plc_heartbeat != now.plc_heartbeat and all(
+        abs(a - b) < _STILL for a, b in zip(before.axes, now.axes, strict=True)
+    )
+
+
+def _restless(controller: str) -> OutcomeUnknownError:
+    return OutcomeUnknownError(
+        tr(
+            "{controller} was told to stop, but did not show within {seconds:g} s "
+            "that it is at rest.",
+            controller=controller,
+            seconds=REST_S,
+        ),
+        remedy=tr("It may still be moving."),
+        controller=controller,
+        request="Stop",
+    )

@@ -1,0 +1,211 @@
+"""The state of an axis group in the words that all controllers share, and what it forbids."""
+
+from robolink.controllers.softmotion.heartbeat import MOST_LOOK_S
+from robolink.errors import ConfigError, NotReadyError, NotReadyReason
+from robolink.messages import tr
+from robolink.model import ControllerStatus
+from robolink.protocols.mailbox import Bits, GroupState, Response, error_meaning
+
+_MOVING = frozenset({GroupState.MOVING, GroupState.HOMING})
+
+
+def is_moving(now: Response) -> bool:
+    """Whether the group moves, whoever told it to; an interrupted movement stands still."""
+    return now.group_state in _MOVING or bool(now.bits & Bits.JOGGING)
+
+
+def status_of(now: Response) -> ControllerStatus:
+    """Translate a snapshot (docs/mailbox.md).
+
+    ``remote`` is the machine's permit, ``paused`` an interrupted movement or a held stop,
+    ``ready`` a group at rest that could move: enabled, its drives with power. ``code`` is
+    robolink's error class, given in the error state only: elsewhere that word is about the last
+    command.
+    """
+    fault = now.group_state == GroupState.ERRORSTOP
+    powered = bool(now.bits & Bits.POWERED)
+    return ControllerStatus(
+        remote=bool(now.bits & Bits.PERMITTED),
+        ready=now.group_state == GroupState.STANDBY and powered and not is_moving(now),
+        disabled=now.group_state == GroupState.DISABLED,
+        unpowered=not powered,
+        running=is_moving(now),
+        paused=bool(now.bits & Bits.INTERRUPTED) or now.group_state == GroupState.STOPPING,
+        fault=fault,
+        code=now.error_class if fault else 0,
+    )
+
+
+def condition_of(now: Response) -> dict[str, object]:
+    """Return what a snapshot says beyond the flags, plain JSON."""
+    bits = now.bits
+    return {
+        "text": error_meaning(now.error_class) if status_of(now).code else "",
+        "selected_tool": now.tool_slot,
+        "tool_known": is_tool_known(now),
+        "motors_on": now.group_state != GroupState.DISABLED,
+        "powered": bool(bits & Bits.POWERED),
+        "owned": bool(bits & Bits.OWNED),
+        "permitted": bool(bits & Bits.PERMITTED),
+        "simulated": bool(bits & Bits.SIMULATED),
+        "unfinished_movements": now.queue_length,
+    }
+
+
+def require_permit(now: Response, *, controller: str, request: str) -> None:
+    """Hold back what changes something while the machine does not permit it.
+
+    Raises:
+        NotReadyError: The permit (xPermit) is missing.
+    """
+    if not now.bits & Bits.PERMITTED:
+        raise NotReadyError(
+            tr("The machine does not permit it now."),
+            reason=NotReadyReason.NOT_REMOTE,
+            remedy=tr(
+                "The machine's program gives the permit (xPermit); bring it to its service state."
+            ),
+            controller=controller,
+            request=request,
+        )
+
+
+def require_beats(whole_look_s: float, *, controller: str, request: str) -> None:
+    """Hold back what must be kept going on a line that is too slow for it (docs/mailbox.md).
+
+    Args:
+        whole_look_s: How long a look at the response block and a beat take on the line.
+        controller: Its name in the error.
+        request: What is held back.
+
+    Raises:
+        ConfigError: No beat would arrive while the block is read.
+    """
+    if whole_look_s > MOST_LOOK_S:
+        raise ConfigError(
+            tr(
+                "This line is too slow for movements: one reading of the PLC takes "
+                "{look:.2f} s, and a movement is halted after 0.5 s without a sign "
+                "from this computer.",
+                look=whole_look_s,
+            ),
+            remedy=tr(
+                "Nothing was sent. Set the PLC's serial line and baud in the URL to "
+                "9600 or more, or move by Modbus TCP. Tools can still be read, "
+                "written and selected."
+            ),
+            controller=controller,
+            request=request,
+        )
+
+
+def require_still(now: Response, *, controller: str, request: str) -> None:
+    """Hold back what may not happen while the group moves (docs/reference/faults.md F42).
+
+    Raises:
+        NotReadyError: It moves, or an interrupted movement waits to go on.
+    """
+    if is_moving(now):
+        raise NotReadyError(
+            tr("The axis group is moving."),
+            reason=NotReadyReason.RUNNING,
+            remedy=tr("Wait until the movement has ended, or stop it."),
+            controller=controller,
+            request=request,
+        )
+    if now.bits & Bits.INTERRUPTED:
+        raise NotReadyError(
+            tr("An interrupted movement is waiting to continue."),
+            reason=NotReadyReason.PAUSED,
+            remedy=tr("Let it continue to its end, or halt it."),
+            controller=controller,
+            request=request,
+        )
+
+
+def is_tool_known(now: Response) -> bool:
+    """Whether the axis group works with the tool that the mailbox set last."""
+    return bool(now.bits & Bits.TOOL_KNOWN)
+
+
+def require_tool_known(now: Response, *, controller: str, request: str) -> None:
+    """Hold back a movement whose tip the mailbox cannot vouch for (docs/reference/faults.md F44).
+
+    Raises:
+        NotReadyError: The machine's own program has set another tool than the selected slot's.
+    """
+    if not is_tool_known(now):
+        raise NotReadyError(
+            tr(
+                "Slot {slot} is selected, but the machine has given the axis group another tool.",
+                slot=now.tool_slot,
+            ),
+            reason=NotReadyReason.WRONG_TOOL,
+            remedy=tr(
+                "Nothing was moved. Select tool {slot} again, or find out which program sets the "
+                "group's tool.",
+                slot=now.tool_slot,
+            ),
+            controller=controller,
+            request=request,
+        )
+
+
+def require_enabled(now: Response, *, controller: str, request: str) -> None:
+    """Hold back what an axis group in this state would refuse.
+
+    Source: docs/reference/softmotion.md 1.1, 2.2.
+
+    Raises:
+        NotReadyError: It is in its error state, disabled, or held by a stop.
+    """
+    found = _obstacle(now)
+    if found is not None:
+        reason, what, remedy = found
+        raise NotReadyError(
+            what,
+            reason=reason,
+            code=status_of(now).code,
+            remedy=remedy,
+            controller=controller,
+            request=request,
+        )
+
+
+def _obstacle(now: Response) -> tuple[NotReadyReason, str, str] | None:
+    if now.group_state == GroupState.ERRORSTOP:
+        return (
+            NotReadyReason.FAULT,
+            tr("The axis group is in its error state."),
+            tr("Remove the cause, then run 'robolink robot reset'."),
+        )
+    if now.group_state == GroupState.STOPPING:
+        return (
+            NotReadyReason.PAUSED,
+            tr("The axis group is held by a stop."),
+            tr("Run 'robolink robot reset' to release the stop when the cell is clear."),
+        )
+    if now.group_state == GroupState.DISABLED:
+        return (
+            NotReadyReason.MOTORS_OFF,
+            tr("The axis group is disabled."),
+            tr("Run 'robolink robot motors on' when the cell is clear."),
+        )
+    return None
+
+
+def require_power(now: Response, *, controller: str, request: str) -> None:
+    """Hold back a movement while a drive has no power.
+
+    Raises:
+        NotReadyError: It has none. Enabling the group does not switch it on
+            (docs/reference/softmotion.md 2.2).
+    """
+    if not now.bits & Bits.POWERED:
+        raise NotReadyError(
+            tr("The drives of the axis group have no power."),
+            reason=NotReadyReason.MOTORS_OFF,
+            remedy=tr("The PLC's program switches them on (MC_Power)."),
+            controller=controller,
+            request=request,
+        )

@@ -1,0 +1,301 @@
+"""The axis group behind one mailbox: where its tip is, and how it is told to move."""
+
+import math
+
+from robolink.controllers.motion_group import MotionGroupCore
+from robolink.controllers.softmotion.answers import describe
+from robolink.controllers.softmotion.commands import bring_group_to_rest
+from robolink.controllers.softmotion.condition import (
+    require_beats,
+    require_enabled,
+    require_permit,
+    require_power,
+    require_still,
+    require_tool_known,
+)
+from robolink.controllers.softmotion.io import SoftMotionIo
+from robolink.controllers.softmotion.jog import Jog, JogWatch
+from robolink.controllers.softmotion.mailbox import Mailbox
+from robolink.controllers.softmotion.movement import (
+    LATCH_CYCLE_S,
+    SoftMotionMotion,
+    SoftMotionMotionUntilInput,
+    dynamics_of,
+    run_up_mm,
+    up_to_an_edge,
+)
+from robolink.errors import ConfigError, ControllerError, ReadBackError, StoppedError
+from robolink.messages import tr
+from robolink.model import InputEdge, MotionProfile, MotionTerms, Path, Pose, WorkBox
+from robolink.protocols.mailbox import (
+    BufferMode,
+    Command,
+    CoordinateSystem,
+    GroupState,
+    Opcode,
+    Response,
+    Six,
+    to_frame,
+)
+
+
+class SoftMotionGroup(MotionGroupCore):
+    """One axis group. Its poses are those of the selected tool in the machine frame (MCS)."""
+
+    def __init__(self, mailbox: Mailbox) -> None:
+        super().__init__(mailbox)
+        self._mailbox = mailbox
+        self._current: list[SoftMotionMotion] = []
+
+    @property
+    def name(self) -> str:
+        """``axis group``: a mailbox serves one."""
+        return "axis group"
+
+    def pose(self) -> Pose:
+        """Read where the tip of the selected tool is now."""
+        now = self._mailbox.snapshots.take()
+        return self._mailbox.pose(now.tcp, tool=now.tool_slot)
+
+    def axes(self) -> dict[str, tuple[float, ...]]:
+        """Read the axes of the machine, in the PLC's units and degrees."""
+        now = self._mailbox.snapshots.take()
+        return {"axes": now.axes[: now.axis_count]}
+
+    def require_able(self, purpose: str) -> None:
+        """Refuse what no movement could begin in now; see :class:`robolink.model.MotionGroup`."""
+        identity = self._mailbox.identity
+        require_beats(self._mailbox.wire.whole_look_s, controller=identity, request=purpose)
+        now = self._mailbox.snapshots.take()
+        require_permit(now, controller=identity, request=purpose)
+        require_enabled(now, controller=identity, request=purpose)
+        require_power(now, controller=identity, request=purpose)
+
+    def terms(self) -> MotionTerms:
+        """Read what a person must know before the group moves."""
+        return MotionTerms(
+            tr("The axis group of {identity}", identity=self._mailbox.identity),
+            tr("The PLC halts it if this computer falls silent for half a second."),
+            tr("The machine permits movements by this computer"),
+        )
+
+    def motors_on(self) -> bool:
+        """Read whether the group is enabled."""
+        return self._mailbox.snapshots.take().group_state != GroupState.DISABLED
+
+    def enable(self) -> None:
+        """Enable the group and prove it; the drives are switched by the PLC's program.
+
+        Raises:
+            RejectedError: The PLC refused it.
+            ReadBackError: It is still disabled.
+        """
+        self._switch(Opcode.ENABLE, enabled=True)
+
+    def disable(self) -> None:
+        """Disable the group, which must stand still, and prove it; raises like :meth:`enable`."""
+        self._switch(Opcode.DISABLE, enabled=False)
+
+    def move_to(self, target: Pose, profile: MotionProfile, *, box: WorkBox) -> SoftMotionMotion:
+        """Start one movement; see :class:`robolink.model.MotionGroup`.
+
+        Wait on it: without the beats of ``wait`` the PLC halts it after half a second. Up to
+        four may be under way, each beginning where the one before it ended.
+
+        Raises:
+            BusyError: The ends of four movements are not taken yet.
+        """
+        box.check(target)
+        return self._start(target, self._move_draft(target, profile))
+
+    def requests_for(self, target: Pose, profile: MotionProfile) -> tuple[str, ...]:
+        """Return what :meth:`move_to` would send besides its reads, in words."""
+        return (describe(self._move_draft(target, profile)),)
+
+    def move_until_input(
+        self, target: Pose, edge: InputEdge, *, speed_mm_s: float, box: WorkBox
+    ) -> SoftMotionMotionUntilInput:
+        """Start a straight movement until an input switches (opcode 30008); see the model."""
+        box.check(target)
+        draft = self._until_draft(target, edge, speed_mm_s)
+        on = SoftMotionIo(self._mailbox).read_input(edge.number)
+        edge.require_ahead(on, controller=self._mailbox.identity, request=describe(draft))
+        return SoftMotionMotionUntilInput(self._start(target, draft), self._mailbox)
+
+    def requests_until(
+        self, target: Pose, edge: InputEdge, *, speed_mm_s: float
+    ) -> tuple[str, ...]:
+        """Return what :meth:`move_until_input` would send besides its reads, in words."""
+        return (describe(self._until_draft(target, edge, speed_mm_s)),)
+
+    def run_up_mm(self, speed_mm_s: float) -> float:
+        """Return the way of the acceleration and jerk that such a movement is sent with."""
+        return run_up_mm(speed_mm_s)
+
+    def edge_step_mm(self, speed_mm_s: float) -> float:
+        """Return how far it goes in a cycle: where it sees an edge is noted once a cycle."""
+        return speed_mm_s * LATCH_CYCLE_S
+
+    def jog(self, jog: Jog, *, duration_s: float, box: WorkBox) -> Pose:
+        """Jog for a time, bring the group to rest, and return where the tip is then.
+
+        Raises:
+            LimitError: The tip came out of the box; the jog was ended there.
+            OutcomeUnknownError: Something earlier is unsettled, or no answer came.
+        """
+        watch = JogWatch(self._mailbox, jog, box)
+        with self._mailbox.lock.held(watch.request):
+            self._require_startable(watch.draft, watch.request)
+            return watch.run(duration_s)
+
+    def stop(self) -> None:
+        """Stop and hold; may be called from any thread, at any time, more than once.
+
+        Until ``release_stop`` nothing acts from here, and until ``reset_fault`` nothing moves.
+
+        Raises:
+            OutcomeUnknownError: The group did not come to rest in time.
+        """
+        mailbox = self._mailbox
+        with mailbox.latch.stopping():
+            bring_group_to_rest(
+                mailbox.commands, mailbox.snapshots, mailbox.clock, controller=mailbox.identity
+            )
+
+    def halt(self) -> None:
+        """Bring the group to rest, ending every movement; it may be moved again at once."""
+        self._mailbox.commands.carry_out(Command(0, Opcode.HALT))
+
+    def interrupt(self) -> None:
+        """Bring the movement to rest on its path; :meth:`resume` lets it go on."""
+        self._mailbox.commands.carry_out(Command(0, Opcode.INTERRUPT))
+
+    def resume(self) -> None:
+        """Let the interrupted movement go on; somebody must be waiting on it.
+
+        Raises:
+            OutcomeUnknownError: Something earlier is unsettled, or no answer came.
+        """
+        draft = Command(0, Opcode.CONTINUE)
+        request = describe(draft)
+        mailbox = self._mailbox
+        require_beats(mailbox.wire.whole_look_s, controller=mailbox.identity, request=request)
+        self._require_settled(request)
+        mailbox.prepare(draft, request)
+        with mailbox.markers.doubt(request):
+            mailbox.commands.carry_out(draft)
+
+    def abort_unfinished(self) -> None:
+        """Halt what was sent here and not seen to its end."""
+        for motion in self._current:
+            if not motion.settled:
+                motion.abort()
+
+    def _start(self, target: Pose, draft: Command) -> SoftMotionMotion:
+        """Start a movement that lies inside the limits; see the model."""
+        mailbox, request = self._mailbox, describe(draft)
+        try:
+            with mailbox.lock.held(request):
+                mailbox.wire.motions.require_room(request, controller=mailbox.identity)
+                now = self._require_startable(draft, request)
+                require_tool_known(now, controller=mailbox.identity, request=request)
+                with mailbox.uninterrupted():
+                    motion = self._started(target, draft, now.tool_slot)
+                    self._current = [*(m for m in self._current if not m.settled), motion]
+                return motion
+        except (KeyboardInterrupt, StoppedError):
+            # Nobody will be given this motion to wait on.
+            self.abort_unfinished()
+            raise
+
+    def _started(self, target: Pose, draft: Command, selected: int) -> SoftMotionMotion:
+        mailbox, request = self._mailbox, describe(draft)
+        marker = self._marked(target, request, selected=selected)
+        with mailbox.markers.doubt(request):
+            try:
+                command = mailbox.commands.start(draft)
+            except (ControllerError, ConfigError, StoppedError, KeyboardInterrupt):
+                mailbox.markers.clear(marker)  # it was not sent, or refused
+                raise
+        return SoftMotionMotion(target, command, marker, mailbox)
+
+    def _require_startable(self, draft: Command, request: str) -> Response:
+        """Hold back what may not start now; see the room ``link``.
+
+        Raises:
+            ConfigError: The line is too slow for any movement.
+            NotReadyError: The group, its drives, the machine or another movement forbid it.
+            OutcomeUnknownError: Something earlier is unsettled.
+            LeaseHeldError, LeaseLostError: Another client owns the mailbox.
+        """
+        mailbox = self._mailbox
+        require_beats(mailbox.wire.whole_look_s, controller=mailbox.identity, request=request)
+        self._require_settled(request)
+        now = mailbox.prepare(draft, request)
+        require_enabled(now, controller=mailbox.identity, request=request)
+        require_power(now, controller=mailbox.identity, request=request)
+        if not mailbox.wire.motions.unfinished:
+            require_still(now, controller=mailbox.identity, request=request)
+        return now
+
+    def _require_settled(self, request: str) -> None:
+        """Hold ``request`` back, before the mailbox is taken, while something is unsettled."""
+        # The markers of our own movements under way do not count; what was open before the
+        # first of them would have held that one back.
+        if not self._mailbox.wire.motions.unread:
+            self._mailbox.markers.require_settled(request)
+
+    def _move_draft(self, target: Pose, profile: MotionProfile) -> Command:
+        joint = profile.path is Path.JOINT
+        return Command(
+            0,
+            Opcode.MOVE_DIRECT if joint else Opcode.MOVE_LINEAR,
+            operands=(0, 0, CoordinateSystem.MCS, BufferMode.BUFFERED),
+            pose=self._frame(target),
+            dynamics=dynamics_of(profile, unit_um=self._mailbox.unit_um),
+        )
+
+    def _until_draft(self, target: Pose, edge: InputEdge, speed_mm_s: float) -> Command:
+        if edge.number < 1:
+            raise ConfigError(
+                tr("There is no input {number}.", number=edge.number),
+                remedy=tr("The PLC's inputs count from 1."),
+            )
+        signed = -edge.number if edge.falling else edge.number
+        return Command(
+            0,
+            Opcode.MOVE_UNTIL_INPUT,
+            operands=(signed, int(edge.run_on), CoordinateSystem.MCS, BufferMode.BUFFERED),
+            pose=self._frame(target),
+            dynamics=up_to_an_edge(speed_mm_s, unit_um=self._mailbox.unit_um),
+        )
+
+    def _frame(self, target: Pose) -> Six:
+        if target.local:
+            raise ConfigError(
+                tr("The target is in local {local}; a PLC has no locals.", local=target.local),
+                remedy=tr("Give it in the base frame."),
+            )
+        if not all(map(math.isfinite, target.coordinates())):
+            raise ConfigError(
+                tr("The target holds something that is not a number."),
+                remedy=tr("Give finite decimal numbers."),
+            )
+        return to_frame(target.coordinates(), unit_um=self._mailbox.unit_um)
+
+    def _switch(self, opcode: Opcode, *, enabled: bool) -> None:
+        mailbox, draft = self._mailbox, Command(0, opcode)
+        request = describe(draft)
+        with mailbox.lock.held(request, calming=not enabled):
+            if self.motors_on() is enabled:
+                return
+            now = mailbox.prepare(draft, request)
+            require_still(now, controller=mailbox.identity, request=request)
+            mailbox.commands.carry_out(draft)
+            if self.motors_on() is not enabled:
+                raise ReadBackError(
+                    tr("The axis group did not change its state."),
+                    remedy=tr("Look at the PLC; nothing was repeated."),
+                    controller=mailbox.identity,
+                    request=request,
+                )

@@ -1,0 +1,178 @@
+"""Two heartbeats: whether the PLC's motion task still runs, and when ours is due.
+
+Whose turn it is on the wire: the beat of who waits on a movement goes before everything.
+
+A link carries one exchange at a time, and on a slow serial line one read of the response block
+takes a quarter of a second (docs/reference/softmotion.md 4.2). A thread that reads and reads would
+keep the waiter from beating for longer than the PLC bears. So while somebody waits on a movement,
+every other thread is let in by the waiter alone: one exchange, just after a beat, before the
+waiter's own. Then no two exchanges lie between two beats.
+"""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import TracebackType
+from typing import Final
+
+from robolink import ambient
+from robolink.protocols.mailbox import heartbeat_word
+from robolink.timing import NS_PER_S
+
+FROZEN_S: Final = 1.0
+"""A motion task counts every few milliseconds; after this long without a count it is dead."""
+
+BUSY_BEAT_S: Final = 0.05
+"""Between beats while something moves: the PLC halts it after 0.5 s without one.
+
+The rest of that half second is for a computer that has something else to do.
+"""
+
+MOST_LOOK_S: Final = 0.4
+"""Where the line alone takes longer for a whole look and a beat, nothing may move: there is no
+beat within the PLC's 0.5 s, of which the PLC itself and the adapters need the rest."""
+
+IDLE_BEAT_S: Final = 1.0
+"""Between beats otherwise: an owner that is silent for 10 s may be displaced."""
+
+
+class PlcHeartbeat:
+    """Notes the PLC's heartbeat wherever it is read."""
+
+    def __init__(self) -> None:
+        self._count = -1
+        self._since_ns = 0
+        self._looks = 0
+
+    def note(self, count: int, now_ns: int) -> None:
+        """Take what was read just now."""
+        if count != self._count:
+            self._count, self._since_ns, self._looks = count, now_ns, 0
+        self._looks += 1
+
+    def frozen(self, now_ns: int) -> bool:
+        """Whether the count has stood still under close observation.
+
+        Two equal counts far apart prove nothing: the counter wraps.
+        """
+        return self._looks > 2 and now_ns - self._since_ns >= FROZEN_S * NS_PER_S
+
+
+class ClientHeartbeat:
+    """Makes the client's heartbeat words."""
+
+    def __init__(self) -> None:
+        self._count = 0
+        self._last_ns: int | None = None
+
+    def due(self, now_ns: int, *, busy: bool, ahead: bool = False) -> bool:
+        """Whether it is time for the next word.
+
+        Args:
+            now_ns: The time.
+            busy: Whether something moves.
+            ahead: Whether an exchange follows that takes a good part of the PLC's patience.
+        """
+        period_s = (0.0 if ahead else BUSY_BEAT_S) if busy else IDLE_BEAT_S
+        return self._last_ns is None or now_ns - self._last_ns >= period_s * NS_PER_S
+
+    def word(self, epoch: int, now_ns: int) -> int:
+        """Return the next word of the owner of ``epoch``."""
+        self._last_ns = now_ns
+        self._count += 1
+        return heartbeat_word(epoch, self._count)
+
+    def again(self, epoch: int) -> int:
+        """Return the last word once more, which is no sign of life; 0 would be an end."""
+        return heartbeat_word(epoch, self._count)
+
+
+_PATIENCE_S: Final = 1.0
+"""Longest time without a sign of the waiter: the PLC has ended by then what moved."""
+
+_LONGEST_EXCHANGE_S: Final = 10.0
+"""Longest time in which an exchange of another thread ends; a link's own deadline is shorter."""
+
+
+class Turns:
+    """Lets threads onto the wire. That one exchange follows another is the link's own lock.
+
+    A ``with`` block is one exchange.
+    """
+
+    def __init__(self) -> None:
+        self._changed = ambient.waiting_room()
+        self._waiters = 0
+        self._waiting = 0
+        self._let_in = 0
+        self._inside = 0
+        self._sign_s = 0.0
+
+    @property
+    def waited_on(self) -> bool:
+        """Whether somebody waits on a movement."""
+        return bool(self._waiters)
+
+    @contextmanager
+    def kept(self) -> Iterator[None]:
+        """Have the say over who comes in, for as long as this thread waits on a movement."""
+        counted = False
+        try:
+            with self._changed:
+                self._waiters += 1
+                counted = True
+                self._sign_s = _now_s()
+                # Ctrl-C may end this wait.
+                self._changed.wait_for(self._nobody_inside, _LONGEST_EXCHANGE_S)
+            yield
+        finally:
+            if counted:
+                with self._changed:
+                    self._waiters -= 1
+                    self._changed.notify_all()
+
+    def let_one_in(self) -> bool:
+        """Let another thread have one exchange and wait for its end; False when none wants it."""
+        with self._changed:
+            self._sign_s = _now_s()
+            if not self._waiting:
+                return False
+            self._let_in = 1
+            self._changed.notify_all()
+            self._changed.wait_for(self._nobody_inside, _LONGEST_EXCHANGE_S)
+            self._sign_s = _now_s()
+            return True
+
+    # Not as a generator: every exchange comes here, and would pay for it.
+    def __enter__(self) -> None:
+        """Wait until the waiter, if there is one, lets this thread in for one exchange."""
+        with self._changed:
+            self._waiting += 1
+            try:
+                # Real time: a clock that stands still would keep this thread out for ever.
+                while self._waiters and not self._let_in:
+                    left_s = self._sign_s + _PATIENCE_S - _now_s()
+                    if left_s <= 0:
+                        break
+                    self._changed.wait(left_s)
+            finally:
+                self._waiting -= 1
+            self._let_in = 0
+            self._inside += 1
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        """Let the next one onto the wire."""
+        with self._changed:
+            self._inside -= 1
+            self._changed.notify_all()
+
+    def _nobody_inside(self) -> bool:
+        return not self._inside and not (self._let_in and self._waiting)
+
+
+def _now_s() -> float:
+    return ambient.monotonic_ns() / NS_PER_S

@@ -1,1 +1,0 @@
-"""One session on a PLC mailbox: snapshots read, commands sent, rest seen."""

@@ -1,0 +1,213 @@
+"""What every part of this driver works with: one mailbox, its commands and its markers.
+
+Which PLC answers: the number that it drew once, the same on every link.
+
+Source: docs/mailbox.md, "Which PLC this is".
+"""
+
+import math
+from collections.abc import Callable
+from typing import Final, Protocol
+
+from robolink import ambient
+from robolink.controllers.driver_link import DriverLink
+from robolink.controllers.softmotion.commands import CommandSender
+from robolink.controllers.softmotion.condition import require_permit
+from robolink.controllers.softmotion.ownership import Bystanders
+from robolink.controllers.softmotion.snapshots import Snapshots
+from robolink.controllers.softmotion.wire import MailboxWire
+from robolink.errors import RejectedError, RemoteProtocolError
+from robolink.messages import tr
+from robolink.model import Identity, OutcomeLog, Pose, ToolOffset, of_no_tool
+from robolink.protocols.mailbox import (
+    Bits,
+    Command,
+    Response,
+    Six,
+    Slot,
+    decode_device_id,
+    frames_match,
+    from_frame,
+    to_frame,
+)
+from robolink.timing import SteppedClock
+
+_READS: Final = 3
+"""A PLC may be drawing its number just while it is read for the first time."""
+
+
+class DeviceReading(Protocol):
+    """A :class:`robolink.transport.MailboxLink`, as far as it is needed here."""
+
+    def read_device(self) -> tuple[int, ...]:
+        """Return the words of the device block."""
+
+
+def read_device_id(link: DeviceReading) -> int | None:
+    """Return the number of the PLC behind a link; it changes nothing.
+
+    Returns:
+        ``None`` when its mailbox program has no such number: such a PLC can be known by its
+        address only.
+
+    Raises:
+        TransportError, RemoteProtocolError: The link failed.
+    """
+    for _ in range(_READS):
+        try:
+            words = link.read_device()
+        except RejectedError:  # there is nothing at that place
+            return None
+        device_id = decode_device_id(words)
+        if device_id is not None or not any(words[:2]):
+            return device_id
+    return None
+
+
+def identity_of(wire: MailboxWire, device_id: int | None) -> Identity:
+    """Return who a PLC is, the same over each medium (docs/mailbox.md, "Which PLC this is").
+
+    Args:
+        wire: The session.
+        device_id: What it said when it was met; ``None`` for a program of before that number,
+            which is known by its address.
+    """
+    place = f"softmotion@{wire.place}"
+    name = place if device_id is None else f"softmotion:{device_id:08X}"
+    return Identity(name, wire.identity, place)
+
+
+TOLERANCE = 1e-9
+"""Two LREALs this near are equal: user units, and elements of a rotation matrix
+(docs/reference/rules.md 3)."""
+
+ROUNDED_TILT_DEG = 1e-6
+"""A smaller tilt is what a PLC's arithmetic leaves: 0.02 um at the end of a tool of 1 m."""
+
+
+class Mailbox(DriverLink):
+    """One PLC mailbox that was met.
+
+    Attributes:
+        wire: The session.
+        snapshots: Reads.
+        commands: Commands.
+        device_id: The number of the PLC, the same on every link; ``None`` where it has none.
+    """
+
+    def __init__(
+        self,
+        wire: MailboxWire,
+        snapshots: Snapshots,
+        outcomes: OutcomeLog,
+        *,
+        device_id: int | None,
+        tell: Callable[[str], None] = lambda _sentence: None,
+    ) -> None:
+        self.wire = wire
+        self.device_id = device_id
+        outcomes.ask(lambda: identity_of(wire, device_id))
+        self.snapshots = snapshots
+        self.commands = CommandSender(wire, snapshots, Bystanders(outcomes, tell))
+        super().__init__(wire.identity, wire.clock, wire.latch, outcomes, gate=wire.uninterrupted())
+
+    @property
+    def waited_on(self) -> bool:
+        """Whether a thread of this process waits on a movement or keeps a jog going."""
+        return self.wire.waited_on
+
+    @property
+    def simulated(self) -> bool:
+        """Whether the last snapshot said that the axes are simulated."""
+        return bool(self.snapshots.latest.bits & Bits.SIMULATED)
+
+    def show_life(self) -> None:
+        """Beat for the ownership alone: nothing while a movement or jog is unfinished."""
+        # Time that only a test lets pass goes on for nobody beside it.
+        if ambient.steps_time() or not isinstance(self.clock, SteppedClock):
+            self.wire.beat_at_rest()
+
+    @property
+    def unit_um(self) -> float:
+        """Micrometres in one of the PLC's units of length."""
+        return self.snapshots.met.unit_um
+
+    def prepare(self, draft: Command, request: str, *, now: Response | None = None) -> Response:
+        """Make sure that a command may be sent: the permit is there and the mailbox ours.
+
+        It is done before a marker is begun: what fails here was never sent.
+
+        Args:
+            draft: The command.
+            request: The same in words.
+            now: A snapshot that was taken just now; by default another one is taken.
+
+        Raises:
+            NotReadyError: The machine does not permit it.
+            LeaseHeldError, LeaseLostError: Another client owns the mailbox.
+        """
+        now = now or self.snapshots.take()
+        if draft.needs_permit:
+            require_permit(now, controller=self.identity, request=request)
+        if draft.needs_owner:
+            self.commands.ownership.require(request)
+        return now
+
+    def same(self, a: ToolOffset | None, b: ToolOffset | None) -> bool:
+        """Tell whether this PLC holds both alike; rotations are compared as matrices."""
+        if a is None or b is None:
+            return a is b
+        return a == b or frames_match(self.to_plc(a), self.to_plc(b), tolerance=TOLERANCE)
+
+    def to_plc(self, offset: ToolOffset) -> Six:
+        """Return a tool in the PLC's units and angles."""
+        return to_frame(offset.components(), unit_um=self.unit_um)
+
+    def from_plc(self, frame: Six) -> ToolOffset:
+        """Return a tool that came from the PLC."""
+        return ToolOffset(*self.coordinates(frame))
+
+    def tool_in(self, slot: Slot) -> ToolOffset | None:
+        """Return what a slot holds, ``None`` when it is empty.
+
+        Values of no tool come as they are: an angle of 1e200 degrees made a rotation would look
+        like one that somebody meant.
+        """
+        if not slot.defined:
+            return None
+        tool = self.from_plc(slot.tool)
+        return ToolOffset(*slot.tool) if of_no_tool(slot.tool) else tool
+
+    def pose(self, frame: Six, *, tool: int | None) -> Pose:
+        """Return where a frame that the PLC tells is, without the tilt that is mere rounding.
+
+        A kinematics that cannot tilt works out its orientation all the same, and not every one
+        ends at exactly 0; what only serves an upright flange asks for exactly that.
+
+        Args:
+            frame: As the mailbox carries it.
+            tool: Whose frame it is, where that is known.
+
+        Raises:
+            RemoteProtocolError: A number in it is not finite.
+        """
+        x_mm, y_mm, z_mm, u_deg, v_deg, w_deg = self.coordinates(frame)
+        if max(abs(v_deg), abs(w_deg)) < ROUNDED_TILT_DEG:
+            v_deg = w_deg = 0.0
+        return Pose(x_mm, y_mm, z_mm, u_deg, v_deg, w_deg, tool=tool)
+
+    def coordinates(self, frame: Six) -> Six:
+        """Return x, y, z in mm and u, v, w in degrees of a frame from the PLC.
+
+        Raises:
+            RemoteProtocolError: A number in it is not finite.
+        """
+        x, y, z, *_ = frame
+        if not all(map(math.isfinite, (*frame, *(v * self.unit_um for v in (x, y, z))))):
+            raise self.wire.ended(
+                RemoteProtocolError(
+                    tr("{identity} sent a position that is not a number.", identity=self.identity),
+                    remedy=tr("Look at the PLC's axes and kinematics, then connect again."),
+                )
+            )
+        return from_frame(frame, unit_um=self.unit_um)

@@ -1,1 +1,0 @@
-"""Moving the axis group behind a mailbox."""

@@ -1,0 +1,319 @@
+"""A movement of an axis group: accepted by the PLC, waited on here with a beating heart.
+
+How fast: the four numbers that go with a movement or a jog.
+
+Source: docs/reference/softmotion.md 2.3.
+"""
+
+import math
+from contextlib import suppress
+from typing import Final
+
+from robolink.controllers.motion_group import stopped_before_edge
+from robolink.controllers.softmotion.answers import describe
+from robolink.controllers.softmotion.commands import is_own
+from robolink.controllers.softmotion.condition import is_moving
+from robolink.controllers.softmotion.mailbox import Mailbox
+from robolink.controllers.softmotion.snapshots import LOOK_S
+from robolink.errors import (
+    ConfigError,
+    ControllerFaultError,
+    MotionTimeoutError,
+    RejectedError,
+    RemoteProtocolError,
+    TransportTimeoutError,
+)
+from robolink.messages import tr
+from robolink.model import Marker, MotionOutcome, MotionProfile, Path, Pose
+from robolink.protocols.mailbox import Command, CommandState, ErrorClass, Finished, Four, Opcode
+from robolink.timing import Deadline
+
+_REST_S = 1.0
+"""Longest time between the end of a movement and the rest of its group."""
+
+_LOOKS_APART = 10
+"""Whole looks, in the time that one takes on the line, while nothing is new."""
+
+_HALT_S = 10.0
+"""Longest time in which a halt brings a group to rest."""
+
+
+class SoftMotionMotion:
+    """A movement under way. Wait on it: the PLC halts a movement on which nobody waits.
+
+    Attributes:
+        target: Where it goes.
+        command: What was sent, with its number.
+    """
+
+    def __init__(self, target: Pose, command: Command, marker: Marker, mailbox: Mailbox) -> None:
+        self.target = target
+        self.command = command
+        self._marker = marker
+        self._mailbox = mailbox
+        self._request = describe(command)
+        self._halted = False
+        self._end: Finished | None = None
+
+    @property
+    def settled(self) -> bool:
+        """Whether its end was seen and taken."""
+        return self._end is not None
+
+    def wait(self, *, timeout_s: float) -> MotionOutcome:
+        """Wait for the end; see :class:`robolink.model.Motion`.
+
+        Raises:
+            StoppedError: A stop came, whatever the movement did.
+        """
+        with self._mailbox.wire.latch.ending(self._request):
+            end = self.await_end(timeout_s)
+            if end.state == CommandState.DONE:
+                return MotionOutcome.ARRIVED
+            return self._stopped(end)
+
+    def abort(self) -> None:
+        """Halt the group once and await the end of the movement.
+
+        Raises:
+            OutcomeUnknownError: No end was seen; the marker stays.
+        """
+        mailbox = self._mailbox
+        with (
+            mailbox.uninterrupted(),
+            mailbox.markers.doubt(self._request),
+            mailbox.wire.attended(),
+        ):
+            if self._end is None and mailbox.wire.motions.end_of(self.command.sequence) is None:
+                self._halted = True
+                # It may have just ended by itself, or by a stop; its end is awaited. A stop that is
+                # under way ends it too, and a halt after it would only hide the end of the stop.
+                if not mailbox.wire.latch.closed:
+                    with suppress(RejectedError, ControllerFaultError):
+                        mailbox.commands.carry_out(Command(0, Opcode.HALT))
+            if not self._watch(Deadline.after(mailbox.wire.clock, _HALT_S)):
+                raise mailbox.wire.ended(
+                    TransportTimeoutError(
+                        tr("The PLC did not finish {request!r}.", request=self._request),
+                        remedy=tr("Press the emergency stop if the robot still moves."),
+                        request=self._request,
+                    )
+                )
+            self._take_end()
+        self._await_rest()
+
+    def await_end(self, timeout_s: float) -> Finished:
+        """Wait for the end, whatever it is; raises like :meth:`wait` but for how it ended."""
+        mailbox = self._mailbox
+        if self._end is not None:
+            return self._end
+        try:
+            with mailbox.markers.doubt(self._request), mailbox.wire.attended():
+                ended = self._watch(Deadline.after(mailbox.wire.clock, timeout_s))
+        except KeyboardInterrupt:
+            self.abort()
+            raise
+        if not ended:
+            self.abort()
+            raise MotionTimeoutError(
+                tr(
+                    "{request!r} did not end within {timeout_s:.0f} s and was halted.",
+                    request=self._request,
+                    timeout_s=timeout_s,
+                ),
+                remedy=tr("Read where the robot is ('robolink robot where') before you go on."),
+                controller=mailbox.identity,
+                request=self._request,
+            )
+        end = self._take_end()
+        self._await_rest()
+        return end
+
+    def _stopped(self, end: Finished) -> MotionOutcome:
+        if end.state == CommandState.ABORTED and (
+            self._halted or end.error_class == ErrorClass.NONE
+        ):
+            return MotionOutcome.STOPPED
+        now = self._mailbox.snapshots.take()
+        error = self._mailbox.commands.motion_failure(self._request, now, end.error_class)
+        error.controller = self._mailbox.identity
+        raise error
+
+    def _watch(self, deadline: Deadline) -> bool:
+        """Beat and look until the end is known; False when the deadline passes first."""
+        mailbox, sequence = self._mailbox, self.command.sequence
+        if self.settled:
+            return True
+        begun_ns = mailbox.wire.clock.now_ns()
+        slow = mailbox.wire.whole_look_s > 0
+        # On a slow line the block that showed its acceptance, or a later one, has to do.
+        now = mailbox.snapshots.latest if slow else mailbox.snapshots.take()
+        while mailbox.wire.motions.end_of(sequence) is None:
+            if mailbox.wire.motions.missing(sequence, now):
+                raise mailbox.wire.ended(self._vanished())
+            if deadline.expired:
+                return False
+            wait_s = self._patience_s(deadline)
+            now = mailbox.snapshots.news(now, wait_s=wait_s, begun_ns=begun_ns)
+        return True
+
+    def _patience_s(self, deadline: Deadline) -> float:
+        """Return how long the head alone is looked at while it shows nothing new.
+
+        Of a single movement it shows the end (it is the last command), and whatever else ends it:
+        so on a slow line the whole block, which keeps the beat waiting, is read rarely.
+        """
+        wire = self._mailbox.wire
+        if not wire.motions.alone:
+            return LOOK_S
+        return max(LOOK_S, min(_LOOKS_APART * wire.whole_look_s, deadline.remaining_s()))
+
+    def _take_end(self) -> Finished:
+        if self._end is None:
+            end = self._mailbox.wire.motions.end_of(self.command.sequence)
+            assert end is not None  # noqa: S101 - _watch has seen it
+            with self._mailbox.uninterrupted():
+                self._mailbox.wire.motions.forget(self.command.sequence)
+                self._mailbox.markers.clear(self._marker)
+                self._end = end
+        return self._end
+
+    def _await_rest(self) -> None:
+        """Let the group come to rest unless more is under way.
+
+        It counts as moving for a cycle longer than its last movement
+        (docs/reference/softmotion.md 2.2), and a program that watches an input may call that
+        movement done while it still brakes.
+        """
+        wire, snapshots = self._mailbox.wire, self._mailbox.snapshots
+        deadline = Deadline.after(wire.clock, _REST_S)
+        now = snapshots.take()
+        while is_moving(now) and not wire.motions.unfinished and not deadline.expired:
+            now = snapshots.news(now, wait_s=deadline.remaining_s())
+
+    def _vanished(self) -> RemoteProtocolError:
+        return RemoteProtocolError(
+            tr("The PLC shows neither {request!r} nor how it ended.", request=self._request),
+            remedy=tr("Another client has moved the group meanwhile."),
+            request=self._request,
+        )
+
+
+class SoftMotionMotionUntilInput:
+    """A straight movement until an input switches (opcode 30008). Wait on it."""
+
+    def __init__(self, motion: SoftMotionMotion, mailbox: Mailbox) -> None:
+        self._motion = motion
+        self._mailbox = mailbox
+
+    def wait(self, *, timeout_s: float) -> Pose | None:
+        """Wait for the end and return where the tip was at the edge.
+
+        Returns:
+            ``None`` when the input did not switch on the way.
+
+        Raises:
+            ControllerError: It was stopped, refused, or ended by an error.
+            MotionTimeoutError, OutcomeUnknownError: As for any movement.
+        """
+        with self._mailbox.wire.latch.ending(describe(self._motion.command)):
+            end = self._motion.await_end(timeout_s)
+        if end.error_class == ErrorClass.NO_EDGE:
+            return None
+        if self._motion.wait(timeout_s=timeout_s) is not MotionOutcome.ARRIVED:
+            raise stopped_before_edge(self._mailbox.identity, describe(self._motion.command))
+        return self._latched()
+
+    def _latched(self) -> Pose:
+        now = self._mailbox.snapshots.take()
+        if not is_own(self._motion.command, now):
+            raise RemoteProtocolError(
+                tr("Another command came before the latched position was read."),
+                remedy=tr("Repeat the measurement."),
+                controller=self._mailbox.identity,
+                request=describe(self._motion.command),
+            )
+        target = self._motion.target
+        return self._mailbox.pose(now.answer.pose, tool=target.tool)
+
+
+_RAMP_S: Final = 0.5
+"""In this time a straight movement reaches its speed, and in this time its acceleration: SoftMotion
+wants all four numbers above 0, and a tip near a pin gains nothing from a harder start."""
+
+_PAST_AN_EDGE_MM: Final = 0.05
+"""A tip that is stopped by an input comes to rest within this, the PLC's cycle apart."""
+
+_EDGE_RAMP_S: Final = 0.02
+"""In this time such a movement reaches its deceleration."""
+
+LATCH_CYCLE_S: Final = 0.004
+"""The longest usual cycle of a motion task. A program notes where an edge was in the cycle in which
+it sees it (the companion's program does), and no mailbox tells how long that is."""
+
+_UM_PER_MM: Final = 1000.0
+
+
+def factors(percent: int) -> Four:
+    """Return the factors of the axes' own limits, for direct movements.
+
+    Raises:
+        ConfigError: It is not 1 to 100.
+    """
+    if not 1 <= percent <= 100:
+        raise ConfigError(
+            tr("A speed of {percent} % is not possible.", percent=percent),
+            remedy=tr("Give 1 to 100."),
+        )
+    return (percent / 100.0,) * 4
+
+
+def straight(speed_mm_s: float, *, unit_um: float) -> Four:
+    """Return velocity, acceleration, deceleration and jerk in the PLC's units.
+
+    Raises:
+        ConfigError: The speed is not above 0, or not finite.
+    """
+    if not 0 < speed_mm_s < float("inf"):
+        raise ConfigError(
+            tr("A speed of {speed} mm/s is not possible.", speed=speed_mm_s),
+            remedy=tr("Give a number above 0."),
+        )
+    velocity = speed_mm_s * _UM_PER_MM / unit_um
+    acceleration = velocity / _RAMP_S
+    return (velocity, acceleration, acceleration, acceleration / _RAMP_S)
+
+
+def up_to_an_edge(speed_mm_s: float, *, unit_um: float) -> Four:
+    """Return the numbers of a movement that an input stops, the tip perhaps in contact.
+
+    Raises:
+        ConfigError: The speed is not above 0, or not finite.
+    """
+    velocity, *_ = straight(speed_mm_s, unit_um=unit_um)
+    deceleration = velocity * speed_mm_s / (2 * _PAST_AN_EDGE_MM)
+    return (velocity, deceleration, deceleration, deceleration / _EDGE_RAMP_S)
+
+
+def run_up_mm(speed_mm_s: float) -> float:
+    """Return in what way a movement that an input stops reaches its speed, and comes to rest.
+
+    With acceleration a and jerk j the speed v takes v/a + a/j, or 2 sqrt(v/j) where a is never
+    reached, and half of v times that is the way.
+
+    Raises:
+        ConfigError: The speed is not above 0, or not finite.
+    """
+    velocity, acceleration, _, jerk = up_to_an_edge(speed_mm_s, unit_um=_UM_PER_MM)
+    if velocity < acceleration**2 / jerk:
+        took_s = 2 * math.sqrt(velocity / jerk)
+    else:
+        took_s = velocity / acceleration + acceleration / jerk
+    return velocity * took_s / 2
+
+
+def dynamics_of(profile: MotionProfile, *, unit_um: float) -> Four:
+    """Return the numbers of a profile: factors for joint moves, else units per second."""
+    if profile.path is Path.JOINT:
+        return factors(profile.speed_percent)
+    return straight(profile.speed_mm_s, unit_um=unit_um)

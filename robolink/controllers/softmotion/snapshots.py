@@ -1,0 +1,325 @@
+"""Whole snapshots of a mailbox: never half of one, never another PLC's.
+
+The PLC may write while it is read, so a block counts only when its two ends and its checksum
+agree (docs/reference/faults.md F31). Only such snapshots decide anything; the head of the block
+says when to read the next one.
+
+Words in a wrong order, or read one register too far, make plausible numbers. So the probe is
+looked for before anything is believed, and the error names what was found (docs/mailbox.md;
+docs/reference/softmotion.md 4.4; docs/reference/faults.md F33, F34, F70).
+"""
+
+from collections.abc import Callable, Sequence
+from typing import Final, TypeVar
+
+from robolink.controllers.softmotion.heartbeat import FROZEN_S, PlcHeartbeat
+from robolink.controllers.softmotion.wire import MailboxWire
+from robolink.errors import (
+    ConnectError,
+    RemoteProtocolError,
+    RobolinkError,
+    TransportBrokenError,
+    TransportTimeoutError,
+)
+from robolink.messages import tr
+from robolink.model import of_no_tool
+from robolink.protocols.mailbox import (
+    PROBE,
+    RESPONSE,
+    BlockError,
+    BlockFault,
+    Response,
+    Slot,
+    WordOrder,
+    decode_response,
+    decode_slot,
+    find_probe,
+)
+from robolink.timing import NS_PER_S, Deadline
+from robolink.transport import MailboxLink
+
+PASSING: Final = frozenset({BlockFault.TORN, BlockFault.CRC})
+"""What a read in the middle of a change gives, and the next one may not."""
+
+
+def read_block(words: Sequence[int], *, controller: str) -> Response:
+    """Return what a response block says.
+
+    Args:
+        words: The block.
+        controller: Identity of the PLC.
+
+    Raises:
+        BlockError: It was caught in the middle of a change; read it again.
+        RemoteProtocolError: It is no mailbox of ours, or its words stand elsewhere.
+    """
+    try:
+        response = decode_response(words)
+    except BlockError as error:
+        _require_place(words, controller)
+        if error.fault in PASSING:
+            raise
+        raise _foreign(error.fault.meaning, controller) from error
+    if response.probe != PROBE:
+        _require_place(words, controller)
+        raise _foreign(tr("its probe value is missing"), controller)
+    if not response.boot_id:
+        raise _foreign(tr("its boot_id is 0"), controller)
+    if not 0 < response.unit_um < float("inf"):
+        raise _foreign(tr("its unit_um is {value}", value=response.unit_um), controller)
+    return response
+
+
+def _require_place(words: Sequence[int], controller: str) -> None:
+    """Refuse words whose probe stands elsewhere, or in another order, and say how."""
+    found = find_probe(words)
+    if found is None:
+        return
+    shift = found.word - RESPONSE["probe"].word
+    if not shift and found.order is WordOrder.LOW_FIRST:
+        return
+    raise RemoteProtocolError(
+        tr(
+            "The probe of {controller} is {shift:+d} registers from its place, in this word "
+            "order: {order}.",
+            controller=controller,
+            shift=shift,
+            order=found.order.meaning,
+        ),
+        remedy=tr(
+            "Nothing was written. Low word first at +0 is right: correct the response address in "
+            "the URL, or the word order in the PLC's union or in the gateway."
+        ),
+        controller=controller,
+    )
+
+
+def _foreign(meaning: str, controller: str) -> RemoteProtocolError:
+    return RemoteProtocolError(
+        tr(
+            "{controller} does not hold a mailbox of this version: {meaning}.",
+            controller=controller,
+            meaning=meaning,
+        ),
+        remedy=tr(
+            "Nothing was written. Compare the addresses in the URL and the program in the PLC "
+            "with 'robolink expert plc export'."
+        ),
+        controller=controller,
+    )
+
+
+POLL_S: Final = 0.04
+"""Longest time from one look at the head of the response block to the next."""
+
+_SHORTEST_POLL_S: Final = 0.0005
+_POLLS_PER_WAIT: Final = 4
+"""Looks come as often as this in the time waited so far, so each wait gets little longer by them.
+
+Most commands end within a PLC cycle or two; where a question takes as long itself, the next one
+follows at once."""
+
+LOOK_S: Final = 0.3
+"""Longest time between two snapshots while something is awaited."""
+
+_READS: Final = 3
+
+T = TypeVar("T")
+
+
+class Snapshots:
+    """Reads snapshots of the one PLC start that was met.
+
+    Args:
+        wire: The session.
+    """
+
+    def __init__(self, wire: MailboxWire) -> None:
+        self._wire = wire
+        self._heartbeat = PlcHeartbeat()
+        self._met: Response | None = None
+        self._latest: Response | None = None
+
+    @property
+    def latest(self) -> Response:
+        """The last whole snapshot; known after :meth:`meet`."""
+        assert self._latest is not None  # noqa: S101 - a controller is made after the meeting
+        return self._latest
+
+    @property
+    def met(self) -> Response:
+        """The first snapshot; known after :meth:`meet`."""
+        assert self._met is not None  # noqa: S101 - a controller is made after the meeting
+        return self._met
+
+    def meet(self) -> None:
+        """Make sure that a mailbox program of our version runs there; writes nothing.
+
+        Raises:
+            ConnectError: Its heartbeat stands still.
+            RemoteProtocolError: It is no mailbox, or its words are in another order.
+        """
+        first = self.take()
+        deadline = Deadline.after(self._wire.clock, FROZEN_S)
+        while self._wire.read_head().heartbeat == first.plc_heartbeat:
+            if deadline.expired:
+                raise self._wire.ended(
+                    ConnectError(
+                        tr(
+                            "The mailbox of {identity} is not running.",
+                            identity=self._wire.identity,
+                        ),
+                        remedy=tr(
+                            "Its heartbeat does not count: the PLC is stopped, or the mailbox "
+                            "program is not called in the motion task."
+                        ),
+                    )
+                )
+            self._wire.clock.sleep(POLL_S)
+        self._met = first
+        self._wire.look_back = self._look_back
+
+    def take(self) -> Response:
+        """Read a whole response block.
+
+        Raises:
+            RemoteProtocolError: It was torn each time, or it is no mailbox of ours.
+            TransportBrokenError: The PLC has started anew, or runs another program.
+            TransportError: The session is over.
+        """
+        now = self._whole(self._wire.read_response, self._read_block, tr("The response block"))
+        self._require_met(now)
+        self._heartbeat.note(now.plc_heartbeat, self._wire.clock.now_ns())
+        self._wire.motions.note(now)
+        self._latest = now
+        return now
+
+    def slot(self, number: int, *, keep: bool = False) -> Slot:
+        """Read a tool slot; needs no ownership, and raises like :meth:`take`.
+
+        A slot has no probe. So values that no tool has are looked into: a program that was
+        changed while it ran may lay them in another order (docs/reference/faults.md F33). Where
+        that is not so, the slot really holds them, and a person has to be able to replace them:
+        whoever reads it asks :attr:`robolink.model.ToolOffset.of_no_tool`.
+
+        Args:
+            number: Of the slot.
+            keep: Whether the session goes on after a slot that cannot be used.
+        """
+        name = tr("Tool slot {number}", number=number)
+
+        def read() -> Slot:
+            return self._whole(lambda: self._wire.read_slot(number), decode_slot, name, keep=keep)
+
+        slot = read()
+        if of_no_tool(slot.tool):
+            self.take()  # tells by the probe what is the matter, if it is the order
+            return read()
+        return slot
+
+    def news(
+        self, since: Response, *, wait_s: float = LOOK_S, begun_ns: int | None = None
+    ) -> Response:
+        """Return a snapshot once the head differs from ``since``, or ``wait_s`` has passed.
+
+        Args:
+            since: The last snapshot.
+            wait_s: Longest wait for something new.
+            begun_ns: When the waiting began of which this is a part; now, if not given. Who has
+                waited long looks rarely from the start.
+
+        Raises:
+            TransportTimeoutError: The PLC's heartbeat stands still; the session is over.
+        """
+        known = (since.ack_head, since.state, since.error_class, since.group_state)
+        clock = self._wire.clock
+        asked_ns = looked_ns = clock.now_ns()
+        until_ns = asked_ns + wait_s * NS_PER_S
+        begun_ns = asked_ns if begun_ns is None else begun_ns
+        while True:
+            head = self._wire.read_head()
+            now_ns = clock.now_ns()
+            self._heartbeat.note(head.heartbeat, now_ns)
+            if head[:4] != known or now_ns >= until_ns:
+                break
+            waited_s = (now_ns - begun_ns) / NS_PER_S
+            period_s = min(max(waited_s / _POLLS_PER_WAIT, _SHORTEST_POLL_S), POLL_S)
+            # Not beyond the end of the wait: a jog is released then.
+            took_ns = now_ns - looked_ns
+            pause_ns = min(period_s * NS_PER_S - took_ns, until_ns - now_ns)
+            # One that is shorter than the look spares the PLC little, and is overslept by as much.
+            if pause_ns > took_ns:
+                clock.sleep(pause_ns / NS_PER_S)
+            looked_ns = clock.now_ns()
+        now = self.take()
+        if self._heartbeat.frozen(clock.now_ns()):
+            raise self._wire.ended(
+                TransportTimeoutError(
+                    tr("The heartbeat of {identity} has stopped.", identity=self._wire.identity),
+                    remedy=tr("The PLC was stopped, or its motion task has failed."),
+                )
+            )
+        return now
+
+    def _read_block(self, words: Sequence[int]) -> Response:
+        return read_block(words, controller=self._wire.identity)
+
+    def _whole(
+        self,
+        read: Callable[[], Sequence[int]],
+        decode: Callable[[Sequence[int]], T],
+        name: str,
+        *,
+        keep: bool = False,
+    ) -> T:
+        cause = ""
+        for _ in range(_READS):
+            try:
+                return decode(read())
+            except BlockError as error:
+                cause = str(error)
+                if error.fault not in PASSING:
+                    break
+            except RemoteProtocolError as error:
+                self._wire.ended(error)
+                raise
+        raise self._useless(name, cause, keep=keep)
+
+    def _useless(self, name: str, cause: str, *, keep: bool) -> RobolinkError:
+        useless = RemoteProtocolError(
+            tr("{name} cannot be used: {cause}.", name=name, cause=cause),
+            remedy=tr("Connect again; if it stays so, compare the PLC's register map."),
+        )
+        return useless if keep else self._wire.ended(useless)
+
+    def _look_back(self, link: MailboxLink) -> RobolinkError | None:
+        """Return that the PLC has started anew, when it is that which ended the session.
+
+        A start cuts TCP connections, and nothing but the next look tells it from a cable.
+        """
+        try:
+            now = decode_response(link.read_response())
+        except BlockError:
+            return None
+        return self._other_plc(now)
+
+    def _require_met(self, now: Response) -> None:
+        """Refuse a PLC that is not, or no longer, the one that was met."""
+        error = self._other_plc(now)
+        if error is not None:
+            raise self._wire.ended(error)
+
+    def _other_plc(self, now: Response) -> TransportBrokenError | None:
+        met = self._met
+        if met is None or (now.boot_id, now.unit_um) == (met.boot_id, met.unit_um):
+            return None
+        if now.boot_id != met.boot_id:
+            what = tr("The PLC {identity} has restarted.", identity=self._wire.identity)
+            remedy = tr(
+                "Nothing comes back by itself: no tool slot is selected now and the "
+                "group is disabled. Connect again and select the tool."
+            )
+        else:
+            what = tr("The unit of length of {identity} changed.", identity=self._wire.identity)
+            remedy = tr("Another program was loaded into the PLC. Connect again.")
+        return TransportBrokenError(what, remedy=remedy)

@@ -1,1 +1,0 @@
-"""The tool slots of a mailbox: read, written, preserved, settled."""

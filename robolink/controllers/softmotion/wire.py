@@ -1,0 +1,384 @@
+"""One session on a mailbox link: requests, beats in between, and an end that is final.
+
+A read that gets no answer may be asked again as long as the link says that it can still be
+used: a serial line finds its place again, TCP and CAN do not. A write is never repeated here.
+What ends the session ends it for good; a movement that was under way then is found again
+through its marker, not through this object.
+
+Movements that were sent and whose end is not read: at most four (docs/mailbox.md, "Movements").
+
+The PLC names the last four ends by their sequence. Every snapshot is looked through for them,
+whatever it was read for, because a later end may push an earlier one out.
+"""
+
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
+from typing import Final, TypeVar
+
+from robolink.checkpoints import Checkpoint, checkpoint
+from robolink.controllers.softmotion.heartbeat import ClientHeartbeat, Turns
+from robolink.errors import (
+    BusyError,
+    RemoteProtocolError,
+    RobolinkError,
+    TransportClosedError,
+    TransportError,
+    TransportTimeoutError,
+)
+from robolink.interrupts import InterruptGate
+from robolink.messages import tr
+from robolink.protocols.mailbox import CommandState, Finished, Response
+from robolink.stop_latch import StopLatch
+from robolink.timing import Deadline
+from robolink.transport import MailboxHead, MailboxLink
+
+MOST: Final = 4
+"""Movements whose end may be unread."""
+
+
+class MotionTracker:
+    """The movements of one client.
+
+    Attributes:
+        jogging: Whether a jog of this client is under way.
+    """
+
+    def __init__(self, owner: int) -> None:
+        self._owner = owner
+        self._ends: dict[int, Finished | None] = {}
+        self.jogging = False
+
+    @property
+    def unfinished(self) -> bool:
+        """Whether something of ours may be moving, so that the PLC wants our heartbeat."""
+        return self.jogging or None in self._ends.values()
+
+    @property
+    def alone(self) -> bool:
+        """Whether there is one movement and no more, so that the head shows how it fares."""
+        return len(self._ends) == 1
+
+    @property
+    def unread(self) -> bool:
+        """Whether there are movements whose end nobody has taken."""
+        return bool(self._ends)
+
+    def require_room(self, request: str, *, controller: str) -> None:
+        """Refuse a fifth movement.
+
+        Raises:
+            BusyError: Four are unread.
+        """
+        if len(self._ends) >= MOST:
+            raise BusyError(
+                tr("{request} has to wait: four movements are unfinished.", request=request),
+                remedy=tr("Wait for the first of them, then send the next."),
+                controller=controller,
+                request=request,
+            )
+
+    def begin(self, sequence: int) -> None:
+        """Expect the end of a movement that is about to be sent."""
+        self._ends[sequence] = None
+
+    def forget(self, sequence: int) -> None:
+        """Expect it no longer: it was refused, or its end was taken."""
+        self._ends.pop(sequence, None)
+
+    def holds(self, sequence: int) -> bool:
+        """Whether its end is awaited, or was not taken."""
+        return sequence in self._ends
+
+    def end_of(self, sequence: int) -> Finished | None:
+        """Return how it ended, ``None`` while that is not known."""
+        return self._ends.get(sequence)
+
+    def note(self, now: Response) -> None:
+        """Look through a snapshot for ends."""
+        if None not in self._ends.values():
+            return
+        ends = [end for end in now.finished if end.sequence]
+        if now.ack_owner == self._owner and has_ended(now.state):
+            ends.append(Finished(now.ack_head, now.state, now.error_class))
+        for end in ends:
+            if has_ended(end.state) and self._ends.get(end.sequence, end) is None:
+                self._ends[end.sequence] = end
+
+    def missing(self, sequence: int, now: Response) -> bool:
+        """Whether a snapshot shows neither the movement nor its end."""
+        return (
+            self.end_of(sequence) is None
+            and now.active_movement != sequence
+            and not now.queue_length
+            and (now.ack_head, now.ack_owner) != (sequence, self._owner)
+        )
+
+
+def has_ended(state: int) -> bool:
+    """Whether a state is one of the three ends; numbers of a newer PLC are not."""
+    return state in (CommandState.DONE, CommandState.ABORTED, CommandState.ERROR)
+
+
+_READS: Final = 3
+_LOOK_BACK_S: Final = 0.7
+"""Longest time for a look at what ended the session: a request to a PLC that is gone ends within
+1 s of its deadline, this look included (docs/reference/faults.md F11)."""
+
+T = TypeVar("T")
+ErrorT = TypeVar("ErrorT", bound=RobolinkError)
+
+
+class _ThisThread(threading.local):
+    """What the thread that asks is doing."""
+
+    attends = False
+    goes_first = False
+
+
+class MailboxWire:
+    """Exchanges on an open link, which it owns from here on.
+
+    Attributes:
+        identity: Which PLC this is.
+        place: Where it was reached, the same for each spelling of the URL.
+        clock: The clock on which the PLC's time passes.
+        owner: This client's token, never 0.
+        epoch: The epoch of our ownership, 0 while we have none.
+        motions: The movements of this client.
+        latch: What holds commands back while a stop is in force.
+        timeout_s: Longest wait for the PLC to acknowledge a command.
+        exchanges: Requests sent so far.
+        look_back: Looks over another link at what ended the session; ``None`` before the
+            meeting.
+    """
+
+    def __init__(self, link: MailboxLink, *, owner: int, timeout_s: float) -> None:
+        self._link = link
+        self.identity, self.place, self.clock = link.identity, link.place, link.clock
+        self._gate = InterruptGate()
+        self._gate.open()
+        self._beat = ClientHeartbeat()
+        self._here = _ThisThread()
+        self._turns = Turns()
+        self._ended_by: RobolinkError | None = None
+        self.owner = owner
+        self.epoch = 0
+        self.motions = MotionTracker(owner)
+        self.latch = StopLatch(link.identity)
+        self.timeout_s = timeout_s
+        self.exchanges = 0
+        self.look_back: Callable[[MailboxLink], RobolinkError | None] | None = None
+
+    @property
+    def whole_look_s(self) -> float:
+        """How long the response block and a beat take on the line alone; 0 on a network."""
+        return self._link.whole_look_s
+
+    @property
+    def alive(self) -> bool:
+        """Whether the session can still be used."""
+        return self._ended_by is None
+
+    def uninterrupted(self) -> AbstractContextManager[None]:
+        """Hold Ctrl-C back over exchanges that belong together; it is raised at their end."""
+        return self._gate
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether Ctrl-C is held back just now."""
+        return self._gate.interrupted
+
+    def read_head(self) -> MailboxHead:
+        """Read the beginning of the response block, after a beat if one is due."""
+        return self._ask(self._link.read_head)
+
+    def read_response(self) -> tuple[int, ...]:
+        """Read the response block, after a beat if one is due."""
+        return self._ask(self._link.read_response, long=True)
+
+    def read_slot(self, slot: int) -> tuple[int, ...]:
+        """Read a tool slot, after a beat if one is due."""
+        return self._ask(lambda: self._link.read_slot(slot), long=True)
+
+    def read_device(self) -> tuple[int, ...]:
+        """Read the device block, after a beat if one is due.
+
+        Raises:
+            RejectedError: There is none.
+        """
+        return self._ask(self._link.read_device)
+
+    def write(self, words: Sequence[int]) -> None:
+        """Write the command block, once.
+
+        Raises:
+            RejectedError: The link's far end refused to take it.
+            TransportError, RemoteProtocolError: The session is over; it may have arrived.
+        """
+        self._require_alive()
+        with self._turn(), self._gate:
+            self.exchanges += 1
+            try:
+                self._link.write_command(words)
+                return
+            except (TransportError, RemoteProtocolError) as error:
+                lost = error
+        raise self._over(lost)
+
+    @contextmanager
+    def attended(self) -> Iterator[None]:
+        """Wait on what is unfinished: the exchanges of this thread keep it going meanwhile.
+
+        Nothing else does. A thread that only looks, or a program that does something else, would
+        else keep a robot moving that nobody watches (docs/mailbox.md, "What ends by itself").
+        """
+        if self._attends:
+            yield
+            return
+        with self.ahead(), self._turns.kept():
+            self._here.attends = True
+            try:
+                yield
+            finally:
+                self._here.attends = False
+
+    @contextmanager
+    def ahead(self) -> Iterator[None]:
+        """Let the exchanges of this thread wait for no other's turn: it stops a movement."""
+        before = self._goes_first
+        self._here.goes_first = True
+        try:
+            yield
+        finally:
+            self._here.goes_first = before
+
+    def next_beat(self) -> int:
+        """Return the heartbeat word that goes with a command block."""
+        if self._may_beat:
+            return self._beat.word(self.epoch, self.clock.now_ns())
+        return self._beat.again(self.epoch)
+
+    def beat(self) -> None:
+        """Write the heartbeat alone, if it is due."""
+        self._require_alive()
+        with self._turn():
+            self._beat_if_due()
+
+    def beat_at_rest(self) -> None:
+        """Write the heartbeat alone for who owns the mailbox, if it is due and nothing moves.
+
+        For another thread than the one that works: it waits for its turn on the wire, and what
+        is unfinished is none of its business.
+        """
+        if self.epoch and not self.motions.unfinished and self.alive:
+            self.beat()
+
+    @property
+    def waited_on(self) -> bool:
+        """Whether a thread waits on what is unfinished (:meth:`attended`)."""
+        return self._turns.waited_on
+
+    def ended(self, error: ErrorT) -> ErrorT:
+        """End the session because of ``error``, and return it to be raised."""
+        error.controller = error.controller or self.identity
+        self._ended_by = self._ended_by or error
+        self._link.close()
+        return error
+
+    def close(self) -> None:
+        """Close the link. Idempotent."""
+        self._ended_by = self._ended_by or TransportClosedError(
+            tr("The connection to {identity} is closed.", identity=self.identity),
+            remedy=tr("Connect again."),
+            controller=self.identity,
+        )
+        self._link.close()
+        self._gate.close()
+
+    @property
+    def _attends(self) -> bool:
+        return self._here.attends
+
+    @property
+    def _goes_first(self) -> bool:
+        return self._here.goes_first
+
+    def _turn(self) -> AbstractContextManager[None]:
+        return nullcontext() if self._goes_first else self._turns
+
+    @property
+    def _may_beat(self) -> bool:
+        return self._attends or not self.motions.unfinished
+
+    def _ask(self, exchange: Callable[[], T], *, long: bool = False) -> T:
+        """Do an exchange after a beat; on a serial line a long one always has one before it."""
+        ahead = long and self.whole_look_s > 0
+        self._require_alive()
+        with self._turn():
+            self._beat_if_due(ahead=ahead)
+            if self._attends and self._turns.let_one_in():
+                self._beat_if_due(ahead=ahead)
+            return self._asked(exchange)
+
+    def _beat_if_due(self, *, ahead: bool = False) -> None:
+        """Write the heartbeat alone, if we own the mailbox and it is due.
+
+        While something is unfinished only who waits on it does (:meth:`attended`).
+        """
+        busy = self.motions.unfinished
+        now_ns = self.clock.now_ns()
+        if self.epoch and self._may_beat and self._beat.due(now_ns, busy=busy, ahead=ahead):
+            self._asked(lambda: self._link.beat(self.next_beat()))
+
+    def _asked(self, exchange: Callable[[], T]) -> T:
+        """Do an exchange up to three times; only once more when its whole deadline has passed."""
+        lost: list[RobolinkError] = []
+        deadline = Deadline.after(self.clock, self.timeout_s)
+        while len(lost) < _READS:
+            last = bool(lost) and deadline.expired
+            try:
+                with self._gate:
+                    self.exchanges += 1
+                    found = exchange()
+                checkpoint(Checkpoint.EXCHANGE, "read")
+                return found
+            except (TransportError, RemoteProtocolError) as error:
+                lost.append(error)
+                silent = last and isinstance(error, TransportTimeoutError)
+                if silent or isinstance(error, TransportClosedError):
+                    break  # nobody is there, or the link cannot be used any more
+        raise self._over(lost[0])
+
+    def _over(self, error: RobolinkError) -> RobolinkError:
+        """End the session because of ``error``, and return what is to be said about it."""
+        told = self._explained(error)
+        if told is not error:
+            told.__cause__ = error
+        return self.ended(told)
+
+    def _explained(self, error: RobolinkError) -> RobolinkError:
+        """Return why the link ended, if another look tells more; it only reads."""
+        if self.look_back is None or isinstance(error, RemoteProtocolError):
+            return error
+        if self.whole_look_s and isinstance(error, TransportTimeoutError):
+            return error  # a start cuts no serial line: who is silent there has nothing to tell
+        self._link.close()
+        try:
+            link = self._link.reopened(timeout_s=_LOOK_BACK_S)
+        except RobolinkError:
+            return error
+        try:
+            return self.look_back(link) or error
+        except RobolinkError:
+            return error
+        finally:
+            link.close()
+
+    def _require_alive(self) -> None:
+        if self._ended_by is not None:
+            raise TransportClosedError(
+                tr("The connection to {identity} has ended.", identity=self.identity),
+                remedy=tr("Connect again; the controller's state is then read again."),
+                controller=self.identity,
+            ) from self._ended_by

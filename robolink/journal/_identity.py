@@ -1,0 +1,238 @@
+"""Which controller a log is about: what it says of itself, and what is on record of that."""
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from robolink.errors import JournalError
+from robolink.messages import tr
+from robolink.model import EntryKind, Identity, NewEntry, Signature, Who
+from robolink.timing import wall_label
+
+if TYPE_CHECKING:
+    from robolink.journal.store.state_rows import NameRows
+    from robolink.journal.store.store import Store
+
+_LOOPBACK_PORT: Final = re.compile(r"[/@](?:127\.[\d.]+|localhost|\[::1\]):(\d+)")
+_FIRST_LENT_PORT: Final = 32768
+"""Ports from here on are given out by the system (Linux; other systems begin later)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Names:
+    """Under which names a controller is on record.
+
+    Attributes:
+        identity: What goes on record from now on.
+        former: Under which earlier entries, and possibly markers, stand.
+        robot: Of several robots the one in force: entries go on record under its name.
+        robots: Under which entries of all its robots stand.
+    """
+
+    identity: str
+    former: tuple[str, ...] = ()
+    robot: str = ""
+    robots: tuple[str, ...] = ()
+
+    @property
+    def all(self) -> tuple[str, ...]:
+        """Every one, the identity first."""
+        return (self.identity, *self.former, *self.robots)
+
+    @property
+    def record(self) -> str:
+        """Under which name entries go on record."""
+        return self.robot or self.identity
+
+
+@dataclass(frozen=True, slots=True)
+class _Meeting:
+    """What the journal knew when a controller was met.
+
+    Attributes:
+        names: Of the controller.
+        before: Who was met at this address last, empty for nobody.
+        elsewhere: Where else this controller was met.
+        unclaimed: Names of before under which something stands that is nobody's yet.
+        new_robots: Robots that the journal did not know to be this controller's.
+        shared: Whether something stands under the controller's name that is no robot's.
+    """
+
+    names: Names
+    before: str = ""
+    elsewhere: tuple[str, ...] = ()
+    unclaimed: tuple[str, ...] = ()
+    new_robots: tuple[str, ...] = ()
+    shared: bool = False
+
+
+class Naming:
+    """Finds out who the controller of one log is, and keeps that on record.
+
+    The controller is asked at the first use of the log, not before: whoever only stops it
+    waits for no question. It is asked again as long as it could not tell.
+
+    Attributes:
+        remarks: What a person should know about it, once, in sentences.
+
+    Args:
+        store: The journal's database.
+        text: How the controller is called until it was asked: a name or an address.
+    """
+
+    def __init__(self, store: "Store", text: str) -> None:
+        self.remarks: tuple[str, ...] = ()
+        self._store = store
+        self._text = text
+        self._who: Who | None = None
+        self._settled: Names | None = None
+
+    def ask(self, who: Who) -> None:
+        """Ask this controller from now on."""
+        self._who, self._settled = who, None
+
+    def known(self, signature: Signature) -> Names:
+        """Return the names of the controller.
+
+        Raises:
+            JournalError: The journal cannot be read.
+            TransportError, RemoteProtocolError: The controller was asked, and the link failed.
+        """
+        if self._settled is None:
+            found = self._who() if self._who else None
+            meeting = self._looked_up(found)
+            if found is None or (found.certain and self._recorded(found, meeting, signature)):
+                self._settled = meeting.names
+            return meeting.names
+        return self._settled
+
+    def _looked_up(self, found: Identity | None) -> _Meeting:
+        with self._store.read(tr("The command was not sent.")) as tables:
+            rows = tables.names
+            if found is None:
+                name = rows.meant(self._text)
+                return _Meeting(_listed(rows, name))
+            before = rows.at(found.address)
+            if found.certain:
+                return _meeting(rows, found, before)
+            # Too busy to tell: taken for whom it was last, until it can be asked.
+            name = before or found.name
+            return _Meeting(_listed(rows, name))
+
+    def _recorded(self, found: Identity, meeting: _Meeting, signature: Signature) -> bool:
+        """Keep what is new; return whether the journal took it."""
+        name = meeting.names.identity
+        if meeting.before == name and not (meeting.unclaimed or meeting.new_robots):
+            return True
+        try:
+            with self._store.write() as tables:
+                tables.names.meet(found.address, name, wall_label())
+                for former in meeting.unclaimed:
+                    tables.names.carry_over(former, name)
+                for robot in meeting.new_robots:
+                    tables.names.note_robot(robot, name)
+                tables.entries.append(name, signature, "", _entries(found, meeting))
+        except JournalError:
+            # Looking goes on without; the next intent will say what the journal has to say.
+            return False
+        self.remarks = _remarks(found, meeting)
+        return True
+
+
+def _listed(rows: "NameRows", name: str) -> Names:
+    """Return the names of a controller that does not tell which of its robots is in force."""
+    return Names(name, rows.former(name), robots=rows.robots(name))
+
+
+def _meeting(rows: "NameRows", found: Identity, before: str) -> _Meeting:
+    name, former = found.name, rows.former(found.name)
+    known = rows.robots(name)
+    new_robots = tuple(robot for robot in found.robots if robot not in known)
+    unclaimed = tuple(
+        text
+        for text in dict.fromkeys((found.address, found.place))
+        if text != name
+        if not (_is_lent(text) or rows.successor(text))
+        if rows.in_use(text)
+    )
+    elsewhere = tuple(text for text in rows.addresses_of(name) if text != found.address)
+    robots = (*known, *new_robots)
+    return _Meeting(
+        Names(name, (*former, *unclaimed), found.robot, robots),
+        before,
+        elsewhere,
+        unclaimed,
+        new_robots,
+        shared=bool(new_robots) and rows.in_use(name),
+    )
+
+
+def _is_lent(text: str) -> bool:
+    """Tell whether a name is that of a port which the system gave to whoever asked.
+
+    Simulators are served there; what one left open is not for the next one on its port.
+    """
+    found = _LOOPBACK_PORT.search(text)
+    return found is not None and int(found[1]) >= _FIRST_LENT_PORT
+
+
+def _entries(found: Identity, meeting: _Meeting) -> list[NewEntry]:
+    said = [_other_than_before(found, meeting), _also_elsewhere(found, meeting)]
+    said.append(_nobodys(found, meeting))
+    said += [
+        tr("The records under {name} belong to {own}.", name=name, own=found.name)
+        for name in meeting.unclaimed
+    ]
+    details = {"address": found.address, "before": meeting.before, "also": list(meeting.elsewhere)}
+    return [NewEntry(EntryKind.IDENTITY, verdict=text, details=details) for text in said if text]
+
+
+def _remarks(found: Identity, meeting: _Meeting) -> tuple[str, ...]:
+    said = [_other_than_before(found, meeting), _also_elsewhere(found, meeting)]
+    said.append(_nobodys(found, meeting))
+    if not (found.own or meeting.before):
+        said.append(
+            tr(
+                "{address} does not say who it is, so it is known by its address: "
+                "{name}. Another controller at that address would be mistaken for it.",
+                address=found.address,
+                name=found.name,
+            )
+        )
+    return tuple(filter(None, said))
+
+
+def _other_than_before(found: Identity, meeting: _Meeting) -> str:
+    if meeting.before in ("", found.name, found.place):
+        return ""
+    return tr(
+        "{name} answers at {address}; last time it was {before}. Is this the right "
+        "controller? Unfinished work on the other one is not shown here.",
+        address=found.address,
+        name=found.name,
+        before=meeting.before,
+    )
+
+
+def _also_elsewhere(found: Identity, meeting: _Meeting) -> str:
+    if not meeting.elsewhere or meeting.before == found.name:
+        return ""
+    return tr(
+        "{address} is {name}, already known as {others}: one controller, one record.",
+        address=found.address,
+        name=found.name,
+        others=", ".join(meeting.elsewhere),
+    )
+
+
+def _nobodys(found: Identity, meeting: _Meeting) -> str:
+    if not meeting.shared:
+        return ""
+    return tr(
+        "Each of the {count} robots of {name} now has a record of its own. Earlier "
+        "entries do not say which robot they are about: they stay listed, but nothing "
+        "is compared with them or undone from them. Learn the stations again for each "
+        "robot.",
+        count=len(found.robots),
+        name=found.name,
+    )

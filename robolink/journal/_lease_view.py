@@ -1,0 +1,354 @@
+"""Who holds a lease, whether that process still lives, and a lease as somebody sees it.
+
+A PLC knows the owner of its mailbox by a token and nothing else. So each run that takes one
+leaves a small file in the state folder, before it asks, and removes it when it has given the
+mailbox back: after a kill the next run finds whose the token is. It need not outlive the power,
+because after that the ten seconds of silence have passed.
+"""
+
+import json
+import os
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Final
+
+from robolink import ambient
+from robolink.errors import LeaseHeldError
+from robolink.files.durable import make_folder, state_folder
+from robolink.messages import tr
+from robolink.model import ClientRun, EntryKind, NewEntry, Signature
+from robolink.timing import local_label, wall_label
+
+_DEAD_STATES: Final = ("Z", "X")
+
+
+@dataclass(frozen=True, slots=True)
+class LeaseHolder:
+    """Who holds a lease.
+
+    Attributes:
+        os_user: User of the operating system.
+        host: Name of the computer.
+        pid: Number of the process.
+        process_start: Tells this process from a later one of the same number: its PID
+            namespace and its start in clock ticks. Empty where the system does not say.
+        boot: Id of this start of the system; empty where it has none.
+        operator: Badge or name that the person gave.
+    """
+
+    os_user: str = ""
+    host: str = ""
+    pid: int = 0
+    process_start: str = ""
+    boot: str = ""
+    operator: str = ""
+
+    def shares_clock_with(self, other: "LeaseHolder") -> bool:
+        """Whether both count the same time since the start of one system."""
+        return self.boot != "" and self.boot == other.boot
+
+    def proves_gone(self, other: "LeaseHolder") -> bool:
+        """Whether this process can tell for certain that ``other`` has ended.
+
+        A container has process numbers of its own, so only the same PID namespace counts.
+        """
+        _, _, start = other.process_start.partition(" ")
+        return self.can_tell(other) and _has_ended(other.pid, start)
+
+    def can_tell(self, other: "LeaseHolder") -> bool:
+        """Whether this process can see at all whether ``other`` still runs."""
+        namespace, _, start = other.process_start.partition(" ")
+        if not self.shares_clock_with(other) or not start:
+            return False
+        return namespace == self.process_start.partition(" ")[0]
+
+
+class BootClock:
+    """Time since the start of the system, the same in all its processes, asleep or not."""
+
+    def now_ns(self) -> int:
+        """Return the nanoseconds since the system was started."""
+        return ambient.boot_ns()
+
+    def sleep(self, seconds: float) -> None:
+        """Block the calling thread."""
+        if seconds > 0:
+            ambient.sleep(seconds)
+
+
+def this_process(operator: str = "") -> LeaseHolder:
+    """Return this process as the holder of a lease."""
+    import getpass
+    import platform
+
+    try:
+        os_user = getpass.getuser()
+    except (OSError, KeyError, ImportError):
+        os_user = ""  # a container may run under a number that has no name
+    pid = os.getpid()
+    process_start, boot = _start_and_boot(pid)
+    return LeaseHolder(
+        os_user=os_user,
+        host=platform.node(),
+        pid=pid,
+        process_start=process_start,
+        boot=boot,
+        operator=operator,
+    )
+
+
+@lru_cache(maxsize=1)
+def _start_and_boot(pid: int) -> tuple[str, str]:
+    """Return what tells this process from others, which stays as it is; a fork has another pid."""
+    found, namespace = _state_and_start(pid), _pid_namespace()
+    return f"{namespace} {found[1]}" if found and namespace else "", _boot_id()
+
+
+def _boot_id() -> str:
+    try:
+        return Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
+    except OSError:
+        return ""
+
+
+def _pid_namespace() -> str:
+    try:
+        return os.readlink("/proc/self/ns/pid")
+    except OSError:
+        return ""
+
+
+def _has_ended(pid: int, start: str) -> bool:
+    # The system is asked first: /proc may be mounted so that it hides others' processes.
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return True
+    except OSError:
+        pass
+    found = _state_and_start(pid)
+    return found is not None and (found[0] in _DEAD_STATES or found[1] != start)
+
+
+def _state_and_start(pid: int) -> tuple[str, str] | None:
+    try:
+        text = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return None
+    # The name stands in parentheses and may hold any character (proc(5)); field 3 follows.
+    fields = text.rpartition(")")[2].split()
+    return fields[0], fields[19]
+
+
+def signature_here(version: str) -> Signature:
+    """Return the user and the computer, with the version of this software."""
+    here = this_process()
+    return Signature(os_user=here.os_user, host=here.host, version=version)
+
+
+LEASE_S: Final = 10.0
+"""A holder that gave no sign of life for so long may be replaced."""
+
+FREE: Final = ""
+"""The token of a lease that nobody holds."""
+
+
+@dataclass(frozen=True, slots=True)
+class LeaseView:
+    """A lease as it was seen.
+
+    Attributes:
+        epoch: How many holders there were; 0 for a lease that never was held.
+        token: Id of the holder, empty when it is free.
+        beat: Counter of the signs of life.
+        beat_ns: The last one, in the holder's time since the start of his system.
+        holder: The holder as JSON.
+        taken_at: Since when, as a label.
+        purpose: What for.
+    """
+
+    epoch: int = 0
+    token: str = FREE
+    beat: int = 0
+    beat_ns: int = 0
+    holder: str = "{}"
+    taken_at: str = ""
+    purpose: str = ""
+
+    def who(self) -> LeaseHolder:
+        """Return the holder, nobody known when the record of him is damaged."""
+        try:
+            return LeaseHolder(**json.loads(self.holder))
+        except (ValueError, TypeError, RecursionError):
+            return LeaseHolder()
+
+    def held_error(self, controller: str, last_sign: str) -> LeaseHeldError:
+        """Return the error that names the holder.
+
+        Args:
+            controller: Whose lease it is.
+            last_sign: When the holder gave its last sign of life, in words.
+        """
+        return LeaseHeldError(
+            tr(
+                "{holder} has been working on {controller} since {since}: {purpose}. "
+                "Last sign of life: {sign}.",
+                holder=describe(self.who()),
+                controller=controller,
+                since=local_label(self.taken_at),
+                purpose=self.purpose,
+                sign=last_sign,
+            ),
+            remedy=tr(
+                "Nothing was sent. Wait until it has finished, or end it; after {seconds:.0f} s "
+                "without a sign of life it may be replaced.",
+                seconds=LEASE_S,
+            ),
+            controller=controller,
+        )
+
+    def at_work(self, alive: str) -> str:
+        """Return the sentences about a holder who is at it.
+
+        Args:
+            alive: Whether he lives, one sentence.
+        """
+        said = tr(
+            "{holder} has been at work on this controller since {since}: {purpose}.",
+            holder=describe(self.who()),
+            since=local_label(self.taken_at),
+            purpose=self.purpose,
+        )
+        return f"{said} {alive}"
+
+    def took_over(self, controller: str) -> str:
+        """Return the sentence about the holder who has it now, or had it last.
+
+        Args:
+            controller: Whose lease it is.
+        """
+        if self.who() == LeaseHolder():
+            return tr("Somebody else took over {controller} meanwhile.", controller=controller)
+        return tr(
+            "{holder} took over {controller} on {since}: {purpose}.",
+            holder=describe(self.who()),
+            controller=controller,
+            since=local_label(self.taken_at),
+            purpose=self.purpose,
+        )
+
+    def taken_entry(self, because: str, insisting: LeaseHolder | None = None) -> NewEntry:
+        """Return what is put on record when this lease was ended by another.
+
+        Args:
+            because: Why that could be done, in words.
+            insisting: The person who had it ended, whoever held it; ``None`` where nobody
+                had to insist.
+        """
+        if self.token == FREE:
+            verdict = tr("Nobody worked on this cell; {because}.", because=because)
+        else:
+            holder = describe(self.who())
+            verdict = (
+                tr(
+                    "{holder} was at work on this controller before: {because}.",
+                    holder=holder,
+                    because=because,
+                )
+                if insisting is None
+                else tr(
+                    "{insisting} insisted on taking this controller over from {holder}: {because}.",
+                    insisting=describe(insisting),
+                    holder=holder,
+                    because=because,
+                )
+            )
+        details = {
+            "epoch": self.epoch + 1,
+            "holder": asdict(self.who()),
+            "since": self.taken_at,
+            "purpose": self.purpose,
+            "reason": because,
+            **({} if insisting is None else {"insisted": asdict(insisting)}),
+        }
+        return NewEntry(EntryKind.LEASE, verdict=verdict, details=details)
+
+    def is_like(self, other: "LeaseView") -> bool:
+        """Whether nothing happened between two sightings."""
+        return (self.epoch, self.token, self.beat) == (other.epoch, other.token, other.beat)
+
+
+def describe(holder: LeaseHolder) -> str:
+    """Return who it is, as a person is told."""
+    if holder == LeaseHolder():
+        return tr("Somebody unknown")
+    process = tr("process {pid} on {host}", pid=holder.pid, host=holder.host)
+    if holder.operator and holder.operator != holder.os_user:
+        return tr(
+            "{operator} ({os_user}, {process})",
+            operator=holder.operator,
+            os_user=holder.os_user,
+            process=process,
+        )
+    return tr("{os_user} ({process})", os_user=holder.os_user or "?", process=process)
+
+
+_SCHEMA: Final = "robolink/mailbox-client/1"
+_KEPT_S: Final = 86_400.0
+"""For so long a file of a run that has ended without removing it is kept at least."""
+
+
+def note_client(client: str, holder: LeaseHolder) -> None:
+    """Note, before it asks for a mailbox, whose a token is; a full state folder is no matter."""
+    known = {"schema": _SCHEMA, "client": client, "holder": asdict(holder), "since": wall_label()}
+    with suppress(OSError):
+        path = _path(client)
+        make_folder(path.parent)
+        for old in _outdated(path.parent):
+            old.unlink(missing_ok=True)
+        draft = path.with_suffix(".new")
+        descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+        with open(descriptor, "w", encoding="utf-8") as file:
+            json.dump(known, file)
+        os.replace(draft, path)
+
+
+def forget_client(client: str) -> None:
+    """Forget a token: the mailbox was given back, or was never got."""
+    with suppress(OSError):
+        _path(client).unlink(missing_ok=True)
+
+
+def run_of(client: str, here: LeaseHolder) -> ClientRun | None:
+    """Return the run whose token this is, ``None`` for one that was not noted here.
+
+    Args:
+        client: The token.
+        here: This process, which judges whether the other still lives.
+    """
+    try:
+        known = json.loads(_path(client).read_bytes())
+        holder, since = LeaseHolder(**known["holder"]), str(known["since"])
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
+        return None
+    if here.proves_gone(holder):
+        return ClientRun(describe(holder), since, lives=False)
+    # Of this process too: whether its earlier session still goes on is not known here.
+    lives = True if here.can_tell(holder) and holder != here else None
+    return ClientRun(describe(holder), since, lives=lives)
+
+
+def _outdated(folder: Path) -> Iterator[Path]:
+    for path in folder.iterdir():
+        with suppress(OSError):
+            if ambient.wall_s() - path.stat().st_mtime > _KEPT_S:
+                yield path
+
+
+def _path(client: str) -> Path:
+    # Eight hexadecimal digits; anything else could name a file that is none of ours.
+    name = client if client.isalnum() else "unreadable"
+    return state_folder("clients") / f"{name}.json"

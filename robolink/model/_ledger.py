@@ -1,0 +1,355 @@
+"""What was done to a controller over one connection, and how much of it is proved.
+
+The durable markers say to the next process what this one had begun. The ledger says to whoever
+is told of an error what stands on the controller now: it is written to before the journal is,
+so that it holds whatever breaks afterwards, the link, the stream, the journal or the disk.
+"""
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+
+from robolink.messages import joined, tr
+from robolink.model._outcomes import Marker, MarkerKind
+from robolink.model._status import ControllerStatus
+from robolink.model._tools import ToolOffset, describe_offset, read_offset
+from robolink.standing import Components, Standing, ToolStanding, note_standing
+
+Same = Callable[[ToolOffset | None, ToolOffset | None], bool]
+
+
+@dataclass(slots=True)
+class Account:
+    """What was begun in one block of work; made by :meth:`Ledger.open`.
+
+    Attributes:
+        before: What each tool held before the first write to it in this block.
+        selected_before: Which tool was selected before the first selection in this block.
+        carried_out: Requests that the controller has carried out, but for tools.
+        moved: Whether a movement was begun.
+    """
+
+    before: dict[int, ToolOffset | None] = field(default_factory=dict)
+    selected_before: int | None = None
+    carried_out: dict[str, None] = field(default_factory=dict)
+    moved: bool = False
+
+
+@dataclass(slots=True)
+class _Deed:
+    """One command that was begun; ``answered`` when the controller is known to be done with it."""
+
+    marker: Marker
+    answered: bool = False
+
+    @property
+    def tool(self) -> int | None:
+        tool = self.marker.details.get("tool")
+        return tool if isinstance(tool, int) and self.marker.kind is MarkerKind.SET else None
+
+    @property
+    def selects(self) -> bool:
+        return "select" in self.marker.details and self.marker.kind is MarkerKind.SET
+
+    @property
+    def before(self) -> ToolOffset | None:
+        return read_offset(self.marker.details.get("before"))
+
+    @property
+    def requested(self) -> ToolOffset | None:
+        return read_offset(self.marker.details.get("requested"))
+
+
+class Ledger:
+    """The commands of one connection that write or move. Thread-safe.
+
+    Attributes:
+        same: Whether the controller stores two offsets alike.
+    """
+
+    def __init__(self) -> None:
+        self.same: Same = lambda a, b: a == b
+        self._lock = threading.RLock()
+        self._doubts: dict[str, _Deed] = {}
+        self._open: dict[str, Marker] = {}
+        self._holds: dict[int, ToolOffset | None] = {}
+        self._requested: dict[int, ToolOffset | None] = {}
+        self._selected: int | None = None
+        self._seen: tuple[ControllerStatus, int] | None = None
+        self._whole = Account()
+        self._accounts = [self._whole]
+        self._unkept: list[Account] = []
+
+    # What is begun, and how it ends; told by whoever keeps the markers.
+
+    def begin(self, marker: Marker) -> None:
+        """Note a command or a procedure that is about to begin; its marker is durable."""
+        with self._lock:
+            self._open[marker.operation] = marker
+            if marker.kind not in (MarkerKind.SET, MarkerKind.MOVE):
+                return
+            deed = self._doubts[marker.operation] = _Deed(marker)
+            if deed.tool is not None:
+                self._requested[deed.tool] = deed.requested
+            for account in self._accounts:
+                if marker.kind is MarkerKind.MOVE:
+                    account.moved = True
+                elif deed.tool is not None:
+                    account.before.setdefault(deed.tool, deed.before)
+                elif deed.selects and account.selected_before is None:
+                    account.selected_before = int(str(marker.details["before"]))
+
+    def answered(self, marker: Marker) -> None:
+        """Note that the controller is done with it, whatever it did: what is read now counts."""
+        with self._lock:
+            if marker.operation in self._doubts:
+                self._doubts[marker.operation].answered = True
+
+    def proved(self, marker: Marker, found: object) -> None:
+        """Note what was read after a command: a tool's offset, the selected tool, a value."""
+        with self._lock:
+            deed = self._doubts.get(marker.operation)
+            if deed is not None:
+                self._prove(deed, found)
+
+    def ended(self, marker: Marker) -> None:
+        """Note that its outcome is known: proved before, or refused, or a movement that ended."""
+        with self._lock:
+            deed = self._doubts.pop(marker.operation, None)
+            if deed is None:
+                return
+            if deed.tool is not None:
+                self._holds.setdefault(deed.tool, deed.before)
+            elif deed.selects:
+                self._selected = int(str(deed.marker.details["before"]))
+
+    def recorded(self, marker: Marker) -> None:
+        """Note that its outcome is on record: its marker is gone."""
+        with self._lock:
+            self._open.pop(marker.operation, None)
+
+    def open_writes(self, tool: int) -> tuple[Marker, ...]:
+        """Return the markers of writes to a tool whose outcome is known and not on record."""
+        with self._lock:
+            return tuple(
+                marker
+                for operation, marker in self._open.items()
+                if operation not in self._doubts and _Deed(marker).tool == tool
+            )
+
+    # What is read besides.
+
+    def saw_tool(self, tool: int, holds: ToolOffset | None) -> None:
+        """Note what a tool was read as."""
+        with self._lock:
+            doubts = [deed for deed in self._doubts.values() if deed.tool == tool]
+            if all(deed.answered for deed in doubts):
+                for deed in doubts:
+                    self._prove(deed, holds)
+                if tool in self._holds:
+                    self._holds[tool] = holds
+
+    def saw_selected(self, tool: int | None) -> None:
+        """Note which tool was read as the selected one."""
+        with self._lock:
+            doubts = [deed for deed in self._doubts.values() if deed.selects]
+            if all(deed.answered for deed in doubts):
+                for deed in doubts:
+                    del self._doubts[deed.marker.operation]
+                self._selected = tool
+
+    def saw_status(self, status: ControllerStatus, at_ns: int) -> None:
+        """Note what state was read, and when on the controller's clock."""
+        self._seen = (status, at_ns)
+
+    @property
+    def seen(self) -> tuple[ControllerStatus, int] | None:
+        """The state that was read last, and when on the controller's clock; ``None`` for never.
+
+        It takes no lock: whoever looks on from another thread holds up nobody at work.
+        """
+        return self._seen
+
+    # What stands.
+
+    @contextmanager
+    def block(self) -> Iterator[Account]:
+        """Let whatever ends the block early say what it left on the controller."""
+        account = self.open()
+        try:
+            yield account
+        except BaseException as error:
+            note_standing(error, self.standing(account))
+            raise
+        finally:
+            self.close(account)
+
+    @contextmanager
+    def telling(self) -> Iterator[None]:
+        """Let whatever leaves the block say what was left on the controller since connecting."""
+        try:
+            yield
+        except BaseException as error:
+            note_standing(error, self.standing())
+            raise
+
+    def open(self) -> Account:
+        """Begin an account of what is done from now on."""
+        with self._lock:
+            account = Account()
+            self._accounts.append(account)
+            return account
+
+    def close(self, account: Account, *, kept: bool = True) -> None:
+        """End an account.
+
+        Args:
+            account: The account.
+            kept: Whether what was written in it is to stay. What is not, and was not put back,
+                stands unproved.
+        """
+        with self._lock:
+            self._accounts = [other for other in self._accounts if other is not account]
+            if not kept:
+                self._unkept.append(account)
+
+    def standing(self, account: Account | None = None) -> Standing:
+        """Return what stands of what was done in ``account``, by default since connecting."""
+        with self._lock:
+            since = self._whole if account is None else account
+            doubts = self._doubts.values()
+            moves = [deed for deed in doubts if deed.marker.kind is MarkerKind.MOVE]
+            unproved = {m.kind for m in self._open.values()} - {MarkerKind.SELECTION}
+            standing = any(map(self._stands, self._unkept))
+            others = [d for d in doubts if d not in moves and d.tool is None and not d.selects]
+            return Standing(
+                tools={tool: self._tool(tool, before) for tool, before in since.before.items()},
+                selected=self._selected,
+                selected_before=since.selected_before,
+                selection_known=not any(deed.selects for deed in doubts),
+                carried_out=tuple(since.carried_out),
+                doubtful=tuple(deed.marker.request for deed in others),
+                moved=since.moved,
+                moving=tuple(deed.marker.request for deed in moves),
+                settled=not unproved and not standing,
+                left_open=bool(self._open) or standing,
+                reset_first=self._seen is not None and self._seen[0].needs_reset,
+            )
+
+    def _tool(self, tool: int, before: ToolOffset | None) -> ToolStanding:
+        known = all(deed.tool != tool for deed in self._doubts.values())
+        holds = self._holds.get(tool, before)
+        return ToolStanding(
+            before=_plain(before),
+            holds=_plain(holds),
+            requested=_plain(self._requested.get(tool)),
+            known=known,
+            differs=known and not self.same(holds, before),
+        )
+
+    def _stands(self, account: Account) -> bool:
+        """Whether something that was not kept was not put back either."""
+        return any(
+            not self.same(self._holds.get(tool, before), before)
+            for tool, before in account.before.items()
+        )
+
+    def _prove(self, deed: _Deed, found: object) -> None:
+        if deed.tool is not None:
+            self._holds[deed.tool] = found if isinstance(found, ToolOffset) else None
+        elif deed.selects:
+            self._selected = found if isinstance(found, int) else None
+        else:
+            for account in self._accounts:
+                account.carried_out[deed.marker.request] = None
+        del self._doubts[deed.marker.operation]
+
+
+def _plain(offset: ToolOffset | None) -> Components:
+    return None if offset is None else offset.components()
+
+
+def describe_standing(standing: Standing, *, settles: bool = True) -> str:
+    """Return what moved, what was written, which tool is selected, and what settles the rest.
+
+    It claims nothing that was not looked at.
+
+    Args:
+        standing: What stands.
+        settles: Whether to say which command settles it; not where that is said besides.
+    """
+    parts = [_movement(standing), *_writes(standing), _selection(standing)]
+    if not settles:
+        return joined(" ", parts)
+    if standing.left_open and standing.reset_first:
+        parts.append(tr("Next: robolink robot reset, then robolink recover."))
+    elif standing.left_open:
+        parts.append(tr("Next: robolink recover."))
+    return joined(" ", parts)
+
+
+def _movement(standing: Standing) -> str:
+    if standing.moving:
+        return tr(
+            "The robot may still be moving; the end of this was not seen: {requests}.",
+            requests=", ".join(standing.moving),
+        )
+    if standing.moved:
+        return tr("Every movement has ended.")
+    return tr("Nothing was moved.")
+
+
+def _writes(standing: Standing) -> list[str]:
+    if not (standing.tools or standing.carried_out or standing.doubtful):
+        return [tr("Nothing was written.")]
+    parts = [_tool(number, tool) for number, tool in sorted(standing.tools.items())]
+    if standing.carried_out:
+        parts.append(
+            tr("This was carried out: {requests}.", requests=", ".join(standing.carried_out))
+        )
+    if standing.doubtful:
+        parts.append(
+            tr(
+                "This may or may not have been carried out: {requests}.",
+                requests=", ".join(standing.doubtful),
+            )
+        )
+    return parts
+
+
+def _tool(number: int, tool: ToolStanding) -> str:
+    before, holds = _shown(tool.before), _shown(tool.holds)
+    if not tool.known:
+        return tr(
+            "Tool {tool} may hold the new value {requested}; before, it held {before}.",
+            tool=number,
+            requested=_shown(tool.requested),
+            before=before,
+        )
+    if tool.differs:
+        return tr(
+            "Tool {tool} now holds {holds}; before, it held {before}.",
+            tool=number,
+            holds=holds,
+            before=before,
+        )
+    return tr("Tool {tool} holds {holds}, as before.", tool=number, holds=holds)
+
+
+def _selection(standing: Standing) -> str:
+    if not standing.selection_known:
+        return tr("It is not proved which tool is selected now.")
+    if standing.selected is None:
+        return tr("It was not read which tool is selected.")
+    if standing.selected_another:
+        return tr(
+            "Tool {now} is selected now; it was tool {tool} before.",
+            now=standing.selected,
+            tool=standing.selected_before,
+        )
+    return tr("Tool {tool} is selected.", tool=standing.selected)
+
+
+def _shown(components: Components) -> str:
+    return describe_offset(None if components is None else ToolOffset(*components))

@@ -1,1 +1,0 @@
-"""Poses, movements, and what sees or switches at the tip."""

@@ -1,1 +1,0 @@
-"""What is kept about what was done: entries, markers, findings, and what stands now."""

@@ -1,1 +1,0 @@
-"""The turn test of a change that was cut off between its write and its proof."""

@@ -1,1 +1,0 @@
-"""The blocks of the mailbox, word by word, and what guards them."""

@@ -1,0 +1,161 @@
+"""The whole recipe. Imported when one is loaded, for pydantic."""
+
+from dataclasses import replace
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import ConfigDict, Field, ValidationInfo, field_validator
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
+from pydantic_core import core_schema
+
+from robolink.methods import MethodParameters, fields_of, method_names
+from robolink.recipe._tables import (
+    AccuracyTable,
+    AnyKind,
+    Box,
+    Line,
+    MethodTable,
+    Note,
+    Output,
+    Poses,
+    Prompt,
+    RefusalTable,
+    Speeds,
+    StationTable,
+    Table,
+    Tolerances,
+    Tool,
+)
+
+Basis = Literal["difference", "absolute"]
+HeightRule = Literal["measured", "typed", "kept"]
+T = TypeVar("T")
+
+
+class Recipe(Table):
+    """A nozzle change, written down once by the integrator and run by whoever changes nozzles."""
+
+    model_config = ConfigDict(validate_default=True)
+
+    format: Annotated[Literal["robolink/recipe/1"], Field(alias="schema")]
+    """What this file is, and which version of it."""
+    name: Line
+    """What people call it; it goes on record with everything that the recipe does."""
+    notes: Note = ""
+    """For people."""
+    cells: Annotated[tuple[Line, ...], Field(strict=False)] = ()
+    """Names of the cells that it is for; without it, any cell. At another it is neither offered
+    nor run: its poses would lead somewhere else there."""
+    numbers: Literal["simulated"] | None = None
+    """Whose numbers these are: "simulated" stands in the copy of a recipe that comes along, which
+    runs on simulated controllers alone. Whoever has put in stations, poses, box and limits of the
+    cell deletes the line."""
+    basis: Basis
+    """What is written: with "difference" the stored offset, moved by how much the tip moved
+    against the reference of the same tool at the same station; with "absolute" what was
+    measured."""
+    z: HeightRule
+    """Where Z of the offset comes from: "measured" on the pin, "typed" by the person each time,
+    or "kept", which the person confirms each time."""
+    verify: bool | None = None
+    """Whether the robot turns about the new tip after the write. If the robot moves at all, it
+    does so unless this is false."""
+    source: Annotated[MethodTable, AnyKind()]
+    """Where the measurements come from."""
+    station: StationTable
+    """Where it is measured."""
+    poses: Poses = Field(default_factory=Poses)
+    """Poses of the whole change."""
+    tools: Annotated[tuple[Tool, ...], Field(strict=False, min_length=1)]
+    """The tools, in the order in which they are measured: all are written, or none."""
+    speeds: Speeds = Field(default_factory=Speeds)
+    """How fast the robot goes, in Power Low."""
+    box: Box = Field(default_factory=Box)
+    """How far the flange may go from where it is when the recipe starts."""
+    tolerances: Tolerances = Field(default_factory=Tolerances)
+    """What a measurement must be like to be believed."""
+    accuracy: AccuracyTable = Field(default_factory=AccuracyTable)
+    """What is known of errors that no measurement shows by itself."""
+    refusal: RefusalTable = Field(default_factory=RefusalTable)
+    """What follows when a measurement is not believed."""
+    prompts: Annotated[tuple[Prompt, ...], Field(strict=False)] = ()
+    """What a person is asked, in this order."""
+    outputs: Annotated[tuple[Output, ...], Field(strict=False)] = ()
+    """Outputs that are switched, in this order."""
+
+    @property
+    def verifies(self) -> bool:
+        """Whether the new tips are proved by turning about them."""
+        return self.source.of_method.needs.motion and self.verify is not False
+
+    @property
+    def parameters(self) -> MethodParameters:
+        """The parameters of its method, with what stands at the top of the recipe."""
+        parameters = self.source.parameters
+        for one in fields_of(type(parameters)):
+            if one.option.from_recipe:
+                value = getattr(self, one.option.from_recipe)
+                parameters = replace(parameters, **{one.name: value})
+        return parameters
+
+    def is_for(self, cell: str) -> bool:
+        """Tell whether it may be run at a cell; ``""`` stands for one that has no name."""
+        return not self.cells or cell in self.cells
+
+    @property
+    def attempts(self) -> int:
+        """How often a tool is measured before a refusal ends the change."""
+        return 1 if self.refusal.action == "stop" else self.refusal.attempts or 2
+
+    @field_validator("*")
+    @classmethod
+    def _hand_on(cls, value: T, info: ValidationInfo) -> T:
+        """Hand on what is right in itself: how it goes with the rest is checked in any case."""
+        if isinstance(info.context, dict):
+            info.context[info.field_name] = value
+        return value
+
+
+_made_for: tuple[str, ...] = method_names()
+
+
+def recipe_of_all_methods() -> type[Recipe]:
+    """Return the recipe, made anew when there are other methods than before."""
+    global _made_for  # noqa: PLW0603 - one registry of methods, one recipe
+    if method_names() != _made_for:
+        Recipe.model_rebuild(force=True)
+        _made_for = method_names()
+    return Recipe
+
+
+class _ForToml(GenerateJsonSchema):
+    def nullable_schema(self, schema: core_schema.NullableSchema) -> JsonSchemaValue:
+        return self.generate_inner(schema["schema"])
+
+    def default_schema(self, schema: core_schema.WithDefaultSchema) -> JsonSchemaValue:
+        if schema.get("default") is None:
+            return self.generate_inner(schema["schema"])
+        return super().default_schema(schema)
+
+    def literal_schema(self, schema: core_schema.LiteralSchema) -> JsonSchemaValue:
+        generated = super().literal_schema(schema)
+        if "const" in generated:
+            generated["enum"] = [generated.pop("const")]
+        return generated
+
+    def field_title_should_be_set(self, schema: Any) -> bool:  # noqa: ANN401, ARG002 - pydantic's
+        return False
+
+
+def json_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a recipe: keys, types, units and limits.
+
+    How the tables go together is beyond a schema; :func:`check_recipe` looks at that.
+    """
+    generated = recipe_of_all_methods().model_json_schema(
+        ref_template="#/definitions/{model}", schema_generator=_ForToml
+    )
+    return {
+        "$schema": "http://json-schema.org/draft-04/schema#",
+        **{key: value for key, value in generated.items() if key != "$defs"},
+        "definitions": generated["$defs"],
+    }

@@ -1,0 +1,373 @@
+"""The tables of a recipe: keys, units and limits. Imported when one is loaded, for pydantic.
+
+The sentence below a key is what an editor shows for it; the schema is made of them.
+"""
+
+import dataclasses
+import functools
+from typing import Annotated, Any, ClassVar, Literal, Union, get_args, get_origin
+
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, create_model
+from pydantic_core import CoreSchema
+
+from robolink.methods import AnyMethod, Help, MethodParameters, Unit, all_methods, fields_of
+from robolink.methods.parameter_checks import ParameterField as Parameter
+from robolink.methods.parameter_checks import bare
+from robolink.model import Pose, WorkBox
+
+Line = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f\x7f-\x9f]*$")]
+"""One line for people. No control characters: they would reach a terminal."""
+
+Note = Annotated[str, Field(max_length=5000, pattern=r"^[^\x00-\x08\x0b-\x1f\x7f-\x9f]*$")]
+"""Lines for people."""
+
+Length = Annotated[float, Field(ge=0.001)]
+"""No limit is finer than the last digit that a controller prints, mm
+(docs/reference/rules.md 3)."""
+
+Angle = Annotated[float, Field(ge=-360, le=360)]
+ToolNumber = Annotated[int, Field(ge=1, le=15)]
+OutputNumber = Annotated[int, Field(ge=0, le=0xFFFF)]
+PointNumber = Annotated[int, Field(ge=0, le=999)]
+
+
+class Table(BaseModel):
+    """What all tables have in common."""
+
+    model_config = ConfigDict(
+        extra="forbid",
+        frozen=True,
+        strict=True,
+        allow_inf_nan=False,
+        hide_input_in_errors=True,
+        use_attribute_docstrings=True,
+    )
+
+
+class FlangePose(Table):
+    """Where the flange (Tool 0) is, in base coordinates."""
+
+    x_mm: float
+    """X of the flange, base, mm."""
+    y_mm: float
+    """Y of the flange, base, mm."""
+    z_mm: float
+    """Z of the flange, base, mm."""
+    u_deg: float
+    """U of the flange, degrees."""
+    v_deg: Angle = 0.0
+    """V of the flange, degrees; "pivot", "plane-touch", "sphere-touch" and "six-point" only, whose
+    robots can tilt it."""
+    w_deg: Angle = 0.0
+    """W of the flange, degrees; likewise."""
+
+    @property
+    def pose(self) -> Pose:
+        """The same as a pose."""
+        return Pose(self.x_mm, self.y_mm, self.z_mm, self.u_deg, self.v_deg, self.w_deg, tool=0)
+
+
+class StationTable(Table):
+    """Where it is measured."""
+
+    id: Line
+    """Name of the pin or gauge; it goes on record with every measurement. What this table does not
+    say about its place comes from the station of that name in the cell file and the journal."""
+    x_mm: float | None = None
+    """X of the pin's end (for the record only), of the place where the surface is touched, or of
+    the place where a camera looks; base, mm; together with y_mm."""
+    y_mm: float | None = None
+    """Y of the same; base, mm; together with x_mm."""
+    z_mm: float | None = None
+    """Z of the pin's end, of the surface, or of the height in focus; base, mm. z = "measured" needs
+    it, from here or from the station's record, when basis is "absolute", and source "z-touch"
+    always."""
+    sigma_mm: Length | None = None
+    """Standard deviation of each of them, mm, where it is known; one touch with basis "absolute"
+    needs it to say what it is repeatable to."""
+    note: Note = ""
+    """For people."""
+
+    @property
+    def place_mm(self) -> tuple[float, float, float]:
+        """Where it is, once recipe or record have said so."""
+        x_mm, y_mm, z_mm = self.x_mm, self.y_mm, self.z_mm
+        assert x_mm is not None  # noqa: S101 - the recipe was checked and located
+        assert y_mm is not None  # noqa: S101
+        assert z_mm is not None  # noqa: S101
+        return x_mm, y_mm, z_mm
+
+
+class Poses(Table):
+    """Poses of the whole change."""
+
+    safe: FlangePose | None = None
+    """Flange pose to which the robot goes first and last: up, over, down."""
+
+
+class PoseFile(Table):
+    """A file of poses, and what it does not say itself (docs/poses.md, "Files of poses")."""
+
+    file: Line
+    """The file; a path that is not absolute begins in the folder of the recipe."""
+    columns: Line | None = None
+    """A name for each of its columns, "-" for one to skip: "x,y,z,u"."""
+    length: Literal["mm", "cm", "m", "in"] | None = None
+    """Unit of its lengths."""
+    euler: Line | None = None
+    """Rule by which its angles turn, such as "kuka"."""
+
+
+class Tool(Table):
+    """One tool whose nozzle was changed."""
+
+    number: ToolNumber
+    """Number of the tool in the controller."""
+    name: Line | None = None
+    """What people call it."""
+    approach: FlangePose | None = None
+    """Flange pose from which the tool is measured: tip some mm beside the pin and above it. Without
+    it, the tool is measured from where the robot is."""
+    retreat: FlangePose | None = None
+    """Flange pose to which the robot goes after the measurement."""
+    points: Annotated[tuple[PointNumber, ...], Field(strict=False, min_length=2)] | None = None
+    """Numbers, 0 to 999, of the taught points that touch the pin with this tool, 2 for "two-pose",
+    3 and more for "n-angle"; source "points" only, which needs them or a file of poses."""
+    poses: PoseFile | None = None
+    """File with the poses that touch the pin with this tool, in place of points."""
+
+
+class Speeds(Table):
+    """How fast the robot goes, in Power Low."""
+
+    percent: Annotated[int, Field(ge=1, le=100)] = 5
+    """Speed of joint moves, percent of the speed in Power Low."""
+    mm_s: Annotated[float, Field(ge=1, le=100)] = 20.0
+    """Speed of straight moves, mm/s."""
+
+
+class Box(Table):
+    """How far the flange may go from where it is when the recipe starts."""
+
+    sideways_mm: Annotated[float, Field(ge=1)] = 150.0
+    """How far in X and in Y, mm."""
+    down_mm: Annotated[float, Field(ge=1)] = 30.0
+    """How far down, mm."""
+    up_mm: Annotated[float, Field(ge=1)] = 50.0
+    """How far up, mm."""
+
+    @property
+    def reach(self) -> WorkBox:
+        """The same, about wherever the flange will be."""
+        return WorkBox.reaching(self.sideways_mm, down_mm=self.down_mm, up_mm=self.up_mm)
+
+
+class Tolerances(Table):
+    """What a measurement must be like to be believed."""
+
+    rms_mm: Length | None = None
+    """Largest rms of the residuals, mm; not for "two-pose", which leaves no residual."""
+    max_mm: Length | None = None
+    """Largest single residual, mm, at least rms_mm; not for "two-pose"."""
+    interval_mm: Length | None = None
+    """Largest distance from the truth within which the tip lies in 95 %, mm, all lengths that are
+    measured together and every row of the budget counted, see [accuracy]. "two-pose" needs
+    sigma_mm for it."""
+    sigma_mm: Length | None = None
+    """Standard deviation of one coordinate of one touch, or of one crossing, mm, where known."""
+    jump_mm: Length = 2.0
+    """Largest change against the stored offset that a nozzle change explains, mm, over the lengths
+    that were measured; more is refused. A Z that is typed is not judged."""
+    drift_mm: Length = 0.2
+    """Largest drift about the new tip that passes the verification, mm."""
+
+
+HalfWidth = Annotated[float, Field(ge=0.0001)]
+
+
+class AccuracyTable(Table):
+    """What is known of errors that no measurement shows by itself: half widths.
+
+    What is not said here counts as in the cell file, as on record, or by its default
+    (docs/accuracy.md).
+    """
+
+    touch_mm: HalfWidth | None = None
+    """How a person sees contact, mm: always beside, on the same side of the tool."""
+    place_mm: HalfWidth | None = None
+    """Place of the station since it was learnt, mm; only where the method uses that place."""
+    camera_turn_deg: HalfWidth | None = None
+    """Turn of the camera since it was calibrated, degrees."""
+    camera_scale_percent: HalfWidth | None = None
+    """Scale of the camera since it was calibrated, percent."""
+    plate_mm: HalfWidth | None = None
+    """Height of the surface, mm."""
+    tip_image_px: HalfWidth | None = None
+    """What the camera sees of a tip beside its middle, pixels."""
+    bend_deg: HalfWidth | None = None
+    """Bend of the needle that is left after its correction, degrees."""
+    print_mm: HalfWidth | None = None
+    """Print of the fiducials, mm."""
+
+    @property
+    def stated(self) -> dict[str, float]:
+        """What is stated, by key."""
+        return {key: value for key, value in self.model_dump().items() if value is not None}
+
+
+class RefusalTable(Table):
+    """What follows when a measurement is not believed."""
+
+    action: Literal["stop", "measure_again"] = "stop"
+    """End the change with the old values, or measure that tool again."""
+    attempts: Annotated[int, Field(ge=2, le=5)] | None = None
+    """How often a tool is measured at most; 2 if this is left out."""
+
+
+class Prompt(Table):
+    """Something a person is asked."""
+
+    at: Literal["start", "before_measure", "before_write", "end"]
+    """When: once at start, before_write and end; before_measure for each tool."""
+    text: Line
+    """The question, as the person reads it."""
+    answer: Literal["yes", "nozzle", "lot", "text"] = "yes"
+    """A yes, without which the change ends; or the nozzle's id, its lot or a text to record."""
+    tool: ToolNumber | None = None
+    """Ask before this tool only."""
+
+
+class Output(Table):
+    """An output that is switched: vacuum, purge, light."""
+
+    at: Literal["start", "before_measure", "after_measure", "before_write", "end"]
+    """When: once at start, before_write and end; before and after the measuring of each tool."""
+    output: OutputNumber
+    """Number of the output bit."""
+    on: bool
+    """Whether it is switched on or off."""
+    tool: ToolNumber | None = None
+    """Switch it for this tool only."""
+
+
+_DESCRIBED = ConfigDict(use_attribute_docstrings=False)
+"""Their keys bring their sentences: pydantic need not look through every module for a source."""
+
+
+class MethodTable(Table):
+    """What the tables of all methods have in common."""
+
+    model_config = _DESCRIBED
+
+    of_method: ClassVar[AnyMethod]
+
+    kind: str
+    """The method."""
+
+    @property
+    def parameters(self) -> MethodParameters:
+        """The parameters of the method."""
+        made: MethodParameters = self.of_method.parameters(
+            **{
+                one.name: _plain(getattr(self, one.name))
+                for one in fields_of(self.of_method.parameters)
+                if one.in_recipe
+            }
+        )
+        return made
+
+
+class _Line(Table):
+    """A table inside of one, such as a light beam."""
+
+    model_config = _DESCRIBED
+
+    of_class: ClassVar[type[Any]]
+
+
+class AnyKind:
+    """Stands for the table of whatever method ``kind`` names."""
+
+    def __get_pydantic_core_schema__(
+        self, _source: object, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        """Return the union of the tables of all methods that there are now."""
+        tables = tuple(map(method_table, all_methods()))
+        return handler.generate_schema(
+            Annotated[Union[tables], Field(discriminator="kind")]  # noqa: UP007 - made at run time
+        )
+
+
+_tables: dict[str, type[MethodTable]] = {}
+_lines: dict[type[Any], type[_Line]] = {}
+
+
+def method_table(method: AnyMethod) -> type[MethodTable]:
+    """Return the table of a method."""
+    made = _tables.get(method.name)
+    if made is None or made.of_method is not method:
+        made = _tables[method.name] = _made_of(method)
+    return made
+
+
+def _made_of(method: AnyMethod) -> type[MethodTable]:
+    keys: dict[str, Any] = {
+        one.name: (_annotation(one), _default(one))
+        for one in fields_of(method.parameters)
+        if one.in_recipe
+    }
+    name = "".join(part.title() for part in method.name.split("-"))
+    made = create_model(
+        f"{name}Source",
+        __base__=MethodTable,
+        __doc__=method.summary,
+        **{"kind": (Literal[method.name], Field(description=method.summary)), **keys},
+    )
+    made.of_method = method
+    return made
+
+
+def _default(one: Parameter) -> Any:  # noqa: ANN401 - pydantic's own form
+    meaning = f"{one.help} [{one.unit}]" if one.unit else one.help
+    return Field(... if one.required else one.default, description=meaning)
+
+
+def _annotation(one: Parameter) -> Any:  # noqa: ANN401 - a type
+    made = _typed(one.kind, one.metadata)
+    return made if one.required or one.default is not None else made | None
+
+
+def _typed(kind: Any, limits: tuple[object, ...]) -> Any:  # noqa: ANN401 - types
+    """Return a type with its limits, for pydantic; a list in TOML is a tuple here."""
+    limits = tuple(limit for limit in limits if not isinstance(limit, (Help, Unit)))
+    if get_origin(kind) is tuple:
+        inner, *more = get_args(kind)
+        if more != [Ellipsis]:
+            limits = (*limits, Field(min_length=len(more) + 1, max_length=len(more) + 1))
+        element = _typed(*bare(inner))
+        kind, limits = tuple[element, ...], (Field(strict=False), *limits)  # type: ignore[valid-type]
+    elif isinstance(kind, type) and dataclasses.is_dataclass(kind):
+        kind = _line(kind)
+    return functools.reduce(lambda made, limit: Annotated[made, limit], limits, kind)
+
+
+def _line(kind: type[Any]) -> type[_Line]:
+    if kind in _lines:
+        return _lines[kind]
+    keys: dict[str, Any] = {one.name: (_annotation(one), _default(one)) for one in fields_of(kind)}
+    made = create_model(kind.__name__, __base__=_Line, __doc__=kind.__doc__, **keys)
+    made.of_class = kind
+    _lines[kind] = made
+    return made
+
+
+def _plain(value: object) -> object:
+    """Return a value of a table as the parameters hold it."""
+    if isinstance(value, tuple):
+        return tuple(map(_plain, value))
+    if isinstance(value, _Line):
+        return value.of_class(
+            **{name: _plain(getattr(value, name)) for name in type(value).model_fields}
+        )
+    assert not isinstance(value, BaseModel)  # noqa: S101 - there are no other tables inside
+    return value

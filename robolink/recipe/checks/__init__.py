@@ -1,1 +1,0 @@
-"""How the tables of a recipe go together: what no table can tell alone."""

@@ -1,1 +1,0 @@
-"""Byte streams: TCP connections and serial ports, and what is recorded of them."""

@@ -1,0 +1,160 @@
+"""Shares the tests of a run among processes: ``pytest --processes 2``.
+
+The tests are collected once, by the process that prints; then it forks. To import and collect all
+of them takes a third of a minute, so each process would pay that anew, and two would compile the
+same modules side by side. A process takes one test module after the other, so that what a module
+sets up serves all of its tests, and sends its reports through a pipe.
+"""
+
+import os
+import pickle
+import struct
+import sys
+import traceback
+from collections.abc import Iterator
+from itertools import groupby
+from multiprocessing.connection import Connection, Pipe, wait
+
+import pytest
+
+_NUMBER = struct.Struct("H")
+"""How the number of a module stands in the pipe from which the processes take them."""
+_OF_THE_PRINTER = ("LFPlugin", "NFPlugin", "StepwisePlugin", "LogXML")
+"""Plug-ins that write down how the whole run went; none of the processes knows."""
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Offer ``--processes``."""
+    parser.addoption(
+        "--processes",
+        type=int,
+        default=1,
+        metavar="N",
+        help="share the tests among N forked processes (POSIX)",
+    )
+
+
+def pytest_runtestloop(session: pytest.Session) -> bool | None:
+    """Run the tests in as many processes as were asked for; ``None`` leaves it to pytest."""
+    count = session.config.getoption("processes")
+    if count < 2 or session.config.option.collectonly or session.testsfailed:
+        return None
+    if not hasattr(os, "fork"):
+        raise pytest.UsageError("--processes needs a system that can fork; leave it out")
+    modules = [list(tests) for _, tests in groupby(session.items, lambda test: test.path)]
+    queue = _numbers(len(modules))
+    session.config.get_terminal_writer().flush()
+    session.config._tmp_path_factory.getbasetemp()  # type: ignore[attr-defined]
+    runs = dict(_start(session, modules, queue, number) for number in range(count))
+    os.close(queue)
+    try:
+        _hear(session, runs)
+    finally:
+        for end, pid in runs.items():
+            end.close()  # what still runs ends at its next report
+            os.waitpid(pid, 0)
+    if session.shouldfail:
+        raise session.Failed(session.shouldfail)
+    if session.shouldstop:
+        raise session.Interrupted(session.shouldstop)
+    return True
+
+
+def _numbers(count: int) -> int:
+    """Return the end of a pipe that holds 0 to ``count`` - 1; whoever reads one has it alone."""
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    for number in range(count):
+        os.write(writing, _NUMBER.pack(number))
+    os.close(writing)
+    return reading
+
+
+def _start(
+    session: pytest.Session, modules: list[list[pytest.Item]], queue: int, number: int
+) -> tuple[Connection, int]:
+    """Fork a process that takes modules from ``queue``."""
+    reading, writing = Pipe(duplex=False)
+    if pid := os.fork():
+        writing.close()
+        return reading, pid
+    try:
+        reading.close()
+        _prepare(session.config, writing, number)
+        _run(session, modules, queue)
+        writing.send_bytes(b"")
+    except (BrokenPipeError, KeyboardInterrupt):
+        pass  # the printer wants no more
+    except BaseException:
+        traceback.print_exc(file=sys.__stderr__)
+    finally:
+        os._exit(0)
+
+
+def _prepare(config: pytest.Config, writing: Connection, number: int) -> None:
+    """Give this process captures and a folder of its own, and lead its reports to the printer."""
+    capture = config.pluginmanager.getplugin("capturemanager")
+    if capture is not None and capture.is_globally_capturing():
+        capture.stop_global_capturing()
+        capture.start_global_capturing()
+    config.get_terminal_writer()._file = open(os.devnull, "w")  # noqa: SIM115 - as long as it runs
+    for plugin in config.pluginmanager.get_plugins():
+        if type(plugin).__name__ in _OF_THE_PRINTER:
+            config.pluginmanager.unregister(plugin)
+    folders = config._tmp_path_factory  # type: ignore[attr-defined]
+    folders._given_basetemp = folders.getbasetemp() / f"process-{number}"
+    folders._basetemp = None
+    config.pluginmanager.register(_Sender(config, writing))
+
+
+class _Sender:
+    """A plug-in that hands reports on."""
+
+    def __init__(self, config: pytest.Config, writing: Connection) -> None:
+        self._config = config
+        self._writing = writing
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Send a report."""
+        data = self._config.hook.pytest_report_to_serializable(config=self._config, report=report)
+        self._writing.send_bytes(pickle.dumps(data))
+
+
+def _run(session: pytest.Session, modules: list[list[pytest.Item]], queue: int) -> None:
+    """Run the tests of one module after the other."""
+    tests = (test for number in _taken(queue) for test in modules[number])
+    test = next(tests, None)
+    while test is not None and not (session.shouldstop or session.shouldfail):
+        following = next(tests, None)
+        test.config.hook.pytest_runtest_protocol(item=test, nextitem=following)
+        test = following
+    session.config.hook.pytest_sessionfinish(session=session, exitstatus=0)
+
+
+def _taken(queue: int) -> Iterator[int]:
+    while number := os.read(queue, _NUMBER.size):
+        yield _NUMBER.unpack(number)[0]
+
+
+def _hear(session: pytest.Session, runs: dict[Connection, int]) -> None:
+    """Let the plug-ins of this process see the reports of the others until all have ended."""
+    hook = session.config.hook
+    open_ends = set(runs)
+    while open_ends and not (session.shouldstop or session.shouldfail):
+        for end in wait(open_ends):
+            assert isinstance(end, Connection)
+            try:
+                data = end.recv_bytes()
+            except EOFError:
+                raise session.Interrupted(f"test process {runs[end]} ended in the middle") from None
+            if not data:
+                open_ends.discard(end)
+                continue
+            report = hook.pytest_report_from_serializable(
+                config=session.config, data=pickle.loads(data)
+            )
+            if report.when == "setup":
+                hook.pytest_runtest_logstart(nodeid=report.nodeid, location=report.location)
+            hook.pytest_runtest_logreport(report=report)
+            if report.when == "teardown":
+                hook.pytest_runtest_logfinish(nodeid=report.nodeid, location=report.location)

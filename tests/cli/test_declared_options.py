@@ -5,12 +5,17 @@ from typing import Annotated, Literal, NamedTuple
 
 import click
 from click.testing import CliRunner
-from robolink_cli.options.declaration import Argument, Option, add_declared, declared_options
+from robolink_cli.options.declaration import (
+    CliArgument,
+    CliOption,
+    add_declared,
+    declared_options,
+)
 
 
 class Offset(NamedTuple):
-    x_mm: Annotated[float | None, Option(help="Sideways.")] = None
-    u_deg: Annotated[float, click.FloatRange(0, 360), Option("--turn")] = 90.0
+    x_mm: Annotated[float | None, CliOption(help="Sideways.")] = None
+    u_deg: Annotated[float, click.FloatRange(0, 360), CliOption("--turn")] = 90.0
 
 
 def shared(command):
@@ -33,13 +38,13 @@ def refused(function, *line):
 
 def lift(
     *,
-    tool: Annotated[int, Argument()],
-    files: Annotated[tuple[Path, ...], Option("--file")] = (),
-    height_mm: Annotated[float, Option(help="How high.")] = 5.0,
-    mode: Annotated[Literal["set", "active"] | None, Option()] = None,
+    tool: Annotated[int, CliArgument()],
+    files: Annotated[tuple[Path, ...], CliOption("--file")] = (),
+    height_mm: Annotated[float, CliOption(help="How high.")] = 5.0,
+    mode: Annotated[Literal["set", "active"] | None, CliOption()] = None,
     offset: Offset,
-    yes: Annotated[bool, Option(late=True)] = False,
-    _plain: Annotated[bool, Option("--plain", late=True, expose_value=False)] = False,
+    yes: Annotated[bool, CliOption(late=True)] = False,
+    _plain: Annotated[bool, CliOption("--plain", late=True, expose_value=False)] = False,
 ):
     return tool, files, height_mm, mode, offset, yes, _plain
 
@@ -78,7 +83,11 @@ def test_a_value_that_is_none_of_its_type_is_refused():
 
 
 def test_an_option_without_a_default_must_be_given():
-    def needs(*, url: Annotated[str, Option()], seeds: Annotated[tuple[int, ...], Argument()] = ()):
+    def needs(
+        *,
+        url: Annotated[str, CliOption()],
+        seeds: Annotated[tuple[int, ...], CliArgument()] = (),
+    ):
         return url, seeds
 
     assert called(needs, "--url", "a", "1", "2") == ("a", (1, 2))

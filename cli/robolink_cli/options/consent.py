@@ -9,31 +9,33 @@ from click.core import ParameterSource
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli.console.output import PLAIN
-from robolink_cli.options.declaration import Option
+from robolink_cli.options.declaration import CliOption
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
 DryRun = Annotated[
     bool,
-    Option(
+    CliOption(
         late=True, help="Show the exact requests and check the limits; read only, write nothing."
     ),
 ]
 
-Yes = Annotated[bool, Option(late=True, help="Answer yes to the question asked.")]
+Yes = Annotated[bool, CliOption(late=True, help="Answer yes to the question asked.")]
 
-Overwrite = Annotated[bool, Option(help="Overwrite a file that is already there.")]
+Overwrite = Annotated[bool, CliOption(help="Overwrite a file that is already there.")]
 
 Published = Annotated[
     bool,
-    Option(help="The tools as the companion program published them; works while production runs."),
+    CliOption(
+        help="The tools as the companion program published them; works while production runs."
+    ),
 ]
 
 ThenSelect = Annotated[
     int | None,
     click.IntRange(0, 15),
-    Option(
+    CliOption(
         metavar="NUMBER",
         help="The tool that the machine is to have selected in place of one that is selected and "
         "loses its definition; 0 is the flange.",
@@ -48,7 +50,7 @@ def _keep_plain(context: click.Context, _parameter: click.Parameter, wanted: boo
 
 Plain = Annotated[
     bool,
-    Option(
+    CliOption(
         "--plain",
         late=True,
         expose_value=False,

@@ -2,9 +2,10 @@
 
 The decorators of ``session.context`` and ``options.shared`` read it. The name of an option, its
 type, whether it must be given, its default and its unit come from the parameter, so a
-:class:`Parameter` says only what is not seen there, and a type of click what else a value must be::
+:class:`CliParameter` says only what is not seen there, and a type of click what else a value must
+be. The parameters stand behind ``*``::
 
-    def lift(context: CliContext, *, height_mm: Annotated[float, Option(help="How high.")] = 5.0):
+    def lift(context: CliContext, *, height_mm: Annotated[float, CliOption(help="How high")] = 5.0):
 
 is ``--height MM``, a decimal number, 5 by default, which the help page shows.
 """
@@ -25,7 +26,7 @@ _UNITS: Final = {"_mm_s": "MM_S", "_mm": "MM", "_deg": "DEG", "_s": "S"}
 """Unit at the end of a parameter's name, which its option shows in place of the value."""
 
 
-class Parameter:
+class CliParameter:
     """An option or argument of a command, beside what the parameter of the function says.
 
     A parameter that begins with an underscore is for an option that is kept elsewhere.
@@ -40,11 +41,11 @@ class Parameter:
         self.names, self.late, self.attributes = names, late, attributes
 
 
-class Option(Parameter):
+class CliOption(CliParameter):
     """Is typed behind its name."""
 
 
-class Argument(Parameter):
+class CliArgument(CliParameter):
     """Is typed by its place."""
 
 
@@ -53,7 +54,7 @@ class _Declared(NamedTuple):
 
     name: str
     kind: Any
-    marker: Parameter
+    marker: CliParameter
     types: tuple[click.ParamType[Any], ...]
     """The type that its annotation names, if it does."""
     defaults: tuple[object, ...]
@@ -62,7 +63,7 @@ class _Declared(NamedTuple):
     def decorator(self) -> Decorator:
         """Return what adds it to a command."""
         attributes, multiple = self._typed()
-        if isinstance(self.marker, Argument):
+        if isinstance(self.marker, CliArgument):
             attributes["required"] = not self.defaults
             if multiple:
                 attributes["nargs"] = -1
@@ -175,7 +176,7 @@ def _fields(group: Any) -> dict[str, _Declared]:  # noqa: ANN401 - a class
 
 def _declared(name: str, hint: Any, defaults: Mapping[str, object]) -> _Declared | None:  # noqa: ANN401 - a type
     about: tuple[object, ...] = getattr(hint, "__metadata__", ())
-    marker = next((one for one in about if isinstance(one, Parameter)), None)
+    marker = next((one for one in about if isinstance(one, CliParameter)), None)
     if marker is None:
         return None
     types = tuple(one for one in about if isinstance(one, click.ParamType))

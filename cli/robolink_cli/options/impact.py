@@ -8,7 +8,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli.access.capabilities import points_of
 from robolink_cli.console.render import say, table
-from robolink_cli.options.declaration import Option
+from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.pose_source import point_numbers
 
 if TYPE_CHECKING:
@@ -34,13 +34,13 @@ class ImpactRequest:
 
 ImpactPoints = Annotated[
     str | None,
-    Option(
+    CliOption(
         metavar="1-50", help="Before the write, show how far the tip moves at these taught points."
     ),
 ]
 
 ImpactFile = Annotated[
-    Path | None, Option(help="The same for all points of a .pts file of EPSON RC+.")
+    Path | None, CliOption(help="The same for all points of a .pts file of EPSON RC+.")
 ]
 
 

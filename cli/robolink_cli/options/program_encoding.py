@@ -7,7 +7,7 @@ import click
 
 from robolink.messages import tr
 from robolink_cli.console.render import note
-from robolink_cli.options.declaration import Option
+from robolink_cli.options.declaration import CliOption
 
 _PLAIN: Final = frozenset({"utf-8", "utf-8-sig"})
 
@@ -33,7 +33,7 @@ class _Encoding(click.ParamType[str]):
 Encoding = Annotated[
     str | None,
     _Encoding(),
-    Option(
+    CliOption(
         metavar="NAME",
         help="Code page of the files: utf-8, gbk, cp932, cp1250. Without it, the first of UTF-8, "
         "cp932 and GBK that fits is used, and named.",

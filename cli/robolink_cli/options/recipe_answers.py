@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_cli.options.declaration import Option
+from robolink_cli.options.declaration import CliOption
 
 if TYPE_CHECKING:
     from robolink.recipe import Answers, Recipe
@@ -15,7 +15,7 @@ _NUMBERED = re.compile(r"([0-9]{1,3})=(.+)", re.ASCII | re.DOTALL)
 
 AnswerTexts = Annotated[
     tuple[str, ...],
-    Option(
+    CliOption(
         "--answer",
         metavar="N=TEXT",
         help="Answer to prompt number N of the recipe, counted from 1.",
@@ -24,7 +24,7 @@ AnswerTexts = Annotated[
 
 TypedHeights = Annotated[
     tuple[str, ...],
-    Option(
+    CliOption(
         metavar="TOOL=MM",
         help='Z of a new tip in mm from the flange, for a recipe with z = "typed".',
     ),

@@ -10,7 +10,7 @@ from robolink import __version__
 from robolink.errors import ConfigError, JournalError
 from robolink.messages import joined, tr
 from robolink_cli.console.render import note
-from robolink_cli.options.declaration import Option
+from robolink_cli.options.declaration import CliOption
 
 if TYPE_CHECKING:
     from robolink.calibration import Impact, VerifyResult
@@ -29,7 +29,7 @@ class ReportRequest:
 
 ReportPath = Annotated[
     Path | None,
-    Option(
+    CliOption(
         "--report",
         metavar="FILE.html",
         help="Write a page to keep: the offsets, the taught points as a table and a picture.",
@@ -38,7 +38,7 @@ ReportPath = Annotated[
 
 ForceReport = Annotated[
     bool,
-    Option(help="Let --report overwrite a file that is already there; it forces nothing else."),
+    CliOption(help="Let --report overwrite a file that is already there; it forces nothing else."),
 ]
 
 

@@ -2,11 +2,11 @@
 
 from typing import Annotated
 
-from robolink_cli.options.declaration import Option
+from robolink_cli.options.declaration import CliOption
 
 Sensor = Annotated[
     str | None,
-    Option(
+    CliOption(
         metavar="NAME|URL",
         help="The camera: a plug-in's name or URL, or a simulator's assist or sim URL.",
     ),

@@ -11,7 +11,7 @@ from robolink.messages import declared, tr
 from robolink_cli.console.help_pages import HelpSection
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import note
-from robolink_cli.options.declaration import Option
+from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.program_encoding import Encoding
 
 DEFAULT_ADDRESS: Final = "127.0.0.1:5020"
@@ -48,12 +48,14 @@ SECTIONS: Final[tuple[HelpSection, ...]] = (
 
 EXISTING_FILE: Final = click.Path(exists=True, dir_okay=False, path_type=Path)
 
-Seed = Annotated[int, click.IntRange(min=0), Option(help="Another cell: other tools, another tip.")]
+Seed = Annotated[
+    int, click.IntRange(min=0), CliOption(help="Another cell: other tools, another tip.")
+]
 
 Pace = Annotated[
     float,
     NumberInside(min=0, max=1000),
-    Option(
+    CliOption(
         "--speed",
         metavar="FACTOR",
         help="How many times faster than real the simulated time passes. At 0 it passes with "
@@ -64,19 +66,19 @@ Pace = Annotated[
 ExchangeTime = Annotated[
     float | None,
     NumberInside(min=0, max=10),
-    Option(
+    CliOption(
         metavar="SECONDS",
         help="How much simulated time each request takes besides; without it 0, and 0.05 at "
         "--speed 0.",
     ),
 ]
 
-AllowRemote = Annotated[bool, Option(help="Listen where other machines can reach it, too.")]
+AllowRemote = Annotated[bool, CliOption(help="Listen where other machines can reach it, too.")]
 
 FaultPlan = Annotated[
     Path | None,
     EXISTING_FILE,
-    Option(
+    CliOption(
         metavar="FILE", help="What is planned to go wrong: a file, as docs/fault-plans.md explains."
     ),
 ]
@@ -88,13 +90,15 @@ class SimulationOptions(NamedTuple):
     seed: Seed = 1
     state: Annotated[
         Path | None,
-        Option(help="File that keeps the tools over a restart, as flash or retained memory does."),
+        CliOption(
+            help="File that keeps the tools over a restart, as flash or retained memory does."
+        ),
     ] = None
     speed: Pace = 1.0
     exchange: ExchangeTime = None
     options: Annotated[
         tuple[str, ...],
-        Option(
+        CliOption(
             "--option",
             metavar="NAME=VALUE",
             help="A habit of the device; a wrong name lists them all. May be repeated.",
@@ -104,7 +108,7 @@ class SimulationOptions(NamedTuple):
     faults: FaultPlan = None
     world: Annotated[
         tuple[str, ...],
-        Option(
+        CliOption(
             metavar="NAME=VALUE",
             help="How imperfect the cell is, and how its camera is built; a wrong name lists all. "
             "May be repeated.",
@@ -124,18 +128,18 @@ class ServedLife(NamedTuple):
 
     control: Annotated[
         str,
-        Option(
+        CliOption(
             metavar="HOST:PORT",
             help="Where the control API listens (docs/control-api.md); port 0 takes a free one.",
         ),
     ] = "127.0.0.1:0"
     with_parent: Annotated[
-        bool, Option(help="End when the process that started this one has ended.")
+        bool, CliOption(help="End when the process that started this one has ended.")
     ] = False
     idle_exit_s: Annotated[
         float | None,
         NumberInside(min=0.1),
-        Option(metavar="SECONDS", help="End when nobody has asked for anything for this long."),
+        CliOption(metavar="SECONDS", help="End when nobody has asked for anything for this long."),
     ] = None
     parent: int | None = None
 
@@ -159,7 +163,7 @@ class ModbusPlaces(NamedTuple):
 
     address: Annotated[
         str | None,
-        Option(
+        CliOption(
             "--tcp",
             metavar="HOST:PORT",
             help="Serve Modbus TCP there; port 0 takes a free one. Without any bus: "
@@ -168,10 +172,10 @@ class ModbusPlaces(NamedTuple):
     ] = None
     serial: Annotated[
         Literal["pty"] | None,
-        Option(help="Serve Modbus RTU on a pseudo terminal, whose path is printed."),
+        CliOption(help="Serve Modbus RTU on a pseudo terminal, whose path is printed."),
     ] = None
-    modbus_tcp: Annotated[str | None, Option(hidden=True)] = None
-    modbus_rtu: Annotated[Literal["pty"] | None, Option(hidden=True)] = None
+    modbus_tcp: Annotated[str | None, CliOption(hidden=True)] = None
+    modbus_rtu: Annotated[Literal["pty"] | None, CliOption(hidden=True)] = None
 
     def by_name_of_today(self) -> dict[str, str | None]:
         """Return them; whoever used an old name is told the new one on a terminal.
@@ -212,7 +216,7 @@ class ProjectOptions(NamedTuple):
     encoding: Encoding = None
     before: Annotated[
         str | None,
-        Option(
+        CliOption(
             metavar="NAME",
             help="A function to run to its end first. It sets what the project keeps outside its "
             "programs, with HomeSet, TLSet, SetNet and SetCom.",
@@ -221,11 +225,13 @@ class ProjectOptions(NamedTuple):
     vision: Annotated[
         Path | None,
         EXISTING_FILE,
-        Option(help="Vision project of the programs, for VRun; docs/spel-programs.md shows one."),
+        CliOption(
+            help="Vision project of the programs, for VRun; docs/spel-programs.md shows one."
+        ),
     ] = None
     lines: Annotated[
         tuple[str, ...],
-        Option(
+        CliOption(
             "--com",
             metavar="NUMBER=DEVICE",
             help="Serial line of a port of OpenCom, as 1=/dev/pts/3; no other is reached. "
@@ -235,7 +241,7 @@ class ProjectOptions(NamedTuple):
     folder: Annotated[
         Path | None,
         click.Path(exists=True, file_okay=False, path_type=Path),
-        Option(
+        CliOption(
             "--files",
             metavar="DIR",
             help="Folder for the files that programs write and read; no other is reached. "

@@ -17,7 +17,7 @@ from robolink.messages import tr
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.output import is_terminal
 from robolink_cli.console.render import json_is_on
-from robolink_cli.options.declaration import Option
+from robolink_cli.options.declaration import CliOption
 
 if TYPE_CHECKING:
     from robolink.model import AnsweredBy, Controller, Jump
@@ -130,7 +130,7 @@ _POSITIVE: Final = NumberInside(min=0, min_open=True)
 AcceptedLength = Annotated[
     float | None,
     _POSITIVE,
-    Option(
+    CliOption(
         "--accept-jump",
         help="Accept a change up to MM this time, beyond the cell's limit; for engineers.",
     ),
@@ -139,7 +139,7 @@ AcceptedLength = Annotated[
 AcceptedAngle = Annotated[
     float | None,
     _POSITIVE,
-    Option(
+    CliOption(
         "--accept-turn",
         help="Accept a turn up to DEG this time, beyond the cell's limit; for engineers.",
     ),

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli.console.render import json_is_on
-from robolink_cli.options.declaration import Option
+from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.shared import LINE
 
 if TYPE_CHECKING:
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 Nozzle = Annotated[
     str | None,
     LINE,
-    Option(metavar="ID", help="Id of the nozzle or needle that is mounted, for the record."),
+    CliOption(metavar="ID", help="Id of the nozzle or needle that is mounted, for the record."),
 ]
 
-Lot = Annotated[str | None, LINE, Option(metavar="LOT", help="Its lot, for the record.")]
+Lot = Annotated[str | None, LINE, CliOption(metavar="LOT", help="Its lot, for the record.")]
 
 
 def signature_of(operator: str | None, cell: "Expected | None", *, changes: bool) -> "Signature":

@@ -11,7 +11,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.timing import local_label
 from robolink_cli.console.render import say
-from robolink_cli.options.declaration import Option
+from robolink_cli.options.declaration import CliOption
 
 if TYPE_CHECKING:
     from robolink.model import Controller
@@ -49,7 +49,7 @@ class OrderType(_ParamType):
 OrderId = Annotated[
     str | None,
     OrderType(),
-    Option(
+    CliOption(
         metavar="ID",
         help="Id of this order from a line computer; delivered again it does nothing, and "
         "reports the first result.",

@@ -26,7 +26,7 @@ from robolink.register_maps import (
 )
 from robolink.timing import local_label
 from robolink_cli.console.render import note, say, table
-from robolink_cli.options.declaration import Argument, Option
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.questions import on_terminal
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.operator_identity import signature_of
@@ -40,11 +40,13 @@ if TYPE_CHECKING:
 def check_map(
     context: CliContext,
     *,
-    file: Annotated[Path | None, click.Path(path_type=Path), Argument(metavar="[MAP.toml]")] = None,
+    file: Annotated[
+        Path | None, click.Path(path_type=Path), CliArgument(metavar="[MAP.toml]")
+    ] = None,
     register_list: Annotated[
         Path | None,
         click.Path(path_type=Path),
-        Option(
+        CliOption(
             "--from-csv",
             metavar="LIST.csv",
             help="Start a map from a register list, and show it; nothing else is done.",
@@ -52,7 +54,7 @@ def check_map(
     ] = None,
     shows: Annotated[
         tuple[str, ...],
-        Option(
+        CliOption(
             metavar="TOOL.AXIS=VALUE",
             help="What the HMI shows, for example 1.x=12.35: confirms that value. May be repeated.",
         ),

@@ -22,7 +22,7 @@ from robolink.protocols.mailbox.exports import (
 )
 from robolink_cli.commands.companions.check_map import check_map
 from robolink_cli.console.render import emit_json, json_is_on, say
-from robolink_cli.options.declaration import Argument, Option
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
 
 _LAST_BASE = 64880  # the response block, fifteen slots and the device block end at register 65535
@@ -47,19 +47,21 @@ def _symbols(given: tuple[str, str, str] | None) -> tuple[str, ...]:
 @json_option
 def export(
     *,
-    folder: Annotated[Path, click.Path(file_okay=False, path_type=Path), Argument(metavar="DIR")],
+    folder: Annotated[
+        Path, click.Path(file_okay=False, path_type=Path), CliArgument(metavar="DIR")
+    ],
     profile: Annotated[
         Literal["tools", "full"],
-        Option(help="tools: tool offsets only, no motion; full: all opcodes."),
+        CliOption(help="tools: tool offsets only, no motion; full: all opcodes."),
     ] = "tools",
     base: Annotated[
         int,
         click.IntRange(0, _LAST_BASE),
-        Option(help="First register of both blocks, counted from 0."),
+        CliOption(help="First register of both blocks, counted from 0."),
     ] = 0,
     kinematics: Annotated[
         str,
-        Option(
+        CliOption(
             metavar="NAME",
             help="Kinematics of the axis group, such as Kin_Scara3_Z or Kin_Gantry3+Kin_CAxis;"
             " opcode 30004 sets it again.",
@@ -68,7 +70,7 @@ def export(
     ] = "",
     read_modes: Annotated[
         tuple[str, ...],
-        Option(
+        CliOption(
             nargs=3,
             metavar="SET ACTIVE LAST",
             callback=lambda _, __, given: _symbols(given),
@@ -78,12 +80,12 @@ def export(
     ] = (),
     plcopen: Annotated[
         Literal["0200", "0201"],
-        Option(
+        CliOption(
             help="Schema of the PLCopen XML: 0200 as CODESYS writes it, 0201 for OpenPLC and "
             "Beremiz."
         ),
     ] = "0200",
-    force: Annotated[bool, Option(help="Overwrite files that were changed.")] = False,
+    force: Annotated[bool, CliOption(help="Overwrite files that were changed.")] = False,
 ) -> None:
     """Write the program of the mailbox, its register map and its CANopen data sheet.
 

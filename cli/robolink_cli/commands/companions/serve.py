@@ -12,7 +12,7 @@ from robolink_cli.commands.simulate.serving import Termination
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.output import hand_over, show
 from robolink_cli.console.render import json_is_on, note
-from robolink_cli.options.declaration import Option
+from robolink_cli.options.declaration import CliOption
 from robolink_cli.session.context import CliContext, optional_controller
 from robolink_cli.session.opening import open_controller
 
@@ -29,7 +29,7 @@ def serve(
     *,
     address: Annotated[
         str | None,
-        Option(
+        CliOption(
             "--spel",
             metavar="HOST:PORT",
             help="Where SPEL+ programs call, for example 127.0.0.1:5001. With -c CELL, that cell "
@@ -39,7 +39,7 @@ def serve(
     ] = None,
     method: Annotated[
         Literal["n-angle", "pivot"] | None,
-        Option(
+        CliOption(
             "--plc",
             help="Answer the program of the PLC that is named: it touches a pin, by this method. "
             "docs/plc-callback.md",
@@ -47,7 +47,7 @@ def serve(
     ] = None,
     allow: Annotated[
         tuple[str, ...],
-        Option(
+        CliOption(
             metavar="ADDRESS",
             help="Address of a controller that may call; needed for any HOST but this computer's "
             "own. "
@@ -56,7 +56,7 @@ def serve(
     ] = (),
     controllers: Annotated[
         tuple[str, ...],
-        Option(
+        CliOption(
             "--on-record",
             metavar="NAME",
             help="Name under which a robot is on record; by default epson: and its serial "
@@ -68,28 +68,28 @@ def serve(
     tolerance_mm: Annotated[
         float,
         NumberInside(min=0, min_open=True),
-        Option("--tolerance-mm", help="Largest drift about the new tip, and widest interval."),
+        CliOption("--tolerance-mm", help="Largest drift about the new tip, and widest interval."),
     ] = 0.1,
     max_change_mm: Annotated[
         float,
         NumberInside(min=0, min_open=True),
-        Option("--max-change-mm", help="Largest change of the offset that is accepted."),
+        CliOption("--max-change-mm", help="Largest change of the offset that is accepted."),
     ] = 2.0,
     sigma_mm: Annotated[
         float | None,
         NumberInside(min=0, min_open=True),
-        Option("--sigma-mm", help="How far one touch scatters, where it is known."),
+        CliOption("--sigma-mm", help="How far one touch scatters, where it is known."),
     ] = None,
     tool: Annotated[
         int | None,
         click.IntRange(1, 15),
-        Option(help="With a PLC: the slot that its program measures."),
+        CliOption(help="With a PLC: the slot that its program measures."),
     ] = None,
-    touches: Annotated[int, Option(help="With a PLC: touches before the write.")] = 5,
-    proofs: Annotated[int, Option(help="With a PLC: touches afterwards.")] = 2,
+    touches: Annotated[int, CliOption(help="With a PLC: touches before the write.")] = 5,
+    proofs: Annotated[int, CliOption(help="With a PLC: touches afterwards.")] = 2,
     permit_is_contact: Annotated[
         bool,
-        Option(
+        CliOption(
             help="With a PLC: its permit comes only by the contact of tip and pin while it "
             "calibrates."
         ),

@@ -12,7 +12,7 @@ from robolink.timing import NS_PER_S
 from robolink_cli.console.exit_codes import USAGE
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import emit_json, json_is_on, note, say
-from robolink_cli.options.declaration import Argument, Option
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.program_encoding import Encoding, tell_encoding
 from robolink_cli.options.shared import json_option
 from robolink_cli.options.simulation import ProjectOptions
@@ -29,11 +29,11 @@ DEFAULT_ROBOT: Final = "T6-602S"
 
 _FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 
-_Files = Annotated[tuple[Path, ...], _FILE, Argument(metavar="FILE...")]
+_Files = Annotated[tuple[Path, ...], _FILE, CliArgument(metavar="FILE...")]
 _PointFiles = Annotated[
     tuple[Path, ...],
     _FILE,
-    Option(help="Point file of the project, for its labels too. May be repeated."),
+    CliOption(help="Point file of the project, for its labels too. May be repeated."),
 ]
 
 
@@ -105,20 +105,21 @@ def run(
     points: _PointFiles = (),
     function: Annotated[
         str | None,
-        Option(
+        CliOption(
             metavar="NAME",
             help="The function to start; it takes no arguments. Without it main, or none beside "
             "background tasks.",
         ),
     ] = None,
     project: ProjectOptions,
-    trace: Annotated[bool, Option(help="Show each statement before it is carried out.")] = False,
+    trace: Annotated[bool, CliOption(help="Show each statement before it is carried out.")] = False,
     robot: Annotated[
-        str | None, Option(metavar="MODEL", help=f"Model of the robot.  [default: {DEFAULT_ROBOT}]")
+        str | None,
+        CliOption(metavar="MODEL", help=f"Model of the robot.  [default: {DEFAULT_ROBOT}]"),
     ] = None,
     options: Annotated[
         tuple[str, ...],
-        Option(
+        CliOption(
             "--option",
             metavar="NAME=VALUE",
             help="A habit of the device; a wrong name lists them all. May be repeated.",
@@ -127,7 +128,9 @@ def run(
     most_s: Annotated[
         float,
         NumberInside(min=0.001, max=1e7),
-        Option("--for", metavar="SECONDS", help="How long a program may run, in simulated time."),
+        CliOption(
+            "--for", metavar="SECONDS", help="How long a program may run, in simulated time."
+        ),
     ] = LONGEST_RUN_S,
 ) -> None:
     """Run SPEL+ programs on a simulated controller and show what they print.
@@ -240,8 +243,10 @@ spel.add_command(run)
 @json_option
 def export(
     *,
-    folder: Annotated[Path, click.Path(file_okay=False, path_type=Path), Argument(metavar="DIR")],
-    force: Annotated[bool, Option(help="Overwrite files that were changed.")] = False,
+    folder: Annotated[
+        Path, click.Path(file_okay=False, path_type=Path), CliArgument(metavar="DIR")
+    ],
+    force: Annotated[bool, CliOption(help="Overwrite files that were changed.")] = False,
 ) -> None:
     """Write the companion programs: what a controller's project can hold of robolink.
 

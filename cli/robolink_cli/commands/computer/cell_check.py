@@ -19,7 +19,7 @@ from robolink_cli.access.cell import complete_cell
 from robolink_cli.console.exit_codes import DIFFERENT, exit_code
 from robolink_cli.console.render import note, say
 from robolink_cli.options.consent import Published
-from robolink_cli.options.declaration import Argument, Option
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.operator import terminal
 from robolink_cli.prompts.questions import on_terminal
 from robolink_cli.session.completing import complete_recipe
@@ -73,18 +73,18 @@ def check(
     context: CliContext,
     *,
     cells: Annotated[
-        tuple[str, ...], Argument(metavar="[CELL]...", shell_complete=complete_cell)
+        tuple[str, ...], CliArgument(metavar="[CELL]...", shell_complete=complete_cell)
     ] = (),
     since: Annotated[
         datetime | None,
         click.DateTime(["%Y-%m-%d"]),
-        Option(
+        CliOption(
             metavar="YYYY-MM-DD", help="Start the charts again from this day, after a repair (UTC)."
         ),
     ] = None,
     recipe: Annotated[
         Path | None,
-        Option(
+        CliOption(
             "--measure",
             metavar="RECIPE.toml",
             shell_complete=complete_recipe,

@@ -6,7 +6,7 @@ from typing import Annotated
 import click
 
 from robolink_cli.console.render import emit_json, json_is_on
-from robolink_cli.options.declaration import Argument, Option
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
 from robolink_cli.session.context import CliContext, emit, optional_controller
 
@@ -28,7 +28,7 @@ def path() -> None:
 @json_option
 def check(
     *,
-    file: Annotated[Path | None, Argument()] = None,
+    file: Annotated[Path | None, CliArgument()] = None,
 ) -> int:
     """Check one cell FILE, or all that are in use, and say everything that is wrong."""
     from robolink_cli.views.cells import check_payload, show_check
@@ -46,8 +46,8 @@ def check(
 def show(
     context: CliContext,
     *,
-    cell: Annotated[str | None, Argument()] = None,
-    origin: Annotated[bool, Option(help="Say where each value came from.")] = False,
+    cell: Annotated[str | None, CliArgument()] = None,
+    origin: Annotated[bool, CliOption(help="Say where each value came from.")] = False,
 ) -> None:
     """Show the cells, or all that is in force for one CELL.
 
@@ -82,7 +82,7 @@ def list_cells() -> None:
 def people(
     context: CliContext,
     *,
-    cell: Annotated[str | None, Argument()] = None,
+    cell: Annotated[str | None, CliArgument()] = None,
 ) -> None:
     """List who works at one CELL, or at all, and in which role; an engineer may do everything."""
     from robolink.config import find_cell, load_cells

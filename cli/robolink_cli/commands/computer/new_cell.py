@@ -10,7 +10,7 @@ from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import tr
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import emit_json, json_is_on, note, say
-from robolink_cli.options.declaration import Argument, Option
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
 from robolink_cli.prompts.questions import asked_for_text, on_terminal
 
@@ -22,25 +22,25 @@ _LEFT_OUT = "-"
 @json_option
 def new_cell(
     *,
-    name: Annotated[str | None, Argument()] = None,
-    url: Annotated[str | None, Option(metavar="URL", help="The controller's URL.")] = None,
+    name: Annotated[str | None, CliArgument()] = None,
+    url: Annotated[str | None, CliOption(metavar="URL", help="The controller's URL.")] = None,
     robot: Annotated[
         str | None,
-        Option(metavar="MODEL", help="The model that must be there, as the controller says it."),
+        CliOption(metavar="MODEL", help="The model that must be there, as the controller says it."),
     ] = None,
     remote_timeout_s: Annotated[
         float | None,
         NumberInside(min=0, min_open=True),
-        Option("--time-out-set", help="The remote time-out that is set in an EPSON controller."),
+        CliOption("--time-out-set", help="The remote time-out that is set in an EPSON controller."),
     ] = None,
     read_by: Annotated[
         str | None,
-        Option(
+        CliOption(
             metavar="WHO", help="Who read that time-out on the controller, and when; goes with it."
         ),
     ] = None,
     file: Annotated[
-        Path, Option(metavar=None, help="The cell file; what it says already stays.")
+        Path, CliOption(metavar=None, help="The cell file; what it says already stays.")
     ] = Path("robolink.toml"),
 ) -> None:
     """Write a cell into a cell file; what is not given is asked for on a terminal.

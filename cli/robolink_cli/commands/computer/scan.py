@@ -15,7 +15,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import emit_json, json_is_on, say
-from robolink_cli.options.declaration import Argument, Option
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
 
 if TYPE_CHECKING:
@@ -26,16 +26,16 @@ if TYPE_CHECKING:
 @json_option
 def scan(
     *,
-    addresses: Annotated[str | None, Argument(metavar="[RANGE]")] = None,
-    port: Annotated[int, click.IntRange(1, 65535), Option()] = 5000,
+    addresses: Annotated[str | None, CliArgument(metavar="[RANGE]")] = None,
+    port: Annotated[int, click.IntRange(1, 65535), CliOption()] = 5000,
     timeout_s: Annotated[
         float,
         NumberInside(min=0.05, max=10),
-        Option(help="Longest wait for one address, in seconds."),
+        CliOption(help="Longest wait for one address, in seconds."),
     ] = 0.5,
     lines: Annotated[
         tuple[str, ...],
-        Option(
+        CliOption(
             "--line",
             metavar="URL",
             help="Ask who is at this serial line, for example "

@@ -14,7 +14,7 @@ from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import note, say
 from robolink_cli.options.consent import DryRun, Overwrite, Published, Yes
-from robolink_cli.options.declaration import Argument, Option
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.questions import AcceptedAngle, AcceptedLength, accepted_jump, agree
 from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
@@ -30,7 +30,7 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 def backup(
     context: CliContext,
     *,
-    file: Annotated[Path, _FILE, Argument()],
+    file: Annotated[Path, _FILE, CliArgument()],
     force: Overwrite = False,
 ) -> None:
     """Save all fifteen tools, the one that is selected, and which controller it is. Reads only."""
@@ -50,20 +50,20 @@ def backup(
 def compare(
     context: CliContext,
     *,
-    file: Annotated[Path, _FILE, Argument()],
+    file: Annotated[Path, _FILE, CliArgument()],
     length_mm: Annotated[
         float,
         NumberInside(min=0),
-        Option("--tolerance", help="Largest difference of X, Y, Z that counts as none."),
+        CliOption("--tolerance", help="Largest difference of X, Y, Z that counts as none."),
     ] = 0.0005,
     angle_deg: Annotated[
         float,
         NumberInside(min=0),
-        Option("--tolerance-deg", help="Largest difference of U, V, W that counts as none."),
+        CliOption("--tolerance-deg", help="Largest difference of U, V, W that counts as none."),
     ] = 0.0005,
     ignore_selected: Annotated[
         bool,
-        Option(
+        CliOption(
             help="Show another selected tool, but do not count it: a program selects tools by "
             "itself."
         ),
@@ -101,14 +101,14 @@ def compare(
 def restore(
     context: CliContext,
     *,
-    file: Annotated[Path, _FILE, Argument()],
+    file: Annotated[Path, _FILE, CliArgument()],
     tools: Annotated[
         tuple[int, ...],
-        Option("--tool", shell_complete=complete_tool, help="Only this tool; may be repeated."),
+        CliOption("--tool", shell_complete=complete_tool, help="Only this tool; may be repeated."),
     ] = (),
-    selected: Annotated[bool, Option(help="Also select the backup's tool.")] = False,
+    selected: Annotated[bool, CliOption(help="Also select the backup's tool.")] = False,
     other_controller: Annotated[
-        bool, Option(help="The backup is of another controller and is still meant for this one.")
+        bool, CliOption(help="The backup is of another controller and is still meant for this one.")
     ] = False,
     accepted_mm: AcceptedLength = None,
     accepted_deg: AcceptedAngle = None,

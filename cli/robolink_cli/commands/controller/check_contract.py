@@ -14,7 +14,7 @@ from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import note, say, table
 from robolink_cli.options.consent import Yes
-from robolink_cli.options.declaration import Option
+from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.shared import controller_argument
 from robolink_cli.session.context import CliContext, controller_options, emit
 
@@ -54,7 +54,7 @@ def check_contract(
     *,
     writes: Annotated[
         bool,
-        Option(
+        CliOption(
             "--write",
             help="Also hold it to the promises about writing: with --tool, and after a yes.",
         ),
@@ -62,29 +62,31 @@ def check_contract(
     tool: Annotated[
         int | None,
         click.IntRange(min=1),
-        Option(
+        CliOption(
             metavar="NUMBER", help="The tool that --write may change; one that no program uses."
         ),
     ] = None,
     moves: Annotated[
         bool,
-        Option(
+        CliOption(
             "--move",
             help="Also hold it to the promises about movement: small steps up, after a yes.",
         ),
     ] = False,
     step_mm: Annotated[
-        float, NumberInside(min=0.2, max=5), Option(help="How far --move goes up, and down again.")
+        float,
+        NumberInside(min=0.2, max=5),
+        CliOption(help="How far --move goes up, and down again."),
     ] = 1.0,
     driver: Annotated[
         str | None,
-        Option(
+        CliOption(
             metavar="MODULE:NAME",
             help="Check a driver of your own: what this is called for gives a controller.",
         ),
     ] = None,
     junit: Annotated[
-        Path | None, Option(help="Also write the findings as JUnit XML, for pipelines.")
+        Path | None, CliOption(help="Also write the findings as JUnit XML, for pipelines.")
     ] = None,
     yes: Yes = False,
 ) -> int:

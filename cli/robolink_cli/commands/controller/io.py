@@ -11,7 +11,7 @@ from robolink_cli.access.capabilities import io_of, require_epson
 from robolink_cli.console.render import say
 from robolink_cli.console.ways import io_words
 from robolink_cli.options.consent import DryRun, Yes
-from robolink_cli.options.declaration import Argument, Option
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.questions import agree
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from robolink.model import Controller, ValueReceipt
 
 _number = click.IntRange(min=0, max=0xFFFF)
-_Memory = Annotated[bool, Option(help="Memory bits in place of inputs or outputs.")]
+_Memory = Annotated[bool, CliOption(help="Memory bits in place of inputs or outputs.")]
 
 
 @click.group()
@@ -33,14 +33,14 @@ def io() -> None:
 def get(
     context: CliContext,
     *,
-    bit: Annotated[int | None, _number, Argument()] = None,
+    bit: Annotated[int | None, _number, CliArgument()] = None,
     byte: Annotated[
-        int | None, _number, Option(metavar="PORT", help="Eight bits, from 8 x PORT on.")
+        int | None, _number, CliOption(metavar="PORT", help="Eight bits, from 8 x PORT on.")
     ] = None,
     word: Annotated[
-        int | None, _number, Option(metavar="PORT", help="Sixteen bits, from 16 x PORT on.")
+        int | None, _number, CliOption(metavar="PORT", help="Sixteen bits, from 16 x PORT on.")
     ] = None,
-    output: Annotated[bool, Option(help="An output, read through Execute.")] = False,
+    output: Annotated[bool, CliOption(help="An output, read through Execute.")] = False,
     memory: _Memory = False,
 ) -> None:
     """Show an input. Legal while production runs, except with --output."""
@@ -77,8 +77,8 @@ def get(
 def set_bit(
     context: CliContext,
     *,
-    bit: Annotated[int, _number, Argument()],
-    switch: Annotated[Literal["on", "off"], Argument()],
+    bit: Annotated[int, _number, CliArgument()],
+    switch: Annotated[Literal["on", "off"], CliArgument()],
     memory: _Memory = False,
     dry_run: DryRun = False,
     yes: Yes = False,

@@ -12,7 +12,7 @@ from robolink_cli.access.cell import with_cell_limits
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.output import may_be_guided
 from robolink_cli.options.consent import DryRun, Plain, Yes
-from robolink_cli.options.declaration import Argument, Option
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.session.context import CliContext, controller_options, guided_if_alone
 from robolink_cli.session.motion_consent import agree_to_motion, motion_question
 from robolink_cli.session.opening import open_controller
@@ -33,41 +33,41 @@ _CELL_KEYS: Final = {
 def jog(
     context: CliContext,
     *,
-    steps: Annotated[tuple[str, ...], Argument()] = (),
+    steps: Annotated[tuple[str, ...], CliArgument()] = (),
     speed_mm_s: Annotated[
         float,
         NumberInside(1, 100),
-        Option(help="Speed of straight moves, in Power Low.", show_default=False),
+        CliOption(help="Speed of straight moves, in Power Low.", show_default=False),
     ] = 20.0,
     box_mm: Annotated[
         float,
         NumberInside(min=0, min_open=True),
-        Option(
+        CliOption(
             help="How far from the start the tool may be jogged, in every direction.",
             show_default=False,
         ),
     ] = 50.0,
     turn_deg: Annotated[
         float | None,
-        Option(
+        CliOption(
             help="Turn U by so much, also by more than 5 degrees: lift first, check the whole "
             "way round, "
             "turn, and stay lifted."
         ),
     ] = None,
     lift_mm: Annotated[
-        float, NumberInside(1, 100), Option(help="How far the tip is lifted before it turns.")
+        float, NumberInside(1, 100), CliOption(help="How far the tip is lifted before it turns.")
     ] = 10.0,
     tip: Annotated[
         int | None,
         click.IntRange(1, 15),
-        Option(
+        CliOption(
             help="For a turn with tool 0: the tool whose tip swings round; without it all that "
             "are defined."
         ),
     ] = None,
     keys: Annotated[
-        bool, Option(help="Jog by single keys on a full screen; on a terminal only.")
+        bool, CliOption(help="Jog by single keys on a full screen; on a terminal only.")
     ] = False,
     dry_run: DryRun = False,
     yes: Yes = False,

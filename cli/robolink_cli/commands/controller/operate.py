@@ -12,7 +12,7 @@ from robolink_cli.access.warnings import note_unsettled
 from robolink_cli.console.render import note, say
 from robolink_cli.console.ways import state_word
 from robolink_cli.options.consent import DryRun, Yes
-from robolink_cli.options.declaration import Argument
+from robolink_cli.options.declaration import CliArgument
 from robolink_cli.options.shared import shared_options
 from robolink_cli.prompts.questions import agree, on_terminal
 from robolink_cli.session.context import (
@@ -184,7 +184,7 @@ def _effect_of_reset(controller: "Controller") -> tuple[str, bool]:
 def motors(
     context: CliContext,
     *,
-    switch: Annotated[Literal["on", "off"], Argument()],
+    switch: Annotated[Literal["on", "off"], CliArgument()],
     dry_run: DryRun = False,
     yes: Yes = False,
 ) -> None:
@@ -248,7 +248,7 @@ def _switch_group(context: CliContext, *, on: bool, dry_run: bool, yes: bool) ->
 def execute_raw(
     context: CliContext,
     *,
-    statement: Annotated[str, Argument()],
+    statement: Annotated[str, CliArgument()],
     yes: Yes = False,
 ) -> None:
     """Run one SPEL+ statement as typed; it takes an engineer, and goes on record.

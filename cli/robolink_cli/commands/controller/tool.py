@@ -18,7 +18,7 @@ from robolink_cli.options.consent import (
     ThenSelect,
     Yes,
 )
-from robolink_cli.options.declaration import Argument, Option
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.questions import AcceptedAngle, AcceptedLength, accepted_jump, agree
 from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
@@ -51,7 +51,7 @@ _BESIDES = {
 }
 
 
-_Number = Annotated[int, Argument(shell_complete=complete_tool)]
+_Number = Annotated[int, CliArgument(shell_complete=complete_tool)]
 
 
 @click.group(cls=LazyGroup, lazy=_BESIDES)
@@ -84,10 +84,10 @@ def list_tools(
 def get(
     context: CliContext,
     *,
-    number: Annotated[int | None, Argument(shell_complete=complete_tool)] = None,
+    number: Annotated[int | None, CliArgument(shell_complete=complete_tool)] = None,
     mode: Annotated[
         Literal["set", "active", "last"] | None,
-        Option(
+        CliOption(
             help="On a PLC, what SMC_GroupReadTool says: the tool set, that of the movement "
             "under way, or "
             "that of the movement commanded last."
@@ -138,15 +138,15 @@ def _get_by_mode(context: CliContext, mode: str) -> None:
 class _Components(NamedTuple):
     """The components of an offset that were given."""
 
-    x: Annotated[float | None, Option(metavar="MM", help="mm from the flange.")] = None
-    y: Annotated[float | None, Option(metavar="MM", help="mm from the flange.")] = None
-    z: Annotated[float | None, Option(metavar="MM", help="mm from the flange.")] = None
-    u: Annotated[float | None, Option(metavar="DEG", help="Degrees about Z.")] = None
+    x: Annotated[float | None, CliOption(metavar="MM", help="mm from the flange.")] = None
+    y: Annotated[float | None, CliOption(metavar="MM", help="mm from the flange.")] = None
+    z: Annotated[float | None, CliOption(metavar="MM", help="mm from the flange.")] = None
+    u: Annotated[float | None, CliOption(metavar="DEG", help="Degrees about Z.")] = None
     v: Annotated[
-        float | None, Option(metavar="DEG", help="Degrees about Y; six-axis robots only.")
+        float | None, CliOption(metavar="DEG", help="Degrees about Y; six-axis robots only.")
     ] = None
     w: Annotated[
-        float | None, Option(metavar="DEG", help="Degrees about X; six-axis robots only.")
+        float | None, CliOption(metavar="DEG", help="Degrees about X; six-axis robots only.")
     ] = None
 
 

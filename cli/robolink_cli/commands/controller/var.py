@@ -8,7 +8,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli.console.render import say
 from robolink_cli.options.consent import DryRun, Yes
-from robolink_cli.options.declaration import Argument, Option
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.questions import agree
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
@@ -37,19 +37,20 @@ def var() -> None:
 def get(
     context: CliContext,
     *,
-    name: Annotated[str, Argument()],
+    name: Annotated[str, CliArgument()],
     kind: Annotated[
         str | None,
         click.Choice(_TYPES, case_sensitive=False),
-        Option("--type", help="Its declared type."),
+        CliOption("--type", help="Its declared type."),
     ] = None,
     index: Annotated[
-        str | None, Option(metavar="I,J,K", help="Subscripts of an array's element; needs --type.")
+        str | None,
+        CliOption(metavar="I,J,K", help="Subscripts of an array's element; needs --type."),
     ] = None,
     count: Annotated[
         int | None,
         click.IntRange(1, 100),
-        Option(help="How many elements, from --index on; the last subscript counts up."),
+        CliOption(help="How many elements, from --index on; the last subscript counts up."),
     ] = None,
 ) -> None:
     """Show a variable. Legal while production runs."""
@@ -80,10 +81,12 @@ def get(
 def set_variable(
     context: CliContext,
     *,
-    name: Annotated[str, Argument()],
-    value: Annotated[str, Argument()],
+    name: Annotated[str, CliArgument()],
+    value: Annotated[str, CliArgument()],
     kind: Annotated[
-        str, click.Choice(_TYPES, case_sensitive=False), Option("--type", help="Its declared type.")
+        str,
+        click.Choice(_TYPES, case_sensitive=False),
+        CliOption("--type", help="Its declared type."),
     ],
     dry_run: DryRun = False,
     yes: Yes = False,

@@ -10,7 +10,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli.access.recording import recording
 from robolink_cli.console.render import say, table
-from robolink_cli.options.declaration import Option
+from robolink_cli.options.declaration import CliOption
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import password_of
 
@@ -29,14 +29,18 @@ def verify_controller(
     context: CliContext,
     *,
     profile: Annotated[
-        Path | None, _file, Option(help="Write a cell profile, for 'robolink sim epson --profile'.")
+        Path | None,
+        _file,
+        CliOption(help="Write a cell profile, for 'robolink sim epson --profile'."),
     ] = None,
     transcript: Annotated[
         Path | None,
         _file,
-        Option(help="Write all that was said, for 'robolink sim epson --replay'."),
+        CliOption(help="Write all that was said, for 'robolink sim epson --replay'."),
     ] = None,
-    redact: Annotated[bool, Option(help="Leave names, serial numbers and addresses out.")] = False,
+    redact: Annotated[
+        bool, CliOption(help="Leave names, serial numbers and addresses out.")
+    ] = False,
 ) -> None:
     """Find out what this controller does where documents are unsure.
 

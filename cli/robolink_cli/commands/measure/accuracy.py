@@ -32,7 +32,7 @@ from robolink_cli.commands.measure.solve.touch_cases import study_values
 from robolink_cli.console.numbers import NumberInside, decimal
 from robolink_cli.console.render import note
 from robolink_cli.options.consent import Yes
-from robolink_cli.options.declaration import Argument, Option
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import LINE
 from robolink_cli.prompts.questions import agree
 from robolink_cli.session.completing import complete_station, complete_tool
@@ -53,7 +53,7 @@ def accuracy(
     *,
     robot: Annotated[
         str | None,
-        Option(
+        CliOption(
             metavar="NAME",
             help="A controller with several robots: which one, as 'station list' names it.",
         ),
@@ -78,30 +78,32 @@ def accuracy(
 def measure(
     context: CliContext,
     *,
-    row: Annotated[str, click.Choice(_ROWS), Argument()],
+    row: Annotated[str, click.Choice(_ROWS), CliArgument()],
     tool: Annotated[
         int | None,
         click.IntRange(1, 15),
-        Option(shell_complete=complete_tool, help="The tool whose calibrations on record count."),
+        CliOption(
+            shell_complete=complete_tool, help="The tool whose calibrations on record count."
+        ),
     ] = None,
     true: Annotated[
         str | None,
-        Option(metavar="X,Y", help="touch_mm: offset of the gauge tip, by its certificate, mm."),
+        CliOption(metavar="X,Y", help="touch_mm: offset of the gauge tip, by its certificate, mm."),
     ] = None,
     true_sigma_mm: Annotated[
         float | None,
         NumberInside(min=0, min_open=True),
-        Option(help="touch_mm: standard deviation of that, each coordinate."),
+        CliOption(help="touch_mm: standard deviation of that, each coordinate."),
     ] = None,
     study: Annotated[
         Path | None,
-        Option(
+        CliOption(
             help="touch_mm: a gauge study, as 'expert solve' takes it, in place of a gauge tip."
         ),
     ] = None,
     station: Annotated[
         str | None,
-        Option(
+        CliOption(
             metavar="ID",
             shell_complete=complete_station,
             help="Only measurements at this station; the row then holds for it alone.",
@@ -110,12 +112,12 @@ def measure(
     nozzle: Annotated[
         str | None,
         LINE,
-        Option(metavar="ID", help="Only measurements of the nozzle or gauge tip with this id."),
+        CliOption(metavar="ID", help="Only measurements of the nozzle or gauge tip with this id."),
     ] = None,
     since: Annotated[
         datetime | None,
         click.DateTime(["%Y-%m-%d", "%Y-%m-%dT%H:%M"]),
-        Option(
+        CliOption(
             metavar="YYYY-MM-DD[THH:MM]",
             help="Only measurements from then on, by this computer's clock; else of 24 hours.",
         ),

@@ -9,7 +9,7 @@ import click
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli.console.render import say
-from robolink_cli.options.declaration import Option
+from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.impact import impact_payload, impact_request, show_impact
 from robolink_cli.options.report import ForceReport, ReportPath, report_request, reporting
 from robolink_cli.session.completing import complete_tool
@@ -22,11 +22,11 @@ class _Components(NamedTuple):
 
     x: Annotated[
         float | None,
-        Option(metavar="MM", help="New offset, mm from the flange; left out: as stored."),
+        CliOption(metavar="MM", help="New offset, mm from the flange; left out: as stored."),
     ] = None
-    y: Annotated[float | None, Option(metavar="MM", help="mm from the flange.")] = None
-    z: Annotated[float | None, Option(metavar="MM", help="mm from the flange.")] = None
-    u: Annotated[float | None, Option(metavar="DEG", help="Degrees about Z.")] = None
+    y: Annotated[float | None, CliOption(metavar="MM", help="mm from the flange.")] = None
+    z: Annotated[float | None, CliOption(metavar="MM", help="mm from the flange.")] = None
+    u: Annotated[float | None, CliOption(metavar="DEG", help="Degrees about Z.")] = None
 
 
 @click.command()
@@ -35,15 +35,17 @@ def impact(
     context: CliContext,
     *,
     tool: Annotated[
-        int, click.IntRange(1, 15), Option(shell_complete=complete_tool, help="Number of the tool.")
+        int,
+        click.IntRange(1, 15),
+        CliOption(shell_complete=complete_tool, help="Number of the tool."),
     ],
     given: _Components,
     points: Annotated[
-        str | None, Option(metavar="1-50", help="Taught points to read from the controller.")
+        str | None, CliOption(metavar="1-50", help="Taught points to read from the controller.")
     ] = None,
     path: Annotated[
         Path | None,
-        Option("--pts", help="A .pts file of EPSON RC+ in place of the controller's points."),
+        CliOption("--pts", help="A .pts file of EPSON RC+ in place of the controller's points."),
     ] = None,
     report_path: ReportPath = None,
     force: ForceReport = False,

@@ -8,7 +8,7 @@ import click
 from robolink.messages import declared, tr
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.options.consent import DryRun, Plain, Yes
-from robolink_cli.options.declaration import Argument, Option
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.recipe_answers import AnswerTexts, TypedHeights
 from robolink_cli.options.sensor import Sensor
 from robolink_cli.options.shared import TYPED
@@ -31,29 +31,30 @@ def recalibrate(
     context: CliContext,
     *,
     recipe: Annotated[
-        Path | None, Argument(metavar="RECIPE.toml", shell_complete=complete_recipe)
+        Path | None, CliArgument(metavar="RECIPE.toml", shell_complete=complete_recipe)
     ] = None,
     reference: Annotated[
-        bool, Option(help="Measure and record a reference for differences; nothing is written.")
+        bool, CliOption(help="Measure and record a reference for differences; nothing is written.")
     ] = False,
     accepted_change_mm: Annotated[
         float | None,
         NumberInside(min=0, min_open=True),
-        Option(
+        CliOption(
             "--accept-jump",
             help="Accept a change up to MM this time, beyond the recipe's limit; for engineers.",
         ),
     ] = None,
     assist: Annotated[
         str | None,
-        Option(
+        CliOption(
             metavar="URL",
             help="A simulator's assist or sim URL: its operator brings the tip onto the pin.",
         ),
     ] = None,
     sensor: Sensor = None,
     jsonl: Annotated[
-        bool, Option(help="One JSON line on stdout for every event, the last one result or error.")
+        bool,
+        CliOption(help="One JSON line on stdout for every event, the last one result or error."),
     ] = False,
     answers: AnswerTexts = (),
     z_mm: TypedHeights = (),

@@ -7,7 +7,7 @@ import click
 from robolink.messages import tr
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.options.consent import DryRun, Yes
-from robolink_cli.options.declaration import Argument, Option
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.session.completing import complete_station, complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 
@@ -19,7 +19,7 @@ def station() -> None:
 
 _Robot = Annotated[
     str | None,
-    Option(
+    CliOption(
         metavar="NAME",
         help="A controller with several robots: which one, as 'station list' names it.",
     ),
@@ -46,7 +46,7 @@ def list_stations(
 def show(
     context: CliContext,
     *,
-    name: Annotated[str, Argument(metavar="ID", shell_complete=complete_station)],
+    name: Annotated[str, CliArgument(metavar="ID", shell_complete=complete_station)],
     robot: _Robot = None,
 ) -> None:
     """Show one station. Reads cell file and journal only; no controller is asked."""
@@ -62,30 +62,30 @@ def show(
 def learn(
     context: CliContext,
     *,
-    name: Annotated[str, Argument(metavar="ID", shell_complete=complete_station)],
+    name: Annotated[str, CliArgument(metavar="ID", shell_complete=complete_station)],
     tool: Annotated[
         int,
         click.IntRange(1, 15),
-        Option(shell_complete=complete_tool, help="Number of the tool whose offset is known."),
+        CliOption(shell_complete=complete_tool, help="Number of the tool whose offset is known."),
     ],
     sigma_mm: Annotated[
         float | None,
         NumberInside(min=0, min_open=True),
-        Option(help="Standard deviation of one coordinate of one touch, where it is known."),
+        CliOption(help="Standard deviation of one coordinate of one touch, where it is known."),
     ] = None,
     speed_mm_s: Annotated[
         float,
         NumberInside(1, 100),
-        Option(help="Speed of straight moves, in Power Low.", show_default=False),
+        CliOption(help="Speed of straight moves, in Power Low.", show_default=False),
     ] = 20.0,
     box_mm: Annotated[
         float,
         NumberInside(min=1),
-        Option(help="How far, sideways, the flange may go from where it is."),
+        CliOption(help="How far, sideways, the flange may go from where it is."),
     ] = 150.0,
     assist: Annotated[
         str | None,
-        Option(
+        CliOption(
             metavar="URL",
             help="A simulator's assist or sim URL: its operator brings the tip onto the pin.",
         ),
@@ -93,12 +93,12 @@ def learn(
     contact_input: Annotated[
         int | None,
         click.IntRange(0, 0xFFFF),
-        Option(
+        CliOption(
             help="A pin: number of the input that shows contact of tip and pin, where there is one."
         ),
     ] = None,
     off_in_contact: Annotated[
-        bool, Option(help="Whether that input goes off, not on, in contact.")
+        bool, CliOption(help="Whether that input goes off, not on, in contact.")
     ] = False,
     dry_run: DryRun = False,
     yes: Yes = False,

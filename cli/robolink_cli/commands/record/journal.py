@@ -22,7 +22,7 @@ from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.lazy_group import LazyGroup
 from robolink_cli.options.consent import Overwrite
-from robolink_cli.options.declaration import Argument, Option
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
 from robolink_cli.session.completing import complete_tool
 
@@ -38,18 +38,18 @@ class _Wanted(NamedTuple):
 
     controller: OfController = None
     tool: Annotated[
-        int | None, Option(shell_complete=complete_tool, help="Only about this tool.")
+        int | None, CliOption(shell_complete=complete_tool, help="Only about this tool.")
     ] = None
     kinds: Annotated[
         tuple[str, ...],
         click.Choice(list(_KINDS), case_sensitive=False),
-        Option(
+        CliOption(
             "--kind",
             metavar="KIND",
             help="Only of this kind; a wrong name lists them all. May be repeated.",
         ),
     ] = ()
-    change: Annotated[str | None, Option(metavar="ID", help="Only of this tool change.")] = None
+    change: Annotated[str | None, CliOption(metavar="ID", help="Only of this tool change.")] = None
 
     def at_address(self) -> "_Wanted":
         """Return the same with the address of the controller, ``None`` for all."""
@@ -97,7 +97,7 @@ journal.add_command(drift)
 def list_entries(
     *,
     meant: _Wanted,
-    limit: Annotated[int, click.IntRange(min=1), Option(help="At most this many.")] = 20,
+    limit: Annotated[int, click.IntRange(min=1), CliOption(help="At most this many.")] = 20,
 ) -> None:
     """Show the newest entries, newest first."""
     from robolink.journal import default_location, may_exist
@@ -123,7 +123,7 @@ def list_entries(
 @json_option
 def show(
     *,
-    name: Annotated[str, Argument(metavar="NUMBER|CHANGE")],
+    name: Annotated[str, CliArgument(metavar="NUMBER|CHANGE")],
 ) -> None:
     """Show all fields of one entry, or of all entries of a change."""
     from robolink_cli.views.journal import entry_payload, show_entry
@@ -141,8 +141,8 @@ def show(
 @json_option
 def diff(
     *,
-    a: Annotated[str, Argument(metavar="NUMBER|CHANGE")],
-    b: Annotated[str, Argument(metavar="NUMBER|CHANGE")],
+    a: Annotated[str, CliArgument(metavar="NUMBER|CHANGE")],
+    b: Annotated[str, CliArgument(metavar="NUMBER|CHANGE")],
 ) -> None:
     """Show what differs between two entries or changes: value, poses, tolerance, people."""
     from robolink_cli.views.journal import diff_payload, show_diff
@@ -159,10 +159,10 @@ def diff(
 @json_option
 def export(
     *,
-    file: Annotated[Path, Argument()],
+    file: Annotated[Path, CliArgument()],
     form: Annotated[
         Literal["csv", "json", "jsonl"] | None,
-        Option("--format", help="Form of the file; by default what its name ends with."),
+        CliOption("--format", help="Form of the file; by default what its name ends with."),
     ] = None,
     force: Overwrite = False,
     meant: _Wanted,

@@ -19,7 +19,7 @@ from robolink_cli.commands.record.journal_lookup import (
 from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.render import emit_json, json_is_on, say, table
 from robolink_cli.options.consent import Overwrite
-from robolink_cli.options.declaration import Option
+from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.shared import json_option
 from robolink_cli.session.completing import complete_tool
 
@@ -35,12 +35,12 @@ def drift(
     *,
     controller: OfController = None,
     tool: Annotated[
-        int | None, Option(shell_complete=complete_tool, help="Only this tool.")
+        int | None, CliOption(shell_complete=complete_tool, help="Only this tool.")
     ] = None,
     since: Annotated[
         datetime.datetime | None,
         click.DateTime(["%Y-%m-%d"]),
-        Option(
+        CliOption(
             metavar="YYYY-MM-DD",
             help="Start again from this day, after a repair or with another kind of nozzle (UTC).",
         ),
@@ -48,11 +48,11 @@ def drift(
     baseline: Annotated[
         int,
         click.IntRange(min=20, max=1000),
-        Option(help="On how many of the first changes the limits rest."),
+        CliOption(help="On how many of the first changes the limits rest."),
     ] = 20,
-    plots: Annotated[bool, Option(help="Draw every chart, not only what stands out.")] = False,
+    plots: Annotated[bool, CliOption(help="Draw every chart, not only what stands out.")] = False,
     page: Annotated[
-        Path | None, Option(help="Also write all charts to FILE, a page for a browser.")
+        Path | None, CliOption(help="Also write all charts to FILE, a page for a browser.")
     ] = None,
     force: Overwrite = False,
 ) -> int:

@@ -9,7 +9,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.transaction import id_of_change
 from robolink_cli.access.cell import complete_cell, is_cell_name
-from robolink_cli.options.declaration import Option
+from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.shared import GIVEN
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def journal_to_read() -> "Journal":
 
 OfController = Annotated[
     str | None,
-    Option(
+    CliOption(
         "-c",
         "--controller",
         metavar="CELL|URL",

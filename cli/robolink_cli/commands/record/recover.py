@@ -13,7 +13,7 @@ from robolink_cli.commands.measure.choosing import context_at_desk
 from robolink_cli.commands.record.recovery_guide import Guide, show_end
 from robolink_cli.console.render import json_is_on
 from robolink_cli.options.consent import DryRun, Plain, Yes
-from robolink_cli.options.declaration import Option
+from robolink_cli.options.declaration import CliOption
 from robolink_cli.prompts.present import present_desk
 from robolink_cli.prompts.questions import on_terminal
 from robolink_cli.session.context import (
@@ -119,14 +119,14 @@ def recover(
     _plain: Plain = False,
     keep: Annotated[
         bool,
-        Option(
+        CliOption(
             late=True,
             help="Keep new values that nobody tested; without it the old ones are written back.",
         ),
     ] = False,
     choose: Annotated[
         Literal["old", "new", "blocked"] | None,
-        Option(
+        CliOption(
             late=True,
             help="Your answer to all of it: old values back; new values kept, on a terminal "
             "after their "
@@ -135,14 +135,14 @@ def recover(
     ] = None,
     yes: Annotated[
         bool,
-        Option(
+        CliOption(
             late=True,
             help="Your answer where reading is not enough: you have looked, and work may go on.",
         ),
     ] = False,
     forget: Annotated[
         bool,
-        Option(
+        CliOption(
             late=True,
             help="Drop everything that is open, without a check and without restoring; you "
             "answer for it.",
@@ -150,7 +150,7 @@ def recover(
     ] = False,
     take_over: Annotated[
         str | None,
-        Option(
+        CliOption(
             late=True,
             metavar="REASON",
             help="Take this controller over from the program that works on it, a PLC's mailbox "
@@ -207,7 +207,7 @@ def resolve(
     *,
     dry_run: DryRun = False,
     yes: Yes = False,
-    forget: Annotated[bool, Option(late=True, help="As with 'robolink recover'.")] = False,
+    forget: Annotated[bool, CliOption(late=True, help="As with 'robolink recover'.")] = False,
 ) -> int:
     """Do what 'robolink recover' does; without a terminal the command itself is your answer."""
     with open_controller(context, quiet=True, changes=not dry_run) as controller:

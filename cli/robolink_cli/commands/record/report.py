@@ -17,7 +17,7 @@ from robolink_cli.commands.record.journal_lookup import controller_meant, entrie
 from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.render import note, say
 from robolink_cli.options.consent import Overwrite
-from robolink_cli.options.declaration import Argument, Option
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.impact import ImpactRequest, judge
 from robolink_cli.options.pose_source import point_numbers
 from robolink_cli.session.context import CliContext, optional_controller
@@ -32,12 +32,12 @@ _ENDINGS = (".html", ".htm")
 def report(
     context: CliContext,
     *,
-    change: Annotated[str | None, Argument()] = None,
-    file: Annotated[Path | None, Argument()] = None,
+    change: Annotated[str | None, CliArgument()] = None,
+    file: Annotated[Path | None, CliArgument()] = None,
     force: Overwrite = False,
     points: Annotated[
         str | None,
-        Option(
+        CliOption(
             metavar="1-50",
             help="Also show how far the tip moves at these taught points, read now from -c.",
         ),

@@ -12,7 +12,7 @@ from robolink.transaction import Undone, UndoPlan
 from robolink.transaction import undo as take_back
 from robolink_cli.console.render import note, say
 from robolink_cli.options.consent import DryRun, ThenSelect, Yes
-from robolink_cli.options.declaration import Argument, Option
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.questions import agree, on_terminal
 from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
@@ -26,14 +26,14 @@ from robolink_cli.views.tables import show_change
 def undo(
     context: CliContext,
     *,
-    change: Annotated[str | None, Argument()] = None,
+    change: Annotated[str | None, CliArgument()] = None,
     tool: Annotated[
-        int | None, Option(shell_complete=complete_tool, help="Only this tool of the change.")
+        int | None, CliOption(shell_complete=complete_tool, help="Only this tool of the change.")
     ] = None,
     to: Annotated[
         int | None,
         click.IntRange(min=1),
-        Option(
+        CliOption(
             metavar="NUMBER", help="Bring back the value that this entry of the journal proved."
         ),
     ] = None,

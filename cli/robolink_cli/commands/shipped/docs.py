@@ -13,7 +13,7 @@ from robolink.messages import tr
 from robolink_cli.console.output import is_terminal
 from robolink_cli.console.render import emit_json, json_is_on, say, say_listed
 from robolink_cli.console.tables import filled, has_wide, within
-from robolink_cli.options.declaration import Argument, Option
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
 
 _COMMENT: Final = re.compile(r"<!--.*?-->\n*", re.DOTALL)
@@ -29,9 +29,9 @@ def _complete_page(_: click.Context, __: click.Parameter, start: str) -> list[st
 @json_option
 def docs(
     *,
-    page: Annotated[str | None, Argument(shell_complete=_complete_page)] = None,
+    page: Annotated[str | None, CliArgument(shell_complete=_complete_page)] = None,
     only_path: Annotated[
-        bool, Option("--path", help="Show where the page is, not the page.")
+        bool, CliOption("--path", help="Show where the page is, not the page.")
     ] = False,
 ) -> None:
     """Read a PAGE of the documentation; without one, list them.

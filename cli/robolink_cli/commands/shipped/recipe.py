@@ -16,7 +16,7 @@ from robolink_cli.commands.shipped.shipped_files import (
 )
 from robolink_cli.console.render import emit_json, json_is_on, say, say_listed
 from robolink_cli.options.consent import Overwrite
-from robolink_cli.options.declaration import Argument
+from robolink_cli.options.declaration import CliArgument
 from robolink_cli.options.shared import json_option
 from robolink_cli.session.completing import complete_recipe
 
@@ -112,8 +112,8 @@ def list_models() -> None:
 @json_option
 def new(
     *,
-    name: Annotated[str, Argument(shell_complete=_complete_model)],
-    file: Annotated[Path | None, Argument()] = None,
+    name: Annotated[str, CliArgument(shell_complete=_complete_model)],
+    file: Annotated[Path | None, CliArgument()] = None,
     force: Overwrite = False,
 ) -> None:
     """Copy the recipe NAME to FILE; without FILE to NAME.toml in the working folder.
@@ -137,7 +137,7 @@ def new(
 @json_option
 def check(
     *,
-    file: Annotated[Path, Argument(shell_complete=complete_recipe)],
+    file: Annotated[Path, CliArgument(shell_complete=complete_recipe)],
 ) -> int:
     """Say everything that is wrong with the recipe FILE. No controller is asked."""
     from robolink.recipe import check_recipe

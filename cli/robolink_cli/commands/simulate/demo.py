@@ -31,7 +31,7 @@ from robolink.messages import tr
 from robolink.model import Controller, ToolOffset
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import emit_json, json_is_on, say
-from robolink_cli.options.declaration import Option
+from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.shared import json_option
 from robolink_cli.prompts.operator import AssistedOperator
 from robolink_cli.views.documents import offset_payload
@@ -42,15 +42,17 @@ from robolink_cli.views.fit import report_payload, show_proposal, show_report
 @json_option
 def demo(
     *,
-    seed: Annotated[int, Option(help="Another cell, another tip.")] = 1,
+    seed: Annotated[int, CliOption(help="Another cell, another tip.")] = 1,
     speed: Annotated[
         float,
         NumberInside(1, 100),
-        Option(metavar="FACTOR", help="How many times faster than real the simulated time passes."),
+        CliOption(
+            metavar="FACTOR", help="How many times faster than real the simulated time passes."
+        ),
     ] = 20.0,
     operator: Annotated[
         Literal["careful", "careless"],
-        Option(
+        CliOption(
             help="Who touches the pin; a careless person only presses Enter, and must not be "
             "believed."
         ),

@@ -9,7 +9,7 @@ from robolink_cli.commands.simulate.run.sim_run import sim_run
 from robolink_cli.commands.simulate.sim_plc import sim_plc
 from robolink_cli.commands.simulate.sim_softmotion import softmotion
 from robolink_cli.console.help_pages import SectionedCommand
-from robolink_cli.options.declaration import Argument, Option
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
 from robolink_cli.options.simulation import (
     EXISTING_FILE,
@@ -46,7 +46,7 @@ class _EpsonOptions(NamedTuple):
 
     address: Annotated[
         str,
-        Option(
+        CliOption(
             "--tcp",
             metavar="HOST:PORT",
             callback=one_place,
@@ -55,7 +55,7 @@ class _EpsonOptions(NamedTuple):
     ] = "127.0.0.1:5000"
     serial: Annotated[
         Literal["pty"] | None,
-        Option(
+        CliOption(
             callback=one_place,
             help="Remote RS232 on a pseudo terminal, whose path is printed, in place of --tcp.",
         ),
@@ -63,11 +63,11 @@ class _EpsonOptions(NamedTuple):
     baud: Annotated[
         int,
         click.IntRange(0, 4_000_000),
-        Option(help="How slow that line is, in real time; 0 carries everything at once."),
+        CliOption(help="How slow that line is, in real time; 0 carries everything at once."),
     ] = 0
     robot: Annotated[
         str,
-        Option(
+        CliOption(
             metavar="MODEL",
             shell_complete=_complete_robot,
             help="Model of the robot, for example RS4-C351S or C8-C901S; several with commas "
@@ -76,24 +76,24 @@ class _EpsonOptions(NamedTuple):
     ] = "T6-602S"
     password_env: Annotated[
         str | None,
-        Option(
+        CliOption(
             metavar="VAR", help="Environment variable that holds the password clients must give."
         ),
     ] = None
     profile: Annotated[
         Path | None,
         EXISTING_FILE,
-        Option(help="Cell profile written by verify-controller; --option overrules it."),
+        CliOption(help="Cell profile written by verify-controller; --option overrules it."),
     ] = None
     replay: Annotated[
         Path | None,
         EXISTING_FILE,
-        Option(help="Serve a dialogue that --record has written, in place of a simulator."),
+        CliOption(help="Serve a dialogue that --record has written, in place of a simulator."),
     ] = None
     programs: Annotated[
         tuple[Path, ...],
         EXISTING_FILE,
-        Option(
+        CliOption(
             "--program",
             help="SPEL+ program (.prg) that Start runs: main, or mainN. May be repeated.",
         ),
@@ -101,7 +101,7 @@ class _EpsonOptions(NamedTuple):
     points: Annotated[
         tuple[Path, ...],
         EXISTING_FILE,
-        Option(help="Point file (.pts) of the programs. May be repeated."),
+        CliOption(help="Point file (.pts) of the programs. May be repeated."),
     ] = ()
 
 
@@ -145,9 +145,9 @@ def epson(
 @json_option
 def assist(
     *,
-    url: Annotated[str, Argument()],
-    act: Annotated[str, Argument()],
-    values: Annotated[tuple[str, ...], Argument(metavar="[NAME=NUMBER]...")] = (),
+    url: Annotated[str, CliArgument()],
+    act: Annotated[str, CliArgument()],
+    values: Annotated[tuple[str, ...], CliArgument(metavar="[NAME=NUMBER]...")] = (),
 ) -> None:
     """Be the person at a simulated cell: press its buttons, teach its points, see its truth.
 
@@ -164,11 +164,11 @@ def assist(
 @json_option
 def ctl(
     *,
-    act: Annotated[str, Argument()],
-    values: Annotated[tuple[str, ...], Argument(metavar="[NAME=VALUE]...")] = (),
+    act: Annotated[str, CliArgument()],
+    values: Annotated[tuple[str, ...], CliArgument(metavar="[NAME=VALUE]...")] = (),
     url: Annotated[
         str,
-        Option(
+        CliOption(
             "--at",
             metavar="URL",
             envvar="ROBOLINK_CONTROL",

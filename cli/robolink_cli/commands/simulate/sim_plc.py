@@ -6,7 +6,7 @@ from typing import Annotated
 import click
 
 from robolink_cli.console.help_pages import SectionedCommand
-from robolink_cli.options.declaration import Option
+from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.shared import json_option
 from robolink_cli.options.simulation import (
     SECTIONS,
@@ -29,17 +29,17 @@ from robolink_cli.options.simulation import (
 @json_option
 def sim_plc(
     *,
-    map_file: Annotated[Path, Option("--map", help="The map; docs/plc-maps.md explains it.")],
+    map_file: Annotated[Path, CliOption("--map", help="The map; docs/plc-maps.md explains it.")],
     places: ModbusPlaces,
     unit: Annotated[
         int,
         click.IntRange(0, 255),
-        Option(help="The unit identifier that answers; 1 to 247 on a serial line."),
+        CliOption(help="The unit identifier that answers; 1 to 247 on a serial line."),
     ] = 1,
     most_registers: Annotated[
         int,
         click.IntRange(4, 125),
-        Option(help="How many registers one read may ask for; some servers allow 61 or 50."),
+        CliOption(help="How many registers one read may ask for; some servers allow 61 or 50."),
     ] = 125,
     seed: Seed = 1,
     speed: Pace = 1.0,

@@ -6,7 +6,7 @@ from typing import Annotated, NamedTuple
 import click
 
 from robolink_cli.console.help_pages import SectionedCommand
-from robolink_cli.options.declaration import Option
+from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.shared import json_option
 from robolink_cli.options.simulation import SECTIONS, ModbusPlaces, ServedLife, SimulationOptions
 
@@ -23,21 +23,21 @@ class _SoftMotionOptions(NamedTuple):
 
     can: Annotated[
         str | None,
-        Option(
+        CliOption(
             metavar="INTERFACE:CHANNEL",
             help="Be a CANopen node, for example on udp_multicast:239.74.163.2:43113 or "
             "socketcan:vcan0.",
         ),
     ] = None
     unit: Annotated[
-        int, click.IntRange(1, 247), Option(help="Unit identifier on the serial line.")
+        int, click.IntRange(1, 247), CliOption(help="Unit identifier on the serial line.")
     ] = 1
     node: Annotated[
-        int, click.IntRange(1, 127), Option(help="Number of the node on the CAN bus.")
+        int, click.IntRange(1, 127), CliOption(help="Number of the node on the CAN bus.")
     ] = 5
     kinematics: Annotated[
         str,
-        Option(
+        CliOption(
             metavar="NAME[+ORIENTATION]",
             shell_complete=_complete_kinematics,
             help="Kinematics of the axis group; TAB completes the names. Or module:Class for one "
@@ -46,7 +46,7 @@ class _SoftMotionOptions(NamedTuple):
     ] = "Kin_Scara3_Z"
     parameters: Annotated[
         tuple[str, ...],
-        Option(
+        CliOption(
             "--param",
             metavar="NAME=VALUE",
             help="A parameter of the kinematics or a drive, for example dArmLength1=250. May be "
@@ -56,7 +56,7 @@ class _SoftMotionOptions(NamedTuple):
     program: Annotated[
         Path | None,
         click.Path(exists=True, file_okay=False, path_type=Path),
-        Option(
+        CliOption(
             metavar="DIR",
             help="Execute the program in this folder, as 'plc export' writes it, changed or not.",
         ),

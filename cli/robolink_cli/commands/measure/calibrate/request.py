@@ -11,7 +11,7 @@ from robolink.errors import ConfigError, ReservedToolError, ToolIndexError
 from robolink.messages import tr
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.options.consent import DryRun, MotionOption, Plain, Yes
-from robolink_cli.options.declaration import Option
+from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.impact import ImpactFile, ImpactPoints, ImpactRequest, impact_request
 from robolink_cli.options.report import ForceReport, ReportPath, ReportRequest, report_request
 from robolink_cli.session.completing import complete_tool
@@ -154,21 +154,25 @@ class CalibrationRequest:
 def request_from(
     context: CliContext,
     *,
-    tool: Annotated[int, Option(shell_complete=complete_tool, help="Number of the tool, 1 to 15.")],
+    tool: Annotated[
+        int, CliOption(shell_complete=complete_tool, help="Number of the tool, 1 to 15.")
+    ],
     speed_mm_s: Annotated[
         float,
         NumberInside(1, 100),
-        Option(cls=MotionOption, show_default=False, help="Speed of straight moves, in Power Low."),
+        CliOption(
+            cls=MotionOption, show_default=False, help="Speed of straight moves, in Power Low."
+        ),
     ] = 20.0,
     box_mm: Annotated[
         float,
         NumberInside(min=1),
-        Option(cls=MotionOption, help="How far, sideways, the flange may go from where it is."),
+        CliOption(cls=MotionOption, help="How far, sideways, the flange may go from where it is."),
     ] = 150.0,
     max_change_mm: Annotated[
         float,
         LENGTH,
-        Option(
+        CliOption(
             help="Largest change against the stored offset that is accepted; more than the cell "
             "allows takes an engineer."
         ),
@@ -176,25 +180,27 @@ def request_from(
     rms_mm: Annotated[
         float | None,
         LENGTH,
-        Option("--max-rms", help="Largest rms of the residuals that is accepted."),
+        CliOption("--max-rms", help="Largest rms of the residuals that is accepted."),
     ] = None,
     residual_mm: Annotated[
         float | None,
         LENGTH,
-        Option("--max-residual", help="Largest residual of one pose that is accepted."),
+        CliOption("--max-residual", help="Largest residual of one pose that is accepted."),
     ] = None,
     interval_mm: Annotated[
         float | None,
         LENGTH,
-        Option("--max-interval", help="Accurate to this or better (95 %), or it is refused."),
+        CliOption("--max-interval", help="Accurate to this or better (95 %), or it is refused."),
     ] = None,
     tolerance_mm: Annotated[
-        float, LENGTH, Option(cls=MotionOption, help="Largest drift that passes the turn test.")
+        float, LENGTH, CliOption(cls=MotionOption, help="Largest drift that passes the turn test.")
     ] = 0.2,
-    no_verify: Annotated[bool, Option(cls=MotionOption, help="Leave the turn test out.")] = False,
+    no_verify: Annotated[
+        bool, CliOption(cls=MotionOption, help="Leave the turn test out.")
+    ] = False,
     assist: Annotated[
         str | None,
-        Option(
+        CliOption(
             cls=MotionOption,
             metavar="URL",
             help="A simulator's assist or sim URL: its operator brings the tip onto the pin.",

@@ -23,7 +23,7 @@ from robolink_cli.commands.simulate.run.cells_file import PlannedCell
 from robolink_cli.commands.simulate.serving import Termination, announce, controlled
 from robolink_cli.console.output import hand_over, show
 from robolink_cli.console.render import emit_json, json_is_on, say
-from robolink_cli.options.declaration import Argument, Option
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
 from robolink_cli.options.simulation import ServedLife
 
@@ -32,13 +32,13 @@ from robolink_cli.options.simulation import ServedLife
 @json_option
 def sim_run(
     *,
-    file: Annotated[Path, Argument()],
+    file: Annotated[Path, CliArgument()],
     only_checked: Annotated[
-        bool, Option("--check", help="Only check the file; serve nothing.")
+        bool, CliOption("--check", help="Only check the file; serve nothing.")
     ] = False,
     wait_ready: Annotated[
         bool,
-        Option(
+        CliOption(
             help="Serve in the background: print one JSON line once all cells listen, and end with "
             "0; 'pid' in it is the process that serves, which SIGTERM ends."
         ),

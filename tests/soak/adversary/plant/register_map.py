@@ -16,7 +16,8 @@ from robolink_simulators.plc.serving import PlcOnLine
 
 from robolink.controllers.plc_map.controller import PlcMapController
 from robolink.model import Controller, OutcomeLog, ToolOffset
-from robolink.register_maps import RegisterMap, load_map
+from robolink.register_maps import RegisterMap, confirmation_of, load_map
+from robolink.testing import confirm_whole_map
 from robolink.timing import Deadline
 from robolink.transport import parse_url
 from robolink.transport.modbus.client import ModbusClient
@@ -137,6 +138,9 @@ class RegisterMapPlant(PlantMachine):
             tapped = TappedRegisters(self, client, process)
             controller = PlcMapController(tapped, _register_map(), outcomes)
             controller.require_probe()
+            # Whoever installed the cell compared each value with the screen of the machine.
+            if confirmation_of(controller.who().name, controller.register_map) is None:
+                confirm_whole_map(controller)
         except BaseException:
             client.close()
             raise

@@ -216,6 +216,7 @@ class ContractRules:
             tool
             for tool in {*state.tools, *last.tools}
             if state.tools.get(tool) != last.tools.get(tool)
+            and not self._on.from_a_lost_write(tool, state.tools.get(tool))
         }
         self._on.hold(
             _RULE,
@@ -268,6 +269,7 @@ class ContractRules:
     def has_written(self, process: VirtualProcess, receipt: ToolReceipt) -> None:
         """Check the receipt of a write: what was there, and what is there."""
         held = [state.tools.get(receipt.tool) for state in self._since(process)]
+        held += [self._on.staged[receipt.tool]] if receipt.tool in self._on.staged else []
         for what, value in (("before", receipt.before), ("now", receipt.read_back)):
             self._promise(
                 any(self._on.plant.same(one, value) for one in held),

@@ -228,7 +228,6 @@ class RestRules:
     def __init__(self, grounds: Grounds) -> None:
         self._on = grounds
         self._by_others: dict[int, ToolOffset | None] = {}
-        self._staged: dict[int, ToolOffset] = {}
         self._told: set[int] = set()
 
     def said(self, text: str) -> None:
@@ -283,7 +282,7 @@ class RestRules:
             if tool in self._on.plant.touched or not self._on.books.trusted:
                 self._by_others[tool] = state.tools.get(tool)
         if not self._on.books.trusted:
-            self._staged |= self._on.plant.staged()
+            self._on.staged |= self._on.plant.staged()
 
     def _came_from_a_lost_write(self, tool: int, holds: ToolOffset | None) -> bool:
         """Tell whether a request brought into force what nobody could know to wait for one.
@@ -291,11 +290,8 @@ class RestRules:
         A write had ended between its registers and its request, and the disk lost the record of
         it. A person has to have been told, where the record could show it.
         """
-        staged = self._staged.get(tool)
         known, _ = self._on.books.value_of(tool)
-        if staged is None or not self._on.plant.same(staged, holds):
-            return False
-        return tool in self._told or not known
+        return self._on.from_a_lost_write(tool, holds) and (tool in self._told or not known)
 
     def _agrees(self, tool: int, holds: ToolOffset | None, named: Sequence[BookedMarker]) -> None:
         known, value = self._on.books.value_of(tool)

@@ -108,6 +108,8 @@ class Grounds:
         books: The journal on the disk.
         now: The hour that runs.
         story: Where a broken rule is noted.
+        staged: Values in registers that wait for a request, left by a write whose record the disk
+            has lost: the next request may bring them into force.
     """
 
     now: HourSoFar
@@ -116,6 +118,12 @@ class Grounds:
         self.story = story
         self.plant = plant
         self.books = books
+        self.staged: dict[int, ToolOffset] = {}
+
+    def from_a_lost_write(self, tool: int, holds: ToolOffset | None) -> bool:
+        """Tell whether a value is one that nobody could know to wait for a request."""
+        staged = self.staged.get(tool)
+        return staged is not None and self.plant.same(staged, holds)
 
     def hold(self, rule: str, holds: bool, sentence: str) -> None:
         """Look at a rule; ``sentence`` says what was seen where it does not hold."""

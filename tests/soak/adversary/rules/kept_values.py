@@ -67,6 +67,7 @@ class AskedRules:
                 "AskedValue",
                 plant.same(first, holds)
                 or tool in plant.touched
+                or self._on.from_a_lost_write(tool, holds)
                 or any(plant.holds(one, holds) for one in asked)
                 or self._mistaken(tool, asked, holds),
                 f"tool {tool} holds {holds}; asked for were {asked}",

@@ -1,68 +1,64 @@
 """Options that answer a question beforehand, or say that nothing is to be changed."""
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import click
 from click.core import ParameterSource
 
 from robolink.errors import ConfigError
-from robolink.messages import declared, tr
+from robolink.messages import tr
 from robolink_cli.console.output import PLAIN
+from robolink_cli.options.declaration import CliOption
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-def dry_run_option(function: F) -> F:
-    """Add ``--dry-run``."""
-    return click.option(
-        "--dry-run",
-        is_flag=True,
-        help="Show the exact requests and check the limits; read only, write nothing.",
-    )(function)
+DryRun = Annotated[
+    bool,
+    CliOption(
+        late=True, help="Show the exact requests and check the limits; read only, write nothing."
+    ),
+]
 
+Yes = Annotated[bool, CliOption(late=True, help="Answer yes to the question asked.")]
 
-def yes_option(function: F) -> F:
-    """Add ``--yes``."""
-    return click.option("--yes", is_flag=True, help="Answer yes to the question asked.")(function)
+Overwrite = Annotated[bool, CliOption(help="Overwrite a file that is already there.")]
 
+Published = Annotated[
+    bool,
+    CliOption(
+        help="The tools as the companion program published them; works while production runs."
+    ),
+]
 
-def plain_option(function: F) -> F:
-    """Add ``--plain``."""
-
-    def keep(context: click.Context, _parameter: click.Parameter, wanted: bool) -> None:
-        if wanted:
-            context.meta[PLAIN] = True
-
-    return click.option(
-        "--plain",
-        is_flag=True,
-        expose_value=False,
-        callback=keep,
-        help=declared("Lines instead of a screen; for screen readers. Also ROBOLINK_PLAIN=1."),
-    )(function)
-
-
-def then_select_option(function: F) -> F:
-    """Add ``--then-select``."""
-    return click.option(
-        "--then-select",
-        type=click.IntRange(0, 15),
+ThenSelect = Annotated[
+    int | None,
+    click.IntRange(0, 15),
+    CliOption(
         metavar="NUMBER",
-        help=declared(
-            "The tool that the machine is to have selected in place of one that is selected and "
-            "loses its definition; 0 is the flange."
-        ),
-    )(function)
+        help="The tool that the machine is to have selected in place of one that is selected and "
+        "loses its definition; 0 is the flange.",
+    ),
+]
 
 
-def published_option(function: F) -> F:
-    """Add ``--published``."""
-    return click.option(
-        "--published",
-        is_flag=True,
-        help="The tools as the companion program published them; works while production runs.",
-    )(function)
+def _keep_plain(context: click.Context, _parameter: click.Parameter, wanted: bool) -> None:
+    if wanted:
+        context.meta[PLAIN] = True
+
+
+Plain = Annotated[
+    bool,
+    CliOption(
+        "--plain",
+        late=True,
+        expose_value=False,
+        callback=_keep_plain,
+        help="Lines instead of a screen; for screen readers. Also ROBOLINK_PLAIN=1.",
+    ),
+]
+"""Is kept for the whole command line, so that no command is told it."""
 
 
 class MotionOption(click.Option):

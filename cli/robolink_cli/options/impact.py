@@ -1,23 +1,19 @@
 """How far taught points lead elsewhere: the options, the reading, the table."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
-
-import click
+from typing import TYPE_CHECKING, Annotated
 
 from robolink.errors import ConfigError
-from robolink.messages import declared, tr
+from robolink.messages import tr
 from robolink_cli.access.capabilities import points_of
 from robolink_cli.console.render import say, table
+from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.pose_source import point_numbers
 
 if TYPE_CHECKING:
     from robolink.calibration import Impact
     from robolink.model import Controller, Pose, ToolOffset
-
-F = TypeVar("F", bound=Callable[..., Any])
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,19 +32,16 @@ class ImpactRequest:
         return read_pts(self.path)
 
 
-def impact_options(function: F) -> F:
-    """Add ``--impact`` and ``--impact-pts`` to a calibration."""
-    function = click.option(
-        "--impact-pts",
-        type=click.Path(dir_okay=False, path_type=Path),
-        metavar="FILE",
-        help=declared("The same for all points of a .pts file of EPSON RC+."),
-    )(function)
-    return click.option(
-        "--impact",
-        metavar="1-50",
-        help=declared("Before the write, show how far the tip moves at these taught points."),
-    )(function)
+ImpactPoints = Annotated[
+    str | None,
+    CliOption(
+        metavar="1-50", help="Before the write, show how far the tip moves at these taught points."
+    ),
+]
+
+ImpactFile = Annotated[
+    Path | None, CliOption(help="The same for all points of a .pts file of EPSON RC+.")
+]
 
 
 def impact_request(

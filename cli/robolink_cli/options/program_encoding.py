@@ -1,12 +1,13 @@
 """The code page of SPEL+ programs: named by a person, or found out and told."""
 
 import codecs
-from typing import Any, Final
+from typing import Annotated, Final
 
 import click
 
 from robolink.messages import tr
 from robolink_cli.console.render import note
+from robolink_cli.options.declaration import CliOption
 
 _PLAIN: Final = frozenset({"utf-8", "utf-8-sig"})
 
@@ -29,15 +30,15 @@ class _Encoding(click.ParamType[str]):
         return value
 
 
-def encoding_option(function: Any) -> Any:  # noqa: ANN401 - a decorator of click
-    """Add ``--encoding``."""
-    return click.option(
-        "--encoding",
-        type=_Encoding(),
+Encoding = Annotated[
+    str | None,
+    _Encoding(),
+    CliOption(
         metavar="NAME",
         help="Code page of the files: utf-8, gbk, cp932, cp1250. Without it, the first of UTF-8, "
         "cp932 and GBK that fits is used, and named.",
-    )(function)
+    ),
+]
 
 
 def tell_encoding(taken: str | None, *, named: str | None) -> None:

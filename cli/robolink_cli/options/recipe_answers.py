@@ -1,43 +1,34 @@
 """Answers that are given with the command, for the questions of a recipe."""
 
 import re
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeVar
-
-import click
+from typing import TYPE_CHECKING, Annotated
 
 from robolink.errors import ConfigError
-from robolink.messages import declared, tr
+from robolink.messages import tr
+from robolink_cli.options.declaration import CliOption
 
 if TYPE_CHECKING:
     from robolink.recipe import Answers, Recipe
 
-F = TypeVar("F", bound=Callable[..., Any])
-
 _NUMBERED = re.compile(r"([0-9]{1,3})=(.+)", re.ASCII | re.DOTALL)
 
 
-def answer_options(function: F) -> F:
-    """Add ``--answer`` and ``--z``."""
-    options = (
-        click.option(
-            "--answer",
-            "answers",
-            metavar="N=TEXT",
-            multiple=True,
-            help=declared("Answer to prompt number N of the recipe, counted from 1."),
-        ),
-        click.option(
-            "--z",
-            "z_mm",
-            metavar="TOOL=MM",
-            multiple=True,
-            help=declared('Z of a new tip in mm from the flange, for a recipe with z = "typed".'),
-        ),
-    )
-    for option in reversed(options):
-        function = option(function)
-    return function
+AnswerTexts = Annotated[
+    tuple[str, ...],
+    CliOption(
+        "--answer",
+        metavar="N=TEXT",
+        help="Answer to prompt number N of the recipe, counted from 1.",
+    ),
+]
+
+TypedHeights = Annotated[
+    tuple[str, ...],
+    CliOption(
+        metavar="TOOL=MM",
+        help='Z of a new tip in mm from the flange, for a recipe with z = "typed".',
+    ),
+]
 
 
 def answers_from(

@@ -1,25 +1,22 @@
 """The report of a tool change: the options, and a page that is written however it ends."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
-
-import click
+from typing import TYPE_CHECKING, Annotated, Any
 
 from robolink import __version__
 from robolink.errors import ConfigError, JournalError
-from robolink.messages import declared, joined, tr
+from robolink.messages import joined, tr
 from robolink_cli.console.render import note
+from robolink_cli.options.declaration import CliOption
 
 if TYPE_CHECKING:
     from robolink.calibration import Impact, VerifyResult
     from robolink.calibration_run import Proposal
     from robolink.model import Controller, ControllerFacts, Pose, ToolOffset, ToolReceipt
     from robolink.report import Outcome, Report, TouchOnRecord
-
-F = TypeVar("F", bound=Callable[..., Any])
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,24 +27,19 @@ class ReportRequest:
     replace: bool = False
 
 
-def report_options(function: F) -> F:
-    """Add ``--report`` and ``--force``."""
-    function = click.option(
-        "--force",
-        is_flag=True,
-        help=declared(
-            "Let --report overwrite a file that is already there; it forces nothing else."
-        ),
-    )(function)
-    return click.option(
+ReportPath = Annotated[
+    Path | None,
+    CliOption(
         "--report",
-        "report_path",
         metavar="FILE.html",
-        type=click.Path(dir_okay=False, path_type=Path),
-        help=declared(
-            "Write a page to keep: the offsets, the taught points as a table and a picture."
-        ),
-    )(function)
+        help="Write a page to keep: the offsets, the taught points as a table and a picture.",
+    ),
+]
+
+ForceReport = Annotated[
+    bool,
+    CliOption(help="Let --report overwrite a file that is already there; it forces nothing else."),
+]
 
 
 def report_request(path: Path | None, *, force: bool) -> ReportRequest | None:

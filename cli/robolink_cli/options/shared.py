@@ -14,6 +14,7 @@ from robolink_cli.console.language import OPTION, VARIABLE
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.output import visible
 from robolink_cli.console.render import switch_json_on
+from robolink_cli.options.declaration import add_declared
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -68,9 +69,16 @@ _ORIGINS = "robolink.origins"
 def shared_options(command: CommandT) -> CommandT:
     """Add the options that are accepted before and after a command's name.
 
-    For groups. What is given later, nearer to the command, wins.
+    What is given later, nearer to the command, wins. What the signature of the command declares is
+    added too.
     """
-    return json_option(_link_options(command))
+    shared: CommandT = add_declared(command, all_shared)
+    return shared
+
+
+def all_shared(command: CommandT) -> CommandT:
+    """Add the shared options alone."""
+    return _json_and_language(_link_options(command))
 
 
 class _Language(click.ParamType[str]):
@@ -100,7 +108,12 @@ class _Language(click.ParamType[str]):
 
 
 def json_option(command: CommandT) -> CommandT:
-    """Add ``--json`` and ``--lang`` alone, for a command that needs no controller."""
+    """Add ``--json`` and ``--lang``, and what a command declares that needs no controller."""
+    alone: CommandT = add_declared(command, _json_and_language)
+    return alone
+
+
+def _json_and_language(command: CommandT) -> CommandT:
     return click.option(
         "--json",
         "json_",

@@ -6,17 +6,18 @@ sign or a unit takes it as far as no nozzle change explains.
 """
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Annotated, Final
 
 import click
 
 from robolink.errors import DeclinedError
-from robolink.messages import declared, tr
+from robolink.messages import tr
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.output import is_terminal
 from robolink_cli.console.render import json_is_on
+from robolink_cli.options.declaration import CliOption
 
 if TYPE_CHECKING:
     from robolink.model import AnsweredBy, Controller, Jump
@@ -124,35 +125,25 @@ def require_yes(question: str) -> None:
         raise DeclinedError(tr("That was not y."), remedy=tr("Nothing was sent."))
 
 
-F = TypeVar("F", bound=Callable[..., Any])
+_POSITIVE: Final = NumberInside(min=0, min_open=True)
 
+AcceptedLength = Annotated[
+    float | None,
+    _POSITIVE,
+    CliOption(
+        "--accept-jump",
+        help="Accept a change up to MM this time, beyond the cell's limit; for engineers.",
+    ),
+]
 
-def accept_jump_options(function: F) -> F:
-    """Add ``--accept-jump`` and ``--accept-turn``."""
-    positive = NumberInside(min=0, min_open=True)
-    options = (
-        click.option(
-            "--accept-jump",
-            "accepted_mm",
-            metavar="MM",
-            type=positive,
-            help=declared(
-                "Accept a change up to MM this time, beyond the cell's limit; for engineers."
-            ),
-        ),
-        click.option(
-            "--accept-turn",
-            "accepted_deg",
-            metavar="DEG",
-            type=positive,
-            help=declared(
-                "Accept a turn up to DEG this time, beyond the cell's limit; for engineers."
-            ),
-        ),
-    )
-    for option in reversed(options):
-        function = option(function)
-    return function
+AcceptedAngle = Annotated[
+    float | None,
+    _POSITIVE,
+    CliOption(
+        "--accept-turn",
+        help="Accept a turn up to DEG this time, beyond the cell's limit; for engineers.",
+    ),
+]
 
 
 @contextmanager

@@ -22,7 +22,8 @@ from robolink_cli.access.cell import (
 )
 from robolink_cli.console.output import may_be_guided
 from robolink_cli.console.render import emit_json, json_is_on, note, say
-from robolink_cli.options.shared import GIVEN, TYPED, shared_options
+from robolink_cli.options.declaration import add_declared, packed
+from robolink_cli.options.shared import GIVEN, TYPED, all_shared
 from robolink_cli.stopping.request import StopRequest
 
 if TYPE_CHECKING:
@@ -100,6 +101,10 @@ class CliContext(NamedTuple):
         show_requests(requests)
 
 
+Command = Callable[..., int | None]
+"""What click calls; it returns the exit code, ``None`` for 0."""
+
+
 def emit(kind: str, payload: Mapping[str, object], show: Callable[[], None]) -> None:
     """Give the result: the document ``robolink/KIND/1`` to a machine, else ``show()``."""
     if json_is_on():
@@ -126,56 +131,51 @@ def stop_request() -> StopRequest:
     )
 
 
-def controller_options(command: Callable[..., int | None]) -> Callable[..., int | None]:
+def controller_options(command: Command) -> Command:
     """Add the same options to a command, and pass it a :class:`CliContext` first.
 
     Where no cell is named, the only one is taken (:func:`_with_only_cell`). What the command
     returns becomes the exit code.
     """
-
-    @wraps(command)
-    def with_context(*args: object, **kwargs: object) -> int | None:
-        return command(_context_from(_with_only_cell(kwargs)), *args, **kwargs)
-
-    return shared_options(with_context)
+    return _with_options(command, lambda options: _context_from(_with_only_cell(options)))
 
 
-def optional_controller(command: Callable[..., int | None]) -> Callable[..., int | None]:
+def optional_controller(command: Command) -> Command:
     """As :func:`controller_options`, for a command that means something without a controller."""
-
-    @wraps(command)
-    def with_context(*args: object, **kwargs: object) -> int | None:
-        given = click.get_current_context().meta.get(GIVEN, {})
-        return command(_context_from(given), *args, **kwargs)
-
-    return shared_options(with_context)
+    return _with_options(
+        command, lambda _: _context_from(click.get_current_context().meta.get(GIVEN, {}))
+    )
 
 
-def calming_options(command: Callable[..., int | None]) -> Callable[..., int | None]:
+def calming_options(command: Command) -> Command:
     """As :func:`controller_options`, for a command that looks or calms.
 
     It is not kept from a person by a cell file: where that is wrong, the address is taken from
     it, or from the last connection, and what is wrong is said.
     """
-
-    @wraps(command)
-    def with_context(*args: object, **kwargs: object) -> int | None:
-        return command(_calming_context_from(_with_only_cell(kwargs)), *args, **kwargs)
-
-    return shared_options(with_context)
+    return _with_options(command, lambda options: _calming_context_from(_with_only_cell(options)))
 
 
-def looking_options(command: Callable[..., int | None]) -> Callable[..., int | None]:
+def looking_options(command: Command) -> Command:
     """As :func:`calming_options`, for a command that only looks.
 
     Cell files that were right at the last connection, and are the same, are not checked anew.
     """
+    return _with_options(command, lambda options: _looking_context_from(_with_only_cell(options)))
+
+
+def _with_options(
+    command: Command, context_of: Callable[[Mapping[str, object]], CliContext]
+) -> Command:
+    """Add what a command declares and the shared options; pass it the context of what was given."""
+    call = packed(command)
 
     @wraps(command)
     def with_context(*args: object, **kwargs: object) -> int | None:
-        return command(_looking_context_from(_with_only_cell(kwargs)), *args, **kwargs)
+        return call(context_of(kwargs), *args, **kwargs)
 
-    return shared_options(with_context)
+    framed: Command = add_declared(command, all_shared, with_context)
+    return framed
 
 
 def context_of_cell(name: str, *, anew: bool = False) -> CliContext:

@@ -1,37 +1,26 @@
 """Who works at the cell, and with which nozzle: what goes with every entry of the journal."""
 
-from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, TypeVar
-
-import click
+from typing import TYPE_CHECKING, Annotated
 
 from robolink.errors import ConfigError
-from robolink.messages import declared, tr
+from robolink.messages import tr
 from robolink_cli.console.render import json_is_on
+from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.shared import LINE
 
 if TYPE_CHECKING:
     from robolink.config import Expected
     from robolink.model import Signature
 
-F = TypeVar("F", bound=Callable[..., Any])
 
+Nozzle = Annotated[
+    str | None,
+    LINE,
+    CliOption(metavar="ID", help="Id of the nozzle or needle that is mounted, for the record."),
+]
 
-def nozzle_options(function: F) -> F:
-    """Add ``--nozzle`` and ``--lot``."""
-    options = (
-        click.option(
-            "--nozzle",
-            metavar="ID",
-            type=LINE,
-            help=declared("Id of the nozzle or needle that is mounted, for the record."),
-        ),
-        click.option("--lot", metavar="LOT", type=LINE, help=declared("Its lot, for the record.")),
-    )
-    for option in reversed(options):
-        function = option(function)
-    return function
+Lot = Annotated[str | None, LINE, CliOption(metavar="LOT", help="Its lot, for the record.")]
 
 
 def signature_of(operator: str | None, cell: "Expected | None", *, changes: bool) -> "Signature":

@@ -1,16 +1,17 @@
 """--order: a job that a line computer may deliver twice is carried out once."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Annotated, Final
 
 import click
 from click.core import ParameterSource
 
 from robolink.errors import ConfigError
-from robolink.messages import declared, tr
+from robolink.messages import tr
 from robolink.timing import local_label
 from robolink_cli.console.render import say
+from robolink_cli.options.declaration import CliOption
 
 if TYPE_CHECKING:
     from robolink.model import Controller
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
     _ParamType = click.ParamType[str]
 else:
     _ParamType = click.ParamType  # click 8.1 knows no parameter of it
-
-F = TypeVar("F", bound=Callable[..., Any])
 
 _NO_PART: Final = frozenset({"order", "recipe", "yes", "assist", "report_path", "force", "jsonl"})
 """What a second delivery may have otherwise: it changes nothing of what is done."""
@@ -47,17 +46,15 @@ class OrderType(_ParamType):
             self.fail(str(error), param, ctx)
 
 
-def order_option(function: F) -> F:
-    """Add ``--order``."""
-    return click.option(
-        "--order",
+OrderId = Annotated[
+    str | None,
+    OrderType(),
+    CliOption(
         metavar="ID",
-        type=OrderType(),
-        help=declared(
-            "Id of this order from a line computer; delivered again it does nothing, and "
-            "reports the first result."
-        ),
-    )(function)
+        help="Id of this order from a line computer; delivered again it does nothing, and "
+        "reports the first result.",
+    ),
+]
 
 
 def require_no_dry_run(order: str | None, *, dry_run: bool) -> None:

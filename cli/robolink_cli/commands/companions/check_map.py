@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import click
 
@@ -26,6 +26,7 @@ from robolink.register_maps import (
 )
 from robolink.timing import local_label
 from robolink_cli.console.render import note, say, table
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.questions import on_terminal
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.operator_identity import signature_of
@@ -35,23 +36,29 @@ if TYPE_CHECKING:
 
 
 @click.command("check-map", short_help="Check the map of a PLC's registers.")
-@click.argument("file", metavar="[MAP.toml]", required=False, type=click.Path(path_type=Path))
-@click.option(
-    "--from-csv",
-    "register_list",
-    metavar="LIST.csv",
-    type=click.Path(path_type=Path),
-    help="Start a map from a register list, and show it; nothing else is done.",
-)
-@click.option(
-    "--shows",
-    multiple=True,
-    metavar="TOOL.AXIS=VALUE",
-    help="What the HMI shows, for example 1.x=12.35: confirms that value. May be repeated.",
-)
 @controller_options
 def check_map(
-    context: CliContext, file: Path | None, register_list: Path | None, shows: tuple[str, ...]
+    context: CliContext,
+    *,
+    file: Annotated[
+        Path | None, click.Path(path_type=Path), CliArgument(metavar="[MAP.toml]")
+    ] = None,
+    register_list: Annotated[
+        Path | None,
+        click.Path(path_type=Path),
+        CliOption(
+            "--from-csv",
+            metavar="LIST.csv",
+            help="Start a map from a register list, and show it; nothing else is done.",
+        ),
+    ] = None,
+    shows: Annotated[
+        tuple[str, ...],
+        CliOption(
+            metavar="TOOL.AXIS=VALUE",
+            help="What the HMI shows, for example 1.x=12.35: confirms that value. May be repeated.",
+        ),
+    ] = (),
 ) -> None:
     """Check the map of a PLC's registers: the file, or with -c its values against the HMI.
 

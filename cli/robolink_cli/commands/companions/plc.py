@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Annotated, Literal
 
 import click
 
@@ -21,6 +22,7 @@ from robolink.protocols.mailbox.exports import (
 )
 from robolink_cli.commands.companions.check_map import check_map
 from robolink_cli.console.render import emit_json, json_is_on, say
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
 
 _LAST_BASE = 64880  # the response block, fifteen slots and the device block end at register 65535
@@ -42,55 +44,48 @@ def _symbols(given: tuple[str, str, str] | None) -> tuple[str, ...]:
 
 
 @plc.command("export", short_help="Write the program of the mailbox and its register map.")
-@click.argument("folder", metavar="DIR", type=click.Path(file_okay=False, path_type=Path))
-@click.option(
-    "--profile",
-    type=click.Choice(["tools", "full"]),
-    default="tools",
-    show_default=True,
-    help="tools: tool offsets only, no motion; full: all opcodes.",
-)
-@click.option(
-    "--base",
-    type=click.IntRange(0, _LAST_BASE),
-    metavar="N",
-    default=0,
-    show_default=True,
-    help="First register of both blocks, counted from 0.",
-)
-@click.option(
-    "--kinematics",
-    default="",
-    metavar="NAME",
-    help="Kinematics of the axis group, such as Kin_Scara3_Z or Kin_Gantry3+Kin_CAxis;"
-    " opcode 30004 sets it again.",
-)
-@click.option(
-    "--read-modes",
-    nargs=3,
-    default=None,
-    metavar="SET ACTIVE LAST",
-    callback=lambda _, __, given: _symbols(given),
-    help="Symbols of SMC_READ_TOOL_MODE in your Library Manager, to read tools by the block.",
-)
-@click.option(
-    "--plcopen",
-    type=click.Choice(["0200", "0201"]),
-    default="0200",
-    show_default=True,
-    help="Schema of the PLCopen XML: 0200 as CODESYS writes it, 0201 for OpenPLC and Beremiz.",
-)
-@click.option("--force", is_flag=True, help="Overwrite files that were changed.")
 @json_option
 def export(
-    folder: Path,
     *,
-    profile: str,
-    base: int,
-    kinematics: str,
-    read_modes: tuple[str, ...],
-    plcopen: str,
-    force: bool,
+    folder: Annotated[
+        Path, click.Path(file_okay=False, path_type=Path), CliArgument(metavar="DIR")
+    ],
+    profile: Annotated[
+        Literal["tools", "full"],
+        CliOption(help="tools: tool offsets only, no motion; full: all opcodes."),
+    ] = "tools",
+    base: Annotated[
+        int,
+        click.IntRange(0, _LAST_BASE),
+        CliOption(help="First register of both blocks, counted from 0."),
+    ] = 0,
+    kinematics: Annotated[
+        str,
+        CliOption(
+            metavar="NAME",
+            help="Kinematics of the axis group, such as Kin_Scara3_Z or Kin_Gantry3+Kin_CAxis;"
+            " opcode 30004 sets it again.",
+            show_default=False,
+        ),
+    ] = "",
+    read_modes: Annotated[
+        tuple[str, ...],
+        CliOption(
+            nargs=3,
+            metavar="SET ACTIVE LAST",
+            callback=lambda _, __, given: _symbols(given),
+            help="Symbols of SMC_READ_TOOL_MODE in your Library Manager, to read tools by the "
+            "block.",
+        ),
+    ] = (),
+    plcopen: Annotated[
+        Literal["0200", "0201"],
+        CliOption(
+            help="Schema of the PLCopen XML: 0200 as CODESYS writes it, 0201 for OpenPLC and "
+            "Beremiz."
+        ),
+    ] = "0200",
+    force: Annotated[bool, CliOption(help="Overwrite files that were changed.")] = False,
 ) -> None:
     """Write the program of the mailbox, its register map and its CANopen data sheet.
 

@@ -1,17 +1,18 @@
 """serve: programs that measure and write a tool themselves ask here whether it may stay."""
 
 import json
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import click
 
 from robolink.errors import CalibrationError, RobolinkError
-from robolink.messages import declared, tr
+from robolink.messages import tr
 from robolink.serving import PermitCall, free_machine
 from robolink_cli.commands.simulate.serving import Termination
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.output import hand_over, show
 from robolink_cli.console.render import json_is_on, note
+from robolink_cli.options.declaration import CliOption
 from robolink_cli.session.context import CliContext, optional_controller
 from robolink_cli.session.opening import open_controller
 
@@ -22,109 +23,77 @@ if TYPE_CHECKING:
 
 
 @click.command("serve")
-@click.option(
-    "--spel",
-    "address",
-    metavar="HOST:PORT",
-    help=declared(
-        "Where SPEL+ programs call, for example 127.0.0.1:5001. With -c CELL, that cell says "
-        "where its stations are."
-    ),
-)
-@click.option(
-    "--plc",
-    "method",
-    type=click.Choice(["n-angle", "pivot"]),
-    help=declared(
-        "Answer the program of the PLC that is named: it touches a pin, by this method. "
-        "docs/plc-callback.md"
-    ),
-)
-@click.option(
-    "--allow",
-    multiple=True,
-    metavar="ADDRESS",
-    help=declared(
-        "Address of a controller that may call; needed for any HOST but this computer's own. "
-        "May be repeated."
-    ),
-)
-@click.option(
-    "--on-record",
-    "controllers",
-    multiple=True,
-    metavar="NAME",
-    help=declared(
-        "Name under which a robot is on record; by default epson: and its serial number. For a "
-        "controller with several robots repeat it: each name ends in the robot's serial number."
-    ),
-)
-@click.option(
-    "--tolerance-mm",
-    type=NumberInside(min=0, min_open=True),
-    metavar="MM",
-    default=0.1,
-    show_default=True,
-    help=declared("Largest drift about the new tip, and widest interval."),
-)
-@click.option(
-    "--max-change-mm",
-    type=NumberInside(min=0, min_open=True),
-    metavar="MM",
-    default=2.0,
-    show_default=True,
-    help=declared("Largest change of the offset that is accepted."),
-)
-@click.option(
-    "--sigma-mm",
-    type=NumberInside(min=0, min_open=True),
-    metavar="MM",
-    help=declared("How far one touch scatters, where it is known."),
-)
-@click.option(
-    "--tool",
-    type=click.IntRange(1, 15),
-    metavar="N",
-    help=declared("With a PLC: the slot that its program measures."),
-)
-@click.option(
-    "--touches",
-    type=int,
-    metavar="N",
-    default=5,
-    show_default=True,
-    help=declared("With a PLC: touches before the write."),
-)
-@click.option(
-    "--proofs",
-    type=int,
-    metavar="N",
-    default=2,
-    show_default=True,
-    help=declared("With a PLC: touches afterwards."),
-)
-@click.option(
-    "--permit-is-contact",
-    is_flag=True,
-    help=declared(
-        "With a PLC: its permit comes only by the contact of tip and pin while it calibrates."
-    ),
-)
 @optional_controller
 def serve(
     context: CliContext,
     *,
-    address: str | None,
-    method: str | None,
-    allow: tuple[str, ...],
-    controllers: tuple[str, ...],
-    tolerance_mm: float,
-    max_change_mm: float,
-    sigma_mm: float | None,
-    tool: int | None,
-    touches: int,
-    proofs: int,
-    permit_is_contact: bool,
+    address: Annotated[
+        str | None,
+        CliOption(
+            "--spel",
+            metavar="HOST:PORT",
+            help="Where SPEL+ programs call, for example 127.0.0.1:5001. With -c CELL, that cell "
+            "says "
+            "where its stations are.",
+        ),
+    ] = None,
+    method: Annotated[
+        Literal["n-angle", "pivot"] | None,
+        CliOption(
+            "--plc",
+            help="Answer the program of the PLC that is named: it touches a pin, by this method. "
+            "docs/plc-callback.md",
+        ),
+    ] = None,
+    allow: Annotated[
+        tuple[str, ...],
+        CliOption(
+            metavar="ADDRESS",
+            help="Address of a controller that may call; needed for any HOST but this computer's "
+            "own. "
+            "May be repeated.",
+        ),
+    ] = (),
+    controllers: Annotated[
+        tuple[str, ...],
+        CliOption(
+            "--on-record",
+            metavar="NAME",
+            help="Name under which a robot is on record; by default epson: and its serial "
+            "number. For a "
+            "controller with several robots repeat it: each name ends in the robot's serial "
+            "number.",
+        ),
+    ] = (),
+    tolerance_mm: Annotated[
+        float,
+        NumberInside(min=0, min_open=True),
+        CliOption("--tolerance-mm", help="Largest drift about the new tip, and widest interval."),
+    ] = 0.1,
+    max_change_mm: Annotated[
+        float,
+        NumberInside(min=0, min_open=True),
+        CliOption("--max-change-mm", help="Largest change of the offset that is accepted."),
+    ] = 2.0,
+    sigma_mm: Annotated[
+        float | None,
+        NumberInside(min=0, min_open=True),
+        CliOption("--sigma-mm", help="How far one touch scatters, where it is known."),
+    ] = None,
+    tool: Annotated[
+        int | None,
+        click.IntRange(1, 15),
+        CliOption(help="With a PLC: the slot that its program measures."),
+    ] = None,
+    touches: Annotated[int, CliOption(help="With a PLC: touches before the write.")] = 5,
+    proofs: Annotated[int, CliOption(help="With a PLC: touches afterwards.")] = 2,
+    permit_is_contact: Annotated[
+        bool,
+        CliOption(
+            help="With a PLC: its permit comes only by the contact of tip and pin while it "
+            "calibrates."
+        ),
+    ] = False,
 ) -> None:
     """Answer running programs that calibrate a tool at their own safe point.
 

@@ -2,7 +2,7 @@
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import click
 
@@ -12,9 +12,10 @@ from robolink.timing import NS_PER_S
 from robolink_cli.console.exit_codes import USAGE
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import emit_json, json_is_on, note, say
-from robolink_cli.options.program_encoding import encoding_option, tell_encoding
+from robolink_cli.options.declaration import CliArgument, CliOption
+from robolink_cli.options.program_encoding import Encoding, tell_encoding
 from robolink_cli.options.shared import json_option
-from robolink_cli.options.simulation import project_options
+from robolink_cli.options.simulation import ProjectOptions
 
 if TYPE_CHECKING:
     from robolink_simulators.epson import EpsonSimulator
@@ -28,24 +29,17 @@ DEFAULT_ROBOT: Final = "T6-602S"
 
 _FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 
-
-def programs_argument(function: Any) -> Any:  # noqa: ANN401 - a decorator of click
-    """Add ``FILE...`` and ``--points``."""
-    function = click.option(
-        "--points",
-        multiple=True,
-        type=_FILE,
-        metavar="FILE",
-        help="Point file of the project, for its labels too. May be repeated.",
-    )(function)
-    return click.argument("files", metavar="FILE...", nargs=-1, required=True, type=_FILE)(function)
+_Files = Annotated[tuple[Path, ...], _FILE, CliArgument(metavar="FILE...")]
+_PointFiles = Annotated[
+    tuple[Path, ...],
+    _FILE,
+    CliOption(help="Point file of the project, for its labels too. May be repeated."),
+]
 
 
 @click.command("check", short_help="Build SPEL+ programs and show every fault.")
-@programs_argument
-@encoding_option
 @json_option
-def check(files: tuple[Path, ...], points: tuple[Path, ...], encoding: str | None) -> int:
+def check(*, files: _Files, points: _PointFiles = (), encoding: Encoding = None) -> int:
     """Build SPEL+ programs and show every fault with its file, line and column.
 
     All files together are one project; a .sprj file stands for the files that it lists. Point
@@ -104,47 +98,40 @@ def _document(checked: "CheckedProject") -> dict[str, object]:
 
 
 @click.command("run", short_help="Run SPEL+ programs on a simulated controller.")
-@programs_argument
-@click.option(
-    "--function",
-    metavar="NAME",
-    help="The function to start; it takes no arguments. Without it main, or none beside background "
-    "tasks.",
-)
-@project_options
-@click.option("--trace", is_flag=True, help="Show each statement before it is carried out.")
-@click.option("--robot", metavar="MODEL", help=f"Model of the robot.  [default: {DEFAULT_ROBOT}]")
-@click.option(
-    "--option",
-    "options",
-    multiple=True,
-    metavar="NAME=VALUE",
-    help="A habit of the device; a wrong name lists them all. May be repeated.",
-)
-@click.option(
-    "--for",
-    "most_s",
-    type=NumberInside(min=0.001, max=1e7),
-    default=LONGEST_RUN_S,
-    show_default=True,
-    metavar="SECONDS",
-    help="How long a program may run, in simulated time.",
-)
 @json_option
 def run(
     *,
-    files: tuple[Path, ...],
-    points: tuple[Path, ...],
-    encoding: str | None,
-    function: str | None,
-    before: str | None,
-    vision: Path | None,
-    lines: tuple[str, ...],
-    folder: Path | None,
-    trace: bool,
-    robot: str | None,
-    options: tuple[str, ...],
-    most_s: float,
+    files: _Files,
+    points: _PointFiles = (),
+    function: Annotated[
+        str | None,
+        CliOption(
+            metavar="NAME",
+            help="The function to start; it takes no arguments. Without it main, or none beside "
+            "background tasks.",
+        ),
+    ] = None,
+    project: ProjectOptions,
+    trace: Annotated[bool, CliOption(help="Show each statement before it is carried out.")] = False,
+    robot: Annotated[
+        str | None,
+        CliOption(metavar="MODEL", help=f"Model of the robot.  [default: {DEFAULT_ROBOT}]"),
+    ] = None,
+    options: Annotated[
+        tuple[str, ...],
+        CliOption(
+            "--option",
+            metavar="NAME=VALUE",
+            help="A habit of the device; a wrong name lists them all. May be repeated.",
+        ),
+    ] = (),
+    most_s: Annotated[
+        float,
+        NumberInside(min=0.001, max=1e7),
+        CliOption(
+            "--for", metavar="SECONDS", help="How long a program may run, in simulated time."
+        ),
+    ] = LONGEST_RUN_S,
 ) -> None:
     """Run SPEL+ programs on a simulated controller and show what they print.
 
@@ -160,11 +147,13 @@ def run(
 
     simulator = EpsonSimulator(robot or DEFAULT_ROBOT, options=habits(options, None))
     printed = list[str]()
-    runner = ProjectSurroundings(vision, lines, folder, encoding).load(simulator, files, points)
+    runner = ProjectSurroundings(
+        project.vision, project.lines, project.folder, project.encoding
+    ).load(simulator, files, points)
     if function is None and not simulator.options.background_tasks:
         function = "main"
     ended = True
-    for name in (function,) if before is None else (before, function):
+    for name in (function,) if project.before is None else (project.before, function):
         ended = _run(simulator, runner, name, most_s, trace=trace, printed=printed)
         if runner.failure is not None:
             too_far = runner.failure.number == simulator.options.numbers.out_of_reach
@@ -251,10 +240,14 @@ spel.add_command(run)
 
 
 @spel.command("export", short_help="Write the companion programs.")
-@click.argument("folder", metavar="DIR", type=click.Path(file_okay=False, path_type=Path))
-@click.option("--force", is_flag=True, help="Overwrite files that were changed.")
 @json_option
-def export(folder: Path, force: bool) -> None:
+def export(
+    *,
+    folder: Annotated[
+        Path, click.Path(file_okay=False, path_type=Path), CliArgument(metavar="DIR")
+    ],
+    force: Annotated[bool, CliOption(help="Overwrite files that were changed.")] = False,
+) -> None:
     """Write the companion programs: what a controller's project can hold of robolink.
 
     robolink_tools.prg publishes the tool table while production runs: add it to the RC+ project

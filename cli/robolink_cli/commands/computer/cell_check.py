@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import click
 
@@ -12,13 +12,14 @@ from robolink.calibration_run import RecipeRun
 from robolink.config import Cell
 from robolink.errors import ConfigError, DeclinedError, NotReadyError, RobolinkError
 from robolink.inspection import InspectionFinding, measured_findings
-from robolink.messages import declared, tr
+from robolink.messages import tr
 from robolink.model import Controller
 from robolink.recipe import LoadedRecipe, load_recipe
 from robolink_cli.access.cell import complete_cell
 from robolink_cli.console.exit_codes import DIFFERENT, exit_code
 from robolink_cli.console.render import note, say
-from robolink_cli.options.consent import published_option
+from robolink_cli.options.consent import Published
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.operator import terminal
 from robolink_cli.prompts.questions import on_terminal
 from robolink_cli.session.completing import complete_recipe
@@ -67,33 +68,32 @@ class CheckedCell(NamedTuple):
 
 
 @click.command()
-@click.argument("cells", metavar="[CELL]...", nargs=-1, shell_complete=complete_cell)
-@click.option(
-    "--since",
-    type=click.DateTime(["%Y-%m-%d"]),
-    metavar="YYYY-MM-DD",
-    help=declared("Start the charts again from this day, after a repair (UTC)."),
-)
-@click.option(
-    "--measure",
-    "recipe",
-    metavar="RECIPE.toml",
-    type=click.Path(dir_okay=False, path_type=Path),
-    shell_complete=complete_recipe,
-    help=declared(
-        "Also measure the tips as this recipe says, by its sensor; the robot moves after a yes on "
-        "a terminal. Nothing is written."
-    ),
-)
-@published_option
 @optional_controller
 def check(
     context: CliContext,
-    cells: tuple[str, ...],
     *,
-    since: datetime | None,
-    recipe: Path | None,
-    published: bool,
+    cells: Annotated[
+        tuple[str, ...], CliArgument(metavar="[CELL]...", shell_complete=complete_cell)
+    ] = (),
+    since: Annotated[
+        datetime | None,
+        click.DateTime(["%Y-%m-%d"]),
+        CliOption(
+            metavar="YYYY-MM-DD", help="Start the charts again from this day, after a repair (UTC)."
+        ),
+    ] = None,
+    recipe: Annotated[
+        Path | None,
+        CliOption(
+            "--measure",
+            metavar="RECIPE.toml",
+            shell_complete=complete_recipe,
+            help="Also measure the tips as this recipe says, by its sensor; the robot moves "
+            "after a yes on "
+            "a terminal. Nothing is written.",
+        ),
+    ] = None,
+    published: Published = False,
 ) -> int:
     """Check that cells are in order, for a job that runs every night. Nothing moves.
 

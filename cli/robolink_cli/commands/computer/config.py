@@ -1,10 +1,12 @@
 """cell list, show, people, files, validate: cells that have a name, and where it stands."""
 
 from pathlib import Path
+from typing import Annotated
 
 import click
 
 from robolink_cli.console.render import emit_json, json_is_on
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
 from robolink_cli.session.context import CliContext, emit, optional_controller
 
@@ -23,9 +25,11 @@ def path() -> None:
 
 
 @click.command()
-@click.argument("file", type=click.Path(dir_okay=False, path_type=Path), required=False)
 @json_option
-def check(file: Path | None) -> int:
+def check(
+    *,
+    file: Annotated[Path | None, CliArgument()] = None,
+) -> int:
     """Check one cell FILE, or all that are in use, and say everything that is wrong."""
     from robolink_cli.views.cells import check_payload, show_check
 
@@ -38,10 +42,13 @@ def check(file: Path | None) -> int:
 
 
 @click.command()
-@click.argument("cell", required=False)
-@click.option("--origin", is_flag=True, help="Say where each value came from.")
 @optional_controller
-def show(context: CliContext, cell: str | None, origin: bool) -> None:
+def show(
+    context: CliContext,
+    *,
+    cell: Annotated[str | None, CliArgument()] = None,
+    origin: Annotated[bool, CliOption(help="Say where each value came from.")] = False,
+) -> None:
     """Show the cells, or all that is in force for one CELL.
 
     Options such as --timeout are counted in, so it shows what a command given the same ones
@@ -71,9 +78,12 @@ def list_cells() -> None:
 
 
 @click.command()
-@click.argument("cell", required=False)
 @optional_controller
-def people(context: CliContext, cell: str | None) -> None:
+def people(
+    context: CliContext,
+    *,
+    cell: Annotated[str | None, CliArgument()] = None,
+) -> None:
     """List who works at one CELL, or at all, and in which role; an engineer may do everything."""
     from robolink.config import find_cell, load_cells
     from robolink_cli.views.cells import people_payload, show_people

@@ -2,13 +2,15 @@
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Annotated
 
 import click
 
 from robolink.errors import ConfigError, DeclinedError
-from robolink.messages import declared, tr
+from robolink.messages import tr
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import emit_json, json_is_on, note, say
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
 from robolink_cli.prompts.questions import asked_for_text, on_terminal
 
@@ -17,40 +19,29 @@ _LEFT_OUT = "-"
 
 
 @click.command("new")
-@click.argument("name", required=False)
-@click.option("--url", metavar="URL", help=declared("The controller's URL."))
-@click.option(
-    "--robot",
-    metavar="MODEL",
-    help=declared("The model that must be there, as the controller says it."),
-)
-@click.option(
-    "--time-out-set",
-    "remote_timeout_s",
-    type=NumberInside(min=0, min_open=True),
-    metavar="S",
-    help=declared("The remote time-out that is set in an EPSON controller."),
-)
-@click.option(
-    "--read-by",
-    metavar="WHO",
-    help=declared("Who read that time-out on the controller, and when; goes with it."),
-)
-@click.option(
-    "--file",
-    type=click.Path(dir_okay=False, path_type=Path),
-    default=Path("robolink.toml"),
-    show_default=True,
-    help=declared("The cell file; what it says already stays."),
-)
 @json_option
 def new_cell(
-    name: str | None,
-    url: str | None,
-    robot: str | None,
-    remote_timeout_s: float | None,
-    read_by: str | None,
-    file: Path,
+    *,
+    name: Annotated[str | None, CliArgument()] = None,
+    url: Annotated[str | None, CliOption(metavar="URL", help="The controller's URL.")] = None,
+    robot: Annotated[
+        str | None,
+        CliOption(metavar="MODEL", help="The model that must be there, as the controller says it."),
+    ] = None,
+    remote_timeout_s: Annotated[
+        float | None,
+        NumberInside(min=0, min_open=True),
+        CliOption("--time-out-set", help="The remote time-out that is set in an EPSON controller."),
+    ] = None,
+    read_by: Annotated[
+        str | None,
+        CliOption(
+            metavar="WHO", help="Who read that time-out on the controller, and when; goes with it."
+        ),
+    ] = None,
+    file: Annotated[
+        Path, CliOption(metavar=None, help="The cell file; what it says already stays.")
+    ] = Path("robolink.toml"),
 ) -> None:
     """Write a cell into a cell file; what is not given is asked for on a terminal.
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import click
 
@@ -15,6 +15,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import emit_json, json_is_on, say
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
 
 if TYPE_CHECKING:
@@ -22,27 +23,27 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("addresses", metavar="[RANGE]", required=False)
-@click.option("--port", type=click.IntRange(1, 65535), metavar="N", default=5000, show_default=True)
-@click.option(
-    "--timeout",
-    "timeout_s",
-    type=NumberInside(min=0.05, max=10),
-    default=0.5,
-    show_default=True,
-    metavar="S",
-    help="Longest wait for one address, in seconds.",
-)
-@click.option(
-    "--line",
-    "lines",
-    multiple=True,
-    metavar="URL",
-    help="Ask who is at this serial line, for example epson+serial:///dev/ttyUSB0?baud=38400. "
-    "May be repeated.",
-)
 @json_option
-def scan(addresses: str | None, port: int, timeout_s: float, lines: tuple[str, ...]) -> None:
+def scan(
+    *,
+    addresses: Annotated[str | None, CliArgument(metavar="[RANGE]")] = None,
+    port: Annotated[int, click.IntRange(1, 65535), CliOption()] = 5000,
+    timeout_s: Annotated[
+        float,
+        NumberInside(min=0.05, max=10),
+        CliOption(help="Longest wait for one address, in seconds."),
+    ] = 0.5,
+    lines: Annotated[
+        tuple[str, ...],
+        CliOption(
+            "--line",
+            metavar="URL",
+            help="Ask who is at this serial line, for example "
+            "epson+serial:///dev/ttyUSB0?baud=38400. "
+            "May be repeated.",
+        ),
+    ] = (),
+) -> None:
     """Try which addresses of RANGE accept a TCP connection, at most 256 of them.
 
     RANGE is 192.168.0.7, 192.168.0.1-20 or 192.168.0.0/28. Each connection is closed at once

@@ -2,6 +2,7 @@
 
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Annotated
 
 import click
 
@@ -12,8 +13,9 @@ from robolink.model import Controller, ToolReceipt, require_engineer
 from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import note, say
-from robolink_cli.options.consent import dry_run_option, published_option, yes_option
-from robolink_cli.prompts.questions import accept_jump_options, accepted_jump, agree
+from robolink_cli.options.consent import DryRun, Overwrite, Published, Yes
+from robolink_cli.options.declaration import CliArgument, CliOption
+from robolink_cli.prompts.questions import AcceptedAngle, AcceptedLength, accepted_jump, agree
 from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
@@ -24,10 +26,13 @@ _FILE = click.Path(dir_okay=False, path_type=Path)
 
 
 @click.command()
-@click.argument("file", type=_FILE)
-@click.option("--force", is_flag=True, help="Overwrite a file that is already there.")
 @controller_options
-def backup(context: CliContext, file: Path, force: bool) -> None:
+def backup(
+    context: CliContext,
+    *,
+    file: Annotated[Path, _FILE, CliArgument()],
+    force: Overwrite = False,
+) -> None:
     """Save all fifteen tools, the one that is selected, and which controller it is. Reads only."""
     from robolink.backup import save, take_backup
     from robolink.files.named import require_free
@@ -41,40 +46,29 @@ def backup(context: CliContext, file: Path, force: bool) -> None:
 
 
 @click.command()
-@click.argument("file", type=_FILE)
-@click.option(
-    "--tolerance",
-    "length_mm",
-    type=NumberInside(min=0),
-    default=0.0005,
-    metavar="MM",
-    show_default=True,
-    help="Largest difference of X, Y, Z that counts as none.",
-)
-@click.option(
-    "--tolerance-deg",
-    "angle_deg",
-    type=NumberInside(min=0),
-    default=0.0005,
-    metavar="DEG",
-    show_default=True,
-    help="Largest difference of U, V, W that counts as none.",
-)
-@click.option(
-    "--ignore-selected",
-    is_flag=True,
-    help="Show another selected tool, but do not count it: a program selects tools by itself.",
-)
-@published_option
 @controller_options
 def compare(
     context: CliContext,
-    file: Path,
     *,
-    length_mm: float,
-    angle_deg: float,
-    ignore_selected: bool,
-    published: bool,
+    file: Annotated[Path, _FILE, CliArgument()],
+    length_mm: Annotated[
+        float,
+        NumberInside(min=0),
+        CliOption("--tolerance", help="Largest difference of X, Y, Z that counts as none."),
+    ] = 0.0005,
+    angle_deg: Annotated[
+        float,
+        NumberInside(min=0),
+        CliOption("--tolerance-deg", help="Largest difference of U, V, W that counts as none."),
+    ] = 0.0005,
+    ignore_selected: Annotated[
+        bool,
+        CliOption(
+            help="Show another selected tool, but do not count it: a program selects tools by "
+            "itself."
+        ),
+    ] = False,
+    published: Published = False,
 ) -> int:
     """Show what differs from a backup. Exit code 1 when something does. Reads only.
 
@@ -103,37 +97,23 @@ def compare(
 
 
 @click.command()
-@click.argument("file", type=_FILE)
-@click.option(
-    "--tool",
-    "tools",
-    type=int,
-    metavar="N",
-    multiple=True,
-    shell_complete=complete_tool,
-    help="Only this tool; may be repeated.",
-)
-@click.option("--selected", is_flag=True, help="Also select the backup's tool.")
-@click.option(
-    "--other-controller",
-    is_flag=True,
-    help="The backup is of another controller and is still meant for this one.",
-)
-@accept_jump_options
 @controller_options
-@dry_run_option
-@yes_option
 def restore(
     context: CliContext,
-    file: Path,
     *,
-    tools: tuple[int, ...],
-    selected: bool,
-    other_controller: bool,
-    accepted_mm: float | None,
-    accepted_deg: float | None,
-    dry_run: bool,
-    yes: bool,
+    file: Annotated[Path, _FILE, CliArgument()],
+    tools: Annotated[
+        tuple[int, ...],
+        CliOption("--tool", shell_complete=complete_tool, help="Only this tool; may be repeated."),
+    ] = (),
+    selected: Annotated[bool, CliOption(help="Also select the backup's tool.")] = False,
+    other_controller: Annotated[
+        bool, CliOption(help="The backup is of another controller and is still meant for this one.")
+    ] = False,
+    accepted_mm: AcceptedLength = None,
+    accepted_deg: AcceptedAngle = None,
+    dry_run: DryRun = False,
+    yes: Yes = False,
 ) -> None:
     """Write the tools of a backup that differ, each only if nobody changed it meanwhile.
 

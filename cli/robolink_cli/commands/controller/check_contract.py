@@ -4,16 +4,17 @@ from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import click
 
 from robolink.errors import ConfigError, DeclinedError
-from robolink.messages import declared, joined, tr
+from robolink.messages import joined, tr
 from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import note, say, table
-from robolink_cli.options.consent import yes_option
+from robolink_cli.options.consent import Yes
+from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.shared import controller_argument
 from robolink_cli.session.context import CliContext, controller_options, emit
 
@@ -46,56 +47,48 @@ class _Asked:
 
 
 @click.command("check-contract")
-@click.option(
-    "--write",
-    "writes",
-    is_flag=True,
-    help=declared("Also hold it to the promises about writing: with --tool, and after a yes."),
-)
-@click.option(
-    "--tool",
-    type=click.IntRange(min=1),
-    metavar="NUMBER",
-    help=declared("The tool that --write may change; one that no program uses."),
-)
-@click.option(
-    "--move",
-    "moves",
-    is_flag=True,
-    help=declared("Also hold it to the promises about movement: small steps up, after a yes."),
-)
-@click.option(
-    "--step",
-    "step_mm",
-    type=NumberInside(min=0.2, max=5),
-    default=1.0,
-    show_default=True,
-    metavar="MM",
-    help=declared("How far --move goes up, and down again."),
-)
-@click.option(
-    "--driver",
-    metavar="MODULE:NAME",
-    help=declared("Check a driver of your own: what this is called for gives a controller."),
-)
-@click.option(
-    "--junit",
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help=declared("Also write the findings as JUnit XML, for pipelines."),
-)
 @controller_argument
 @controller_options
-@yes_option
 def check_contract(
     context: CliContext,
-    writes: bool,
-    tool: int | None,
-    moves: bool,
-    step_mm: float,
-    driver: str | None,
-    junit: Path | None,
-    yes: bool,
+    *,
+    writes: Annotated[
+        bool,
+        CliOption(
+            "--write",
+            help="Also hold it to the promises about writing: with --tool, and after a yes.",
+        ),
+    ] = False,
+    tool: Annotated[
+        int | None,
+        click.IntRange(min=1),
+        CliOption(
+            metavar="NUMBER", help="The tool that --write may change; one that no program uses."
+        ),
+    ] = None,
+    moves: Annotated[
+        bool,
+        CliOption(
+            "--move",
+            help="Also hold it to the promises about movement: small steps up, after a yes.",
+        ),
+    ] = False,
+    step_mm: Annotated[
+        float,
+        NumberInside(min=0.2, max=5),
+        CliOption(help="How far --move goes up, and down again."),
+    ] = 1.0,
+    driver: Annotated[
+        str | None,
+        CliOption(
+            metavar="MODULE:NAME",
+            help="Check a driver of your own: what this is called for gives a controller.",
+        ),
+    ] = None,
+    junit: Annotated[
+        Path | None, CliOption(help="Also write the findings as JUnit XML, for pipelines.")
+    ] = None,
+    yes: Yes = False,
 ) -> int:
     """Hold a controller to what every kind of controller promises; without options, reading only.
 

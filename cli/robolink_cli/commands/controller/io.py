@@ -1,7 +1,7 @@
 """io get, set: inputs, outputs and memory bits."""
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import click
 
@@ -10,7 +10,8 @@ from robolink.messages import tr
 from robolink_cli.access.capabilities import io_of, require_epson
 from robolink_cli.console.render import say
 from robolink_cli.console.ways import io_words
-from robolink_cli.options.consent import dry_run_option, yes_option
+from robolink_cli.options.consent import DryRun, Yes
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.questions import agree
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from robolink.model import Controller, ValueReceipt
 
 _number = click.IntRange(min=0, max=0xFFFF)
-_memory = click.option("--memory", is_flag=True, help="Memory bits in place of inputs or outputs.")
+_Memory = Annotated[bool, CliOption(help="Memory bits in place of inputs or outputs.")]
 
 
 @click.group()
@@ -28,20 +29,19 @@ def io() -> None:
 
 
 @io.command("get")
-@click.argument("bit", type=_number, required=False)
-@click.option("--byte", type=_number, metavar="PORT", help="Eight bits, from 8 x PORT on.")
-@click.option("--word", type=_number, metavar="PORT", help="Sixteen bits, from 16 x PORT on.")
-@click.option("--output", is_flag=True, help="An output, read through Execute.")
-@_memory
 @controller_options
 def get(
     context: CliContext,
-    bit: int | None,
-    byte: int | None,
-    word: int | None,
     *,
-    output: bool,
-    memory: bool,
+    bit: Annotated[int | None, _number, CliArgument()] = None,
+    byte: Annotated[
+        int | None, _number, CliOption(metavar="PORT", help="Eight bits, from 8 x PORT on.")
+    ] = None,
+    word: Annotated[
+        int | None, _number, CliOption(metavar="PORT", help="Sixteen bits, from 16 x PORT on.")
+    ] = None,
+    output: Annotated[bool, CliOption(help="An output, read through Execute.")] = False,
+    memory: _Memory = False,
 ) -> None:
     """Show an input. Legal while production runs, except with --output."""
     if sum(at is not None for at in (bit, byte, word)) != 1:
@@ -73,14 +73,15 @@ def get(
 
 
 @io.command("set")
-@click.argument("bit", type=_number)
-@click.argument("switch", type=click.Choice(["on", "off"]))
-@_memory
 @controller_options
-@dry_run_option
-@yes_option
 def set_bit(
-    context: CliContext, bit: int, switch: str, *, memory: bool, dry_run: bool, yes: bool
+    context: CliContext,
+    *,
+    bit: Annotated[int, _number, CliArgument()],
+    switch: Annotated[Literal["on", "off"], CliArgument()],
+    memory: _Memory = False,
+    dry_run: DryRun = False,
+    yes: Yes = False,
 ) -> None:
     """Switch an output or a memory bit, and read it back. An output may move something."""
     on = switch == "on"

@@ -1,17 +1,18 @@
 """jog: small steps, in low power, inside a box."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import click
 from click.core import ParameterSource
 
 from robolink.errors import ConfigError
-from robolink.messages import declared, tr
+from robolink.messages import tr
 from robolink_cli.access.cell import with_cell_limits
-from robolink_cli.console.numbers import DECIMAL, NumberInside
+from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.output import may_be_guided
-from robolink_cli.options.consent import dry_run_option, plain_option, yes_option
+from robolink_cli.options.consent import DryRun, Plain, Yes
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.session.context import CliContext, controller_options, guided_if_alone
 from robolink_cli.session.motion_consent import agree_to_motion, motion_question
 from robolink_cli.session.opening import open_controller
@@ -28,70 +29,49 @@ _CELL_KEYS: Final = {
 
 
 @click.command()
-@click.argument("steps", nargs=-1)
-@click.option(
-    "--speed",
-    "speed_mm_s",
-    type=NumberInside(1, 100),
-    default=20.0,
-    metavar="MM_S",
-    help="Speed of straight moves, in Power Low.",
-)
-@click.option(
-    "--box",
-    "box_mm",
-    type=NumberInside(min=0, min_open=True),
-    default=50.0,
-    metavar="MM",
-    help="How far from the start the tool may be jogged, in every direction.",
-)
-@click.option(
-    "--turn",
-    "turn_deg",
-    type=DECIMAL,
-    metavar="DEG",
-    help=declared(
-        "Turn U by so much, also by more than 5 degrees: lift first, check the whole way round, "
-        "turn, and stay lifted."
-    ),
-)
-@click.option(
-    "--lift",
-    "lift_mm",
-    type=NumberInside(1, 100),
-    default=10.0,
-    show_default=True,
-    metavar="MM",
-    help=declared("How far the tip is lifted before it turns."),
-)
-@click.option(
-    "--tip",
-    type=click.IntRange(1, 15),
-    metavar="N",
-    help=declared(
-        "For a turn with tool 0: the tool whose tip swings round; without it all that are defined."
-    ),
-)
-@click.option(
-    "--keys",
-    is_flag=True,
-    help=declared("Jog by single keys on a full screen; on a terminal only."),
-)
 @controller_options
-@dry_run_option
-@yes_option
-@plain_option
 def jog(
     context: CliContext,
-    steps: tuple[str, ...],
-    speed_mm_s: float,
-    box_mm: float,
-    turn_deg: float | None,
-    lift_mm: float,
-    tip: int | None,
-    keys: bool,
-    dry_run: bool,
-    yes: bool,
+    *,
+    steps: Annotated[tuple[str, ...], CliArgument()] = (),
+    speed_mm_s: Annotated[
+        float,
+        NumberInside(1, 100),
+        CliOption(help="Speed of straight moves, in Power Low.", show_default=False),
+    ] = 20.0,
+    box_mm: Annotated[
+        float,
+        NumberInside(min=0, min_open=True),
+        CliOption(
+            help="How far from the start the tool may be jogged, in every direction.",
+            show_default=False,
+        ),
+    ] = 50.0,
+    turn_deg: Annotated[
+        float | None,
+        CliOption(
+            help="Turn U by so much, also by more than 5 degrees: lift first, check the whole "
+            "way round, "
+            "turn, and stay lifted."
+        ),
+    ] = None,
+    lift_mm: Annotated[
+        float, NumberInside(1, 100), CliOption(help="How far the tip is lifted before it turns.")
+    ] = 10.0,
+    tip: Annotated[
+        int | None,
+        click.IntRange(1, 15),
+        CliOption(
+            help="For a turn with tool 0: the tool whose tip swings round; without it all that "
+            "are defined."
+        ),
+    ] = None,
+    keys: Annotated[
+        bool, CliOption(help="Jog by single keys on a full screen; on a terminal only.")
+    ] = False,
+    dry_run: DryRun = False,
+    yes: Yes = False,
+    _plain: Plain = False,
 ) -> None:
     """Move the selected tool by STEPS such as x+0.1 z-0.5 u+5; without STEPS, ask for them.
 

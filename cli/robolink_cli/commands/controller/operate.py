@@ -1,6 +1,6 @@
 """status, where, stop, reset, motors: looking at a controller and calming it."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import click
 
@@ -11,7 +11,8 @@ from robolink_cli.access.capabilities import preferences_of, require_epson, requ
 from robolink_cli.access.warnings import note_unsettled
 from robolink_cli.console.render import note, say
 from robolink_cli.console.ways import state_word
-from robolink_cli.options.consent import dry_run_option, yes_option
+from robolink_cli.options.consent import DryRun, Yes
+from robolink_cli.options.declaration import CliArgument
 from robolink_cli.options.shared import shared_options
 from robolink_cli.prompts.questions import agree, on_terminal
 from robolink_cli.session.context import (
@@ -71,8 +72,10 @@ def where(context: CliContext) -> None:
 
 @click.command()
 @shared_options
-@dry_run_option
-def stop(dry_run: bool) -> None:
+def stop(
+    *,
+    dry_run: DryRun = False,
+) -> None:
     """Bring the robot to rest, whoever moves it. Not an emergency stop, and no substitute for one.
 
     Nothing is asked and no file is waited for. From then on a command that moves asks first, until
@@ -98,8 +101,10 @@ def stop(dry_run: bool) -> None:
 
 @click.command()
 @shared_options
-@yes_option
-def release(yes: bool) -> None:
+def release(
+    *,
+    yes: Yes = False,
+) -> None:
     """Let the robot be moved again after a stop: shows who stopped it and when, and asks.
 
     Nothing is sent: a PLC that is held by a stop, and a controller in error, need 'reset'.
@@ -120,9 +125,12 @@ def release(yes: bool) -> None:
 
 @click.command()
 @calming_options
-@dry_run_option
-@yes_option
-def reset(context: CliContext, dry_run: bool, yes: bool) -> None:
+def reset(
+    context: CliContext,
+    *,
+    dry_run: DryRun = False,
+    yes: Yes = False,
+) -> None:
     """Clear an error. May switch outputs off: a gripper may drop its part."""
     with open_controller(context, calms=True, quiet=True) as controller:
         if dry_run:
@@ -172,11 +180,14 @@ def _effect_of_reset(controller: "Controller") -> tuple[str, bool]:
 
 
 @click.command()
-@click.argument("switch", type=click.Choice(["on", "off"]))
 @calming_options
-@dry_run_option
-@yes_option
-def motors(context: CliContext, switch: str, dry_run: bool, yes: bool) -> None:
+def motors(
+    context: CliContext,
+    *,
+    switch: Annotated[Literal["on", "off"], CliArgument()],
+    dry_run: DryRun = False,
+    yes: Yes = False,
+) -> None:
     """Switch the robot's motors on or off, and prove it."""
     on = switch == "on"
     with open_controller(context, calms=not on) as controller:
@@ -196,18 +207,24 @@ def motors(context: CliContext, switch: str, dry_run: bool, yes: bool) -> None:
 
 @click.command()
 @controller_options
-@dry_run_option
-@yes_option
-def enable(context: CliContext, dry_run: bool, yes: bool) -> None:
+def enable(
+    context: CliContext,
+    *,
+    dry_run: DryRun = False,
+    yes: Yes = False,
+) -> None:
     """Enable the axis group of a PLC, and prove it; its own program switches the drives."""
     _switch_group(context, on=True, dry_run=dry_run, yes=yes)
 
 
 @click.command()
 @controller_options
-@dry_run_option
-@yes_option
-def disable(context: CliContext, dry_run: bool, yes: bool) -> None:
+def disable(
+    context: CliContext,
+    *,
+    dry_run: DryRun = False,
+    yes: Yes = False,
+) -> None:
     """Disable the axis group of a PLC, which must stand still, and prove it."""
     _switch_group(context, on=False, dry_run=dry_run, yes=yes)
 
@@ -227,10 +244,13 @@ def _switch_group(context: CliContext, *, on: bool, dry_run: bool, yes: bool) ->
 
 
 @click.command("execute-raw")
-@click.argument("statement")
 @controller_options
-@yes_option
-def execute_raw(context: CliContext, statement: str, yes: bool) -> None:
+def execute_raw(
+    context: CliContext,
+    *,
+    statement: Annotated[str, CliArgument()],
+    yes: Yes = False,
+) -> None:
     """Run one SPEL+ statement as typed; it takes an engineer, and goes on record.
 
     It is sent once, as it stands, and must be answered within --timeout: it is not for

@@ -8,7 +8,7 @@ from robolink.errors import DeclinedError, LeaseHeldError
 from robolink.messages import tr
 from robolink_cli.access.capabilities import require_softmotion
 from robolink_cli.console.render import say
-from robolink_cli.options.consent import dry_run_option, yes_option
+from robolink_cli.options.consent import DryRun, Yes
 from robolink_cli.prompts.questions import agree, on_terminal
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
@@ -19,9 +19,12 @@ if TYPE_CHECKING:
 
 @click.command("take-ownership")
 @controller_options
-@dry_run_option
-@yes_option
-def take_ownership(context: CliContext, dry_run: bool, yes: bool) -> None:
+def take_ownership(
+    context: CliContext,
+    *,
+    dry_run: DryRun = False,
+    yes: Yes = False,
+) -> None:
     """Take a PLC's mailbox from the client that holds it; nobody has it afterwards.
 
     For a program that hangs or that nobody finds. What that client has under way is halted by

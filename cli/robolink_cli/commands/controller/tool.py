@@ -3,28 +3,28 @@
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, nullcontext
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Literal, NamedTuple
 
 import click
 
 from robolink.errors import ConfigError
 from robolink.messages import declared, tr
 from robolink_cli.access.warnings import note_change
-from robolink_cli.console.numbers import DECIMAL
 from robolink_cli.console.render import note, say
 from robolink_cli.lazy_group import LazyGroup
 from robolink_cli.options.consent import (
-    dry_run_option,
-    published_option,
-    then_select_option,
-    yes_option,
+    DryRun,
+    Published,
+    ThenSelect,
+    Yes,
 )
-from robolink_cli.prompts.questions import accept_jump_options, accepted_jump, agree
+from robolink_cli.options.declaration import CliArgument, CliOption
+from robolink_cli.prompts.questions import AcceptedAngle, AcceptedLength, accepted_jump, agree
 from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
 from robolink_cli.session.ordering import (
-    order_option,
+    OrderId,
     ordered,
     require_no_dry_run,
     show_done,
@@ -51,15 +51,21 @@ _BESIDES = {
 }
 
 
+_Number = Annotated[int, CliArgument(shell_complete=complete_tool)]
+
+
 @click.group(cls=LazyGroup, lazy=_BESIDES)
 def tool() -> None:
     """Read and change the tool offsets stored in the controller."""
 
 
 @tool.command("list")
-@published_option
 @controller_options
-def list_tools(context: CliContext, published: bool) -> None:
+def list_tools(
+    context: CliContext,
+    *,
+    published: Published = False,
+) -> None:
     """Show all tools and which one is selected."""
     from robolink_cli.session.context import find_tools
     from robolink_cli.views.documents import offset_payload
@@ -74,15 +80,20 @@ def list_tools(context: CliContext, published: bool) -> None:
 
 
 @tool.command("get")
-@click.argument("number", type=int, required=False, shell_complete=complete_tool)
-@click.option(
-    "--mode",
-    type=click.Choice(["set", "active", "last"]),
-    help="On a PLC, what SMC_GroupReadTool says: the tool set, that of the movement under way, or "
-    "that of the movement commanded last.",
-)
 @controller_options
-def get(context: CliContext, number: int | None, mode: str | None) -> None:
+def get(
+    context: CliContext,
+    *,
+    number: Annotated[int | None, CliArgument(shell_complete=complete_tool)] = None,
+    mode: Annotated[
+        Literal["set", "active", "last"] | None,
+        CliOption(
+            help="On a PLC, what SMC_GroupReadTool says: the tool set, that of the movement "
+            "under way, or "
+            "that of the movement commanded last."
+        ),
+    ] = None,
+) -> None:
     """Show one tool; 0 is the flange."""
     from robolink_cli.views.documents import offset_payload
     from robolink_cli.views.tables import show_tools
@@ -124,29 +135,33 @@ def _get_by_mode(context: CliContext, mode: str) -> None:
     context.emit("tool-mode", payload, lambda: show_offset(mode, value))
 
 
+class _Components(NamedTuple):
+    """The components of an offset that were given."""
+
+    x: Annotated[float | None, CliOption(metavar="MM", help="mm from the flange.")] = None
+    y: Annotated[float | None, CliOption(metavar="MM", help="mm from the flange.")] = None
+    z: Annotated[float | None, CliOption(metavar="MM", help="mm from the flange.")] = None
+    u: Annotated[float | None, CliOption(metavar="DEG", help="Degrees about Z.")] = None
+    v: Annotated[
+        float | None, CliOption(metavar="DEG", help="Degrees about Y; six-axis robots only.")
+    ] = None
+    w: Annotated[
+        float | None, CliOption(metavar="DEG", help="Degrees about X; six-axis robots only.")
+    ] = None
+
+
 @tool.command("set")
-@click.argument("number", type=int, shell_complete=complete_tool)
-@click.option("--x", type=DECIMAL, metavar="MM", help="mm from the flange.")
-@click.option("--y", type=DECIMAL, metavar="MM", help="mm from the flange.")
-@click.option("--z", type=DECIMAL, metavar="MM", help="mm from the flange.")
-@click.option("--u", type=DECIMAL, metavar="DEG", help="Degrees about Z.")
-@click.option("--v", type=DECIMAL, metavar="DEG", help="Degrees about Y; six-axis robots only.")
-@click.option("--w", type=DECIMAL, metavar="DEG", help="Degrees about X; six-axis robots only.")
-@accept_jump_options
-@order_option
 @controller_options
-@dry_run_option
-@yes_option
 def set_tool(
     context: CliContext,
-    number: int,
     *,
-    accepted_mm: float | None,
-    accepted_deg: float | None,
-    order: str | None,
-    dry_run: bool,
-    yes: bool,
-    **given: float | None,
+    number: _Number,
+    given: _Components,
+    accepted_mm: AcceptedLength = None,
+    accepted_deg: AcceptedAngle = None,
+    order: OrderId = None,
+    dry_run: DryRun = False,
+    yes: Yes = False,
 ) -> None:
     """Write a tool offset; components that are not given are kept.
 
@@ -156,7 +171,7 @@ def set_tool(
     from robolink.transaction import Wanted, change_tools
 
     units = {"x": "x_mm", "y": "y_mm", "z": "z_mm", "u": "u_deg", "v": "v_deg", "w": "w_deg"}
-    changes = {units[axis]: value for axis, value in given.items() if value is not None}
+    changes = {units[axis]: value for axis, value in given._asdict().items() if value is not None}
     if not changes:
         raise ConfigError(
             tr("No component was given."),
@@ -279,13 +294,14 @@ class _Setting:
 
 
 @tool.command("clear")
-@click.argument("number", type=int, shell_complete=complete_tool)
-@then_select_option
 @controller_options
-@dry_run_option
-@yes_option
 def clear(
-    context: CliContext, number: int, *, then_select: int | None, dry_run: bool, yes: bool
+    context: CliContext,
+    *,
+    number: _Number,
+    then_select: ThenSelect = None,
+    dry_run: DryRun = False,
+    yes: Yes = False,
 ) -> None:
     """Remove a tool's definition. Where the cell names people, it takes an engineer.
 
@@ -330,11 +346,14 @@ def _clear_question(number: int, then_select: int | None) -> str:
 
 
 @tool.command("select")
-@click.argument("number", type=int, shell_complete=complete_tool)
 @controller_options
-@dry_run_option
-@yes_option
-def select(context: CliContext, number: int, dry_run: bool, yes: bool) -> None:
+def select(
+    context: CliContext,
+    *,
+    number: _Number,
+    dry_run: DryRun = False,
+    yes: Yes = False,
+) -> None:
     """Select a tool; the choice survives power-off. 0 is the flange."""
     with open_controller(context, changes=not dry_run) as controller:
         before = controller.tools.selected()

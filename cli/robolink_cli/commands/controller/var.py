@@ -1,13 +1,14 @@
 """var get, set: the project's Global Preserve variables."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli.console.render import say
-from robolink_cli.options.consent import dry_run_option, yes_option
+from robolink_cli.options.consent import DryRun, Yes
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.questions import agree
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
@@ -32,20 +33,25 @@ def var() -> None:
 
 
 @var.command("get")
-@click.argument("name")
-@click.option(
-    "--type", "kind", type=click.Choice(_TYPES, case_sensitive=False), help="Its declared type."
-)
-@click.option("--index", metavar="I,J,K", help="Subscripts of an array's element; needs --type.")
-@click.option(
-    "--count",
-    type=click.IntRange(1, 100),
-    metavar="N",
-    help="How many elements, from --index on; the last subscript counts up.",
-)
 @controller_options
 def get(
-    context: CliContext, name: str, kind: str | None, index: str | None, count: int | None
+    context: CliContext,
+    *,
+    name: Annotated[str, CliArgument()],
+    kind: Annotated[
+        str | None,
+        click.Choice(_TYPES, case_sensitive=False),
+        CliOption("--type", help="Its declared type."),
+    ] = None,
+    index: Annotated[
+        str | None,
+        CliOption(metavar="I,J,K", help="Subscripts of an array's element; needs --type."),
+    ] = None,
+    count: Annotated[
+        int | None,
+        click.IntRange(1, 100),
+        CliOption(help="How many elements, from --index on; the last subscript counts up."),
+    ] = None,
 ) -> None:
     """Show a variable. Legal while production runs."""
     subscripts = _subscripts(index)
@@ -71,20 +77,19 @@ def get(
     context_settings={"ignore_unknown_options": True},
     short_help="Set a variable and read it back.",
 )
-@click.argument("name")
-@click.argument("value")
-@click.option(
-    "--type",
-    "kind",
-    type=click.Choice(_TYPES, case_sensitive=False),
-    required=True,
-    help="Its declared type.",
-)
 @controller_options
-@dry_run_option
-@yes_option
 def set_variable(
-    context: CliContext, name: str, value: str, kind: str, *, dry_run: bool, yes: bool
+    context: CliContext,
+    *,
+    name: Annotated[str, CliArgument()],
+    value: Annotated[str, CliArgument()],
+    kind: Annotated[
+        str,
+        click.Choice(_TYPES, case_sensitive=False),
+        CliOption("--type", help="Its declared type."),
+    ],
+    dry_run: DryRun = False,
+    yes: Yes = False,
 ) -> None:
     """Set a variable and read it back; the program that uses it may act on it."""
     from robolink.controllers import typed_value

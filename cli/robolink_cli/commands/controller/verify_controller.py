@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import click
 
@@ -10,6 +10,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli.access.recording import recording
 from robolink_cli.console.render import say, table
+from robolink_cli.options.declaration import CliOption
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import password_of
 
@@ -23,22 +24,23 @@ _file = click.Path(dir_okay=False, path_type=Path)
 
 
 @click.command("verify-controller")
-@click.option(
-    "--profile",
-    type=_file,
-    metavar="FILE",
-    help="Write a cell profile, for 'robolink sim epson --profile'.",
-)
-@click.option(
-    "--transcript",
-    type=_file,
-    metavar="FILE",
-    help="Write all that was said, for 'robolink sim epson --replay'.",
-)
-@click.option("--redact", is_flag=True, help="Leave names, serial numbers and addresses out.")
 @controller_options
 def verify_controller(
-    context: CliContext, *, profile: Path | None, transcript: Path | None, redact: bool
+    context: CliContext,
+    *,
+    profile: Annotated[
+        Path | None,
+        _file,
+        CliOption(help="Write a cell profile, for 'robolink sim epson --profile'."),
+    ] = None,
+    transcript: Annotated[
+        Path | None,
+        _file,
+        CliOption(help="Write all that was said, for 'robolink sim epson --replay'."),
+    ] = None,
+    redact: Annotated[
+        bool, CliOption(help="Leave names, serial numbers and addresses out.")
+    ] = False,
 ) -> None:
     """Find out what this controller does where documents are unsure.
 

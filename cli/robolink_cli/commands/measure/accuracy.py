@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from math import isfinite
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final
 
 import click
 
@@ -23,7 +23,7 @@ from robolink.accuracy import (
 )
 from robolink.calibration import ACCURACY_ROWS, gauge_study
 from robolink.errors import ConfigError
-from robolink.messages import declared, spoken, tr
+from robolink.messages import spoken, tr
 from robolink.model import Controller, EntryKind, require_engineer
 from robolink.stations import StationKind, find_station
 from robolink.timing import wall_time
@@ -31,7 +31,8 @@ from robolink_cli.commands.measure.solve.solving import load
 from robolink_cli.commands.measure.solve.touch_cases import study_values
 from robolink_cli.console.numbers import NumberInside, decimal
 from robolink_cli.console.render import note
-from robolink_cli.options.consent import yes_option
+from robolink_cli.options.consent import Yes
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import LINE
 from robolink_cli.prompts.questions import agree
 from robolink_cli.session.completing import complete_station, complete_tool
@@ -46,13 +47,18 @@ _ROWS = (
 
 
 @click.group(invoke_without_command=True)
-@click.option(
-    "--robot",
-    metavar="NAME",
-    help=declared("A controller with several robots: which one, as 'station list' names it."),
-)
 @controller_options
-def accuracy(context: CliContext, robot: str | None) -> None:
+def accuracy(
+    context: CliContext,
+    *,
+    robot: Annotated[
+        str | None,
+        CliOption(
+            metavar="NAME",
+            help="A controller with several robots: which one, as 'station list' names it.",
+        ),
+    ] = None,
+) -> None:
     """What a cell knows of the errors that no measurement shows by itself.
 
     Each row with its half width, what tells it, and the command that measures it where it is a
@@ -68,65 +74,55 @@ def accuracy(context: CliContext, robot: str | None) -> None:
 
 
 @accuracy.command("measure", short_help="Put a row on record that was measured.")
-@click.argument("row", type=click.Choice(_ROWS))
-@click.option(
-    "--tool",
-    type=click.IntRange(1, 15),
-    metavar="N",
-    shell_complete=complete_tool,
-    help=declared("The tool whose calibrations on record count."),
-)
-@click.option(
-    "--true",
-    "true",
-    metavar="X,Y",
-    help=declared("touch_mm: offset of the gauge tip, by its certificate, mm."),
-)
-@click.option(
-    "--true-sigma",
-    "true_sigma_mm",
-    type=NumberInside(min=0, min_open=True),
-    metavar="MM",
-    help=declared("touch_mm: standard deviation of that, each coordinate."),
-)
-@click.option(
-    "--study",
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help=declared("touch_mm: a gauge study, as 'expert solve' takes it, in place of a gauge tip."),
-)
-@click.option(
-    "--station",
-    metavar="ID",
-    shell_complete=complete_station,
-    help=declared("Only measurements at this station; the row then holds for it alone."),
-)
-@click.option(
-    "--nozzle",
-    metavar="ID",
-    type=LINE,
-    help=declared("Only measurements of the nozzle or gauge tip with this id."),
-)
-@click.option(
-    "--since",
-    type=click.DateTime(["%Y-%m-%d", "%Y-%m-%dT%H:%M"]),
-    metavar="YYYY-MM-DD[THH:MM]",
-    help=declared("Only measurements from then on, by this computer's clock; else of 24 hours."),
-)
 @controller_options
-@yes_option
 def measure(
     context: CliContext,
     *,
-    row: str,
-    tool: int | None,
-    true: str | None,
-    true_sigma_mm: float | None,
-    study: Path | None,
-    station: str | None,
-    nozzle: str | None,
-    since: datetime | None,
-    yes: bool,
+    row: Annotated[str, click.Choice(_ROWS), CliArgument()],
+    tool: Annotated[
+        int | None,
+        click.IntRange(1, 15),
+        CliOption(
+            shell_complete=complete_tool, help="The tool whose calibrations on record count."
+        ),
+    ] = None,
+    true: Annotated[
+        str | None,
+        CliOption(metavar="X,Y", help="touch_mm: offset of the gauge tip, by its certificate, mm."),
+    ] = None,
+    true_sigma_mm: Annotated[
+        float | None,
+        NumberInside(min=0, min_open=True),
+        CliOption(help="touch_mm: standard deviation of that, each coordinate."),
+    ] = None,
+    study: Annotated[
+        Path | None,
+        CliOption(
+            help="touch_mm: a gauge study, as 'expert solve' takes it, in place of a gauge tip."
+        ),
+    ] = None,
+    station: Annotated[
+        str | None,
+        CliOption(
+            metavar="ID",
+            shell_complete=complete_station,
+            help="Only measurements at this station; the row then holds for it alone.",
+        ),
+    ] = None,
+    nozzle: Annotated[
+        str | None,
+        LINE,
+        CliOption(metavar="ID", help="Only measurements of the nozzle or gauge tip with this id."),
+    ] = None,
+    since: Annotated[
+        datetime | None,
+        click.DateTime(["%Y-%m-%d", "%Y-%m-%dT%H:%M"]),
+        CliOption(
+            metavar="YYYY-MM-DD[THH:MM]",
+            help="Only measurements from then on, by this computer's clock; else of 24 hours.",
+        ),
+    ] = None,
+    yes: Yes = False,
 ) -> None:
     """Calculate ROW from measurements that are on record, show it, and put it on record.
 

@@ -2,54 +2,53 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Annotated, NamedTuple
 
 import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_cli.console.numbers import DECIMAL
 from robolink_cli.console.render import say
+from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.impact import impact_payload, impact_request, show_impact
-from robolink_cli.options.report import report_options, report_request, reporting
+from robolink_cli.options.report import ForceReport, ReportPath, report_request, reporting
 from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
 
 
+class _Components(NamedTuple):
+    """The components of the new offset that were given."""
+
+    x: Annotated[
+        float | None,
+        CliOption(metavar="MM", help="New offset, mm from the flange; left out: as stored."),
+    ] = None
+    y: Annotated[float | None, CliOption(metavar="MM", help="mm from the flange.")] = None
+    z: Annotated[float | None, CliOption(metavar="MM", help="mm from the flange.")] = None
+    u: Annotated[float | None, CliOption(metavar="DEG", help="Degrees about Z.")] = None
+
+
 @click.command()
-@click.option(
-    "--tool",
-    type=click.IntRange(1, 15),
-    metavar="N",
-    required=True,
-    shell_complete=complete_tool,
-    help="Number of the tool.",
-)
-@click.option(
-    "--x", type=DECIMAL, metavar="MM", help="New offset, mm from the flange; left out: as stored."
-)
-@click.option("--y", type=DECIMAL, metavar="MM", help="mm from the flange.")
-@click.option("--z", type=DECIMAL, metavar="MM", help="mm from the flange.")
-@click.option("--u", type=DECIMAL, metavar="DEG", help="Degrees about Z.")
-@click.option("--points", metavar="1-50", help="Taught points to read from the controller.")
-@click.option(
-    "--pts",
-    "path",
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help="A .pts file of EPSON RC+ in place of the controller's points.",
-)
-@report_options
 @controller_options
 def impact(
     context: CliContext,
     *,
-    tool: int,
-    points: str | None,
-    path: Path | None,
-    report_path: Path | None,
-    force: bool,
-    **given: float | None,
+    tool: Annotated[
+        int,
+        click.IntRange(1, 15),
+        CliOption(shell_complete=complete_tool, help="Number of the tool."),
+    ],
+    given: _Components,
+    points: Annotated[
+        str | None, CliOption(metavar="1-50", help="Taught points to read from the controller.")
+    ] = None,
+    path: Annotated[
+        Path | None,
+        CliOption("--pts", help="A .pts file of EPSON RC+ in place of the controller's points."),
+    ] = None,
+    report_path: ReportPath = None,
+    force: ForceReport = False,
 ) -> None:
     """Show how far the tip will move at taught points when a tool's offset is changed.
 
@@ -68,7 +67,7 @@ def impact(
         raise ConfigError(
             tr("No points were named."), remedy=tr("Give --points 1-50 or --pts robot1.pts.")
         )
-    changes = _changes(given)
+    changes = _changes(given._asdict())
     wanted = report_request(report_path, force=force)
     with open_controller(context) as controller, reporting(wanted, controller) as draft:
         before = controller.tools.read(tool)

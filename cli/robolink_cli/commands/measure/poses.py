@@ -1,12 +1,13 @@
 """poses show: what robolink understands of a file of poses. Nothing is connected."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import click
 
 from robolink.messages import tr
 from robolink_cli.console.render import emit_json, json_is_on, say, table
+from robolink_cli.options.declaration import CliArgument
 from robolink_cli.options.pose_source import reading_options
 from robolink_cli.options.shared import json_option
 
@@ -20,10 +21,9 @@ def poses() -> None:
 
 
 @poses.command("show", short_help="Show the poses in a file, and how they were read.")
-@click.argument("file", type=click.Path(dir_okay=False, path_type=Path))
 @reading_options
 @json_option
-def show(file: Path, choices: "ReadingChoices") -> None:
+def show(*, file: Annotated[Path, CliArgument()], choices: "ReadingChoices") -> None:
     """Show the poses in FILE in mm and EPSON's angles, and how they were read.
 
     FILE may come from a robot of another maker, a spreadsheet or ROS; docs/poses.md lists them.

@@ -1,20 +1,21 @@
 """recalibrate RECIPE.toml: the scripted nozzle change."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import click
 
 from robolink.messages import declared, tr
 from robolink_cli.console.numbers import NumberInside
-from robolink_cli.options.consent import dry_run_option, plain_option, yes_option
-from robolink_cli.options.recipe_answers import answer_options
-from robolink_cli.options.sensor import sensor_option
+from robolink_cli.options.consent import DryRun, Plain, Yes
+from robolink_cli.options.declaration import CliArgument, CliOption
+from robolink_cli.options.recipe_answers import AnswerTexts, TypedHeights
+from robolink_cli.options.sensor import Sensor
 from robolink_cli.options.shared import TYPED
 from robolink_cli.session.completing import complete_recipe
 from robolink_cli.session.context import CliContext, optional_controller
-from robolink_cli.session.operator_identity import nozzle_options
-from robolink_cli.session.ordering import order_option, require_no_dry_run
+from robolink_cli.session.operator_identity import Lot, Nozzle
+from robolink_cli.session.ordering import OrderId, require_no_dry_run
 
 if TYPE_CHECKING:
     from robolink.recipe import LoadedRecipe
@@ -25,59 +26,44 @@ _STEPS: Final = 7
 
 
 @click.command()
-@click.argument(
-    "recipe",
-    required=False,
-    metavar="RECIPE.toml",
-    type=click.Path(dir_okay=False, path_type=Path),
-    shell_complete=complete_recipe,
-)
-@click.option(
-    "--reference",
-    is_flag=True,
-    help=declared("Measure and record a reference for differences; nothing is written."),
-)
-@click.option(
-    "--accept-jump",
-    "accepted_change_mm",
-    metavar="MM",
-    type=NumberInside(min=0, min_open=True),
-    help=declared("Accept a change up to MM this time, beyond the recipe's limit; for engineers."),
-)
-@click.option(
-    "--assist",
-    metavar="URL",
-    help=declared("A simulator's assist or sim URL: its operator brings the tip onto the pin."),
-)
-@sensor_option
-@click.option(
-    "--jsonl",
-    is_flag=True,
-    help=declared("One JSON line on stdout for every event, the last one result or error."),
-)
-@answer_options
-@nozzle_options
-@order_option
 @optional_controller
-@dry_run_option
-@yes_option
-@plain_option
 def recalibrate(
     context: CliContext,
-    recipe: Path | None,
     *,
-    reference: bool,
-    accepted_change_mm: float | None,
-    assist: str | None,
-    sensor: str | None,
-    jsonl: bool,
-    nozzle: str | None,
-    lot: str | None,
-    answers: tuple[str, ...],
-    z_mm: tuple[str, ...],
-    order: str | None,
-    dry_run: bool,
-    yes: bool,
+    recipe: Annotated[
+        Path | None, CliArgument(metavar="RECIPE.toml", shell_complete=complete_recipe)
+    ] = None,
+    reference: Annotated[
+        bool, CliOption(help="Measure and record a reference for differences; nothing is written.")
+    ] = False,
+    accepted_change_mm: Annotated[
+        float | None,
+        NumberInside(min=0, min_open=True),
+        CliOption(
+            "--accept-jump",
+            help="Accept a change up to MM this time, beyond the recipe's limit; for engineers.",
+        ),
+    ] = None,
+    assist: Annotated[
+        str | None,
+        CliOption(
+            metavar="URL",
+            help="A simulator's assist or sim URL: its operator brings the tip onto the pin.",
+        ),
+    ] = None,
+    sensor: Sensor = None,
+    jsonl: Annotated[
+        bool,
+        CliOption(help="One JSON line on stdout for every event, the last one result or error."),
+    ] = False,
+    answers: AnswerTexts = (),
+    z_mm: TypedHeights = (),
+    nozzle: Nozzle = None,
+    lot: Lot = None,
+    order: OrderId = None,
+    dry_run: DryRun = False,
+    yes: Yes = False,
+    _plain: Plain = False,
 ) -> None:
     """Change a nozzle as a recipe says: measure, propose, write, prove, record.
 

@@ -1,10 +1,13 @@
 """station list, show, learn: the pins, beams, surfaces and cameras of a cell."""
 
+from typing import Annotated
+
 import click
 
-from robolink.messages import declared, tr
+from robolink.messages import tr
 from robolink_cli.console.numbers import NumberInside
-from robolink_cli.options.consent import dry_run_option, yes_option
+from robolink_cli.options.consent import DryRun, Yes
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.session.completing import complete_station, complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 
@@ -14,17 +17,22 @@ def station() -> None:
     """Pins, beams, surfaces and cameras of a cell: where, and how well known."""
 
 
-_robot_option = click.option(
-    "--robot",
-    metavar="NAME",
-    help=declared("A controller with several robots: which one, as 'station list' names it."),
-)
+_Robot = Annotated[
+    str | None,
+    CliOption(
+        metavar="NAME",
+        help="A controller with several robots: which one, as 'station list' names it.",
+    ),
+]
 
 
 @station.command("list")
-@_robot_option
 @controller_options
-def list_stations(context: CliContext, robot: str | None) -> None:
+def list_stations(
+    context: CliContext,
+    *,
+    robot: _Robot = None,
+) -> None:
     """List the stations of a cell. Reads cell file and journal only; no controller is asked."""
     from robolink_cli.views.stations import known_stations, show_stations, station_payload
 
@@ -34,10 +42,13 @@ def list_stations(context: CliContext, robot: str | None) -> None:
 
 
 @station.command("show")
-@click.argument("name", metavar="ID", shell_complete=complete_station)
-@_robot_option
 @controller_options
-def show(context: CliContext, name: str, robot: str | None) -> None:
+def show(
+    context: CliContext,
+    *,
+    name: Annotated[str, CliArgument(metavar="ID", shell_complete=complete_station)],
+    robot: _Robot = None,
+) -> None:
     """Show one station. Reads cell file and journal only; no controller is asked."""
     from robolink_cli.views.stations import known_station, show_station, station_payload
 
@@ -47,73 +58,50 @@ def show(context: CliContext, name: str, robot: str | None) -> None:
 
 
 @station.command("learn", short_help="Find a station with a tool whose offset is known.")
-@click.argument("name", metavar="ID", shell_complete=complete_station)
-@click.option(
-    "--tool",
-    type=click.IntRange(1, 15),
-    metavar="N",
-    required=True,
-    shell_complete=complete_tool,
-    help=declared("Number of the tool whose offset is known."),
-)
-@click.option(
-    "--sigma",
-    "sigma_mm",
-    type=NumberInside(min=0, min_open=True),
-    metavar="MM",
-    help=declared("Standard deviation of one coordinate of one touch, where it is known."),
-)
-@click.option(
-    "--speed",
-    "speed_mm_s",
-    type=NumberInside(1, 100),
-    default=20.0,
-    metavar="MM_S",
-    help=declared("Speed of straight moves, in Power Low."),
-)
-@click.option(
-    "--box",
-    "box_mm",
-    type=NumberInside(min=1),
-    metavar="MM",
-    default=150.0,
-    show_default=True,
-    help=declared("How far, sideways, the flange may go from where it is."),
-)
-@click.option(
-    "--assist",
-    metavar="URL",
-    help=declared("A simulator's assist or sim URL: its operator brings the tip onto the pin."),
-)
-@click.option(
-    "--contact-input",
-    type=click.IntRange(0, 0xFFFF),
-    metavar="N",
-    help=declared(
-        "A pin: number of the input that shows contact of tip and pin, where there is one."
-    ),
-)
-@click.option(
-    "--off-in-contact",
-    is_flag=True,
-    help=declared("Whether that input goes off, not on, in contact."),
-)
 @controller_options
-@dry_run_option
-@yes_option
 def learn(
     context: CliContext,
     *,
-    name: str,
-    tool: int,
-    sigma_mm: float | None,
-    speed_mm_s: float,
-    box_mm: float,
-    assist: str | None,
-    contact_input: int | None,
-    off_in_contact: bool,
-    dry_run: bool,
-    yes: bool,
+    name: Annotated[str, CliArgument(metavar="ID", shell_complete=complete_station)],
+    tool: Annotated[
+        int,
+        click.IntRange(1, 15),
+        CliOption(shell_complete=complete_tool, help="Number of the tool whose offset is known."),
+    ],
+    sigma_mm: Annotated[
+        float | None,
+        NumberInside(min=0, min_open=True),
+        CliOption(help="Standard deviation of one coordinate of one touch, where it is known."),
+    ] = None,
+    speed_mm_s: Annotated[
+        float,
+        NumberInside(1, 100),
+        CliOption(help="Speed of straight moves, in Power Low.", show_default=False),
+    ] = 20.0,
+    box_mm: Annotated[
+        float,
+        NumberInside(min=1),
+        CliOption(help="How far, sideways, the flange may go from where it is."),
+    ] = 150.0,
+    assist: Annotated[
+        str | None,
+        CliOption(
+            metavar="URL",
+            help="A simulator's assist or sim URL: its operator brings the tip onto the pin.",
+        ),
+    ] = None,
+    contact_input: Annotated[
+        int | None,
+        click.IntRange(0, 0xFFFF),
+        CliOption(
+            help="A pin: number of the input that shows contact of tip and pin, where there is one."
+        ),
+    ] = None,
+    off_in_contact: Annotated[
+        bool, CliOption(help="Whether that input goes off, not on, in contact.")
+    ] = False,
+    dry_run: DryRun = False,
+    yes: Yes = False,
 ) -> None:
     """Find a station with a tool whose offset is known, such as a gauge pin, and keep where it is.
 

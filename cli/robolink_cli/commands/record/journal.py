@@ -1,18 +1,18 @@
 """journal list, show, diff, drift, export, verify: what is on record. Reads only, no controller."""
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, TypeVar
+from typing import TYPE_CHECKING, Annotated, Final, Literal, NamedTuple
 
 import click
 
 from robolink.messages import declared, tr
 from robolink.model import EntryKind
-from robolink_cli.access.cell import complete_cell
 from robolink_cli.commands.record.journal_drift import drift
 from robolink_cli.commands.record.journal_lookup import (
+    OfController,
     controller_meant,
     entries_named,
     entries_of_change,
@@ -21,6 +21,8 @@ from robolink_cli.commands.record.journal_lookup import (
 from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.lazy_group import LazyGroup
+from robolink_cli.options.consent import Overwrite
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
 from robolink_cli.session.completing import complete_tool
 
@@ -28,79 +30,48 @@ if TYPE_CHECKING:
     from robolink.journal import Journal
     from robolink.model import Recorded
 
-F = TypeVar("F", bound=Callable[..., Any])
-
 _KINDS: Final = {str(kind).replace(" ", "-"): kind for kind in EntryKind}
 
 
-def _filters(function: F) -> F:
-    """Add the options that say which entries are meant."""
-    options = (
-        click.option(
-            "-c",
-            "--controller",
-            metavar="CELL|URL",
-            shell_complete=complete_cell,
-            help=declared("Only of this controller; without it, of all."),
-        ),
-        click.option(
-            "--tool",
-            type=int,
-            metavar="N",
-            shell_complete=complete_tool,
-            help=declared("Only about this tool."),
-        ),
-        click.option(
+class _Wanted(NamedTuple):
+    """Which entries the options mean."""
+
+    controller: OfController = None
+    tool: Annotated[
+        int | None, CliOption(shell_complete=complete_tool, help="Only about this tool.")
+    ] = None
+    kinds: Annotated[
+        tuple[str, ...],
+        click.Choice(list(_KINDS), case_sensitive=False),
+        CliOption(
             "--kind",
-            "kinds",
-            type=click.Choice(list(_KINDS), case_sensitive=False),
-            multiple=True,
             metavar="KIND",
-            help=declared("Only of this kind; a wrong name lists them all. May be repeated."),
+            help="Only of this kind; a wrong name lists them all. May be repeated.",
         ),
-        click.option("--change", metavar="ID", help=declared("Only of this tool change.")),
-    )
-    for option in reversed(options):
-        function = option(function)
-    return function
+    ] = ()
+    change: Annotated[str | None, CliOption(metavar="ID", help="Only of this tool change.")] = None
 
-
-class _Wanted:
-    """Which entries the options mean.
-
-    Attributes:
-        controller: Address of the controller, ``None`` for all.
-    """
-
-    def __init__(
-        self,
-        *,
-        controller: str | None,
-        tool: int | None,
-        kinds: Sequence[str],
-        change: str | None,
-    ) -> None:
-        self.controller = controller_meant(controller)
-        self._tool = tool
-        self._kinds = [_KINDS[kind] for kind in kinds]
-        self._change = change
+    def at_address(self) -> "_Wanted":
+        """Return the same with the address of the controller, ``None`` for all."""
+        return self._replace(controller=controller_meant(self.controller))
 
     def of(
         self, opened: "Journal", *, limit: int | None = None, newest_first: bool = True
     ) -> "Iterator[Recorded]":
         """Yield them, read page by page."""
-        if self._change is None:
+        kinds = [_KINDS[kind] for kind in self.kinds]
+        if self.change is None:
             return opened.entries(
                 controller=self.controller,
-                tool=self._tool,
-                kinds=self._kinds,
+                tool=self.tool,
+                kinds=kinds,
                 limit=limit,
                 newest_first=newest_first,
             )
         found = [
             entry
-            for entry in entries_of_change(opened, self._change, controller=self.controller)
-            if self._tool in (None, entry.tool) and (not self._kinds or entry.kind in self._kinds)
+            for entry in entries_of_change(opened, self.change, controller=self.controller)
+            if self.tool in (None, entry.tool) and (not kinds or entry.kind in kinds)
         ]
         return iter((found[::-1] if newest_first else found)[:limit])
 
@@ -122,22 +93,17 @@ journal.add_command(drift)
 
 
 @journal.command("list")
-@_filters
-@click.option(
-    "--limit",
-    type=click.IntRange(min=1),
-    metavar="N",
-    default=20,
-    show_default=True,
-    help="At most this many.",
-)
 @json_option
-def list_entries(*, limit: int, **meant: Any) -> None:  # noqa: ANN401 - click's form
+def list_entries(
+    *,
+    meant: _Wanted,
+    limit: Annotated[int, click.IntRange(min=1), CliOption(help="At most this many.")] = 20,
+) -> None:
     """Show the newest entries, newest first."""
     from robolink.journal import default_location, may_exist
     from robolink_cli.views.journal import entry_payload, show_list
 
-    wanted = _Wanted(**meant)
+    wanted = meant.at_address()
     location = default_location()
     if not may_exist(location):
         if json_is_on():
@@ -154,9 +120,11 @@ def list_entries(*, limit: int, **meant: Any) -> None:  # noqa: ANN401 - click's
 
 
 @journal.command("show")
-@click.argument("name", metavar="NUMBER|CHANGE")
 @json_option
-def show(name: str) -> None:
+def show(
+    *,
+    name: Annotated[str, CliArgument(metavar="NUMBER|CHANGE")],
+) -> None:
     """Show all fields of one entry, or of all entries of a change."""
     from robolink_cli.views.journal import entry_payload, show_entry
 
@@ -170,10 +138,12 @@ def show(name: str) -> None:
 
 
 @journal.command("diff", short_help="Show what differs between two entries or changes.")
-@click.argument("a", metavar="NUMBER|CHANGE")
-@click.argument("b", metavar="NUMBER|CHANGE")
 @json_option
-def diff(a: str, b: str) -> None:
+def diff(
+    *,
+    a: Annotated[str, CliArgument(metavar="NUMBER|CHANGE")],
+    b: Annotated[str, CliArgument(metavar="NUMBER|CHANGE")],
+) -> None:
     """Show what differs between two entries or changes: value, poses, tolerance, people."""
     from robolink_cli.views.journal import diff_payload, show_diff
 
@@ -186,33 +156,27 @@ def diff(a: str, b: str) -> None:
 
 
 @journal.command("export", short_help="Write entries to a file, oldest first.")
-@click.argument("file", type=click.Path(dir_okay=False, path_type=Path))
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["csv", "json", "jsonl"]),
-    help=declared("Form of the file; by default what its name ends with."),
-)
-@click.option("--force", is_flag=True, help=declared("Overwrite a file that is already there."))
-@_filters
 @json_option
 def export(
-    file: Path,
     *,
-    form: str | None,
-    force: bool,
-    **meant: Any,  # noqa: ANN401 - click's form
+    file: Annotated[Path, CliArgument()],
+    form: Annotated[
+        Literal["csv", "json", "jsonl"] | None,
+        CliOption("--format", help="Form of the file; by default what its name ends with."),
+    ] = None,
+    force: Overwrite = False,
+    meant: _Wanted,
 ) -> None:
     """Write entries to FILE, oldest first; all of them, or those that are meant."""
     from robolink.files.named import require_free, save_named
     from robolink_cli.commands.record.journal_export import FORMATS, Counted, form_of
 
-    form = form or form_of(file)
+    written = form or form_of(file)
     require_free(file, replace=force)
-    wanted = _Wanted(**meant)
+    wanted = meant.at_address()
     counted = Counted(wanted.of(journal_to_read(), newest_first=False))
-    save_named(file, FORMATS[form](counted), replace=force)
-    payload = {"file": str(file), "format": form, "entry_count": counted.count}
+    save_named(file, FORMATS[written](counted), replace=force)
+    payload = {"file": str(file), "format": written, "entry_count": counted.count}
     if json_is_on():
         emit_json("robolink/journal-exported/1", payload)
     else:

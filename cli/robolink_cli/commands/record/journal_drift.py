@@ -3,21 +3,23 @@
 import datetime
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import click
 
 from robolink.drift import CellDrift, Chart, ChartPoint, last_statements
-from robolink.messages import declared, tr
+from robolink.messages import tr
 from robolink.report import chart_title
-from robolink_cli.access.cell import complete_cell
 from robolink_cli.commands.record.journal_lookup import (
+    OfController,
     cell_meant,
     controller_meant,
     journal_to_read,
 )
 from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.render import emit_json, json_is_on, say, table
+from robolink_cli.options.consent import Overwrite
+from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.shared import json_option
 from robolink_cli.session.completing import complete_tool
 
@@ -28,50 +30,31 @@ if TYPE_CHECKING:
 
 
 @click.command("drift", short_help="Show how each tool's offset moved, and what stands out.")
-@click.option(
-    "-c",
-    "--controller",
-    metavar="CELL|URL",
-    shell_complete=complete_cell,
-    help=declared("Only of this controller; without it, of all."),
-)
-@click.option(
-    "--tool", type=int, metavar="N", shell_complete=complete_tool, help=declared("Only this tool.")
-)
-@click.option(
-    "--since",
-    type=click.DateTime(["%Y-%m-%d"]),
-    metavar="YYYY-MM-DD",
-    help=declared(
-        "Start again from this day, after a repair or with another kind of nozzle (UTC)."
-    ),
-)
-@click.option(
-    "--baseline",
-    type=click.IntRange(min=20, max=1000),
-    metavar="N",
-    default=20,
-    show_default=True,
-    help=declared("On how many of the first changes the limits rest."),
-)
-@click.option("--plots", is_flag=True, help=declared("Draw every chart, not only what stands out."))
-@click.option(
-    "--page",
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help=declared("Also write all charts to FILE, a page for a browser."),
-)
-@click.option("--force", is_flag=True, help=declared("Overwrite a file that is already there."))
 @json_option
 def drift(
     *,
-    controller: str | None,
-    tool: int | None,
-    since: datetime.datetime | None,
-    baseline: int,
-    plots: bool,
-    page: Path | None,
-    force: bool,
+    controller: OfController = None,
+    tool: Annotated[
+        int | None, CliOption(shell_complete=complete_tool, help="Only this tool.")
+    ] = None,
+    since: Annotated[
+        datetime.datetime | None,
+        click.DateTime(["%Y-%m-%d"]),
+        CliOption(
+            metavar="YYYY-MM-DD",
+            help="Start again from this day, after a repair or with another kind of nozzle (UTC).",
+        ),
+    ] = None,
+    baseline: Annotated[
+        int,
+        click.IntRange(min=20, max=1000),
+        CliOption(help="On how many of the first changes the limits rest."),
+    ] = 20,
+    plots: Annotated[bool, CliOption(help="Draw every chart, not only what stands out.")] = False,
+    page: Annotated[
+        Path | None, CliOption(help="Also write all charts to FILE, a page for a browser.")
+    ] = None,
+    force: Overwrite = False,
 ) -> int:
     """Show how each tool's offset moved from change to change, and what stands out.
 

@@ -1,14 +1,15 @@
 """Finding entries of the journal by what a person types; nothing here adds to it."""
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Final
+from typing import TYPE_CHECKING, Annotated, Final
 
 import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.transaction import id_of_change
-from robolink_cli.access.cell import is_cell_name
+from robolink_cli.access.cell import complete_cell, is_cell_name
+from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.shared import GIVEN
 
 if TYPE_CHECKING:
@@ -31,6 +32,18 @@ def journal_to_read() -> "Journal":
     from robolink.journal import open_journal
 
     return open_journal(read_only=True)
+
+
+OfController = Annotated[
+    str | None,
+    CliOption(
+        "-c",
+        "--controller",
+        metavar="CELL|URL",
+        shell_complete=complete_cell,
+        help="Only of this controller; without it, of all.",
+    ),
+]
 
 
 def controller_meant(named: str | None) -> str | None:

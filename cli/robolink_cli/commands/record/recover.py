@@ -1,6 +1,6 @@
 """recover: the one way to settle what was begun and not proved finished."""
 
-from typing import Final
+from typing import Annotated, Final, Literal
 
 import click
 
@@ -12,7 +12,8 @@ from robolink.transaction import Recovery, look
 from robolink_cli.commands.measure.choosing import context_at_desk
 from robolink_cli.commands.record.recovery_guide import Guide, show_end
 from robolink_cli.console.render import json_is_on
-from robolink_cli.options.consent import dry_run_option, plain_option, yes_option
+from robolink_cli.options.consent import DryRun, Plain, Yes
+from robolink_cli.options.declaration import CliOption
 from robolink_cli.prompts.present import present_desk
 from robolink_cli.prompts.questions import on_terminal
 from robolink_cli.session.context import (
@@ -111,50 +112,54 @@ def _option(answer: str, *, written: bool, tests: bool) -> str:
 
 @click.command("recover")
 @optional_controller
-@dry_run_option
-@plain_option
-@click.option(
-    "--keep",
-    is_flag=True,
-    help="Keep new values that nobody tested; without it the old ones are written back.",
-)
-@click.option(
-    "--choose",
-    type=click.Choice(["old", "new", "blocked"]),
-    help=declared(
-        "Your answer to all of it: old values back; new values kept, on a terminal after their "
-        "turn test; or everything left blocked as it is."
-    ),
-)
-@click.option(
-    "--yes",
-    is_flag=True,
-    help="Your answer where reading is not enough: you have looked, and work may go on.",
-)
-@click.option(
-    "--forget",
-    is_flag=True,
-    help=(
-        "Drop everything that is open, without a check and without restoring; you answer for it."
-    ),
-)
-@click.option(
-    "--take-over",
-    metavar="REASON",
-    help=(
-        "Take this controller over from the program that works on it, a PLC's mailbox too, where "
-        "what moves is halted. That program is refused from then on. Your name and the reason are "
-        "recorded."
-    ),
-)
 def recover(
     context: CliContext,
-    dry_run: bool,
-    keep: bool,
-    choose: str | None,
-    yes: bool,
-    forget: bool,
-    take_over: str | None,
+    *,
+    dry_run: DryRun = False,
+    _plain: Plain = False,
+    keep: Annotated[
+        bool,
+        CliOption(
+            late=True,
+            help="Keep new values that nobody tested; without it the old ones are written back.",
+        ),
+    ] = False,
+    choose: Annotated[
+        Literal["old", "new", "blocked"] | None,
+        CliOption(
+            late=True,
+            help="Your answer to all of it: old values back; new values kept, on a terminal "
+            "after their "
+            "turn test; or everything left blocked as it is.",
+        ),
+    ] = None,
+    yes: Annotated[
+        bool,
+        CliOption(
+            late=True,
+            help="Your answer where reading is not enough: you have looked, and work may go on.",
+        ),
+    ] = False,
+    forget: Annotated[
+        bool,
+        CliOption(
+            late=True,
+            help="Drop everything that is open, without a check and without restoring; you "
+            "answer for it.",
+        ),
+    ] = False,
+    take_over: Annotated[
+        str | None,
+        CliOption(
+            late=True,
+            metavar="REASON",
+            help="Take this controller over from the program that works on it, a PLC's mailbox "
+            "too, where "
+            "what moves is halted. That program is refused from then on. Your name and the "
+            "reason are "
+            "recorded.",
+        ),
+    ] = None,
 ) -> int:
     """Put right what a stop, a crash or a lost link left open: what this PC cannot see, you decide.
 
@@ -197,10 +202,13 @@ def recover(
 
 @click.command(hidden=True)
 @controller_options
-@dry_run_option
-@yes_option
-@click.option("--forget", is_flag=True, help="As with 'robolink recover'.")
-def resolve(context: CliContext, dry_run: bool, yes: bool, forget: bool) -> int:
+def resolve(
+    context: CliContext,
+    *,
+    dry_run: DryRun = False,
+    yes: Yes = False,
+    forget: Annotated[bool, CliOption(late=True, help="As with 'robolink recover'.")] = False,
+) -> int:
     """Do what 'robolink recover' does; without a terminal the command itself is your answer."""
     with open_controller(context, quiet=True, changes=not dry_run) as controller:
         by = AnsweredBy.YES if yes else AnsweredBy.COMMAND

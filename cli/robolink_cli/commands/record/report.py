@@ -3,18 +3,21 @@
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Annotated
 
 import click
 
 from robolink.errors import ConfigError
 from robolink.journal import Journal
-from robolink.messages import declared, tr
+from robolink.messages import tr
 from robolink.model import EntryKind, Recorded
 from robolink.report import Report
 from robolink.transaction import id_of_change
 from robolink_cli.commands.record.journal_lookup import controller_meant, entries_of_change
 from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.render import note, say
+from robolink_cli.options.consent import Overwrite
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.impact import ImpactRequest, judge
 from robolink_cli.options.pose_source import point_numbers
 from robolink_cli.session.context import CliContext, optional_controller
@@ -25,22 +28,20 @@ _ENDINGS = (".html", ".htm")
 
 
 @click.command()
-@click.argument("change", required=False)
-@click.argument("file", type=click.Path(dir_okay=False, path_type=Path), required=False)
-@click.option("--force", is_flag=True, help=declared("Overwrite a file that is already there."))
-@click.option(
-    "--points",
-    metavar="1-50",
-    help=declared("Also show how far the tip moves at these taught points, read now from -c."),
-)
 @optional_controller
 def report(
     context: CliContext,
     *,
-    change: str | None,
-    file: Path | None,
-    force: bool,
-    points: str | None,
+    change: Annotated[str | None, CliArgument()] = None,
+    file: Annotated[Path | None, CliArgument()] = None,
+    force: Overwrite = False,
+    points: Annotated[
+        str | None,
+        CliOption(
+            metavar="1-50",
+            help="Also show how far the tip moves at these taught points, read now from -c.",
+        ),
+    ] = None,
 ) -> int:
     """Write one HTML page about CHANGE, to keep, to mail or to print.
 

@@ -1,15 +1,18 @@
 """undo: what tools held before a change is written back."""
 
+from typing import Annotated
+
 import click
 
 from robolink.backup import keep_first_backup
 from robolink.errors import ConfigError, DeclinedError
-from robolink.messages import declared, tr
+from robolink.messages import tr
 from robolink.model import Controller
 from robolink.transaction import Undone, UndoPlan
 from robolink.transaction import undo as take_back
 from robolink_cli.console.render import note, say
-from robolink_cli.options.consent import dry_run_option, then_select_option, yes_option
+from robolink_cli.options.consent import DryRun, ThenSelect, Yes
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.questions import agree, on_terminal
 from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
@@ -19,33 +22,24 @@ from robolink_cli.views.tables import show_change
 
 
 @click.command()
-@click.argument("change", required=False)
-@click.option(
-    "--tool",
-    type=int,
-    metavar="N",
-    shell_complete=complete_tool,
-    help=declared("Only this tool of the change."),
-)
-@click.option(
-    "--to",
-    type=click.IntRange(min=1),
-    metavar="NUMBER",
-    help=declared("Bring back the value that this entry of the journal proved."),
-)
-@then_select_option
 @controller_options
-@dry_run_option
-@yes_option
 def undo(
     context: CliContext,
     *,
-    change: str | None,
-    tool: int | None,
-    to: int | None,
-    then_select: int | None,
-    dry_run: bool,
-    yes: bool,
+    change: Annotated[str | None, CliArgument()] = None,
+    tool: Annotated[
+        int | None, CliOption(shell_complete=complete_tool, help="Only this tool of the change.")
+    ] = None,
+    to: Annotated[
+        int | None,
+        click.IntRange(min=1),
+        CliOption(
+            metavar="NUMBER", help="Bring back the value that this entry of the journal proved."
+        ),
+    ] = None,
+    then_select: ThenSelect = None,
+    dry_run: DryRun = False,
+    yes: Yes = False,
 ) -> None:
     """Put back what tools held before CHANGE; by default before the newest one.
 

@@ -5,7 +5,7 @@ import shutil
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final
 
 import click
 
@@ -13,6 +13,7 @@ from robolink.messages import tr
 from robolink_cli.console.output import is_terminal
 from robolink_cli.console.render import emit_json, json_is_on, say, say_listed
 from robolink_cli.console.tables import filled, has_wide, within
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
 
 _COMMENT: Final = re.compile(r"<!--.*?-->\n*", re.DOTALL)
@@ -25,10 +26,14 @@ def _complete_page(_: click.Context, __: click.Parameter, start: str) -> list[st
 
 
 @click.command()
-@click.argument("page", required=False, shell_complete=_complete_page)
-@click.option("--path", "only_path", is_flag=True, help="Show where the page is, not the page.")
 @json_option
-def docs(page: str | None, *, only_path: bool) -> None:
+def docs(
+    *,
+    page: Annotated[str | None, CliArgument(shell_complete=_complete_page)] = None,
+    only_path: Annotated[
+        bool, CliOption("--path", help="Show where the page is, not the page.")
+    ] = False,
+) -> None:
     """Read a PAGE of the documentation; without one, list them.
 
     The pages come with the program, so they are of its version and need no network. Where a page

@@ -2,7 +2,7 @@
 
 import re
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final
 
 import click
 
@@ -15,6 +15,8 @@ from robolink_cli.commands.shipped.shipped_files import (
     require_one_of,
 )
 from robolink_cli.console.render import emit_json, json_is_on, say, say_listed
+from robolink_cli.options.consent import Overwrite
+from robolink_cli.options.declaration import CliArgument
 from robolink_cli.options.shared import json_option
 from robolink_cli.session.completing import complete_recipe
 
@@ -107,11 +109,13 @@ def list_models() -> None:
 
 
 @recipe.command("new", short_help="Copy a recipe to a file of your own.")
-@click.argument("name", shell_complete=_complete_model)
-@click.argument("file", type=click.Path(dir_okay=False, path_type=Path), required=False)
-@click.option("--force", is_flag=True, help="Overwrite a file that is already there.")
 @json_option
-def new(name: str, file: Path | None, *, force: bool) -> None:
+def new(
+    *,
+    name: Annotated[str, CliArgument(shell_complete=_complete_model)],
+    file: Annotated[Path | None, CliArgument()] = None,
+    force: Overwrite = False,
+) -> None:
     """Copy the recipe NAME to FILE; without FILE to NAME.toml in the working folder.
 
     Its numbers fit the simulated cell, and with them it runs on simulated controllers alone. Put in
@@ -130,11 +134,11 @@ def new(name: str, file: Path | None, *, force: bool) -> None:
 
 
 @recipe.command("check")
-@click.argument(
-    "file", type=click.Path(dir_okay=False, path_type=Path), shell_complete=complete_recipe
-)
 @json_option
-def check(file: Path) -> int:
+def check(
+    *,
+    file: Annotated[Path, CliArgument(shell_complete=complete_recipe)],
+) -> int:
     """Say everything that is wrong with the recipe FILE. No controller is asked."""
     from robolink.recipe import check_recipe
 

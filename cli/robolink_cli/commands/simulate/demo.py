@@ -5,6 +5,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Annotated, Literal
 
 import click
 from robolink_simulators.assist.port import LEAST_THINKING_S, InProcessEyes
@@ -30,6 +31,7 @@ from robolink.messages import tr
 from robolink.model import Controller, ToolOffset
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import emit_json, json_is_on, say
+from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.shared import json_option
 from robolink_cli.prompts.operator import AssistedOperator
 from robolink_cli.views.documents import offset_payload
@@ -37,26 +39,25 @@ from robolink_cli.views.fit import report_payload, show_proposal, show_report
 
 
 @click.command()
-@click.option(
-    "--seed", type=int, metavar="N", default=1, show_default=True, help="Another cell, another tip."
-)
-@click.option(
-    "--speed",
-    type=NumberInside(1, 100),
-    metavar="FACTOR",
-    default=20.0,
-    show_default=True,
-    help="How many times faster than real the simulated time passes.",
-)
-@click.option(
-    "--operator",
-    type=click.Choice(["careful", "careless"]),
-    default="careful",
-    show_default=True,
-    help="Who touches the pin; a careless person only presses Enter, and must not be believed.",
-)
 @json_option
-def demo(seed: int, speed: float, operator: str) -> None:
+def demo(
+    *,
+    seed: Annotated[int, CliOption(help="Another cell, another tip.")] = 1,
+    speed: Annotated[
+        float,
+        NumberInside(1, 100),
+        CliOption(
+            metavar="FACTOR", help="How many times faster than real the simulated time passes."
+        ),
+    ] = 20.0,
+    operator: Annotated[
+        Literal["careful", "careless"],
+        CliOption(
+            help="Who touches the pin; a careless person only presses Enter, and must not be "
+            "believed."
+        ),
+    ] = "careful",
+) -> None:
     """Change the nozzle of a simulated EPSON SCARA, then of a simulated SoftMotion PLC.
 
     The SCARA is reached over a TCP connection on this machine's loopback, the PLC through its

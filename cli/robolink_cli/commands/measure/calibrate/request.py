@@ -1,8 +1,7 @@
 """What one calibration was asked for, whatever the method, and the two ways it goes."""
 
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated, Final
 
 import click
 from click.core import ParameterSource
@@ -10,10 +9,15 @@ from click.core import ParameterSource
 from robolink.config import USUAL_CHANGE_MM
 from robolink.errors import ConfigError, ReservedToolError, ToolIndexError
 from robolink.messages import tr
-from robolink_cli.options.impact import ImpactRequest, impact_request
-from robolink_cli.options.report import ReportRequest, report_request
+from robolink_cli.console.numbers import NumberInside
+from robolink_cli.options.consent import DryRun, MotionOption, Plain, Yes
+from robolink_cli.options.declaration import CliOption
+from robolink_cli.options.impact import ImpactFile, ImpactPoints, ImpactRequest, impact_request
+from robolink_cli.options.report import ForceReport, ReportPath, ReportRequest, report_request
+from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext
-from robolink_cli.session.ordering import require_no_dry_run
+from robolink_cli.session.operator_identity import Lot, Nozzle
+from robolink_cli.session.ordering import OrderId, require_no_dry_run
 
 if TYPE_CHECKING:
     from robolink.calibration import RowFact
@@ -22,6 +26,9 @@ if TYPE_CHECKING:
     from robolink.model import Controller
     from robolink.procedures import TipSource
     from robolink.stations import Station
+
+
+LENGTH: Final = NumberInside(min=0, min_open=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,25 +154,68 @@ class CalibrationRequest:
 def request_from(
     context: CliContext,
     *,
-    tool: int,
-    speed_mm_s: float,
-    box_mm: float,
-    max_change_mm: float,
-    rms_mm: float | None,
-    residual_mm: float | None,
-    interval_mm: float | None,
-    tolerance_mm: float,
-    no_verify: bool,
-    assist: str | None,
-    impact: str | None,
-    impact_pts: Path | None,
-    report_path: Path | None,
-    force: bool,
-    nozzle: str | None,
-    lot: str | None,
-    order: str | None,
-    dry_run: bool,
-    yes: bool,
+    tool: Annotated[
+        int, CliOption(shell_complete=complete_tool, help="Number of the tool, 1 to 15.")
+    ],
+    speed_mm_s: Annotated[
+        float,
+        NumberInside(1, 100),
+        CliOption(
+            cls=MotionOption, show_default=False, help="Speed of straight moves, in Power Low."
+        ),
+    ] = 20.0,
+    box_mm: Annotated[
+        float,
+        NumberInside(min=1),
+        CliOption(cls=MotionOption, help="How far, sideways, the flange may go from where it is."),
+    ] = 150.0,
+    max_change_mm: Annotated[
+        float,
+        LENGTH,
+        CliOption(
+            help="Largest change against the stored offset that is accepted; more than the cell "
+            "allows takes an engineer."
+        ),
+    ] = USUAL_CHANGE_MM,
+    rms_mm: Annotated[
+        float | None,
+        LENGTH,
+        CliOption("--max-rms", help="Largest rms of the residuals that is accepted."),
+    ] = None,
+    residual_mm: Annotated[
+        float | None,
+        LENGTH,
+        CliOption("--max-residual", help="Largest residual of one pose that is accepted."),
+    ] = None,
+    interval_mm: Annotated[
+        float | None,
+        LENGTH,
+        CliOption("--max-interval", help="Accurate to this or better (95 %), or it is refused."),
+    ] = None,
+    tolerance_mm: Annotated[
+        float, LENGTH, CliOption(cls=MotionOption, help="Largest drift that passes the turn test.")
+    ] = 0.2,
+    no_verify: Annotated[
+        bool, CliOption(cls=MotionOption, help="Leave the turn test out.")
+    ] = False,
+    assist: Annotated[
+        str | None,
+        CliOption(
+            cls=MotionOption,
+            metavar="URL",
+            help="A simulator's assist or sim URL: its operator brings the tip onto the pin.",
+        ),
+    ] = None,
+    impact: ImpactPoints = None,
+    impact_pts: ImpactFile = None,
+    report_path: ReportPath = None,
+    force: ForceReport = False,
+    nozzle: Nozzle = None,
+    lot: Lot = None,
+    order: OrderId = None,
+    _plain: Plain = False,
+    yes: Yes = False,
+    dry_run: DryRun = False,
 ) -> CalibrationRequest:
     """Return the frame that the options of a command describe.
 

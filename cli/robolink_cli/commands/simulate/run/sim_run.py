@@ -9,9 +9,8 @@ import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import replace
 from pathlib import Path
-from typing import Final
+from typing import Annotated, Final
 
 import click
 from robolink_simulators.control.cell import AnySimulator
@@ -24,22 +23,28 @@ from robolink_cli.commands.simulate.run.cells_file import PlannedCell
 from robolink_cli.commands.simulate.serving import Termination, announce, controlled
 from robolink_cli.console.output import hand_over, show
 from robolink_cli.console.render import emit_json, json_is_on, say
+from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
-from robolink_cli.options.simulation import ServedLife, life_options
+from robolink_cli.options.simulation import ServedLife
 
 
 @click.command("run", short_help="Serve many simulated controllers, as a file says.")
-@click.argument("file", type=click.Path(dir_okay=False, path_type=Path))
-@click.option("--check", "only_checked", is_flag=True, help="Only check the file; serve nothing.")
-@click.option(
-    "--wait-ready",
-    is_flag=True,
-    help="Serve in the background: print one JSON line once all cells listen, and end with 0; "
-    "'pid' in it is the process that serves, which SIGTERM ends.",
-)
-@life_options
 @json_option
-def sim_run(*, file: Path, only_checked: bool, wait_ready: bool, life: ServedLife) -> int:
+def sim_run(
+    *,
+    file: Annotated[Path, CliArgument()],
+    only_checked: Annotated[
+        bool, CliOption("--check", help="Only check the file; serve nothing.")
+    ] = False,
+    wait_ready: Annotated[
+        bool,
+        CliOption(
+            help="Serve in the background: print one JSON line once all cells listen, and end with "
+            "0; 'pid' in it is the process that serves, which SIGTERM ends."
+        ),
+    ] = False,
+    life: ServedLife,
+) -> int:
     """Serve many simulated controllers of all kinds, as a file says, until Ctrl-C.
 
     The first line names every cell with its URLs, its control URL and the folder for what its
@@ -61,7 +66,7 @@ def sim_run(*, file: Path, only_checked: bool, wait_ready: bool, life: ServedLif
         return start_and_wait([str(file), *_as_typed(life)])
     from robolink_cli.commands.simulate.run.sim_run import run_cells
 
-    run_cells(file, cells, replace(life, parent=parent_of_starter()))
+    run_cells(file, cells, life._replace(parent=parent_of_starter()))
     return 0
 
 

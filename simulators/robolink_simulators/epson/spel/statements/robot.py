@@ -65,7 +65,7 @@ def _offsets(machine: Machine, values: Numbers) -> None:
 @setting(lambda machine: _listed(machine.kept.origins.reference or (0,) * machine.model.axes))
 def _reference(machine: Machine, values: Numbers) -> None:
     """Set or list CalPls; what it lists before it was set is not documented: 0 (assumed)."""
-    machine.kept.origins.refer_to(_one_a_joint(machine, "CalPls", values))
+    machine.kept.origins.reference = tuple(_one_a_joint(machine, "CalPls", values))
 
 
 def _calibrate(machine: Machine, values: Numbers) -> str:
@@ -105,7 +105,7 @@ def _find_origins(_: Machine, values: Numbers) -> str:
 @setting(lambda machine: _listed(machine.kept.origins.order))
 def _order(machine: Machine, values: Numbers) -> None:
     """Set or list MCordr."""
-    machine.kept.origins.move_in(_steps(machine, "MCordr", values))
+    machine.kept.origins.order = _steps(machine, "MCordr", values)
 
 
 def _steps(machine: Machine, word: str, values: Numbers) -> tuple[int, ...]:

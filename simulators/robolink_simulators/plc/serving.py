@@ -8,9 +8,14 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.transport import parse_url
 from robolink_simulators.cell.clock import ScaledClock
-from robolink_simulators.hosting.streams.serial_host import PTY_LINE, LineHost, no_pseudo_terminal
+from robolink_simulators.hosting.streams.serial_host import (
+    PTY_LINE,
+    LineFace,
+    LineHost,
+    no_pseudo_terminal,
+)
 from robolink_simulators.hosting.streams.tcp_host import TcpHost
-from robolink_simulators.plc.device import PlcLink, PlcSimulator
+from robolink_simulators.plc.device import PlcSimulator
 from robolink_simulators.plc.frames import LineFrames
 
 _DEFAULT_UNIT: Final = 1
@@ -65,9 +70,7 @@ class PlcHost(TcpHost):
             lock=simulator.lock,
             allow_remote=allow_remote,
         )
-        self._simulator = simulator
-        simulator.keep_time(clock)
-        simulator.watchers.append(self.wake)
+        self.present(simulator)
 
     @property
     def url(self) -> str:
@@ -75,12 +78,6 @@ class PlcHost(TcpHost):
         url = super().url + self._options
         # What leads out of this computer may lead to a machine, and says nothing of itself.
         return url + _SIMULATED if parse_url(url).stays_here else url
-
-    def close(self) -> None:
-        """Stop serving and close every connection. Idempotent."""
-        super().close()
-        if self.wake in self._simulator.watchers:
-            self._simulator.watchers.remove(self.wake)
 
 
 class PlcLineHost(LineHost):
@@ -91,7 +88,7 @@ class PlcLineHost(LineHost):
     """
 
     def __init__(self, simulator: PlcSimulator, map_file: Path, clock: ScaledClock) -> None:
-        super().__init__(PlcOnLine(simulator), clock=clock, lock=simulator.lock)
+        super().__init__(line_face(simulator), clock=clock, lock=simulator.lock)
         options = dict(PTY_LINE)
         if simulator.unit != _DEFAULT_UNIT:
             options["unit"] = str(simulator.unit)
@@ -99,17 +96,9 @@ class PlcLineHost(LineHost):
         simulator.keep_time(clock)
 
 
-class PlcOnLine:
-    """The PLC as a line sees it: a :class:`~robolink_simulators.hosting.addresses.WireDevice`."""
-
-    def __init__(self, simulator: PlcSimulator) -> None:
-        self._simulator = simulator
-        self.advance = simulator.advance
-        self.next_change = simulator.next_change
-
-    def connect(self, now_ns: int) -> PlcLink:
-        """Listen at the line."""
-        return self._simulator.connect(now_ns, LineFrames())
+def line_face(simulator: PlcSimulator) -> LineFace:
+    """Return the PLC as a line sees it."""
+    return LineFace(simulator, lambda now_ns: simulator.connect(now_ns, LineFrames()))
 
 
 def serve_plc(

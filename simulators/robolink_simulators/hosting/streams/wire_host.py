@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from robolink.interrupts import ClosedAtExit
 from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.device.hosted import HostedDevice
 from robolink_simulators.hosting.addresses import WireDevice
 from robolink_simulators.hosting.streams.serving_loop import (
     Served,
@@ -46,10 +47,22 @@ class WireHost(ClosedAtExit):
         self.stopping = False
         self.due_s: float | None = None
         self.queued_s: float | None = None
+        self._presented: tuple[HostedDevice, str] | None = None
 
     def start(self) -> None:
         """Begin to serve."""
         self._loop = serve_beside_others(self)
+
+    def present(self, simulator: HostedDevice, url: str = "") -> None:
+        """Let a simulator keep the time of this host, and wake it after an act past the wire.
+
+        Args:
+            simulator: What is served.
+            url: What it says of itself no more when this host is closed.
+        """
+        self._presented = simulator, url
+        simulator.keep_time(self._clock)
+        simulator.watchers.append(self.wake)
 
     def wake(self) -> None:
         """Have the device looked at again; any thread may call it."""
@@ -61,6 +74,11 @@ class WireHost(ClosedAtExit):
         """Stop serving and close what is open. Idempotent."""
         self.stopping = True
         self._loop.leave(self)
+        if self._presented is not None:
+            (simulator, url), self._presented = self._presented, None
+            simulator.watchers.remove(self.wake)
+            if simulator.url == url:
+                simulator.url = ""
 
     def begin(self, loop: ServingLoop) -> None:
         """See ``LoopHost.begin``."""

@@ -148,6 +148,9 @@ class PlcLink:
             self._over = True
 
 
+_SEVERAL_COILS: Final = 15
+"""The one function of those that are read here which this PLC does not have."""
+
 MOST_WRITES: Final = 2000
 MOST_REGISTERS_READ: Final = 125
 """What the standard allows in one read."""
@@ -320,7 +323,7 @@ class PlcSimulator(HostedDevice):
     def _answer(self, request: PlcRequest, frames: Frames, *, ignored: bool) -> bytes:
         if request.unit != self.unit:
             return frames.refusal(request, NO_SUCH_UNIT)
-        if request.table is None:
+        if request.table is None or request.function == _SEVERAL_COILS:
             return frames.refusal(request, ILLEGAL_FUNCTION)
         words = request.table in (RegisterTable.HOLDING, RegisterTable.INPUT)
         if words and request.values is None and request.count > self.most_registers:

@@ -31,7 +31,7 @@ from robolink.transport.modbus.rtu import RtuExchange, RtuLine
 from robolink.transport.modbus.tcp import TcpExchange
 from tests.soak.adversary.computer import VirtualProcess
 from tests.soak.adversary.history import CountedActs, Disturbance, Hindrance
-from tests.soak.adversary.plant.lines import BentLine, BentTransport, MailboxFrames
+from tests.soak.adversary.plant.lines import BentLine, BentTransport, TimedFrames
 from tests.soak.adversary.plant.machine import (
     USUAL_TOOL,
     MachineState,
@@ -386,7 +386,7 @@ class ModbusTcpPlant(SoftMotionPlant):
 
     def __init__(self, clock: ManualClock, tap: WireTap, seed: int) -> None:
         super().__init__(clock, tap, seed)
-        self._device = MailboxFrames(self.simulator, clock, unit=_UNIT, baud=self.baud)
+        self._device = TimedFrames(self.simulator, clock, unit=_UNIT, baud=self.baud)
 
     def link(self) -> MailboxLink:
         """Open a connection of one's own."""

@@ -13,7 +13,7 @@ from robolink_simulators.device.wire_record import MotionLog
 from robolink_simulators.faults import Departure, FaultAction, FaultPlan
 from robolink_simulators.faults.departing import DepartingReplies
 from robolink_simulators.faults.links import PLC_LINKS
-from robolink_simulators.plc.frames import (
+from robolink_simulators.hosting.modbus_frames import (
     ILLEGAL_ADDRESS,
     ILLEGAL_FUNCTION,
     ILLEGAL_VALUE,
@@ -286,7 +286,7 @@ class PlcSimulator(HostedDevice):
             >>> from pathlib import Path
             >>> from robolink.register_maps import RegisterTable, load_map
             >>> from robolink_simulators.plc import PlcSimulator
-            >>> from robolink_simulators.plc.frames import PlcRequest, TcpFrames
+            >>> from robolink_simulators.hosting.modbus_frames import PlcRequest, TcpFrames
             >>> from robolink_simulators.testkit.operator import written_map
             >>> plc, frames = PlcSimulator(load_map(written_map(Path.cwd()))), TcpFrames()
             >>> link = plc.connect(now_ns=0, frames=frames)

@@ -8,6 +8,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.transport import parse_url
 from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.hosting.modbus_frames import LineFrames
 from robolink_simulators.hosting.streams.serial_host import (
     PTY_LINE,
     LineFace,
@@ -16,7 +17,6 @@ from robolink_simulators.hosting.streams.serial_host import (
 )
 from robolink_simulators.hosting.streams.tcp_host import TcpHost
 from robolink_simulators.plc.device import PlcSimulator
-from robolink_simulators.plc.frames import LineFrames
 
 _DEFAULT_UNIT: Final = 1
 _SIMULATED: Final = "&simulated=yes"

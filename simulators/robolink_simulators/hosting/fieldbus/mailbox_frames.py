@@ -9,7 +9,7 @@ from robolink_simulators.faults import LinkKind, PlcFault, PlcFaultAction
 from robolink_simulators.faults.departing import DepartingReplies
 from robolink_simulators.faults.plan import LinkEnd
 from robolink_simulators.hosting.fieldbus.plc_registers import WORD_BITS, PlcRegisters
-from robolink_simulators.plc.frames import (
+from robolink_simulators.hosting.modbus_frames import (
     ILLEGAL_ADDRESS,
     ILLEGAL_FUNCTION,
     Frames,

@@ -10,8 +10,8 @@ from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.faults import Fault, FaultAction
 from robolink_simulators.hosting.in_process.transport import LinePort
+from robolink_simulators.hosting.modbus_frames import decode
 from robolink_simulators.plc.device import PlcSimulator
-from robolink_simulators.plc.frames import decode
 from robolink_simulators.plc.serving import line_face
 
 from robolink.controllers.plc_map.controller import PlcMapController

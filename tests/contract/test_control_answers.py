@@ -8,7 +8,7 @@ from urllib.parse import urlencode, urlsplit
 
 import pytest
 from robolink_simulators.cell.clock import ManualClock, SteeredClock
-from robolink_simulators.control.acts.registry import ACTS
+from robolink_simulators.control.acts import ACTS
 from robolink_simulators.control.cell import AnySimulator, ControlledCell
 from robolink_simulators.control.openapi import AnswerSchemas
 from robolink_simulators.control.server import ControlServer

@@ -14,8 +14,8 @@ import pytest
 from robolink_cli import main
 from robolink_simulators.cell.clock import ManualClock, SteeredClock
 from robolink_simulators.control import http_port
-from robolink_simulators.control.acts import wire
-from robolink_simulators.control.acts.registry import ACTS
+from robolink_simulators.control import wire_acts as wire
+from robolink_simulators.control.acts import ACTS
 from robolink_simulators.control.cell import ControlledCell
 from robolink_simulators.control.client import ControlClient
 from robolink_simulators.control.http_port import LONGEST_REQUEST, MOST_CLIENTS

@@ -31,10 +31,10 @@ from robolink_simulators.client_errors import (
     is_silent,
     nobody_listens,
 )
-from robolink_simulators.control.acts.declared import Answer, Given
-from robolink_simulators.control.acts.registry import MACHINE_REFUSALS, defect, machine_refusal
-from robolink_simulators.control.acts.registry import perform as perform_act
+from robolink_simulators.control.acts import MACHINE_REFUSALS, defect, machine_refusal
+from robolink_simulators.control.acts import perform as perform_act
 from robolink_simulators.control.cell import AnySimulator, ControlledCell, drawn_token, is_token
+from robolink_simulators.control.declared_acts import Answer, Given
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process import epson as in_process
 from robolink_simulators.hosting.in_process import softmotion as plc_in_process

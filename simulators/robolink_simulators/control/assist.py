@@ -138,7 +138,6 @@ class AssistHost(TcpHost):
     """A listening assist port; its URL holds the token."""
 
     def __init__(self, simulator: Assisted, port: int, clock: ScaledClock, token: str) -> None:
-        self._token = token
         self._assisting = _AssistDevice(simulator, clock, token)
         super().__init__(
             self._assisting,
@@ -147,16 +146,12 @@ class AssistHost(TcpHost):
             clock=clock,
             lock=simulator.lock,
         )
+        self.url = self.url.replace("://", f"://{token}@")
 
     @property
     def requests(self) -> int:
         """How many lines came, of whomever."""
         return self._assisting.requests
-
-    @property
-    def url(self) -> str:
-        """Where clients connect to, with what lets them in."""
-        return super().url.replace("://", f"://{self._token}@")
 
 
 def serve_assist(

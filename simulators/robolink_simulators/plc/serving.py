@@ -61,7 +61,6 @@ class PlcHost(TcpHost):
         *,
         allow_remote: bool,
     ) -> None:
-        self._options = f"?unit={simulator.unit}&{_map_option(map_file)}"
         super().__init__(
             simulator,
             "plc+modbus-tcp",
@@ -70,14 +69,10 @@ class PlcHost(TcpHost):
             lock=simulator.lock,
             allow_remote=allow_remote,
         )
-        self.present(simulator)
-
-    @property
-    def url(self) -> str:
-        """Where clients connect to, with the unit and the map."""
-        url = super().url + self._options
+        self.url += f"?unit={simulator.unit}&{_map_option(map_file)}"
         # What leads out of this computer may lead to a machine, and says nothing of itself.
-        return url + _SIMULATED if parse_url(url).stays_here else url
+        self.url += _SIMULATED if parse_url(self.url).stays_here else ""
+        self.present(simulator)
 
 
 class PlcLineHost(LineHost):

@@ -25,7 +25,6 @@ class ModbusTcpHost(TcpHost):
         allow_remote: bool,
     ) -> None:
         self._frames = MailboxFrames(simulator, clock)
-        self._options = _query(_client_options(simulator.options.mailbox))
         super().__init__(
             self._frames,
             "softmotion+modbus-tcp",
@@ -34,14 +33,9 @@ class ModbusTcpHost(TcpHost):
             lock=simulator.lock,
             allow_remote=allow_remote,
         )
-        self._address = address[0], self._address[1]
+        self.url = self.url_at(address[0]) + _query(_client_options(simulator.options.mailbox))
         self.present(simulator, self.url)
         simulator.url = simulator.url or self.url
-
-    @property
-    def url(self) -> str:
-        """Where clients connect to, with what they must be told."""
-        return super().url + self._options
 
     def wake(self) -> None:
         """Have the PLC looked at again; any thread may call it."""
@@ -82,7 +76,7 @@ def serve_modbus_tcp(
     *,
     clock: ScaledClock | None = None,
     allow_remote: bool = False,
-) -> ModbusHost:
+) -> ModbusTcpHost:
     """Serve a PLC over Modbus TCP; every unit is answered.
 
     Args:
@@ -106,7 +100,7 @@ def serve_modbus_rtu(
     unit: int = _DEFAULT_UNIT,
     baud: int = 0,
     clock: ScaledClock | None = None,
-) -> ModbusHost:
+) -> ModbusLineHost:
     """Serve a PLC over Modbus RTU on a pseudo terminal; other units are not answered.
 
     Args:

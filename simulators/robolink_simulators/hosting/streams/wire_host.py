@@ -29,12 +29,14 @@ class WireHost(ClosedAtExit):
         lock: Held while the device is touched.
 
     Attributes:
+        url: Where a client finds the device.
         stopping: Whether it is served no more.
         due_s: See ``LoopHost``.
         queued_s: See ``LoopHost``.
     """
 
     _loop: ServingLoop
+    url: str
 
     def __init__(
         self, device: WireDevice, *, clock: ScaledClock, lock: AbstractContextManager[object]

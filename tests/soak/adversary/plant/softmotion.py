@@ -10,7 +10,6 @@ from robolink_simulators.cell.frames import Frame
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.faults import PlcFault, PlcFaultAction
 from robolink_simulators.faults.fieldbus import Order
-from robolink_simulators.hosting.in_process.canopen_bus import SteppedCan
 from robolink_simulators.hosting.in_process.mailbox_link import InProcessMailboxLink
 from robolink_simulators.hosting.in_process.transport import LinePort
 from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
@@ -39,6 +38,7 @@ from tests.soak.adversary.plant.machine import (
     WireTap,
 )
 from tests.soak.adversary.plant.mailbox_tap import TappedMailboxLink, another_clients
+from tests.soak.adversary.plant.stepped_can import SteppedCan
 
 _TOKEN: Final = 0x50C0_0001
 _PATIENCE_NS: Final = 60_000_000

@@ -1,6 +1,6 @@
 """The control API as an OpenAPI document, made from the declared acts.
 
-``python -m robolink_simulators.control.openapi`` prints it; the wheel holds it as
+``python -m tools.openapi`` prints it; the wheel holds it as
 ``robolink_simulators/control/openapi.json``, and every control port serves it.
 """
 

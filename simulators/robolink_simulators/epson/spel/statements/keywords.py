@@ -132,7 +132,7 @@ def _where(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     arguments, session = command.taking(0, 1), evaluator.session
     machine = session.machine
     local = evaluator.integer(arguments[0]) if arguments else 0
-    here = machine.locals.convert(machine.here(), local)
+    here = machine.locals.convert(machine.robot.here(), local)
     joints = machine.arm.joints
     printed = PrintedWhere(here.coordinates, tuple(joints), tuple(pulses_of(machine, joints)))
     linear = machine.model.linear_joints

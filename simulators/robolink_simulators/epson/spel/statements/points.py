@@ -34,7 +34,7 @@ def point_argument(evaluator: Evaluator, arguments: tuple[Expression, ...]) -> P
 def _here(evaluator: Evaluator, command: KeywordStatement) -> str:
     (target,) = command.taking(1)
     machine = evaluator.session.machine
-    machine.points.store(evaluator.stored_number(target), machine.here())
+    machine.points.store(evaluator.stored_number(target), machine.robot.here())
     return ""
 
 

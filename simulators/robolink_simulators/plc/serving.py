@@ -11,7 +11,7 @@ from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.hosting.modbus_frames import LineFrames
 from robolink_simulators.hosting.streams.serial_host import (
     PTY_LINE,
-    LineFace,
+    DeviceOnLine,
     LineHost,
     no_pseudo_terminal,
 )
@@ -83,7 +83,7 @@ class PlcLineHost(LineHost):
     """
 
     def __init__(self, simulator: PlcSimulator, map_file: Path, clock: ScaledClock) -> None:
-        super().__init__(line_face(simulator), clock=clock, lock=simulator.lock)
+        super().__init__(plc_on_line(simulator), clock=clock, lock=simulator.lock)
         options = dict(PTY_LINE)
         if simulator.unit != _DEFAULT_UNIT:
             options["unit"] = str(simulator.unit)
@@ -91,9 +91,9 @@ class PlcLineHost(LineHost):
         simulator.keep_time(clock)
 
 
-def line_face(simulator: PlcSimulator) -> LineFace:
+def plc_on_line(simulator: PlcSimulator) -> DeviceOnLine:
     """Return the PLC as a line sees it."""
-    return LineFace(simulator, lambda now_ns: simulator.connect(now_ns, LineFrames()))
+    return DeviceOnLine(simulator, lambda now_ns: simulator.connect(now_ns, LineFrames()))
 
 
 def serve_plc(

@@ -7,7 +7,11 @@ from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import serial_dialect
 from robolink_simulators.epson.spel.parser import prepare
-from robolink_simulators.hosting.streams.serial_host import LineFace, LineHost, no_pseudo_terminal
+from robolink_simulators.hosting.streams.serial_host import (
+    DeviceOnLine,
+    LineHost,
+    no_pseudo_terminal,
+)
 from robolink_simulators.hosting.streams.tcp_host import TcpHost as TcpHost
 
 _SHOWN_BAUD = 115_200
@@ -44,7 +48,7 @@ class EpsonLineHost(LineHost):
     """
 
     def __init__(self, simulator: EpsonSimulator, *, clock: ScaledClock, baud: int) -> None:
-        face = LineFace(simulator, simulator.connect_serial)
+        face = DeviceOnLine(simulator, simulator.connect_serial)
         super().__init__(face, clock=clock, lock=simulator.lock, baud=baud)
         prepare()
         options = {"baud": str(baud or _SHOWN_BAUD), **_told(serial_dialect(simulator.options))}

@@ -80,7 +80,7 @@ def no_pseudo_terminal(error: Exception) -> ConnectError:
     )
 
 
-class LineFace:
+class DeviceOnLine:
     """A device as a serial line shows it; see ``hosting.addresses.WireDevice``.
 
     Args:

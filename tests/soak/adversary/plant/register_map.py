@@ -12,7 +12,7 @@ from robolink_simulators.faults import Fault, FaultAction
 from robolink_simulators.hosting.in_process.transport import LinePort
 from robolink_simulators.hosting.modbus_frames import decode
 from robolink_simulators.plc.device import PlcSimulator
-from robolink_simulators.plc.serving import line_face
+from robolink_simulators.plc.serving import plc_on_line
 
 from robolink.controllers.plc_map.controller import PlcMapController
 from robolink.model import Controller, OutcomeLog, ToolOffset
@@ -110,7 +110,7 @@ class RegisterMapPlant(PlantMachine):
     def __init__(self, clock: ManualClock, tap: WireTap, seed: int) -> None:
         super().__init__(clock, tap)
         self._simulator = PlcSimulator(_register_map(), unit=_UNIT, seed=seed)
-        self._port = LinePort(line_face(self._simulator))
+        self._port = LinePort(plc_on_line(self._simulator))
         self._line = BentLine()
         self._open: dict[int, ModbusClient] = {}
 

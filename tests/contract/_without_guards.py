@@ -150,7 +150,7 @@ def _previewed(table: Any, tool: int, offset: ToolOffset) -> tuple[str, ...]:
 def _unguarded(_statement: object, text: str) -> str:
     """Run a statement as it was typed, and tell nobody."""
     reply: Any = _statement
-    return str(reply._link.session.execute(text).text or "")
+    return str(reply._link.session.exchange("Execute", text).text or "")
 
 
 def _settled_unread(_settler: object, marker: Any) -> Any:

@@ -67,7 +67,10 @@ DEFECTS: Final = (
     ),
     KnownDefect(
         "a stop is looked for before the lock of the exchange, not under it",
-        {f"{_SESSION}._exchanging": stand_ins.asked_before_the_lock},
+        {
+            f"{_SESSION}._announced": stand_ins.asked_before_the_lock,
+            f"{_SESSION}._admit": stand_ins.admitted_unasked,
+        },
         CellKind.EPSON,
         found_by=_THREAD,
     ),

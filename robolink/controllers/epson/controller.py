@@ -5,13 +5,13 @@ from functools import cached_property
 from typing import ClassVar
 
 from robolink.controllers.controller_core import ControllerCore
-from robolink.controllers.epson.answers import NOT_EXECUTED
+from robolink.controllers.epson.answers import NOT_EXECUTED, may_log_out
 from robolink.controllers.epson.condition import ConditionReader, EpsonAlarms
 from robolink.controllers.epson.group import EpsonActs, EpsonGroup
 from robolink.controllers.epson.line import EpsonLine, open_line
 from robolink.controllers.epson.link import EpsonLink, FactReader
 from robolink.controllers.epson.preserve import EpsonPreserver, EpsonResolver, PendingValues
-from robolink.controllers.epson.session import EpsonSession, command_class_of
+from robolink.controllers.epson.session import EpsonSession, command_class_of, execution, log_in
 from robolink.controllers.epson.singularities import EpsonPoints
 from robolink.controllers.epson.tools import EpsonToolTable, PublishedReader, PublishedTools
 from robolink.controllers.epson.values import EpsonIo, EpsonVariables
@@ -40,7 +40,7 @@ from robolink.model import (
     Spot,
     require_engineer,
 )
-from robolink.protocols.epson_text import Preference, Refusal, Reply, Request
+from robolink.protocols.epson_text import Preference, Refusal, Reply
 from robolink.protocols.spel import Statement
 from robolink.stop_latch import CommandClass
 from robolink.transport import LinkUrl
@@ -62,11 +62,10 @@ class EpsonController(ControllerCore):
     Example:
         >>> from robolink.controllers import EpsonController
         >>> from robolink.controllers.epson.line import open_line
-        >>> from robolink.controllers.epson.session import EpsonSession
+        >>> from robolink.controllers.epson.session import log_in
         >>> from robolink.journal import memory_journal
         >>> line = open_line("epson+sim://session-example", timeout_s=1)
-        >>> session = EpsonSession(line, timeout_s=1)
-        >>> session.login(None)
+        >>> session = log_in(line, None, timeout_s=1)
         >>> outcomes = memory_journal("session-example").log("session-example")
         >>> with EpsonController(session, outcomes, remote_timeout_s=60) as controller:
         ...     controller.status().ready
@@ -247,16 +246,10 @@ class EpsonController(ControllerCore):
         return self._link.window.status()
 
     def _take_leave(self) -> None:
-        """Abort what nobody waited on, and log out where that does no harm.
-
-        Logging out while a task runs raises an error on the controller
-        (docs/reference/epson.md 1.1), so the connection is just closed then. So it is when another
-        device starts the cell: a task could begin between the look and the logout.
-        """
+        """Abort what nobody waited on, and log out where that does no harm."""
         if self._link.session.alive:
             self.groups[0].abort_unfinished()
-            status = self.status()
-            if status.remote and not (status.running or status.paused):
+            if may_log_out(self.status()):
                 self._link.session.exchange("Logout")
 
     def _close_link(self) -> None:
@@ -321,16 +314,7 @@ def open_epson(
         ...     controller.tools.indices()[-1]
         15
     """
-    session = EpsonSession(line, timeout_s=timeout_s)
-    try:
-        session.login(password)
-        if session.outlived:
-            from robolink.controllers.epson.session import prove_in_step
-
-            prove_in_step(session)
-    except BaseException:
-        session.close()
-        raise
+    session = log_in(line, password, timeout_s=timeout_s)
     return EpsonController(session, outcomes, remote_timeout_s=remote_timeout_s)
 
 
@@ -350,7 +334,7 @@ class RawStatements:
             # Before an engineer's word for it goes on record.
             self._link.markers.require_settled(statement)
             self._link.window.require_ready(statement)
-            if command_class_of(Request("Execute", (statement,))) is CommandClass.ACT:
+            if command_class_of(execution(statement)) is CommandClass.ACT:
                 self._link.window.require_abort(statement)
             require_engineer(
                 self._link.markers.outcomes, tr("run {statement!r} as typed", statement=statement)
@@ -360,7 +344,7 @@ class RawStatements:
                 self._link.forget_robot()
                 with self._link.markers.doubt(statement):
                     with self._link.markers.unless_stopped(marker):
-                        answer = self._link.session.execute(statement)
+                        answer = self._link.session.ask(execution(statement))
                     self._check(statement, answer, marker)
                 self._link.markers.ledger.proved(marker, None)
                 printed = answer.text or "" if isinstance(answer, Reply) else ""

@@ -1,19 +1,38 @@
-"""The line to a controller: its bytes, and the frames in which both ends speak.
+"""The line to a controller, and the one conversation that is held on it.
 
 Over TCP, and in process, that is Remote Ethernet; on a serial line Remote RS232, whose frames are
-loaded only there, since a stop is timed (docs/decisions/0017).
-What an unanswered or a refused login means stands here too: a stop needs nothing else of the
-answers.
+loaded only there, since a stop is timed (docs/decisions/0017). For the same reason a refusal is
+put into words by a module that is loaded when one comes.
+
+A stop holds the conversation as it stands here: it has no record beside it, nothing of its own can
+be pending, and what turns up unasked, such as the late answer to the Execute that it ends, is
+passed over. A session (:mod:`robolink.controllers.epson.session`) takes nothing unasked but the
+answer to its own Execute, and adds the lock and the latch.
 """
 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Protocol
 
-from robolink.errors import LoginRefusedError, LoginUnansweredError, RejectedError
+from robolink.errors import (
+    LoginRefusedError,
+    LoginUnansweredError,
+    RejectedError,
+    RemoteProtocolError,
+    TransportBrokenError,
+    TransportTimeoutError,
+)
 from robolink.messages import tr
-from robolink.protocols import Role
-from robolink.protocols.epson_text import EpsonTextCodec, ErrorCode, Event
-from robolink.timing import Clock
+from robolink.protocols import NEED_DATA, Role
+from robolink.protocols.epson_text import (
+    EndOfStream,
+    EpsonTextCodec,
+    ErrorCode,
+    Event,
+    Refusal,
+    Reply,
+    Request,
+)
+from robolink.timing import Clock, Deadline
 from robolink.transport import LinkUrl, TraceSink, TracingTransport, Transport, open_transport
 from robolink.ways import Way, way
 
@@ -135,12 +154,161 @@ def _turned_on(transport: Transport, dialect: "Dialect") -> EpsonLine:
     return EpsonLine(transport, codec, outlives_sessions=True)
 
 
-PASSWORD_REFUSALS: Final = (13, 98)
+_PASSWORD_REFUSALS: Final = (13, 98)
 """The password is wrong, or one is demanded (docs/reference/epson.md 1.6)."""
 
+_STRAYS: Final = 16
+"""As many answers to questions that nobody asked are no controller's."""
 
-def unanswered(controller: str) -> LoginUnansweredError:
-    """Return the error for a controller that is reached and does not answer the login."""
+
+class EpsonConversation:
+    """Requests and answers on one line, one after the other.
+
+    Attributes:
+        identity: Which controller this is.
+        clock: The clock on which the controller's time passes.
+        timeout_s: Longest wait for the answer to one request that moves nothing.
+        exchanges: Requests sent so far.
+
+    Args:
+        line: An open line; it is owned from here on.
+        timeout_s: See above.
+    """
+
+    def __init__(self, line: EpsonLine, *, timeout_s: float) -> None:
+        self._line = line
+        self._codec = line.codec
+        self._transport = line.transport
+        self.identity, self.clock = line.transport.identity, line.transport.clock
+        self.timeout_s = timeout_s
+        self.exchanges = 0
+        self._passed_over = 0
+
+    def login(self, password: str) -> None:
+        """Log in, with an empty password where none is set. One attempt.
+
+        Raises:
+            LoginRefusedError: The password is wrong (13) or one is demanded (98).
+            LoginUnansweredError: No answer; most likely another client is logged in.
+        """
+        try:
+            answer = self.ask(Request("Login", (password,)), secret=True)
+        except (TransportTimeoutError, TransportBrokenError) as error:
+            raise _unanswered(self.identity) from error
+        if isinstance(answer, Refusal):
+            self.close()
+            if answer.code in _PASSWORD_REFUSALS:
+                raise _refused(answer.code, self.identity)
+            raise self._rejected(answer, "Login")
+
+    def exchange(self, name: str, *parameters: str) -> Reply:
+        """Send one request and return its answer.
+
+        Raises:
+            RejectedError: The controller refused; it did not act.
+            BusyError: An Execute is running and this request is not legal meanwhile.
+            TransportError, RemoteProtocolError: The conversation is over.
+        """
+        answer = self.ask(Request(name, parameters))
+        if isinstance(answer, Refusal):
+            raise self._rejected(answer, name)
+        return answer
+
+    def ask(self, request: Request, *, secret: bool = False) -> Reply | Refusal:
+        """Send one request and return whatever was answered.
+
+        Args:
+            request: It moves nothing, so that its answer comes within the time-out.
+            secret: Whether the traces may not see it.
+        """
+        self._line.require_carried(request.name, *request.parameters)
+        self._passed_over = 0
+        return self._put(request, secret=secret)
+
+    def close(self) -> None:
+        """Close the connection. Idempotent."""
+        self._transport.close()
+
+    def _put(self, request: Request, *, secret: bool) -> Reply | Refusal:
+        """Send a request that this line carries, and read until its answer has come."""
+        data = self._codec.send(request)
+        deadline = Deadline.after(self.clock, self.timeout_s)
+        self._transport.send(data, deadline=deadline, secret=secret)
+        self.exchanges += 1
+        wanted = request.name.lower()
+        while True:
+            try:
+                data = self._transport.receive(deadline=deadline)
+            except TransportTimeoutError as error:
+                self._require_none_held(request, error)
+                raise
+            self._codec.receive_data(data)
+            while (event := self._codec.next_event()) is not NEED_DATA:
+                if isinstance(event, (Reply, Refusal)) and self._answers(event, wanted):
+                    return event
+                # A login that was bent on its way comes back in its refusal, password and all.
+                self._take_aside(event, hidden=wanted == "login")
+
+    def _require_none_held(self, request: Request, error: TransportTimeoutError) -> None:
+        """Say where a time-out cut an answer: the controller is there, unlike without any."""
+        if held := self._codec.bytes_held:
+            raise TransportTimeoutError(
+                tr(
+                    "{identity} answered {count} bytes, then nothing: {request}.",
+                    identity=self.identity,
+                    count=len(held),
+                    request=as_shown(request),
+                ),
+                remedy=error.remedy,
+                controller=self.identity,
+                request=as_shown(request),
+                raw=held,
+            ) from error
+
+    def _answers(self, event: Reply | Refusal, wanted: str) -> bool:
+        """Whether it answers the request of that name, in small letters.
+
+        A refusal may come without a readable name (docs/reference/epson.md 1.6, unverified).
+        """
+        name = event.name.lower()
+        return name == wanted or (isinstance(event, Refusal) and not name)
+
+    def _take_aside(self, event: object, *, hidden: bool = False) -> None:  # noqa: ARG002 - not shown
+        """Pass over what is no answer to the request that is out.
+
+        Args:
+            event: What it is.
+            hidden: Whether it may hold a password.
+        """
+        if isinstance(event, EndOfStream):
+            raise self._closed_by_far_end()
+        self._passed_over += 1
+        if self._passed_over >= _STRAYS:
+            raise RemoteProtocolError(
+                tr("{identity} sent an answer to a question nobody asked.", identity=self.identity),
+                remedy=tr("Look for a second program on this controller."),
+                controller=self.identity,
+            )
+
+    def _rejected(self, refusal: Refusal, name: str) -> RejectedError:
+        from robolink.controllers.epson.answers import rejected
+
+        return rejected(refusal, controller=self.identity, request=name)
+
+    def _closed_by_far_end(self) -> TransportBrokenError:
+        return TransportBrokenError(
+            tr("{identity} closed the connection.", identity=self.identity),
+            remedy=tr("Check cable, power and remote time-out of the controller, then try again."),
+            controller=self.identity,
+        )
+
+
+def as_shown(request: Request) -> str:
+    """Return a request as a person may read it. Never the parameters of a login."""
+    return request.parameters[0] if request.name == "Execute" else request.name
+
+
+def _unanswered(controller: str) -> LoginUnansweredError:
     return LoginUnansweredError(
         tr("{identity} can be reached, but does not answer the login.", identity=controller),
         remedy=tr(
@@ -152,8 +320,7 @@ def unanswered(controller: str) -> LoginUnansweredError:
     )
 
 
-def refused(code: int, controller: str) -> LoginRefusedError:
-    """Return the error for a password that the controller does not take."""
+def _refused(code: int, controller: str) -> LoginRefusedError:
     return LoginRefusedError(
         tr("The controller refused the login (code {code}).", code=code),
         code=code,

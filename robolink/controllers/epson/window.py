@@ -10,7 +10,7 @@ from robolink.controllers.epson.answers import (
     require_ready,
     status_from_flags,
 )
-from robolink.controllers.epson.session import EpsonSession
+from robolink.controllers.epson.session import EpsonSession, execution
 from robolink.errors import (
     ControllerFaultError,
     NotReadyError,
@@ -112,7 +112,7 @@ class CommandWindow:
             ControllerFaultError: It failed and put the controller in error.
             UnclearAnswerError: The answer says neither.
         """
-        self.check(statement, self._session.execute(statement))
+        self.check(statement, self._session.ask(execution(statement)))
 
     def printed(self, query: Statement, *, may_be_nothing: bool = False) -> str:
         """Run a statement that prints, and return what it printed.
@@ -124,7 +124,7 @@ class CommandWindow:
         Raises:
             RejectedError, ControllerFaultError: As for :meth:`command`.
         """
-        answer = self._session.execute(query)
+        answer = self._session.ask(execution(query))
         if isinstance(answer, Reply) and answer.text is not None:
             # A failed statement may be answered by a text too; the flags would show it.
             if not answer.text.lstrip().startswith("!"):

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from robolink.controllers.epson.controller import EpsonController
-from robolink.controllers.epson.session import EpsonSession
+from robolink.controllers.epson.session import EpsonSession, execution
 from robolink.controllers.epson.window import CommandWindow
 from robolink.errors import ControllerError, RejectedError
 from robolink.model import ControllerFacts
@@ -181,7 +181,7 @@ class Interview:
         """
         if self.why_no_statement():
             return None
-        answer = self._session.execute(query)
+        answer = self._session.ask(execution(query))
         if isinstance(answer, Reply) and answer.fields == ("0",):
             return ""
         if isinstance(answer, Reply) and answer.text is not None:

@@ -86,7 +86,7 @@ def test_the_late_end_of_an_execute_does_not_disturb_a_stop(serve):
 @pytest.mark.remote_ethernet
 def test_who_does_not_say_who_it_is_is_logged_out_all_the_same(serve):
     simulator = EpsonSimulator(seed=7)
-    met = []
+    met: list[str] = []
     with serve(simulator) as cell:
         simulator.faults.add(Fault(FaultAction.DROP_REPLY, match="GetContNo"))
         assert stop_now(cell.url, timeout_s=0.2, met=met.append).ready

@@ -3,6 +3,8 @@
 Against one that answers as it is told.
 """
 
+from typing import Any
+
 import pytest
 from robolink_simulators.cell.clock import ManualClock
 
@@ -114,6 +116,10 @@ class Wire:
         return self._pieces.pop(0)
 
 
+def over(wire: Any) -> EpsonConversation:
+    return EpsonConversation(text_line(wire), timeout_s=1.0)
+
+
 LATE = b"#Execute,0\r\n"
 
 
@@ -121,14 +127,14 @@ LATE = b"#Execute,0\r\n"
 @pytest.mark.parametrize("answer", [b"#Abort,0\r\n", b"#ABORT,0\r\n"])
 def test_a_stop_passes_over_what_it_did_not_ask_for(answer):
     wire = Wire(LATE * 15 + answer)
-    reply = EpsonConversation(text_line(wire), timeout_s=1.0).exchange("Abort")
+    reply = over(wire).exchange("Abort")
     assert (reply.name.lower(), reply.fields) == ("abort", ("0",))
     assert wire.sent == [b"$Abort\r\n"]
 
 
 def test_who_only_ever_answers_something_else_is_no_controller():
     wire = Wire(LATE * 8, LATE * 8, b"#Abort,0\r\n")
-    conversation = EpsonConversation(text_line(wire), timeout_s=1.0)
+    conversation = over(wire)
     with pytest.raises(RemoteProtocolError, match="a question nobody asked"):
         conversation.exchange("Abort")
     # The next request has its own count, and what came late is none of its answers.
@@ -137,11 +143,11 @@ def test_who_only_ever_answers_something_else_is_no_controller():
 
 def test_a_refusal_without_a_name_is_the_answer_to_a_stop():
     with pytest.raises(RejectedError, match="refused Stop with code 20") as refused:
-        EpsonConversation(text_line(Wire(b"!,20\r\n")), timeout_s=1.0).exchange("Stop")
+        over(Wire(b"!,20\r\n")).exchange("Stop")
     assert (refused.value.code, refused.value.request) == (20, "Stop")
 
 
 def test_half_an_answer_to_a_stop_is_told_from_none():
     wire = Wire(b"#Abo")
     with pytest.raises(TransportTimeoutError, match="answered 4 bytes, then nothing: Abort"):
-        EpsonConversation(text_line(wire), timeout_s=1.0).exchange("Abort")
+        over(wire).exchange("Abort")

@@ -11,7 +11,7 @@ answer to its own Execute, and adds the lock and the latch.
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import TYPE_CHECKING, Final
 
 from robolink.errors import (
     LoginRefusedError,
@@ -25,9 +25,9 @@ from robolink.messages import tr
 from robolink.protocols import NEED_DATA, Role
 from robolink.protocols.epson_text import (
     EndOfStream,
+    EpsonCodec,
     EpsonTextCodec,
     ErrorCode,
-    Event,
     Refusal,
     Reply,
     Request,
@@ -44,26 +44,6 @@ SERIAL: Final = "serial"
 """The medium of Remote RS232."""
 
 
-class LineCodec(Protocol):
-    """What cuts the bytes of a line into events, and makes bytes of them."""
-
-    @property
-    def bytes_held(self) -> bytes:
-        """What has arrived and is part of no event yet."""
-
-    def carries(self, name: str, *parameters: str) -> bool:
-        """Whether a command can be sent, with these parameters where any are given."""
-
-    def send(self, event: Event) -> bytes:
-        """Return the bytes of one message."""
-
-    def receive_data(self, data: bytes) -> None:
-        """Take what was received; ``b""`` means that the far side closed."""
-
-    def next_event(self) -> object:
-        """Return the next event, or ``NEED_DATA``."""
-
-
 @dataclass(frozen=True, slots=True)
 class EpsonLine:
     """An open line.
@@ -75,7 +55,7 @@ class EpsonLine:
     """
 
     transport: Transport
-    codec: LineCodec
+    codec: EpsonCodec
     outlives_sessions: bool = False
 
     def require_carried(self, name: str, *parameters: str) -> None:

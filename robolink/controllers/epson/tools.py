@@ -213,51 +213,41 @@ class PublishedTools:
     publication: int
 
 
-class PublishedReader:
-    """Reads the companion's variables, and a torn table again."""
+def read_published(variables: EpsonVariables) -> PublishedTools | None:
+    """Read the companion's variables, and a torn table again.
 
-    def __init__(self, variables: EpsonVariables) -> None:
-        self._variables = variables
+    Returns:
+        The table, ``None`` where the project publishes none.
 
-    def read(self) -> PublishedTools | None:
-        """Return the table, ``None`` where the project publishes none.
+    Raises:
+        ToolError: It was being changed at every attempt, or was arranged by another
+            version of the companion.
+        RejectedError: The controller refused for another reason.
+    """
 
-        Raises:
-            ToolError: It was being changed at every attempt, or was arranged by another
-                version of the companion.
-            RejectedError: The controller refused for another reason.
-        """
-        try:
-            for _ in range(_ATTEMPTS):
-                # The program counts up the one before and the other after it changes the
-                # table; read the other way about, equal counts enclose a whole table.
-                publication = self._whole(_END)
-                state = self._wholes()
-                table = self._numbers()
-                if self._whole(_BEGIN) == publication:
-                    return _understood(publication, state, table)
-        except RejectedError as error:
-            if error.code == ErrorCode.NO_SUCH_VARIABLE:
-                return None
-            raise
-        raise ToolError(
-            tr("The published tool table was being changed at each of {n} readings.", n=_ATTEMPTS),
-            remedy=tr(
-                "Try again. If it stays so, the program was stopped in the middle of "
-                "RobolinkPublish; its next call puts that right."
-            ),
-        )
+    def whole(name: str) -> int:
+        return int(variables.read(name, VariableType.LONG))
 
-    def _whole(self, name: str) -> int:
-        return int(self._variables.read(name, VariableType.LONG))
-
-    def _wholes(self) -> tuple[int, ...]:
-        values = self._variables.read_array(_STATE, (0,), VariableType.LONG, count=_STATE_COUNT)
-        return tuple(int(value) for value in values)
-
-    def _numbers(self) -> tuple[float, ...]:
-        values = self._variables.read_array(_TABLE, (0,), VariableType.DOUBLE, count=_TABLE_COUNT)
-        return tuple(float(value) for value in values)
+    try:
+        for _ in range(_ATTEMPTS):
+            # The program counts up the one before and the other after it changes the
+            # table; read the other way about, equal counts enclose a whole table.
+            publication = whole(_END)
+            state = variables.read_array(_STATE, (0,), VariableType.LONG, count=_STATE_COUNT)
+            table = variables.read_array(_TABLE, (0,), VariableType.DOUBLE, count=_TABLE_COUNT)
+            if whole(_BEGIN) == publication:
+                return _understood(publication, tuple(map(int, state)), tuple(map(float, table)))
+    except RejectedError as error:
+        if error.code == ErrorCode.NO_SUCH_VARIABLE:
+            return None
+        raise
+    raise ToolError(
+        tr("The published tool table was being changed at each of {n} readings.", n=_ATTEMPTS),
+        remedy=tr(
+            "Try again. If it stays so, the program was stopped in the middle of "
+            "RobolinkPublish; its next call puts that right."
+        ),
+    )
 
 
 def _understood(

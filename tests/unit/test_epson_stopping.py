@@ -133,7 +133,7 @@ def test_a_stop_passes_over_what_it_did_not_ask_for(answer):
 
 
 def test_who_only_ever_answers_something_else_is_no_controller():
-    wire = Wire(LATE * 8, LATE * 8, b"#Abort,0\r\n")
+    wire = Wire(LATE * 8, LATE * 8, LATE + b"#Abort,0\r\n")
     conversation = over(wire)
     with pytest.raises(RemoteProtocolError, match="a question nobody asked"):
         conversation.exchange("Abort")

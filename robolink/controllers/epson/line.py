@@ -148,7 +148,6 @@ class EpsonConversation:
         identity: Which controller this is.
         clock: The clock on which the controller's time passes.
         timeout_s: Longest wait for the answer to one request that moves nothing.
-        exchanges: Requests sent so far.
 
     Args:
         line: An open line; it is owned from here on.
@@ -161,7 +160,6 @@ class EpsonConversation:
         self._transport = line.transport
         self.identity, self.clock = line.transport.identity, line.transport.clock
         self.timeout_s = timeout_s
-        self.exchanges = 0
         self._passed_over = 0
 
     def login(self, password: str) -> None:
@@ -203,18 +201,17 @@ class EpsonConversation:
         """
         self._line.require_carried(request.name, *request.parameters)
         self._passed_over = 0
-        return self._put(request, secret=secret)
+        data = self._codec.send(request)
+        deadline = Deadline.after(self.clock, self.timeout_s)
+        self._transport.send(data, deadline=deadline, secret=secret)
+        return self._receive(request, deadline)
 
     def close(self) -> None:
         """Close the connection. Idempotent."""
         self._transport.close()
 
-    def _put(self, request: Request, *, secret: bool) -> Reply | Refusal:
-        """Send a request that this line carries, and read until its answer has come."""
-        data = self._codec.send(request)
-        deadline = Deadline.after(self.clock, self.timeout_s)
-        self._transport.send(data, deadline=deadline, secret=secret)
-        self.exchanges += 1
+    def _receive(self, request: Request, deadline: Deadline) -> Reply | Refusal:
+        """Read until the answer to a request that was sent has come."""
         wanted = request.name.lower()
         while True:
             try:

@@ -120,6 +120,7 @@ class EpsonSession(EpsonConversation):
 
     Attributes:
         place: Where it was reached, the same for each spelling of the URL.
+        exchanges: Requests sent so far.
         latch: What holds requests back while a stop is in force.
 
     Args:
@@ -130,6 +131,7 @@ class EpsonSession(EpsonConversation):
     def __init__(self, line: EpsonLine, *, timeout_s: float = 3.0) -> None:
         super().__init__(line, timeout_s=timeout_s)
         self.place = line.transport.place
+        self.exchanges = 0
         self._wire = ambient.lock()
         self._gate = InterruptGate()
         self._gate.open()
@@ -159,7 +161,11 @@ class EpsonSession(EpsonConversation):
                 self._admit(request, what)
                 try:
                     self._expect_silence()
-                    return self._put(request, secret=secret)
+                    data = self._codec.send(request)
+                    deadline = Deadline.after(self.clock, self.timeout_s)
+                    self._transport.send(data, deadline=deadline, secret=secret)
+                    self.exchanges += 1
+                    return self._receive(request, deadline)
                 except RobolinkError as error:
                     self._end(error)
                     raise

@@ -1,7 +1,7 @@
 """Statements run through Execute, as if typed in the controller's command window."""
 
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from functools import lru_cache
 
 from robolink.controllers.epson.answers import (
@@ -40,10 +40,6 @@ class CommandWindow:
     def __init__(self, session: EpsonSession) -> None:
         self._session = session
         self._was_ready = False
-
-    def uninterrupted(self) -> AbstractContextManager[None]:
-        """Hold Ctrl-C back over statements that belong together; it is raised at their end."""
-        return self._session.uninterrupted()
 
     def status(self) -> ControllerStatus:
         """Read the flags; legal at any time after the login."""

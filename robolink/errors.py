@@ -46,6 +46,8 @@ Each error says what happened (:attr:`~RobolinkError.what`) and what to do next
 boundary only, always ``from`` the original.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
@@ -90,6 +92,7 @@ __all__ = [
     "UnclearAnswerError",
     "UndefinedToolError",
     "VerifyError",
+    "concerning",
 ]
 
 if TYPE_CHECKING:  # what no command needs before something stands on a controller
@@ -128,6 +131,11 @@ class RobolinkError(Exception):
     def __str__(self) -> str:
         return f"{self.what} {self.remedy}".rstrip()
 
+    def concern(self, controller: str, request: str = "") -> None:
+        """Name the controller and the request, where neither was named nearer to the cause."""
+        self.controller = self.controller or controller
+        self.request = self.request or request
+
     @property
     def controller_state(self) -> "Standing":
         """What stands on the controller now, of what was done to it in the block that this ended.
@@ -144,6 +152,19 @@ class RobolinkError(Exception):
     @controller_state.setter
     def controller_state(self, standing: "Standing") -> None:
         self._standing = standing
+
+
+@contextmanager
+def concerning(controller: str, request: str = "") -> Iterator[None]:
+    """Let each error that leaves the block name the controller and the request.
+
+    What a driver raises inside says what happened; this says of whom, once, at its border.
+    """
+    try:
+        yield
+    except RobolinkError as error:
+        error.concern(controller, request)
+        raise
 
 
 class ConfigError(RobolinkError, ValueError):

@@ -19,6 +19,7 @@ from robolink.errors import (
     RobolinkError,
     StoppedError,
     TransportError,
+    concerning,
 )
 from robolink.messages import tr
 from robolink.model import Ledger, Marker, MarkerKind, NewEntry, OutcomeLog, new_operation
@@ -56,12 +57,13 @@ class ProcedureLock:
             BusyError: Another thread holds it.
             StoppedError: A stop is in force, or came meanwhile.
         """
-        if calming:
-            with self._latch.calming(request), self._locked(request):
-                yield
-        else:
-            with self._locked(request), self._latch.watching(request):
-                yield
+        with concerning(self._identity, request):
+            if calming:
+                with self._latch.calming(request), self._locked(request):
+                    yield
+            else:
+                with self._locked(request), self._latch.watching(request):
+                    yield
 
     @contextmanager
     def _locked(self, request: str) -> Iterator[None]:
@@ -70,8 +72,6 @@ class ProcedureLock:
             raise BusyError(
                 tr("{request} has to wait: another operation is under way.", request=request),
                 remedy=tr("Wait for it to end; stopping is possible at any time."),
-                controller=self._identity,
-                request=request,
             )
         try:
             yield

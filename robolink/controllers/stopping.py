@@ -16,6 +16,7 @@ from robolink.errors import (
     RemoteProtocolError,
     RobolinkError,
     TransportError,
+    concerning,
 )
 from robolink.messages import tr
 from robolink.transport import LinkUrl, parse_url
@@ -151,7 +152,8 @@ def _stop_group(link: LinkUrl, means: _Means) -> "ControllerStatus":
     try:
         snapshots = Snapshots(wire)
         commands = CommandSender(wire, snapshots)
-        now = bring_group_to_rest(commands, snapshots, wire.clock, controller=wire.identity)
+        with concerning(wire.identity):
+            now = bring_group_to_rest(commands, snapshots, wire.clock, controller=wire.identity)
         from robolink.controllers.softmotion.condition import status_of
 
         if means.met is not None:

@@ -150,7 +150,6 @@ class Registers:
                 "Compare the addresses in the map with the PLC's register list; or "
                 "another program is writing them now."
             ),
-            controller=self.identity,
         )
 
     def word(self, word: Word) -> int:
@@ -234,7 +233,6 @@ def require_probe(registers: Registers, probe: MapProbe | None) -> None:
             found=number.decode(words),
         ),
         remedy=tr("{diagnosis} Nothing was written.", diagnosis=_diagnosis(registers, probe)),
-        controller=registers.identity,
     )
 
 
@@ -355,7 +353,6 @@ class MappedPlc(DriverLink):
         return RejectedError(
             tr("A PLC with a register map is neither moved nor stopped by robolink."),
             remedy=tr("Do it at the machine; in danger press the emergency stop."),
-            controller=self.identity,
         )
 
     def who(self) -> Identity:
@@ -376,7 +373,6 @@ class MappedPlc(DriverLink):
             ),
             reason=NotReadyReason.NOT_REMOTE,
             remedy=tr("Check that the PLC's program runs, then try again; nothing was written."),
-            controller=self.identity,
         )
 
     def require_probe(self) -> None:
@@ -387,9 +383,9 @@ class MappedPlc(DriverLink):
         """
         require_probe(self.registers, self.register_map.probe)
 
-    def require_ready(self, tool: int, request: str) -> None:
+    def require_ready(self, tool: int) -> None:
         """Refuse a write where the map is not known to be right, or the machine says no."""
-        self.require_known_place(tool, request)
+        self.require_known_place(tool)
         self.require_probe()
         permit = self.register_map.permit
         if permit is not None and not self.registers.is_on(permit):
@@ -397,11 +393,9 @@ class MappedPlc(DriverLink):
                 tr("The machine does not permit changes now ({place}).", place=permit.place),
                 reason=NotReadyReason.NOT_REMOTE,
                 remedy=tr("Permit it at the machine, then try again; nothing was written."),
-                controller=self.identity,
-                request=request,
             )
 
-    def require_known_place(self, tool: int, request: str) -> None:
+    def require_known_place(self, tool: int) -> None:
         """Refuse a change of a tool of which nobody has compared anything; writes nothing.
 
         Raises:
@@ -409,15 +403,14 @@ class MappedPlc(DriverLink):
         """
         confirmation = self._confirmation()
         if confirmation is None or not confirmation.knows_tool(tool):
-            self._refuse(tool, tuple(self.register_map.slots[tool].components), request)
+            self._refuse(tool, tuple(self.register_map.slots[tool].components))
 
-    def require_compared(self, tool: int, components: tuple[str, ...], request: str) -> None:
+    def require_compared(self, tool: int, components: tuple[str, ...]) -> None:
         """Refuse a change of components that nobody has compared; writes nothing.
 
         Args:
             tool: Number of the tool.
             components: Those that would change.
-            request: What would be written, for a person.
 
         Raises:
             NotComparedError: One was not, with this map at this PLC.
@@ -426,12 +419,12 @@ class MappedPlc(DriverLink):
         missing = confirmation.missing(self.register_map) if confirmation is not None else []
         lacking = tuple(name for name in components if MapValue(tool, name) in missing)
         if lacking or confirmation is None:
-            self._refuse(tool, lacking or components, request)
+            self._refuse(tool, lacking or components)
 
     def _confirmation(self) -> Confirmation | None:
         return confirmation_of(self.who().name, self.register_map)
 
-    def _refuse(self, tool: int, components: tuple[str, ...], request: str) -> NoReturn:
+    def _refuse(self, tool: int, components: tuple[str, ...]) -> NoReturn:
         raise NotComparedError(
             tr(
                 "Nobody has compared {values} of the map {name!r} with the screen of the machine "
@@ -446,6 +439,4 @@ class MappedPlc(DriverLink):
                 "Nothing was written. Run 'robolink expert plc check-map' with the same -c at "
                 "the machine. A changed map has to be compared again."
             ),
-            controller=self.identity,
-            request=request,
         )

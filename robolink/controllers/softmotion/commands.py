@@ -16,7 +16,7 @@ axes themselves are compared.
 """
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from typing import Final
 
@@ -39,6 +39,7 @@ from robolink.errors import (
     OutcomeUnknownError,
     RejectedError,
     RemoteProtocolError,
+    RobolinkError,
     StoppedError,
     TransportTimeoutError,
     UnclearAnswerError,
@@ -128,22 +129,23 @@ class CommandSender:
             ConfigError: A value does not fit; nothing was sent.
             TransportError, RemoteProtocolError: The session is over; it may have been done.
         """
-        with self._wire.uninterrupted():
+        with self._naming(draft), self._wire.uninterrupted():
             self._possess(draft)
-            end = self._to_end(draft)
-            return self._taken(end)
+            return self._taken(self._to_end(draft))
 
     def stop(self) -> Callable[[Response], bool]:
         """Send 2003, and return what tells by a later snapshot whether it is done.
 
         What it returns raises like :meth:`carry_out`.
         """
-        with self._wire.uninterrupted():
-            command, now = self._send(Command(0, Opcode.STOP))
+        draft = Command(0, Opcode.STOP)
+        with self._naming(draft), self._wire.uninterrupted():
+            command, now = self._send(draft)
 
         def done(now: Response) -> bool:
-            end = self._end_of(command, now)
-            return end is not None and self._taken(end) is not None
+            with self._naming(draft):
+                end = self._end_of(command, now)
+                return end is not None and self._taken(end) is not None
 
         done(now)
         return done
@@ -163,7 +165,7 @@ class CommandSender:
             KeyboardInterrupt: Ctrl-C came before a movement was sent; it was not.
         """
         # Who begins a movement is there; at most four begin before one has to be waited on.
-        with self._wire.uninterrupted(), self._wire.attended():
+        with self._naming(draft), self._wire.uninterrupted(), self._wire.attended():
             self._possess(draft)
             command, now = self._send(draft, ride=draft.opcode != Opcode.JOG)
             if now.state == CommandState.ERROR:
@@ -187,6 +189,15 @@ class CommandSender:
             self.ownership.lose()
         return motion_failure(request, now, error_class)
 
+    @contextmanager
+    def _naming(self, draft: Command) -> Iterator[None]:
+        """Let each error that leaves the block name the PLC and the command."""
+        try:
+            yield
+        except RobolinkError as error:
+            error.concern(self._wire.identity, describe(draft))
+            raise
+
     def _possess(self, draft: Command) -> None:
         if draft.needs_owner:
             self.ownership.require(describe(draft))
@@ -197,10 +208,9 @@ class CommandSender:
         return refused(command, now, error_class)
 
     def _to_end(self, draft: Command) -> Ended:
-        if draft.only_ends:
-            with self._wire.ahead():
-                return self._seen_to_end(draft)
-        return self._seen_to_end(draft)
+        """Send a command and return how it ended."""
+        with self._naming(draft), self._wire.ahead() if draft.only_ends else nullcontext():
+            return self._seen_to_end(draft)
 
     def _seen_to_end(self, draft: Command) -> Ended:
         command, now = self._send(draft)
@@ -210,8 +220,7 @@ class CommandSender:
             if deadline.expired:
                 raise self._wire.ended(
                     self._silence(
-                        command,
-                        tr("{request!r} began, and has not ended.", request=describe(command)),
+                        tr("{request!r} began, and has not ended.", request=describe(command))
                     )
                 )
             now = self._snapshots.news(now, begun_ns=begun_ns)
@@ -303,7 +312,7 @@ class CommandSender:
                 return now, False
             if deadline.expired:
                 silence = self._silence(
-                    command, tr("{request!r} was not acknowledged.", request=describe(command))
+                    tr("{request!r} was not acknowledged.", request=describe(command))
                 )
                 # Something stronger must be able to follow what should have ended a movement.
                 raise silence if command.only_ends else self._wire.ended(silence)
@@ -330,7 +339,6 @@ class CommandSender:
             raise ConfigError(
                 tr("{request!r} cannot be sent: {cause}.", request=describe(command), cause=error),
                 remedy=tr("Correct the value; nothing was sent."),
-                controller=self._wire.identity,
             ) from error
 
     def _require_able(self, draft: Command, before: Response) -> None:
@@ -338,11 +346,10 @@ class CommandSender:
         if OPCODES[opcode].capability not in before.capabilities:
             raise refused(draft, before, ErrorClass.UNKNOWN_OPCODE)
 
-    def _silence(self, command: Command, said: str) -> TransportTimeoutError:
+    def _silence(self, said: str) -> TransportTimeoutError:
         return TransportTimeoutError(
             said,
             remedy=tr("Look at the PLC; the command may still be carried out."),
-            request=describe(command),
         )
 
     def _unseen(self, command: Command) -> UnclearAnswerError:
@@ -351,8 +358,6 @@ class CommandSender:
         return UnclearAnswerError(
             tr("A stop came before the end of {request!r} was read.", request=describe(command)),
             remedy=tr("Read again what it should have changed."),
-            controller=self._wire.identity,
-            request=describe(command),
         )
 
     def _overtaken(self, command: Command, now: Response) -> RemoteProtocolError:
@@ -365,7 +370,6 @@ class CommandSender:
                 request=describe(command),
             ),
             remedy=tr("Find the other client; one at a time may command this mailbox."),
-            request=describe(command),
         )
 
 
@@ -473,6 +477,5 @@ def _restless(controller: str) -> OutcomeUnknownError:
             seconds=REST_S,
         ),
         remedy=tr("It may still be moving."),
-        controller=controller,
         request="Stop",
     )

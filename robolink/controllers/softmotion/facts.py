@@ -87,7 +87,7 @@ def set_kinematics(mailbox: Mailbox, position: Kinematics, orientation: Kinemati
     with mailbox.lock.held(request):
         mailbox.markers.require_settled(request)  # before the mailbox is taken
         now = mailbox.prepare(draft, request)
-        require_still(now, controller=mailbox.identity, request=request)
+        require_still(now)
         mailbox.markers.note_selection(0)
         after = mailbox.carry_out(_Change(mailbox, draft, wanted, now.kinematics))
         mailbox.markers.ledger.saw_selected(after.tool_slot)
@@ -100,7 +100,6 @@ def set_kinematics(mailbox: Mailbox, position: Kinematics, orientation: Kinemati
                 request=request,
             ),
             remedy=tr("Do not move the robot; compare the mailbox program with its codes."),
-            controller=mailbox.identity,
             request=request,
         )
 

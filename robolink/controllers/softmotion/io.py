@@ -2,19 +2,20 @@
 
 from collections.abc import Mapping
 
-from robolink.controllers.driver_link import MarkedCommand
+from robolink.controllers.driver_link import DriverPart, MarkedCommand
 from robolink.controllers.softmotion.answers import describe
 from robolink.controllers.softmotion.mailbox import Mailbox
 from robolink.protocols.mailbox import Command, Opcode
 
 
-class SoftMotionIo:
+class SoftMotionIo(DriverPart):
     """Reads inputs and sets outputs; both need the ownership.
 
     An output cannot be read back through the mailbox: the PLC's acknowledgement is the proof.
     """
 
     def __init__(self, mailbox: Mailbox) -> None:
+        super().__init__(mailbox)
         self._mailbox = mailbox
 
     def read_input(self, bit: int) -> bool:

@@ -146,12 +146,13 @@ class Mailbox(DriverLink):
             NotReadyError: The machine does not permit it.
             LeaseHeldError, LeaseLostError: Another client owns the mailbox.
         """
-        now = now or self.snapshots.take()
-        if draft.needs_permit:
-            require_permit(now, controller=self.identity, request=request)
-        if draft.needs_owner:
-            self.commands.ownership.require(request)
-        return now
+        with self.asked(request):
+            now = now or self.snapshots.take()
+            if draft.needs_permit:
+                require_permit(now)
+            if draft.needs_owner:
+                self.commands.ownership.require(request)
+            return now
 
     def same(self, a: ToolOffset | None, b: ToolOffset | None) -> bool:
         """Tell whether this PLC holds both alike; rotations are compared as matrices."""

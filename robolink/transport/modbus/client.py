@@ -13,6 +13,7 @@ from robolink.errors import (
     RemoteProtocolError,
     TransportError,
     TransportTimeoutError,
+    concerning,
 )
 from robolink.messages import tr
 from robolink.timing import Clock, Deadline
@@ -203,7 +204,7 @@ class ModbusClient:
         )
 
     def _ask(self, request: ModbusRequest) -> ModbusReply:
-        with self._lock:
+        with concerning(self._identity), self._lock:
             deadline = self._deadline()
             try:
                 reply = self._exchange.ask(request, deadline)

@@ -213,29 +213,6 @@ _AROUND: Final = 8
 """How many registers before and behind its place it is looked for."""
 
 
-def require_probe(registers: Registers, probe: MapProbe | None) -> None:
-    """Read the constant, if there is one, and refuse a PLC in which it is another.
-
-    Raises:
-        RemoteProtocolError: It differs; says what the map should say, if that can be found.
-    """
-    if probe is None:
-        return
-    number = probe.number
-    words = registers.read(number.table, number.registers)
-    if words == number.encode(probe.value):
-        return
-    raise RemoteProtocolError(
-        tr(
-            "The probe at {place} should be {value:g}, but reads {found:g}.",
-            place=number.place,
-            value=probe.value,
-            found=number.decode(words),
-        ),
-        remedy=tr("{diagnosis} Nothing was written.", diagnosis=_diagnosis(registers, probe)),
-    )
-
-
 def _diagnosis(registers: Registers, probe: MapProbe) -> str:
     number = probe.number
     found = _found(registers, probe)
@@ -280,32 +257,6 @@ def _found(registers: Registers, probe: MapProbe) -> Number | None:
     return None
 
 
-class MapIdentityReader:
-    """Reads the machine's own number, where the map says where it stands."""
-
-    def __init__(self, registers: Registers, register_map: RegisterMap) -> None:
-        self._registers = registers
-        self._place = register_map.device_id
-
-    def read(self) -> Identity:
-        """Return who it is.
-
-        Raises:
-            TransportError, RemoteProtocolError: The link failed, or the number does not stand
-                still.
-            RejectedError: The PLC has no such registers.
-        """
-        address, place = self._registers.identity, f"plc@{self._registers.place}"
-        if self._place is None:
-            return Identity(place, address, place)
-        words = self._registers.read_twice(self._place.table, self._place.registers)
-        if not any(words):
-            # Zeroed by a watchdog, or the program has not started
-            # (docs/reference/softmotion.md 4.1).
-            return Identity(place, address, place, certain=False)
-        return Identity(f"plc:{''.join(f'{word:04X}' for word in words)}", address, place)
-
-
 class MappedPlc(DriverLink):
     """One PLC that is reached by a map.
 
@@ -331,8 +282,7 @@ class MappedPlc(DriverLink):
         self._simulated = simulated
         registers = self.registers = Registers(client)
         self.register_map = register_map
-        self._identity = MapIdentityReader(registers, register_map)
-        outcomes.ask(self._identity.read)
+        outcomes.ask(self.read_identity)
         super().__init__(
             client.identity, registers.clock, registers.latch, outcomes, gate=registers.gate
         )
@@ -355,6 +305,25 @@ class MappedPlc(DriverLink):
             remedy=tr("Do it at the machine; in danger press the emergency stop."),
         )
 
+    def read_identity(self) -> Identity:
+        """Return who it is: by its own number, where the map says where that stands.
+
+        Raises:
+            TransportError, RemoteProtocolError: The link failed, or the number does not stand
+                still.
+            RejectedError: The PLC has no such registers.
+        """
+        address, place = self.registers.identity, f"plc@{self.registers.place}"
+        number = self.register_map.device_id
+        if number is None:
+            return Identity(place, address, place)
+        words = self.registers.read_twice(number.table, number.registers)
+        if not any(words):
+            # Zeroed by a watchdog, or the program has not started
+            # (docs/reference/softmotion.md 4.1).
+            return Identity(place, address, place, certain=False)
+        return Identity(f"plc:{''.join(f'{word:04X}' for word in words)}", address, place)
+
     def who(self) -> Identity:
         """Return which PLC this is: what a person confirms about a map holds for that one.
 
@@ -363,7 +332,7 @@ class MappedPlc(DriverLink):
                 still.
             NotReadyError: The map knows where the PLC's number stands, and there is none now.
         """
-        found = self._identity.read()
+        found = self.read_identity()
         if found.certain:
             return found
         raise NotReadyError(
@@ -379,9 +348,26 @@ class MappedPlc(DriverLink):
         """Compare the PLC's constant with the map's, if there is one.
 
         Raises:
-            RemoteProtocolError: It differs; says what the map should say.
+            RemoteProtocolError: It differs; says what the map should say, if that can be found.
         """
-        require_probe(self.registers, self.register_map.probe)
+        probe = self.register_map.probe
+        if probe is None:
+            return
+        number = probe.number
+        words = self.registers.read(number.table, number.registers)
+        if words == number.encode(probe.value):
+            return
+        raise RemoteProtocolError(
+            tr(
+                "The probe at {place} should be {value:g}, but reads {found:g}.",
+                place=number.place,
+                value=probe.value,
+                found=number.decode(words),
+            ),
+            remedy=tr(
+                "{diagnosis} Nothing was written.", diagnosis=_diagnosis(self.registers, probe)
+            ),
+        )
 
     def require_ready(self, tool: int) -> None:
         """Refuse a write where the map is not known to be right, or the machine says no."""

@@ -16,7 +16,7 @@ from robolink.errors import (
     concerning,
 )
 from robolink.messages import tr
-from robolink.timing import Clock, Deadline
+from robolink.timing import Deadline
 from robolink.transport.byte_stream import Transport
 from robolink.transport.modbus.errors import refused
 from robolink.transport.modbus.frames import (
@@ -96,27 +96,17 @@ class ModbusClient:
         self.most_registers = most_registers
         self._transport = transport
         self._exchange = exchange
-        self._identity = identity
+        self.identity, self.clock = identity, transport.clock
         self._unit = unit
         self._timeout_s = timeout_s
         self._lock = ambient.lock()
         self._repeats_until: Deadline | None = None
 
     @property
-    def identity(self) -> str:
-        """Which far end this is: many units may share a line or a gateway."""
-        return self._identity
-
-    @property
     def place(self) -> str:
         """Where it was reached; the unit only where it is not the usual one."""
-        unit = self._identity.partition("?")[2]
+        unit = self.identity.partition("?")[2]
         return f"{self._transport.place}?{unit}" if unit else self._transport.place
-
-    @property
-    def clock(self) -> Clock:
-        """The clock on which deadlines are kept."""
-        return self._transport.clock
 
     def read_takes_s(self, count: int) -> float:
         """Return how long a read of so many registers takes on the line alone; 0 on a network."""
@@ -204,7 +194,7 @@ class ModbusClient:
         )
 
     def _ask(self, request: ModbusRequest) -> ModbusReply:
-        with concerning(self._identity), self._lock:
+        with concerning(self.identity), self._lock:
             deadline = self._deadline()
             try:
                 reply = self._exchange.ask(request, deadline)

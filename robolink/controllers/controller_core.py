@@ -222,7 +222,8 @@ class ControllerCore(DriverPart, ABC):
         Raises:
             OutcomeUnknownError: Names it.
         """
-        self._driver.markers.require_settled(request)
+        with self._driver.asked(request):
+            self._driver.markers.require_settled(request)
 
     def begin(
         self,
@@ -233,7 +234,8 @@ class ControllerCore(DriverPart, ABC):
         operation: str = "",
     ) -> Marker:
         """Store the durable marker of a procedure; see the model."""
-        return self._driver.markers.begin(kind, request, details, operation=operation)
+        with self._driver.asked(request):
+            return self._driver.markers.begin(kind, request, details, operation=operation)
 
     def finish(self, marker: Marker, *entries: NewEntry) -> None:
         """Forget the marker of a procedure, and journal how it ended."""

@@ -261,8 +261,6 @@ class MarkerStore:
                     request=request,
                 ),
                 remedy=tr("Wait until the movement has ended, or stop it."),
-                controller=self._identity,
-                request=request,
             )
 
     def _refuse_unsettled(self, request: str, *, besides: Collection[str]) -> None:
@@ -281,8 +279,6 @@ class MarkerStore:
                     when=local_label(marker.begun_at),
                 ),
                 remedy=tr("Next: 'robolink recover'. The robot stays blocked until then."),
-                controller=self._identity,
-                request=request,
             )
 
     def _overtaken(self, request: str) -> LeaseLostError:
@@ -297,8 +293,6 @@ class MarkerStore:
                 request=request,
             ),
             remedy=tr("Nothing was sent. Read the tools again, then start again."),
-            controller=self._identity,
-            request=request,
         )
 
     def _recorded(self, keep: Callable[[], object]) -> bool:

@@ -6,11 +6,12 @@ Source: docs/mailbox.md, "Which PLC this is".
 """
 
 import math
-from collections.abc import Callable
-from typing import Final, Protocol
+from collections.abc import Callable, Mapping
+from typing import Final, Protocol, TypeVar
 
 from robolink import ambient
-from robolink.controllers.driver_link import DriverLink
+from robolink.controllers.driver_link import DriverLink, MarkedCommand
+from robolink.controllers.softmotion.answers import describe
 from robolink.controllers.softmotion.commands import CommandSender
 from robolink.controllers.softmotion.condition import require_permit
 from robolink.controllers.softmotion.ownership import Bystanders
@@ -212,3 +213,41 @@ class Mailbox(DriverLink):
                 )
             )
         return from_frame(frame, unit_um=self.unit_um)
+
+
+T = TypeVar("T")
+
+
+class MarkedDraft(MarkedCommand[T]):
+    """A command of a mailbox that is marked meanwhile.
+
+    Args:
+        mailbox: Where it is sent.
+        draft: The command.
+        details: Plain JSON values needed to settle it later.
+        read: Reads what it changes.
+    """
+
+    def __init__(
+        self,
+        mailbox: Mailbox,
+        draft: Command,
+        details: Mapping[str, object],
+        read: Callable[[], T],
+    ) -> None:
+        super().__init__(describe(draft))
+        self._mailbox, self._draft = mailbox, draft
+        self._details, self._read = details, read
+
+    @property
+    def details(self) -> Mapping[str, object]:
+        """Plain JSON values needed to settle it later."""
+        return self._details
+
+    def send(self) -> None:
+        """Send it; raises unless the PLC accepted it."""
+        self._mailbox.commands.carry_out(self._draft)
+
+    def read(self) -> T:
+        """Read what it changes."""
+        return self._read()

@@ -13,6 +13,7 @@ from robolink.errors import (
     RemoteProtocolError,
     RobolinkError,
     TransportTimeoutError,
+    concerning,
 )
 from robolink.messages import tr
 from robolink.timing import Clock, Deadline, SystemClock
@@ -189,7 +190,7 @@ class CanopenMailboxLink:
     @contextmanager
     def _exchange(self) -> Iterator[Deadline]:
         """Hold the lock and one deadline; after an error that is no refusal, close."""
-        with self._lock:
+        with concerning(self.identity), self._lock:
             try:
                 self._watch.drain()
                 yield Deadline.after(self.clock, self._timeout_s)
@@ -220,7 +221,6 @@ class CanopenMailboxLink:
                     due=2 * count,
                 ),
                 remedy=tr("The PLC's mailbox has another version: compare its EDS."),
-                controller=self.identity,
                 raw=data,
             )
         return struct.unpack(f"<{count}H", data)
@@ -242,5 +242,4 @@ class CanopenMailboxLink:
                 "Check in the PLC that TPDO1 is mapped and sent at least every 100 ms, and that "
                 "the node is operational (start=yes in the URL)."
             ),
-            controller=self.identity,
         )

@@ -142,7 +142,7 @@ def _stop_epson(link: LinkUrl, means: _Means) -> "ControllerStatus":
 
 
 def _stop_group(link: LinkUrl, means: _Means) -> "ControllerStatus":
-    from robolink.controllers.softmotion.commands import CommandSender, bring_group_to_rest
+    from robolink.controllers.softmotion.commands import CommandSender
     from robolink.controllers.softmotion.snapshots import Snapshots
     from robolink.controllers.softmotion.wire import MailboxWire
     from robolink.transport import open_mailbox_link
@@ -150,10 +150,8 @@ def _stop_group(link: LinkUrl, means: _Means) -> "ControllerStatus":
     mailbox = open_mailbox_link(link, timeout_s=means.timeout_s, clock=means.clock)
     wire = MailboxWire(mailbox, owner=means.owner, timeout_s=means.timeout_s)
     try:
-        snapshots = Snapshots(wire)
-        commands = CommandSender(wire, snapshots)
         with concerning(wire.identity):
-            now = bring_group_to_rest(commands, snapshots, wire.clock, controller=wire.identity)
+            now = CommandSender(wire, Snapshots(wire)).bring_to_rest()
         from robolink.controllers.softmotion.condition import status_of
 
         if means.met is not None:

@@ -60,7 +60,7 @@ from robolink.protocols.mailbox import (
     next_number,
 )
 from robolink.stop_latch import CommandClass
-from robolink.timing import Clock, Deadline
+from robolink.timing import Deadline
 
 _CLASSES: Final = {
     Opcode.OWNERSHIP: CommandClass.LOOK,
@@ -89,6 +89,15 @@ def command_class_of(command: Command) -> CommandClass:
         return CommandClass.CALM
     return _CLASSES.get(Opcode(command.opcode), CommandClass.ACT)
 
+
+REST_S: Final = 5.0
+"""Longest time from the stop to a state that shows rest (docs/reference/rules.md 5)."""
+
+_ALREADY: Final = frozenset({ErrorClass.STOPPING, ErrorClass.DISABLED, ErrorClass.ERRORSTOP})
+_LOOK_S: Final = 0.1
+_STILL: Final = 0.05
+"""An axis that changed by less than this, in its units, in :data:`_LOOK_S` stands: drives hold
+a position within microns and millidegrees, and robolink moves no slower than 1 mm/s."""
 
 COMPLETION_S: Final = 10.0
 """Longest time between the acknowledgement and the end of what is not a movement."""
@@ -149,6 +158,41 @@ class CommandSender:
 
         done(now)
         return done
+
+    def bring_to_rest(self) -> Response:
+        """Send 2003 and return a snapshot that shows that the group rests.
+
+        Raises:
+            RejectedError: The PLC knows no stop: its program moves nothing.
+            OutcomeUnknownError: The group does not come to rest within :data:`REST_S`.
+            TransportError, RemoteProtocolError: The link is over; whether it stops is not known.
+        """
+        snapshots, clock = self._snapshots, self._wire.clock
+        deadline = Deadline.after(clock, REST_S)
+        try:
+            done = self.stop()
+            now = snapshots.take()
+            while not done(now):
+                if deadline.expired:
+                    raise self._restless()
+                now = snapshots.news(now)
+            # A stop of another thread that came meanwhile ends ours before the group stands.
+            stands = not now.bits & Bits.BUSY
+        except RejectedError as error:
+            if error.code not in _ALREADY:
+                raise
+            now, stands = snapshots.take(), False
+        # Here, because nothing may stand before the frame of a stop (docs/reference/rules.md 5).
+        from robolink.controllers.softmotion.condition import is_moving
+
+        while is_moving(now) or not stands:
+            if deadline.expired:
+                raise self._restless()
+            before, looked = now, Deadline.after(clock, _LOOK_S)
+            while not looked.expired:
+                now = snapshots.news(now, wait_s=looked.remaining_s())
+            stands = stands or _still(before, now)
+        return now
 
     def _taken(self, end: Ended) -> Response:
         """Return the snapshot of a command that is done; raise for one that is not."""
@@ -346,6 +390,18 @@ class CommandSender:
         if OPCODES[opcode].capability not in before.capabilities:
             raise refused(draft, before, ErrorClass.UNKNOWN_OPCODE)
 
+    def _restless(self) -> OutcomeUnknownError:
+        return OutcomeUnknownError(
+            tr(
+                "{controller} was told to stop, but did not show within {seconds:g} s "
+                "that it is at rest.",
+                controller=self._wire.identity,
+                seconds=REST_S,
+            ),
+            remedy=tr("It may still be moving."),
+            request="Stop",
+        )
+
     def _silence(self, said: str) -> TransportTimeoutError:
         return TransportTimeoutError(
             said,
@@ -409,73 +465,7 @@ def _has_taken(command: Command, now: Response) -> bool:
     )
 
 
-REST_S: Final = 5.0
-"""Longest time from the stop to a state that shows rest (docs/reference/rules.md 5)."""
-
-_ALREADY: Final = frozenset({ErrorClass.STOPPING, ErrorClass.DISABLED, ErrorClass.ERRORSTOP})
-_LOOK_S: Final = 0.1
-_STILL: Final = 0.05
-"""An axis that changed by less than this, in its units, in :data:`_LOOK_S` stands: drives hold
-a position within microns and millidegrees, and robolink moves no slower than 1 mm/s."""
-
-
-def bring_group_to_rest(
-    commands: CommandSender, snapshots: Snapshots, clock: Clock, *, controller: str
-) -> Response:
-    """Send 2003 and return a snapshot that shows rest.
-
-    Args:
-        commands: Commands of the mailbox.
-        snapshots: Reads of it.
-        clock: The clock on which the PLC's time passes.
-        controller: Its name in errors.
-
-    Raises:
-        RejectedError: The PLC knows no stop: its program moves nothing.
-        OutcomeUnknownError: The group does not come to rest within :data:`REST_S`.
-        TransportError, RemoteProtocolError: The link is over; whether it stops is not known.
-    """
-    deadline = Deadline.after(clock, REST_S)
-    try:
-        done = commands.stop()
-        now = snapshots.take()
-        while not done(now):
-            if deadline.expired:
-                raise _restless(controller)
-            now = snapshots.news(now)
-        # A stop of another thread that came meanwhile ends ours before the group stands.
-        stands = not now.bits & Bits.BUSY
-    except RejectedError as error:
-        if error.code not in _ALREADY:
-            raise
-        now, stands = snapshots.take(), False
-    # Here, because nothing may stand before the frame of a stop (docs/reference/rules.md 5).
-    from robolink.controllers.softmotion.condition import is_moving
-
-    while is_moving(now) or not stands:
-        if deadline.expired:
-            raise _restless(controller)
-        before, looked = now, Deadline.after(clock, _LOOK_S)
-        while not looked.expired:
-            now = snapshots.news(now, wait_s=looked.remaining_s())
-        stands = stands or _still(before, now)
-    return now
-
-
 def _still(before: Response, now: Response) -> bool:
     return before.plc_heartbeat != now.plc_heartbeat and all(
         abs(a - b) < _STILL for a, b in zip(before.axes, now.axes, strict=True)
-    )
-
-
-def _restless(controller: str) -> OutcomeUnknownError:
-    return OutcomeUnknownError(
-        tr(
-            "{controller} was told to stop, but did not show within {seconds:g} s "
-            "that it is at rest.",
-            controller=controller,
-            seconds=REST_S,
-        ),
-        remedy=tr("It may still be moving."),
-        request="Stop",
     )

@@ -4,7 +4,6 @@ import math
 
 from robolink.controllers.motion_group import MotionGroupCore
 from robolink.controllers.softmotion.answers import describe
-from robolink.controllers.softmotion.commands import bring_group_to_rest
 from robolink.controllers.softmotion.condition import (
     require_beats,
     require_enabled,
@@ -156,11 +155,8 @@ class SoftMotionGroup(MotionGroupCore):
         Raises:
             OutcomeUnknownError: The group did not come to rest in time.
         """
-        mailbox = self._mailbox
-        with mailbox.latch.stopping():
-            bring_group_to_rest(
-                mailbox.commands, mailbox.snapshots, mailbox.clock, controller=mailbox.identity
-            )
+        with self._mailbox.latch.stopping():
+            self._mailbox.commands.bring_to_rest()
 
     def halt(self) -> None:
         """Bring the group to rest, ending every movement; it may be moved again at once."""

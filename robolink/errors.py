@@ -46,15 +46,15 @@ Each error says what happened (:attr:`~RobolinkError.what`) and what to do next
 boundary only, always ``from`` the original.
 """
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from enum import StrEnum
+from types import TracebackType
 from typing import TYPE_CHECKING
 
 __all__ = [
     "AmbiguousPosesError",
     "BusyError",
     "CalibrationError",
+    "Concerning",
     "ConfigError",
     "ConnectError",
     "ControllerError",
@@ -92,7 +92,6 @@ __all__ = [
     "UnclearAnswerError",
     "UndefinedToolError",
     "VerifyError",
-    "concerning",
 ]
 
 if TYPE_CHECKING:  # what no command needs before something stands on a controller
@@ -154,17 +153,32 @@ class RobolinkError(Exception):
         self._standing = standing
 
 
-@contextmanager
-def concerning(controller: str, request: str = "") -> Iterator[None]:
-    """Let each error that leaves the block name the controller and the request.
+class Concerning:
+    """Lets each error that leaves the block name the controller and the request.
 
-    What a driver raises inside says what happened; this says of whom, once, at its border.
+    What a driver raises inside says what happened; this says of whom, once, at its border. No
+    generator: every procedure passes here.
+
+    Args:
+        controller: Identity of the controller.
+        request: What it was asked.
     """
-    try:
-        yield
-    except RobolinkError as error:
-        error.concern(controller, request)
-        raise
+
+    __slots__ = ("_controller", "_request")
+
+    def __init__(self, controller: str, request: str = "") -> None:
+        self._controller, self._request = controller, request
+
+    def __enter__(self) -> None: ...
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if isinstance(error, RobolinkError):
+            error.concern(self._controller, self._request)
 
 
 class ConfigError(RobolinkError, ValueError):
@@ -207,10 +221,8 @@ class NotComparedError(ConfigError):
         tool: int,
         components: tuple[str, ...],
         remedy: str = "",
-        controller: str = "",
-        request: str = "",
     ) -> None:
-        super().__init__(what, remedy=remedy, controller=controller, request=request)
+        super().__init__(what, remedy=remedy)
         self.tool = tool
         self.components = components
 

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from enum import Enum, auto
 
 from robolink import ambient
-from robolink.errors import ControllerError, StoppedError, UnclearAnswerError, concerning
+from robolink.errors import Concerning, ControllerError, StoppedError, UnclearAnswerError
 from robolink.messages import tr
 
 __all__ = [
@@ -148,7 +148,7 @@ class StopLatch:
             StoppedError: A stop is in force at its end, be that a success or a "no" of the
                 controller, which the stop explains.
         """
-        with concerning(self._controller, request):
+        with Concerning(self._controller, request):
             try:
                 yield
             except (ControllerError, UnclearAnswerError):

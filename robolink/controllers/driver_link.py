@@ -34,12 +34,12 @@ from typing import Any, Final, Generic, TypeVar
 from robolink import ambient
 from robolink.controllers.markers import MarkerStore, ProcedureLock
 from robolink.errors import (
+    Concerning,
     ConfigError,
     ControllerFaultError,
     RejectedError,
     RobolinkError,
     UnclearAnswerError,
-    concerning,
 )
 from robolink.messages import joined, tr
 from robolink.model import ChangeGuard, EntryKind, Marker, MarkerKind, NewEntry, OutcomeLog
@@ -253,7 +253,7 @@ class DriverLink:
 
     def asked(self, request: str) -> AbstractContextManager[None]:
         """Let each error that leaves the block name this controller and ``request``."""
-        return concerning(self.identity, request)
+        return Concerning(self.identity, request)
 
     def carry_out(self, command: MarkedCommand[T]) -> T:
         """Send something that is marked, and return what is read then.

@@ -12,6 +12,7 @@ from typing import Final
 from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.errors import (
     BusyError,
+    Concerning,
     JournalError,
     LeaseLostError,
     OutcomeUnknownError,
@@ -19,7 +20,6 @@ from robolink.errors import (
     RobolinkError,
     StoppedError,
     TransportError,
-    concerning,
 )
 from robolink.messages import tr
 from robolink.model import Ledger, Marker, MarkerKind, NewEntry, OutcomeLog, new_operation
@@ -57,7 +57,7 @@ class ProcedureLock:
             BusyError: Another thread holds it.
             StoppedError: A stop is in force, or came meanwhile.
         """
-        with concerning(self._identity, request):
+        with Concerning(self._identity, request):
             if calming:
                 with self._latch.calming(request), self._locked(request):
                     yield

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from robolink import ambient
 from robolink.errors import (
+    Concerning,
     ConnectError,
     RejectedError,
     RemoteProtocolError,
     RobolinkError,
     TransportError,
-    concerning,
 )
 from robolink.messages import tr
 from robolink.transport import LinkUrl, parse_url
@@ -150,7 +150,7 @@ def _stop_group(link: LinkUrl, means: _Means) -> "ControllerStatus":
     mailbox = open_mailbox_link(link, timeout_s=means.timeout_s, clock=means.clock)
     wire = MailboxWire(mailbox, owner=means.owner, timeout_s=means.timeout_s)
     try:
-        with concerning(wire.identity):
+        with Concerning(wire.identity):
             now = CommandSender(wire, Snapshots(wire)).bring_to_rest()
         from robolink.controllers.softmotion.condition import status_of
 

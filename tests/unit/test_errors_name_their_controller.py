@@ -6,6 +6,7 @@ import pytest
 
 from robolink.controllers import ControllerCore, ToolTableCore
 from robolink.errors import (
+    Concerning,
     ConfigError,
     NotReadyError,
     RejectedError,
@@ -14,7 +15,6 @@ from robolink.errors import (
     StoppedError,
     ToolChangedError,
     TransportTimeoutError,
-    concerning,
 )
 from robolink.model import Capabilities, MotionProfile, Path, Pose, ToolOffset, WorkBox
 from robolink.protocols.mailbox import ErrorClass, GroupState, Opcode
@@ -52,11 +52,11 @@ def named(error):
 
 def test_what_was_named_nearer_to_the_cause_stays():
     nearer = ConfigError("no", controller="a", request="read")
-    with pytest.raises(ConfigError), concerning("b", "write"):
+    with pytest.raises(ConfigError), Concerning("b", "write"):
         raise nearer
     assert (nearer.controller, nearer.request) == ("a", "read")
     nameless = ConfigError("no")
-    with pytest.raises(ConfigError), concerning("b", "write"):
+    with pytest.raises(ConfigError), Concerning("b", "write"):
         raise nameless
     assert (nameless.controller, nameless.request) == ("b", "write")
 

@@ -19,7 +19,7 @@ from robolink.controllers.plc_map.slots import OffsetValues
 from robolink.controllers.plc_map.tools import RegisterResolver, RegisterToolTable
 from robolink.controllers.preserving import Preserver
 from robolink.controllers.registry import ConnectionTerms
-from robolink.errors import ConfigError, RejectedError, concerning
+from robolink.errors import Concerning, ConfigError, RejectedError
 from robolink.messages import tr
 from robolink.model import (
     Act,
@@ -358,7 +358,7 @@ def open_plc_map(
     register_map, url, simulated = _with_map(url)
     client = open_modbus(url, timeout_s=timeout_s, clock=clock)
     try:
-        with concerning(client.identity):
+        with Concerning(client.identity):
             controller = PlcMapController(
                 client, register_map, outcomes(client.identity), simulated=simulated
             )

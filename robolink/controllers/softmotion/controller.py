@@ -19,7 +19,7 @@ from robolink.controllers.softmotion.ownership import take_command
 from robolink.controllers.softmotion.snapshots import Snapshots
 from robolink.controllers.softmotion.tools import SoftMotionResolver, SoftMotionToolTable
 from robolink.controllers.softmotion.wire import MailboxWire
-from robolink.errors import ConfigError, ControllerFaultError, LeaseHeldError, concerning
+from robolink.errors import Concerning, ConfigError, ControllerFaultError, LeaseHeldError
 from robolink.messages import tr
 from robolink.model import (
     Act,
@@ -347,7 +347,7 @@ def open_softmotion(
     """
     wire = MailboxWire(link, owner=owner or ambient.random_number(32), timeout_s=timeout_s)
     try:
-        with concerning(link.identity):
+        with Concerning(link.identity):
             snapshots = Snapshots(wire)
             snapshots.meet()
             device_id = read_device_id(wire)

@@ -8,12 +8,12 @@ from typing import Final
 
 from robolink import ambient
 from robolink.errors import (
+    Concerning,
     ConnectError,
     RejectedError,
     RemoteProtocolError,
     RobolinkError,
     TransportTimeoutError,
-    concerning,
 )
 from robolink.messages import tr
 from robolink.timing import Clock, Deadline, SystemClock
@@ -190,7 +190,7 @@ class CanopenMailboxLink:
     @contextmanager
     def _exchange(self) -> Iterator[Deadline]:
         """Hold the lock and one deadline; after an error that is no refusal, close."""
-        with concerning(self.identity), self._lock:
+        with Concerning(self.identity), self._lock:
             try:
                 self._watch.drain()
                 yield Deadline.after(self.clock, self._timeout_s)

@@ -10,10 +10,10 @@ from typing import Final, Protocol
 from robolink import ambient
 from robolink.errors import (
     ConfigError,
+    RejectedError,
     RemoteProtocolError,
-    TransportError,
+    RobolinkError,
     TransportTimeoutError,
-    concerning,
 )
 from robolink.messages import tr
 from robolink.timing import Deadline
@@ -194,20 +194,20 @@ class ModbusClient:
         )
 
     def _ask(self, request: ModbusRequest) -> ModbusReply:
-        with concerning(self.identity), self._lock:
+        with self._lock:
             deadline = self._deadline()
             try:
                 reply = self._exchange.ask(request, deadline)
                 if reply.refusal is not None:
                     raise refused(self.identity, request, reply.refusal)
-            except (TransportTimeoutError, RemoteProtocolError) as error:
-                if not self._exchange.recovers:
+            except RobolinkError as error:
+                error.concern(self.identity)
+                silent = isinstance(error, TransportTimeoutError)
+                if self._exchange.recovers and (silent or isinstance(error, RemoteProtocolError)):
+                    if silent and self._repeats_until is None:
+                        self._repeats_until = Deadline.after(self.clock, self._retry_s)
+                elif not isinstance(error, RejectedError):
                     self._transport.close()
-                elif isinstance(error, TransportTimeoutError) and self._repeats_until is None:
-                    self._repeats_until = Deadline.after(self.clock, self._retry_s)
-                raise
-            except TransportError:
-                self._transport.close()
                 raise
             self._repeats_until = None
             return reply

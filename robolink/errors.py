@@ -54,7 +54,6 @@ __all__ = [
     "AmbiguousPosesError",
     "BusyError",
     "CalibrationError",
-    "Concerning",
     "ConfigError",
     "ConnectError",
     "ControllerError",

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from robolink import ambient
 from robolink.errors import (
+    Concerning,
     ConnectError,
     RejectedError,
     RemoteProtocolError,
@@ -158,7 +159,7 @@ def _tell_who(talk: "EpsonConversation", met: "Callable[[str], None]") -> None:
 
 
 def _stop_group(link: LinkUrl, means: _Means) -> "ControllerStatus":
-    from robolink.controllers.softmotion.commands import CommandSender, bring_group_to_rest
+    from robolink.controllers.softmotion.commands import CommandSender
     from robolink.controllers.softmotion.snapshots import Snapshots
     from robolink.controllers.softmotion.wire import MailboxWire
     from robolink.transport import open_mailbox_link
@@ -166,9 +167,8 @@ def _stop_group(link: LinkUrl, means: _Means) -> "ControllerStatus":
     mailbox = open_mailbox_link(link, timeout_s=means.timeout_s, clock=means.clock)
     wire = MailboxWire(mailbox, owner=means.owner, timeout_s=means.timeout_s)
     try:
-        snapshots = Snapshots(wire)
-        commands = CommandSender(wire, snapshots)
-        now = bring_group_to_rest(commands, snapshots, wire.clock, controller=wire.identity)
+        with Concerning(wire.identity):
+            now = CommandSender(wire, Snapshots(wire)).bring_to_rest()
         from robolink.controllers.softmotion.condition import status_of
 
         if means.met is not None:

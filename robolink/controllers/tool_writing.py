@@ -109,13 +109,7 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
             if self._same(self.before, self.requested):
                 return self._receipt(self.before, skipped=True)
             if expected is not ANY and not self._same(self.before, expected):
-                raise tool_changed(
-                    self.tool,
-                    self.before,
-                    expected,
-                    controller=self._link.identity,
-                    request=self.request,
-                )
+                raise tool_changed(self.tool, self.before, expected)
             self._link.change_guard.require(self.tool, self.before, self.requested)
             self._require_clearer()
             found = self._link.carry_out(self)
@@ -200,5 +194,4 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
                 "Do not run the cell with it. Before the write it held {before}.",
                 before=describe_offset(self.before),
             ),
-            request=self.request,
         )

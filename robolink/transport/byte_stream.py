@@ -101,33 +101,15 @@ class TracingTransport:
     """
 
     def __init__(self, inner: Transport, sink: TraceSink) -> None:
+        self.url, self.identity, self.durable = inner.url, inner.identity, inner.durable
+        self.clock = inner.clock
         self._inner = inner
         self._sink = sink
-
-    @property
-    def url(self) -> str:
-        """The inner transport's."""
-        return self._inner.url
-
-    @property
-    def identity(self) -> str:
-        """The inner transport's."""
-        return self._inner.identity
 
     @property
     def place(self) -> str:
         """The inner transport's."""
         return self._inner.place
-
-    @property
-    def durable(self) -> bool:
-        """The inner transport's."""
-        return self._inner.durable
-
-    @property
-    def clock(self) -> Clock:
-        """The inner transport's."""
-        return self._inner.clock
 
     def send(self, data: bytes, *, deadline: Deadline, secret: bool = False) -> None:
         """See :meth:`robolink.transport.Transport.send`; a secret never reaches the sink."""

@@ -186,36 +186,14 @@ def _opened(
 class SerialTransport:
     """Implements :class:`~robolink.transport.Transport` on an open port, and owns it."""
 
+    durable: bool = True
+    """What hangs on a cable outlives this process."""
+
     def __init__(self, port: Any, url: LinkUrl, clock: Clock) -> None:  # noqa: ANN401 - pyserial has no types
         self._port = port
-        self._url = url
-        self._clock = clock
+        self.url = self.identity = url.identity
+        self.place, self.clock = url.place, clock
         self._closed = False
-
-    @property
-    def url(self) -> str:
-        """Which port; how it is set is not repeated."""
-        return self._url.identity
-
-    @property
-    def identity(self) -> str:
-        """Which port."""
-        return self._url.identity
-
-    @property
-    def place(self) -> str:
-        """Which port; two names of one port are two places."""
-        return self._url.place
-
-    @property
-    def durable(self) -> bool:
-        """True: what is wired to a port outlives this process."""
-        return True
-
-    @property
-    def clock(self) -> Clock:
-        """The clock it was opened with."""
-        return self._clock
 
     def send(self, data: bytes, *, deadline: Deadline, secret: bool = False) -> None:  # noqa: ARG002 - pyserial has its own write time-out; nothing is recorded here
         """See :meth:`robolink.transport.Transport.send`."""
@@ -257,7 +235,7 @@ class SerialTransport:
                 return True
             if deadline.expired:
                 return False
-            self._clock.sleep(min(deadline.remaining_s(), _SLICE_S))
+            self.clock.sleep(min(deadline.remaining_s(), _SLICE_S))
         return True
 
     def close(self) -> None:

@@ -228,8 +228,8 @@ _AS_IMPORTED: Final[Mapping[str, Mapping[str, StandIn]]] = {
         "robolink.controllers.epson.rest.bring_to_rest": _nothing,
         "robolink.controllers.epson.group.bring_to_rest": _nothing,
     },
-    "robolink.controllers.softmotion.commands.bring_group_to_rest": {
-        "robolink.controllers.softmotion.group.bring_group_to_rest": _nothing
+    "robolink.controllers.softmotion.commands.CommandSender.bring_to_rest": {
+        "robolink.controllers.softmotion.commands.CommandSender.bring_to_rest": _nothing
     },
     "robolink.controllers.epson.answers.require_ready": {
         "robolink.controllers.epson.window.require_ready": _nothing,

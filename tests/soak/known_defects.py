@@ -47,7 +47,6 @@ _WIRE: Final = "robolink.controllers.softmotion.wire.MailboxWire.ended"
 _COMMANDS: Final = "robolink.controllers.softmotion.commands"
 _SENDER: Final = f"{_COMMANDS}.CommandSender"
 _CORE: Final = "robolink.controllers.controller_core.ControllerCore"
-_GROUP: Final = "robolink.controllers.softmotion.group"
 _BEGIN: Final = "robolink.controllers.markers.MarkerStore.begin"
 _SESSION: Final = "robolink.controllers.epson.session.EpsonSession"
 
@@ -106,7 +105,7 @@ DEFECTS: Final = (
     ),
     KnownDefect(
         "a PLC's stop is acknowledged when it is accepted",
-        {f"{_GROUP}.bring_group_to_rest": stand_ins.stop_sent_only},
+        {f"{_SENDER}.bring_to_rest": stand_ins.stop_sent_only},
         CellKind.SOFTMOTION,
     ),
     KnownDefect(

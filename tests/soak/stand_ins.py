@@ -92,9 +92,7 @@ def stop_not_looked_after(ask: Function, _clock: object, *, controller: str) -> 
     return parse_status(ask("GetStatus"))
 
 
-def stop_sent_only(
-    commands: CommandSender, _snapshots: object, _clock: object, *, controller: str
-) -> None:
+def stop_sent_only(commands: CommandSender) -> None:
     """Take a stop that was acknowledged for rest."""
     commands.stop()
 

@@ -211,7 +211,7 @@ class EpsonGroup(MotionGroupCore):
                 link.preferences.require_real_motion(statement)
                 self._require_motors(statement)
                 found = spel.parse_integer(window.printed(spel.print_selected_tool()))
-                self._require_tool(target, found, statement)
+                self._require_tool(target, found)
                 singular = self._singular
                 if singular is not None:
                     singular.require_clear(self._flagged(target), profile.path)

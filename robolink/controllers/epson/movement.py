@@ -80,7 +80,7 @@ class EpsonMotion:
             raise
         if not arrived:
             self.abort()
-            raise not_ended_in_time(self._link.identity, self.statement, timeout_s)
+            raise not_ended_in_time(self.statement, timeout_s)
         return self._settle()
 
     def abort(self) -> None:

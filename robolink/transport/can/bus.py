@@ -240,7 +240,6 @@ class NodeWatch:
                 count=_MOST_WAITING,
             ),
             remedy=tr("Look for a second device with its node number, or one that is defective."),
-            controller=self._identity,
         )
 
     def pump(self, deadline: Deadline) -> None:
@@ -321,7 +320,6 @@ class NodeWatch:
                     silent_s=self._silent_s(),
                 ),
                 remedy=tr("Check cable, power and state of the PLC, then try again."),
-                controller=self._identity,
             )
 
     def _restarted(self) -> TransportBrokenError:
@@ -330,5 +328,4 @@ class NodeWatch:
                 "Node {node} of {identity} has restarted.", node=self._node, identity=self._identity
             ),
             remedy=tr("Connect again, then check what was under way."),
-            controller=self._identity,
         )

@@ -130,17 +130,18 @@ def _stop_epson(link: LinkUrl, means: _Means) -> "ControllerStatus":
     opened = open_line(link, timeout_s=means.timeout_s, clock=means.clock, traces=traces)
     talk = EpsonConversation(opened, timeout_s=means.timeout_s)
     try:
-        talk.login(means.password)
-        now = bring_to_rest(talk.exchange, talk.clock, controller=talk.identity)
-        from robolink.controllers.epson.answers import may_log_out, status_from_flags
+        with Concerning(talk.identity):
+            talk.login(means.password)
+            now = bring_to_rest(talk.exchange, talk.clock, controller=talk.identity)
+            from robolink.controllers.epson.answers import may_log_out, status_from_flags
 
-        status = status_from_flags(*now)
-        if means.met is not None:
-            _tell_who(talk, means.met)
-        if may_log_out(status):
-            with suppress(RobolinkError):  # it stands: nothing that fails here matters
-                talk.exchange("Logout")
-        return status
+            status = status_from_flags(*now)
+            if means.met is not None:
+                _tell_who(talk, means.met)
+            if may_log_out(status):
+                with suppress(RobolinkError):  # it stands: nothing that fails here matters
+                    talk.exchange("Logout")
+            return status
     finally:
         talk.close()
 

@@ -205,16 +205,12 @@ class EpsonController(ControllerCore):
                     tr("The emergency stop is still pressed after the reset."),
                     code=status.code,
                     remedy=tr("Release the button, then reset again."),
-                    controller=link.identity,
-                    request="Reset",
                 )
             if status.fault or status.serious_fault:
                 raise ControllerFaultError(
                     tr("The reset did not clear error {code:04d}.", code=status.code),
                     code=status.code,
                     remedy=tr("Remove the cause; a serious error needs the power switched off."),
-                    controller=link.identity,
-                    request="Reset",
                 )
             if status.remote and status.ready:
                 self.groups[0].settings.slow_down(MotionProfile())
@@ -236,8 +232,6 @@ class EpsonController(ControllerCore):
                 raise ReadBackError(
                     tr("The motors are not on.") if on else tr("The motors are not off."),
                     remedy=tr("Look at the controller; nothing was repeated."),
-                    controller=self._link.identity,
-                    request=name,
                 )
 
     def robot_number(self) -> int:
@@ -281,7 +275,7 @@ class EpsonController(ControllerCore):
             markers.require_settled(request)
             link.window.require_ready(request)
             if command_class_of(execution(request)) is CommandClass.ACT:
-                link.window.require_abort(request)
+                link.window.require_abort()
             require_engineer(markers.outcomes, tr("run {statement!r} as typed", statement=request))
             with link.uninterrupted(), markers.ledger.block():
                 marker = markers.begin(MarkerKind.SET, request, {"raw": True})
@@ -318,8 +312,6 @@ class EpsonController(ControllerCore):
                 tr("The safety guard is open."),
                 reason=NotReadyReason.GUARD_OPEN,
                 remedy=tr("Close it before the reset."),
-                controller=self._link.identity,
-                request="Reset",
             )
 
     def _require_run(self, statement: Statement, answer: Reply | Refusal, marker: Marker) -> None:

@@ -131,9 +131,10 @@ class EpsonGroup(MotionGroupCore):
 
     def require_able(self, purpose: str) -> None:
         """Refuse what no movement could begin in now; see :class:`robolink.model.MotionGroup`."""
-        self._require_supervision(purpose)
-        self._link.window.require_ready(purpose)
-        self._require_motors(purpose)
+        with self._link.asked(purpose):
+            self._require_supervision()
+            self._link.window.require_ready(purpose)
+            self._require_motors()
 
     def terms(self) -> MotionTerms:
         """Read what a person must know before the robot moves."""
@@ -206,10 +207,10 @@ class EpsonGroup(MotionGroupCore):
             with link.lock.held(statement):
                 # Before power and speed are set for it.
                 link.markers.require_settled(statement)
-                self._require_supervision(statement)
+                self._require_supervision()
                 window.require_ready(statement)
                 link.preferences.require_real_motion(statement)
-                self._require_motors(statement)
+                self._require_motors()
                 found = spel.parse_integer(window.printed(spel.print_selected_tool()))
                 self._require_tool(target, found)
                 singular = self._singular
@@ -269,7 +270,7 @@ class EpsonGroup(MotionGroupCore):
             target, hand=target.hand or here.hand, posture=target.posture or here.posture
         )
 
-    def _require_supervision(self, statement: str) -> None:
+    def _require_supervision(self) -> None:
         # With a remote time-out of 0 the robot may keep moving when this PC is gone
         # (docs/reference/epson.md 1.1). The value cannot be read over the wire; a person states it.
         if self._remote_timeout_s <= 0:
@@ -281,17 +282,13 @@ class EpsonGroup(MotionGroupCore):
                     "{timeout}; without it a lost link leaves a moving robot unwatched.",
                     timeout=way(Way.REMOTE_TIMEOUT),
                 ),
-                controller=self._link.identity,
-                request=statement,
             )
-        self._link.window.require_abort(statement)
+        self._link.window.require_abort()
 
-    def _require_motors(self, statement: str) -> None:
+    def _require_motors(self) -> None:
         if not self.motors_on():
             raise NotReadyError(
                 tr("The motors are off."),
                 reason=NotReadyReason.MOTORS_OFF,
                 remedy=tr("Run 'robolink robot motors on' when the cell is clear."),
-                controller=self._link.identity,
-                request=statement,
             )

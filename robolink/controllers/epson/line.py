@@ -176,7 +176,7 @@ class EpsonConversation:
         if isinstance(answer, Refusal):
             self.close()
             if answer.code in _PASSWORD_REFUSALS:
-                raise _refused(answer.code, self.identity)
+                raise _refused(answer.code)
             raise self._rejected(answer, "Login")
 
     def exchange(self, name: str, *parameters: str) -> Reply:
@@ -237,7 +237,6 @@ class EpsonConversation:
                     request=as_shown(request),
                 ),
                 remedy=error.remedy,
-                controller=self.identity,
                 request=as_shown(request),
                 raw=held,
             ) from error
@@ -264,7 +263,6 @@ class EpsonConversation:
             raise RemoteProtocolError(
                 tr("{identity} sent an answer to a question nobody asked.", identity=self.identity),
                 remedy=tr("Look for a second program on this controller."),
-                controller=self.identity,
             )
 
     def _rejected(self, refusal: Refusal, name: str) -> RejectedError:
@@ -276,7 +274,6 @@ class EpsonConversation:
         return TransportBrokenError(
             tr("{identity} closed the connection.", identity=self.identity),
             remedy=tr("Check cable, power and remote time-out of the controller, then try again."),
-            controller=self.identity,
         )
 
 
@@ -292,12 +289,11 @@ def _unanswered(controller: str) -> LoginUnansweredError:
             "Only one client may be logged in: close the other one. If there is none, "
             "check that this port is the controller's Remote Ethernet port."
         ),
-        controller=controller,
         request="Login",
     )
 
 
-def _refused(code: int, controller: str) -> LoginRefusedError:
+def _refused(code: int) -> LoginRefusedError:
     return LoginRefusedError(
         tr("The controller refused the login (code {code}).", code=code),
         code=code,
@@ -306,6 +302,5 @@ def _refused(code: int, controller: str) -> LoginRefusedError:
             "{password}. No second attempt was made.",
             password=way(Way.PASSWORD),
         ),
-        controller=controller,
         request="Login",
     )

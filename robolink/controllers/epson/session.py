@@ -26,6 +26,7 @@ from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.controllers.epson.line import EpsonConversation, EpsonLine, as_shown
 from robolink.errors import (
     BusyError,
+    Concerning,
     RejectedError,
     RemoteProtocolError,
     RobolinkError,
@@ -317,7 +318,6 @@ class EpsonSession(EpsonConversation):
                 "The connection is closed, because later answers could be mistaken. Connect "
                 "again; if it happens twice, look for a second program on this controller."
             ),
-            controller=self.identity,
         )
 
     def _end(self, error: RobolinkError) -> None:
@@ -339,7 +339,8 @@ def log_in(line: EpsonLine, password: Secret | None, *, timeout_s: float) -> Eps
     """
     session = EpsonSession(line, timeout_s=timeout_s)
     try:
-        session.login(password.reveal() if password else "")
+        with Concerning(session.identity):
+            session.login(password.reveal() if password else "")
         if line.outlives_sessions:
             _prove_in_step(session)
     except BaseException:

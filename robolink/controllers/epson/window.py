@@ -57,7 +57,7 @@ class CommandWindow:
         self._was_ready = True
         return status
 
-    def require_abort(self, request: str) -> None:
+    def require_abort(self) -> None:
         """Hold back what could not be ended over this line once it runs.
 
         While a statement runs, Abort alone ends it (docs/reference/epson.md 1.5), and no manual
@@ -76,8 +76,6 @@ class CommandWindow:
                 "expert verify-controller' that the controller knows the letter A, "
                 "and write letters=guessed into the URL."
             ),
-            controller=self._session.identity,
-            request=request,
         )
 
     @contextmanager

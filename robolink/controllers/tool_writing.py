@@ -114,7 +114,7 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
             self._require_clearer()
             found = self._link.carry_out(self)
             if not self._same(found, self.requested):
-                raise self._read_back_differs(found)
+                raise self._differs(found)
             return self._receipt(found)
 
     def _require_clearer(self) -> None:
@@ -182,7 +182,7 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
             unconditional=self._unconditional,
         )
 
-    def _read_back_differs(self, found: ToolOffset | None) -> ReadBackError:
+    def _differs(self, found: ToolOffset | None) -> ReadBackError:
         return ReadBackError(
             tr(
                 "Tool {tool} was written as {requested}, but reads back as {found}.",

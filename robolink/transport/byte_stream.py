@@ -6,6 +6,8 @@ Records what goes over a transport.
 from collections.abc import Callable
 from typing import Final, Literal, Protocol
 
+from robolink.errors import TransportClosedError
+from robolink.messages import tr
 from robolink.timing import Clock, Deadline
 
 
@@ -82,6 +84,19 @@ class Transport(Protocol):
 
     def close(self) -> None:
         """Close. Idempotent; a waiting call in another thread ends soon after."""
+
+
+def link_closed(identity: str) -> TransportClosedError:
+    """Return the error for a link that is used after this side has closed it.
+
+    Args:
+        identity: Its far end.
+    """
+    return TransportClosedError(
+        tr("The connection to {identity} is closed.", identity=identity),
+        remedy=tr("Connect again."),
+        controller=identity,
+    )
 
 
 Direction = Literal["sent", "received"]

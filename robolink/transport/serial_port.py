@@ -12,13 +12,13 @@ from robolink.errors import (
     ConfigError,
     ConnectError,
     TransportBrokenError,
-    TransportClosedError,
     TransportError,
     TransportTimeoutError,
 )
 from robolink.messages import tr
 from robolink.timing import Clock, Deadline, SystemClock
 from robolink.transport._url import LinkUrl, UrlOptions
+from robolink.transport.byte_stream import link_closed
 
 _SLICE_S: Final = 0.02
 _CHUNK_BYTES: Final = 4096
@@ -258,11 +258,7 @@ class SerialTransport:
     def _ended(self, error: Exception) -> TransportError:
         # pyserial reads from a port that another thread has closed as from no number at all.
         if self._closed or isinstance(error, TypeError):
-            return TransportClosedError(
-                tr("The connection to {identity} is closed.", identity=self.identity),
-                remedy=tr("Connect again."),
-                controller=self.identity,
-            )
+            return link_closed(self.identity)
         return TransportBrokenError(
             tr("The connection to {identity} broke: {cause}.", identity=self.identity, cause=error),
             remedy=tr("Check that the adapter is still plugged in, then connect again."),

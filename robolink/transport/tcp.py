@@ -35,13 +35,13 @@ from robolink.errors import (
     ConfigError,
     ConnectError,
     TransportBrokenError,
-    TransportClosedError,
     TransportError,
     TransportTimeoutError,
 )
 from robolink.messages import tr
 from robolink.timing import Clock, Deadline, SystemClock
 from robolink.transport._url import LinkUrl
+from robolink.transport.byte_stream import link_closed
 
 # Unacknowledged data end the connection after 2.5 s. Each constant is missing on some platform.
 _OPTIONS: Final = (
@@ -321,11 +321,7 @@ class TcpTransport:
 
     def _ended(self, error: OSError | None) -> TransportError:
         if self._closed or error is None:
-            return TransportClosedError(
-                tr("The connection to {identity} is closed.", identity=self.identity),
-                remedy=tr("Connect again."),
-                controller=self.identity,
-            )
+            return link_closed(self.identity)
         return TransportBrokenError(
             tr(
                 "The connection to {identity} broke: {cause}.",

@@ -114,17 +114,7 @@ class SlotWrite(ToolWrite):
         self._draft = draft
         self._stored = stored
         self._group_tool = group_tool
-        self._found: ToolOffset | None = None
         self._group_differs = False
-
-    def change(self, expected: Expected) -> ToolReceipt:
-        """Write and read back; see :class:`robolink.controllers.tool_writing.ToolWrite`."""
-        try:
-            return super().change(expected)
-        except ReadBackError as error:
-            if self._group_differs and self._group_tool is not None:
-                raise self._group_tool.differs(self.requested, self._found) from error
-            raise
 
     def read_before(self, expected: Expected) -> ToolOffset | None:  # noqa: ARG002 - one way only
         """Read what the write replaces.
@@ -140,11 +130,16 @@ class SlotWrite(ToolWrite):
 
     def read_back(self) -> ToolOffset | None:
         """Return what is stored, or what the group works with where that differs."""
-        self._found, group_tool = self._slot(), self._group_tool
-        if group_tool is not None and self._mailbox.same(self._found, self.requested):
-            self._found = group_tool.read()
-            self._group_differs = not self._mailbox.same(self._found, self.requested)
-        return self._found
+        found, group_tool = self._slot(), self._group_tool
+        if group_tool is not None and self._mailbox.same(found, self.requested):
+            found = group_tool.read()
+            self._group_differs = not self._mailbox.same(found, self.requested)
+        return found
+
+    def _differs(self, found: ToolOffset | None) -> ReadBackError:
+        if self._group_differs and self._group_tool is not None:
+            return self._group_tool.differs(self.requested, found)
+        return super()._differs(found)
 
     def _slot(self) -> ToolOffset | None:
         mailbox = self._mailbox

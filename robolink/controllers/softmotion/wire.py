@@ -32,6 +32,7 @@ from robolink.protocols.mailbox import CommandState, Finished, Response
 from robolink.stop_latch import StopLatch
 from robolink.timing import Deadline
 from robolink.transport import MailboxHead, MailboxLink
+from robolink.transport.byte_stream import link_closed
 
 MOST: Final = 4
 """Movements whose end may be unread."""
@@ -285,10 +286,7 @@ class MailboxWire:
 
     def close(self) -> None:
         """Close the link. Idempotent."""
-        self._ended_by = self._ended_by or TransportClosedError(
-            tr("The connection to {identity} is closed.", identity=self.identity),
-            remedy=tr("Connect again."),
-        )
+        self._ended_by = self._ended_by or link_closed(self.identity)
         self._link.close()
         self._gate.close()
 

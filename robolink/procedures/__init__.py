@@ -83,40 +83,4 @@ if TYPE_CHECKING:
     from robolink.procedures.witnessed_touches import require_one_height as require_one_height
     from robolink.procedures.witnessed_touches import require_touches as require_touches
 else:
-    __getattr__, __dir__, __all__ = lazy_exports(
-        __name__,
-        {
-            "approach": (
-                "NO_OFFSET approach_path offset_z require_turn_inside seek_or_retract turn_in_air"
-            ),
-            "camera_drive": (
-                "CameraDrive HALF_ROUND_DEG LEAST_BESIDE_MM LookPlan Place TWO_ANGLES_DEG"
-            ),
-            "camera_looks": "CameraSamples NO_ERROR nearest_first seen_drift verify_by_looking",
-            "kept_proof": "KeepsProof KeptProof PlacedProof ProvesAgain",
-            "pin_proof": (
-                "DriftProof MOST_MORE TurnTest contact_pose drift_uncertainty_mm verify_by_turning"
-            ),
-            "pin_touches": "PinTouches lift_off touch_again turned_touches",
-            "sample_sequence": (
-                "SamplingPolicy TAKE_ALL agreement finalize_samples may_end_early "
-                "resume_samples sample_sequentially"
-            ),
-            "samples": "Sampler Samples SequentialSampler",
-            "source": (
-                "FindsStation MeasurementContext MovingSource PoseMethod RequiresMotion "
-                "RequiresSensor StopsAbovePin TipSource TouchesFurther"
-            ),
-            "source_bases": (
-                "CalibratedCameraSource InputSource LazySource ManualPinSource PinSource "
-                "TouchSource TouchesPin angles_between calibrated_camera camera_error_of "
-                "middles_of_gaps pixel_camera proof_angles radius_of touches_of"
-            ),
-            "surface_touches": "SurfaceTouches",
-            "tilt_proof": "SurfaceProof",
-            "witnessed_touches": (
-                "TOUCH_CODES TouchPlan heights_agree jog_mm plain_pose require_one_height "
-                "require_touches"
-            ),
-        },
-    )
+    __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)

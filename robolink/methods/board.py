@@ -49,8 +49,8 @@ from robolink.procedures import (
     CameraDrive,
     CameraSamples,
     LookPlan,
-    MeasurementContext,
     Place,
+    ProofBasis,
     camera_error_of,
     nearest_first,
     proof_angles,
@@ -383,27 +383,16 @@ class BoardSource(CalibratedCameraSource):
             retake=self.retake,
         )
 
-    def proof(
-        self,
-        context: MeasurementContext,  # noqa: ARG002 - nothing of it is read
-        tool: int,
-        result: CalibrationResult,
-        *,
-        tip: ToolOffset,
-        tolerance_mm: float,
-    ) -> BoardTest:
-        """Return the proof at other angles; see :class:`~robolink.procedures.KeepsProof`."""
+    def proof_of(self, basis: ProofBasis) -> BoardTest:
+        """Return the proof at other angles; see :class:`~robolink.procedures.ProvesAgain`."""
         return BoardTest(
-            tool=tool,
-            written=result.offset,
-            tip=tip,
-            tolerance_mm=tolerance_mm,
+            **basis.common,
             sensor=self.sensor,
             station=self.station,
             plan=self.plan,
             # The tool's own U turned with the board, so the joint stands where it stood.
-            angles_deg=proof_angles(result, tool),
-            camera_error_mm=camera_error_of(result),
+            angles_deg=proof_angles(basis.result, basis.tool),
+            camera_error_mm=camera_error_of(basis.result),
             board=self.board,
         )
 

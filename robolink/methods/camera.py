@@ -31,6 +31,7 @@ from robolink.procedures import (
     MeasurementContext,
     Place,
     PlacedProof,
+    ProofBasis,
     calibrated_camera,
     camera_error_of,
     proof_angles,
@@ -260,27 +261,16 @@ class CameraSource(CalibratedCameraSource):
             retake=self.retake,
         )
 
-    def proof(
-        self,
-        context: MeasurementContext,  # noqa: ARG002 - nothing of it is read
-        tool: int,
-        result: CalibrationResult,
-        *,
-        tip: ToolOffset,
-        tolerance_mm: float,
-    ) -> LookTest:
-        """Return the proof at other angles; see :class:`~robolink.procedures.KeepsProof`."""
+    def proof_of(self, basis: ProofBasis) -> LookTest:
+        """Return the proof at other angles; see :class:`~robolink.procedures.ProvesAgain`."""
         return LookTest(
-            tool=tool,
-            written=result.offset,
-            tip=tip,
-            tolerance_mm=tolerance_mm,
+            **basis.common,
             sensor=self.sensor,
             station=self.station,
             plan=self.plan,
-            angles_deg=proof_angles(result, tool),
-            camera_error_mm=camera_error_of(result),
-            radius_px=radius_of(result),
+            angles_deg=proof_angles(basis.result, basis.tool),
+            camera_error_mm=camera_error_of(basis.result),
+            radius_px=radius_of(basis.result),
         )
 
 

@@ -44,6 +44,7 @@ from robolink.procedures import (
     CameraSamples,
     MeasurementContext,
     Place,
+    ProofBasis,
     ProvesAgain,
     pixel_camera,
     proof_angles,
@@ -345,16 +346,8 @@ class CameraAffineSource(ProvesAgain):
             sigma_mm=self.sigma_mm,
         )
 
-    def proof(
-        self,
-        context: MeasurementContext,  # noqa: ARG002 - nothing of it is read
-        tool: int,
-        result: CalibrationResult,
-        *,
-        tip: ToolOffset,
-        tolerance_mm: float,
-    ) -> "LookTest":
-        """Return the proof at other angles; see :class:`~robolink.procedures.KeepsProof`.
+    def proof_of(self, basis: ProofBasis) -> "LookTest":
+        """Return the proof at other angles; see :meth:`~robolink.procedures.ProvesAgain.proof_of`.
 
         Raises:
             TypeError: The result is not that of a camera that was found.
@@ -362,18 +355,15 @@ class CameraAffineSource(ProvesAgain):
         from robolink.calibration import CameraCalibration
         from robolink.methods.camera import LookTest  # numpy
 
-        if not isinstance(result, CameraCalibration):
-            raise TypeError(f"no camera was found by {result.method}")
+        if not isinstance(basis.result, CameraCalibration):
+            raise TypeError(f"no camera was found by {basis.result.method}")
         return LookTest(
-            tool=tool,
-            written=result.offset,
-            tip=tip,
-            tolerance_mm=tolerance_mm,
+            **basis.common,
             sensor=self.sensor,
-            station=replace(self.station, model=result.camera),
+            station=replace(self.station, model=basis.result.camera),
             plan=self.plan.look,
-            angles_deg=proof_angles(result, tool),
-            radius_px=radius_of(result),
+            angles_deg=proof_angles(basis.result, basis.tool),
+            radius_px=radius_of(basis.result),
         )
 
 

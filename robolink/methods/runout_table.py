@@ -18,7 +18,7 @@ from robolink.methods.shared_parameters import (
     camera_at,
 )
 from robolink.model import Pose, ToolOffset
-from robolink.procedures import LookPlan, MeasurementContext
+from robolink.procedures import LookPlan, ProofBasis
 from robolink.runner import Procedure
 from robolink.sensing import sensor_name
 from robolink.stations import StationKind
@@ -117,25 +117,17 @@ class RunoutTableSource(CameraSource):
             retake=self.retake,
         )
 
-    def proof(
-        self,
-        context: MeasurementContext,
-        tool: int,
-        result: CalibrationResult,
-        *,
-        tip: ToolOffset,
-        tolerance_mm: float,
-    ) -> "LookTest":
+    def proof_of(self, basis: ProofBasis) -> "LookTest":
         """Return the proof at other angles, where the tip has to be where the table says."""
         from robolink.calibration import RunoutTableResult  # numpy
         from robolink.methods.runout_table_procedure import WobbleTest
 
         # "slots" makes the class anew, so the short form of super() would not find it.
-        looks = CameraSource.proof(self, context, tool, result, tip=tip, tolerance_mm=tolerance_mm)
-        if not isinstance(result, RunoutTableResult):
+        looks = CameraSource.proof_of(self, basis)
+        if not isinstance(basis.result, RunoutTableResult):
             return looks
         plain = {field.name: getattr(looks, field.name) for field in fields(looks)}
-        return WobbleTest(**plain, table=result.table)
+        return WobbleTest(**plain, table=basis.result.table)
 
 
 def _source(parameters: RunoutTableParameters, site: Site) -> "TipSource":

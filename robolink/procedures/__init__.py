@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from robolink.procedures.kept_proof import KeepsProof as KeepsProof
     from robolink.procedures.kept_proof import KeptProof as KeptProof
     from robolink.procedures.kept_proof import PlacedProof as PlacedProof
+    from robolink.procedures.kept_proof import ProofBasis as ProofBasis
     from robolink.procedures.kept_proof import ProvesAgain as ProvesAgain
     from robolink.procedures.pin_proof import MOST_MORE as MOST_MORE
     from robolink.procedures.pin_proof import DriftProof as DriftProof

@@ -13,7 +13,7 @@ from robolink.deprecation import deprecated, old_hook
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Pose, SpotUnit, TipSensor, ToolOffset
-from robolink.procedures.kept_proof import KeepsProof, KeptProof, ProvesAgain
+from robolink.procedures.kept_proof import KeepsProof, KeptProof, ProofBasis, ProvesAgain
 from robolink.procedures.pin_proof import TurnTest, contact_pose, drift_uncertainty_mm
 from robolink.procedures.source import MeasurementContext, MovingSource, TouchesFurther
 from robolink.procedures.witnessed_touches import TouchPlan
@@ -324,26 +324,15 @@ class ManualPinSource(PinSource):
 
     __slots__ = ()
 
-    def proof(
-        self,
-        context: MeasurementContext,  # noqa: ARG002 - nothing of it is read
-        tool: int,
-        result: CalibrationResult,
-        *,
-        tip: ToolOffset,
-        tolerance_mm: float,
-    ) -> TurnTest:
-        """Return the turn test; see :class:`~robolink.procedures.KeepsProof`."""
-        angles = [tip_pose(pose, result.offset, tool=tool).u_deg for pose in result.inputs]
+    def proof_of(self, basis: ProofBasis) -> TurnTest:
+        """Return the turn test; see :meth:`~robolink.procedures.ProvesAgain.proof_of`."""
+        angles = basis.measured_deg
         return TurnTest(
-            tool=tool,
+            **basis.common,
             touch=self.touch,
-            contact=contact_pose(result, tool=tool),
+            contact=contact_pose(basis.result, tool=basis.tool),
             angles_deg=(middles_of_gaps(angles)[0], angles[0]),
-            tolerance_mm=tolerance_mm,
-            u_mm=drift_uncertainty_mm(result),
-            written=result.offset,
-            tip=tip,
+            u_mm=drift_uncertainty_mm(basis.result),
         )
 
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 
 from annotated_types import Ge, Le, Len
 
-from robolink.calibration import MIN_ROTATION_DEG, CalibrationResult, tip_pose
+from robolink.calibration import MIN_ROTATION_DEG, CalibrationResult
 from robolink.files.toml import Problem
 from robolink.messages import declared, tr
 from robolink.methods.method import (
@@ -27,7 +27,13 @@ from robolink.methods.method import (
 )
 from robolink.methods.z_touch import retake_of_nothing
 from robolink.model import MotionGroup, Pose, ToolOffset, angle_difference_deg
-from robolink.procedures import InputSource, MeasurementContext, SamplingPolicy, may_end_early
+from robolink.procedures import (
+    InputSource,
+    MeasurementContext,
+    ProofBasis,
+    SamplingPolicy,
+    may_end_early,
+)
 from robolink.runner import Procedure
 from robolink.stations import BeamStation, StationKind
 
@@ -331,16 +337,8 @@ class BeamsSource(InputSource[BeamsParameters]):
 
         return cross_beams(self, stored, here)
 
-    def proof(
-        self,
-        context: MeasurementContext,
-        tool: int,
-        result: CalibrationResult,
-        *,
-        tip: ToolOffset,
-        tolerance_mm: float,
-    ) -> "CrossingTest":
-        """Return the proof at another U; see :class:`~robolink.procedures.KeepsProof`.
+    def proof_of(self, basis: ProofBasis) -> "CrossingTest":
+        """Return the proof at another U; see :meth:`~robolink.procedures.ProvesAgain.proof_of`.
 
         Its crossings are others than those that were measured, and as far from them as a turn goes:
         90 degrees and more from each. Where the beams were found too it is about those places: with
@@ -350,24 +348,18 @@ class BeamsSource(InputSource[BeamsParameters]):
         from robolink.calibration import moved_beams
         from robolink.methods.beams.procedure import CrossingTest  # numpy
 
-        measured_deg = [
-            tip_pose(pose, result.offset, tool=tool).u_deg
-            for pose in (result.inputs[0], result.inputs[-1])
-        ]
-        station, lean = self.station, getattr(result, "lean", None)
+        station, measured_deg = self.station, basis.measured_deg
+        lean = getattr(basis.result, "lean", None)
         return CrossingTest(
-            tool=tool,
-            written=result.offset,
-            tip=tip,
-            tolerance_mm=tolerance_mm,
-            beams=moved_beams(station.beams, getattr(result, "moved_mm", ())),
+            **basis.common,
+            beams=moved_beams(station.beams, getattr(basis.result, "moved_mm", ())),
             z_mm=station.z_mm,
             inputs=station.inputs,
             off_when_broken=station.off_when_broken,
             plan=self.plan,
-            angles_deg=(farthest_from(*measured_deg),),
+            angles_deg=(farthest_from(measured_deg[0], measured_deg[-1]),),
             lean=None if lean is None else (lean.x, lean.y),
-            run_up_mm=context.controller.groups[0].run_up_mm(self.plan.crossing_mm_s),
+            run_up_mm=basis.context.controller.groups[0].run_up_mm(self.plan.crossing_mm_s),
         )
 
 

@@ -26,7 +26,13 @@ from robolink.methods.method import (
 )
 from robolink.methods.shared_parameters import clearance_below_lift
 from robolink.model import Pose, ToolOffset
-from robolink.procedures import InputSource, MeasurementContext, SamplingPolicy, may_end_early
+from robolink.procedures import (
+    InputSource,
+    MeasurementContext,
+    ProofBasis,
+    SamplingPolicy,
+    may_end_early,
+)
 from robolink.runner import Procedure
 from robolink.stations import StationKind, TouchStation
 
@@ -218,27 +224,17 @@ class ZTouchSource(InputSource[ZTouchParameters]):
 
         return touch_surface(self, stored, here)
 
-    def proof(
-        self,
-        context: MeasurementContext,
-        tool: int,
-        result: CalibrationResult,
-        *,
-        tip: ToolOffset,
-        tolerance_mm: float,
-    ) -> "ProbeTest":
-        """Return the proof at another U; see :class:`~robolink.procedures.KeepsProof`."""
+    def proof_of(self, basis: ProofBasis) -> "ProbeTest":
+        """Return the proof at another U; see :meth:`~robolink.procedures.ProvesAgain.proof_of`."""
         from robolink.calibration import toward_zero
         from robolink.methods.z_touch.procedure import ProbeTest  # numpy
 
+        context, tool = basis.context, basis.tool
         here = context.stands or context.controller.groups[0].pose()
         # After a measurement that is the flange; else whatever is in force.
-        frame = here if here.tool == tool else tip_pose(here, result.offset, tool=tool)
+        frame = here if here.tool == tool else tip_pose(here, basis.result.offset, tool=tool)
         return ProbeTest(
-            tool=tool,
-            written=result.offset,
-            tip=tip,
-            tolerance_mm=tolerance_mm,
+            **basis.common,
             station=self.station,
             plan=self.plan,
             angles_deg=(toward_zero(frame.u_deg, self.plan.proof_turn_deg),),

@@ -1,6 +1,7 @@
 """camera-affine: an up-looking camera whose place and scale are unknown, found with the tip."""
 
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -42,10 +43,9 @@ from robolink.procedures import (
     NO_OFFSET,
     CameraDrive,
     CameraSamples,
-    MeasurementContext,
+    LookSource,
     Place,
     ProofBasis,
-    ProvesAgain,
     pixel_camera,
     proof_angles,
     radius_of,
@@ -258,7 +258,7 @@ def _require_pattern(plan: CameraAffineParameters) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class CameraAffineSource(ProvesAgain):
+class CameraAffineSource(LookSource):
     """Measures X and Y of a tip, and the camera that sees it, in one pattern of looks.
 
     Attributes:
@@ -270,8 +270,6 @@ class CameraAffineSource(ProvesAgain):
         name: Name of the station, under which the camera is kept on record; empty for not.
     """
 
-    sensor: str | TipSensor
-    station: CameraStation
     plan: CameraAffineParameters = field(default_factory=CameraAffineParameters)
     sigma_mm: float | None = None
     name: str = ""
@@ -318,23 +316,9 @@ class CameraAffineSource(ProvesAgain):
             },
         )
 
-    def require_ready(self) -> None:
-        """Find out whether the camera is there.
-
-        See :class:`~robolink.procedures.RequiresSensor`.
-        """
-        with pixel_camera(self.sensor):
-            pass
-
-    def measure(
-        self,
-        context: MeasurementContext,
-        tool: int,  # noqa: ARG002 - the flange is what moves
-        stored: ToolOffset | None,
-    ) -> CalibrationResult:
-        """Look and solve; see :class:`~robolink.procedures.MovingSource`."""
-        with pixel_camera(self.sensor) as camera:
-            return context.measure(lambda here: self.procedure(stored, here), camera=camera)
+    def opened(self) -> AbstractContextManager[TipSensor]:
+        """Open the camera, which answers in pixels; see :func:`pixel_camera`."""
+        return pixel_camera(self.sensor)
 
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
         """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`."""

@@ -5,7 +5,7 @@ A procedure is a generator of steps (:mod:`robolink.runner`); a source runs proc
 
 from typing import TYPE_CHECKING
 
-from robolink.lazy_exports import lazy_exports
+from robolink.lazy_exports import lazy_exports, old_names
 
 if TYPE_CHECKING:
     from robolink.procedures.approach import NO_OFFSET as NO_OFFSET
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from robolink.procedures.camera_drive import Place as Place
     from robolink.procedures.camera_looks import NO_ERROR as NO_ERROR
     from robolink.procedures.camera_looks import CameraSamples as CameraSamples
+    from robolink.procedures.camera_looks import look_again as look_again
     from robolink.procedures.camera_looks import nearest_first as nearest_first
     from robolink.procedures.camera_looks import seen_drift as seen_drift
     from robolink.procedures.camera_looks import verify_by_looking as verify_by_looking
@@ -59,9 +60,9 @@ if TYPE_CHECKING:
     from robolink.procedures.source import StopsAbovePin as StopsAbovePin
     from robolink.procedures.source import TipSource as TipSource
     from robolink.procedures.source import TouchesFurther as TouchesFurther
-    from robolink.procedures.source_bases import CalibratedCameraSource as CalibratedCameraSource
     from robolink.procedures.source_bases import InputSource as InputSource
     from robolink.procedures.source_bases import LazySource as LazySource
+    from robolink.procedures.source_bases import LookSource as LookSource
     from robolink.procedures.source_bases import ManualPinSource as ManualPinSource
     from robolink.procedures.source_bases import PinSource as PinSource
     from robolink.procedures.source_bases import TouchesPin as TouchesPin
@@ -84,4 +85,4 @@ if TYPE_CHECKING:
     from robolink.procedures.witnessed_touches import require_one_height as require_one_height
     from robolink.procedures.witnessed_touches import require_touches as require_touches
 else:
-    __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)
+    __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__, old_names(__name__))

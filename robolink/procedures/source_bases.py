@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from statistics import median
@@ -417,8 +417,8 @@ def pixel_camera(sensor: str | TipSensor) -> Iterator[TipSensor]:
 
 
 @dataclass(frozen=True, slots=True)
-class CalibratedCameraSource(ProvesAgain):
-    """Measures by looks of a camera whose place and pixels are known.
+class LookSource(ProvesAgain):
+    """Measures by looks of a camera.
 
     Attributes:
         sensor: URL or name of the camera (:func:`robolink.sensing.open_sensor`), or the camera.
@@ -428,9 +428,13 @@ class CalibratedCameraSource(ProvesAgain):
     sensor: str | TipSensor
     station: CameraStation
 
+    def opened(self) -> AbstractContextManager[TipSensor]:
+        """Open the camera; it has to be a calibrated one, see :func:`calibrated_camera`."""
+        return calibrated_camera(self.sensor, self.station)
+
     def require_ready(self) -> None:
         """Find out whether the camera is there; see :class:`RequiresSensor`."""
-        with calibrated_camera(self.sensor, self.station):
+        with self.opened():
             pass
 
     def measure(
@@ -440,7 +444,7 @@ class CalibratedCameraSource(ProvesAgain):
         stored: ToolOffset | None,
     ) -> CalibrationResult:
         """Look and solve; see :class:`~robolink.procedures.MovingSource`."""
-        with calibrated_camera(self.sensor, self.station) as camera:
+        with self.opened() as camera:
             return context.measure(lambda here: self.procedure(stored, here), camera=camera)
 
     @abstractmethod

@@ -159,10 +159,6 @@ class LookTest(PlacedProof):
             radius_px=self.radius_px,
         )
 
-    def steps_after_a_break(self, here: Pose) -> Procedure[VerifyResult]:
-        """Return the same steps: they begin straight up."""
-        return self.steps(here)
-
 
 class RoundSource(LookSource):
     """Measures by bringing marks before a calibrated camera at every angle of a plan.

@@ -96,13 +96,13 @@ class PlacedProof(KeptProof):
             here: Where the frame of the new tool is.
         """
 
-    @abstractmethod
     def steps_after_a_break(self, here: Pose) -> Procedure[VerifyResult]:
-        """Return the steps from wherever the robot stands now.
+        """Return the steps from wherever the robot stands now; the same where they go up first.
 
         Args:
             here: Where the frame of the new tool is.
         """
+        return self.steps(here)
 
 
 @runtime_checkable

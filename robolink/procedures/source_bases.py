@@ -168,7 +168,16 @@ class InputSource(ProvesAgain, Generic[PlanT]):
         stored: ToolOffset | None,
     ) -> CalibrationResult:
         """Drive and solve; see :class:`~robolink.procedures.MovingSource`."""
-        return context.measure(lambda here: self.steps(stored, here))
+        source = self.told_by(context)
+        return context.measure(lambda here: source.steps(stored, here))
+
+    def told_by(self, context: MeasurementContext) -> Self:  # noqa: ARG002 - for overriding
+        """Return the source with what only the controller tells of its movements; it is asked now.
+
+        Args:
+            context: What to work with.
+        """
+        return self
 
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
         """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`.

@@ -3,11 +3,11 @@
 import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field, replace
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final, Self
 
 from annotated_types import Ge, Le, Len
 
-from robolink.calibration import MIN_ROTATION_DEG, CalibrationResult
+from robolink.calibration import MIN_ROTATION_DEG
 from robolink.files.toml import Problem
 from robolink.messages import declared, tr
 from robolink.methods.method import (
@@ -20,18 +20,16 @@ from robolink.methods.method import (
     InputNumber,
     Length,
     Method,
-    MethodParameters,
     Needs,
     Option,
     Site,
 )
-from robolink.methods.z_touch import retake_of_nothing
+from robolink.methods.shared_parameters import SampledParameters
 from robolink.model import MotionGroup, Pose, ToolOffset, angle_difference_deg
 from robolink.procedures import (
     InputSource,
     MeasurementContext,
     ProofBasis,
-    SamplingPolicy,
     may_end_early,
 )
 from robolink.runner import Procedure
@@ -60,7 +58,7 @@ class BeamLine:
 
 
 @dataclass(frozen=True, kw_only=True)
-class BeamsParameters(MethodParameters):
+class BeamsParameters(SampledParameters):
     """How a tip is driven through two crossed light beams."""
 
     beams: Annotated[
@@ -169,11 +167,6 @@ class BeamsParameters(MethodParameters):
         Help(declared("Whether robolink offers to make the crossing that fits worst again.")),
     ] = False
 
-    @property
-    def sampling(self) -> SamplingPolicy:
-        """When it ends, and whether a crossing is offered to be made again."""
-        return SamplingPolicy(self.until_mm, retake=self.retake)
-
     def may_end_early(self, *, sigma_stated: bool) -> bool:
         """Tell whether the tip can be known well enough before the last crossing.
 
@@ -186,7 +179,7 @@ class BeamsParameters(MethodParameters):
 
     def problems(self, check: Check) -> Iterator[Problem]:
         """Check that the beams cross, and that one breaks at a time."""
-        yield from self._of_sampling(check)
+        yield from super().problems(check)
         yield from self._of_beams(check)
         if self.aside_mm <= self.search_mm:
             yield Problem(
@@ -217,21 +210,14 @@ class BeamsParameters(MethodParameters):
         """Tell whether the beams are stated here, so that the station need not be known."""
         return self.beams is not None
 
-    def _of_sampling(self, check: Check) -> Iterator[Problem]:
-        if "retake" in check.given and self.retake and self.no_residual():
-            yield retake_of_nothing()
-        if self.until_mm is None or check.sigma_stated is None:
-            return
-        if not self.may_end_early(sigma_stated=check.sigma_stated):
-            yield Problem(
-                "until_mm",
-                tr(
-                    "has nothing to leave out; give 3 {repeats}, or 2 with {sigma} or {turn}",
-                    repeats=check.spell("repeats"),
-                    sigma=check.spell("sigma_mm"),
-                    turn=check.spell("turn_deg"),
-                ),
-            )
+    def nothing_to_leave_out(self, check: Check) -> str:
+        """Return why it cannot end early, and what to give."""
+        return tr(
+            "has nothing to leave out; give 3 {repeats}, or 2 with {sigma} or {turn}",
+            repeats=check.spell("repeats"),
+            sigma=check.spell("sigma_mm"),
+            turn=check.spell("turn_deg"),
+        )
 
     def _of_beams(self, check: Check) -> Iterator[Problem]:
         if (self.beams is None) != (self.z_mm is None):
@@ -309,15 +295,12 @@ class BeamsSource(InputSource[BeamsParameters]):
         """What to do when a measurement makes the tip jump."""
         return tr("Were the beams moved since the reference was taken, or does the needle lean?")
 
-    def measure(
-        self, context: MeasurementContext, tool: int, stored: ToolOffset | None
-    ) -> CalibrationResult:
-        """Cross and solve; see :class:`~robolink.procedures.MovingSource`."""
+    def told_by(self, context: MeasurementContext) -> Self:
+        """Return the source with the run-up and the step of a crossing."""
         group, speed_mm_s = context.controller.groups[0], self.plan.crossing_mm_s
-        told = replace(
+        return replace(
             self, run_up_mm=group.run_up_mm(speed_mm_s), step_mm=group.edge_step_mm(speed_mm_s)
         )
-        return InputSource.measure(told, context, tool, stored)
 
     def require_able(self, group: MotionGroup, change_mm: float) -> None:
         """Refuse crossings that are too fast for their way.

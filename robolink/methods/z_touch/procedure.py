@@ -218,7 +218,3 @@ class ProbeTest(PlacedProof):
             deceleration_mm_s2=self.deceleration_mm_s2,
             step_mm=self.step_mm,
         )
-
-    def steps_after_a_break(self, here: Pose) -> Procedure[VerifyResult]:
-        """Return the same steps: they begin straight up."""
-        return self.steps(here)

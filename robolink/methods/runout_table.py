@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Annotated, cast
+from typing import TYPE_CHECKING, Annotated, ClassVar, cast
 
 from annotated_types import MaxLen, MinLen
 
@@ -54,6 +54,8 @@ class AllRoundPlan(LookPlan):
 class RunoutTableParameters(LookParameters):
     """How a calibrated camera looks at a tip all round."""
 
+    plan_kind: ClassVar[type[LookPlan]] = AllRoundPlan
+
     turns_deg: Annotated[
         tuple[Angle, ...],
         MinLen(_LEAST_LOOKS),
@@ -67,16 +69,6 @@ class RunoutTableParameters(LookParameters):
             )
         ),
     ] = tuple(30.0 * step for step in range(12))
-
-    @property
-    def look(self) -> LookPlan:
-        """The same for a procedure."""
-        return AllRoundPlan(
-            turns_deg=self.turns_deg,
-            pictures=self.pictures,
-            lift_mm=self.lift_mm,
-            beside_mm=self.beside_mm,
-        )
 
     def problems(self, check: Check) -> Iterator[Problem]:
         """Check that the looks go all round."""

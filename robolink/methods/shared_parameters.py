@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from annotated_types import Ge, Le, MaxLen, MinLen
 
@@ -203,6 +203,8 @@ UNMEASURED_Z = declared('cannot be "measured" by a camera; write "typed" or "kep
 class LookParameters(MethodParameters):
     """How marks are brought before a camera and looked at."""
 
+    plan_kind: ClassVar[type[LookPlan]] = LookPlan
+
     sensor: Annotated[
         str | None,
         MinLen(1),
@@ -257,7 +259,7 @@ class LookParameters(MethodParameters):
     @property
     def look(self) -> LookPlan:
         """The same for a procedure."""
-        return LookPlan(
+        return self.plan_kind(
             turns_deg=self.turns_deg,
             pictures=self.pictures,
             lift_mm=self.lift_mm,

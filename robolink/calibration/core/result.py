@@ -173,19 +173,9 @@ class ResidualVectors(Sequence[tuple[float, ...]]):
 
 
 PLAIN_FIELDS: Final = (
-    "residuals_mm",
-    "rejected",
-    "rms_mm",
-    "max_residual_mm",
-    "covariance",
-    "half_width95",
-    "sigma_mm",
-    "sigma_stated",
-    "dof",
-    "sigma_gain",
-    "condition_number",
-    "warnings",
-)
+    "residuals_mm rejected rms_mm max_residual_mm covariance half_width95 sigma_mm sigma_stated "
+    "dof sigma_gain condition_number warnings"
+).split()
 """Fields of a result that stand on record as they are, under their own names."""
 
 LEAST_HALF_WIDTH: Final = 0.0005

@@ -11,7 +11,7 @@ from robolink.files.toml import Problem
 from robolink.messages import declared, tr
 from robolink.methods.method import MM, Check, Help, Method, Needs, Option, PoseHelp, Site
 from robolink.methods.pivot import TiltedTouches
-from robolink.methods.surface_touch import SurfaceParameters, SurfaceTouchSource
+from robolink.methods.surface_touch import SurfaceParameters, SurfaceTouchSource, told_at
 from robolink.methods.surface_touch.survey import SphereSurvey
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import (
@@ -194,15 +194,8 @@ class SphereTouches(TiltedTouches):
 
 
 def _source(parameters: SphereTouchParameters, site: Site) -> "TipSource":
-    from robolink.methods.pivot import axes_of, require_tilting
-
-    require_tilting(site.controller, METHOD.name)
     return SphereTouchSource(
-        parameters.touch,
-        parameters.survey,
-        axes=axes_of(site.controller),
-        sigma_mm=site.sigma_mm,
-        sampling=parameters.sampling,
+        parameters.touch, parameters.survey, **told_at(METHOD, parameters, site)
     )
 
 

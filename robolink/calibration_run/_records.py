@@ -15,6 +15,7 @@ from robolink.calibration import (
     chain_of,
     offset_sigma_mm,
 )
+from robolink.calibration.core.result import PLAIN_FIELDS
 from robolink.calibration_run._acceptance import AcceptanceCriteria
 from robolink.calibration_run._proposal import Proposal
 from robolink.calibration_run._repeatability import TouchWitness, touched_by
@@ -203,18 +204,7 @@ def _result(result: CalibrationResult) -> dict[str, object]:
         "poses": [_pose(pose) for pose in result.inputs],
         **_seen(result.inputs),
         **touches_made(result.inputs),
-        "residuals_mm": [list(residual) for residual in result.residuals_mm],
-        "rejected": list(result.rejected),
-        "rms_mm": result.rms_mm,
-        "max_residual_mm": result.max_residual_mm,
-        "covariance": [list(row) for row in result.covariance],
-        "half_width95": list(result.half_width95),
-        "sigma_mm": result.sigma_mm,
-        "sigma_stated": result.sigma_stated,
-        "dof": result.dof,
-        "sigma_gain": result.sigma_gain,
-        "condition_number": result.condition_number,
-        "warnings": list(result.warnings),
+        **{name: _plain(getattr(result, name)) for name in PLAIN_FIELDS},
         "information": list(result.notes),
         "interval_from": result.interval_from,
         "region95_radius_mm": result.region95_radius_mm,
@@ -225,6 +215,13 @@ def _result(result: CalibrationResult) -> dict[str, object]:
         "accuracy": result.accuracy.as_json(result.measured) if result.accuracy else None,
         **result.details(),
     }
+
+
+def _plain(value: object) -> object:
+    """Return a value with lists in place of other sequences."""
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return [_plain(one) for one in value]
+    return value
 
 
 def _pose(pose: Pose) -> dict[str, object]:

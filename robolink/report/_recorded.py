@@ -12,6 +12,7 @@ from robolink.calibration import (
     VerifyResult,
     doubt_sentence,
 )
+from robolink.calibration.core.result import PLAIN_FIELDS
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import (
@@ -52,26 +53,16 @@ def recorded_fit(details: Mapping[str, Any]) -> CalibrationResult:
     Raises:
         ConfigError, KeyError, TypeError, ValueError: The entry cannot be understood.
     """
+    plain = {name: _tupled(details[name]) for name in PLAIN_FIELDS if name in details}
     return CalibrationResult(
+        **{"sigma_gain": 1.0, "warnings": (), **plain},
         method=method_name_now(details["method"]),
         offset=read_offset(details["proposed"]) or ToolOffset(),
         measured=tuple(details["measured"]),
         kept=tuple(details.get("kept", ())),
         changed=tuple(details.get("changed", ())),
         reference_point_mm=tuple(details.get("reference_point_mm", ())),
-        sigma_gain=details.get("sigma_gain", 1.0),
-        warnings=tuple(details.get("warnings", ())),
         inputs=tuple(map(recorded_pose, details.get("poses", ()))),
-        covariance=_vectors(details.get("covariance", ())),
-        half_width95=tuple(details.get("half_width95", ())),
-        sigma_mm=details.get("sigma_mm"),
-        sigma_stated=details.get("sigma_stated", False),
-        rms_mm=details.get("rms_mm"),
-        max_residual_mm=details.get("max_residual_mm"),
-        residuals_mm=_vectors(details.get("residuals_mm", ())),
-        rejected=tuple(details.get("rejected", ())),
-        condition_number=details.get("condition_number"),
-        dof=details.get("dof"),
         notes=tuple(details.get("information", ())),
         interval_from=details.get("interval_from", ""),
         region95_radius_mm=details.get("region95_radius_mm"),
@@ -90,8 +81,8 @@ def recorded_pose(pose: Mapping[str, Any]) -> Pose:
     return Pose(**{**pose, **flags})
 
 
-def _vectors(rows: Any) -> tuple[tuple[float, ...], ...]:  # noqa: ANN401 - read from JSON
-    return tuple(map(tuple, rows))
+def _tupled(value: Any) -> Any:  # noqa: ANN401 - read from JSON
+    return tuple(map(_tupled, value)) if isinstance(value, list) else value
 
 
 _ENDS: Final = {

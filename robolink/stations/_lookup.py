@@ -8,7 +8,7 @@ from robolink.calibration import ACCURACY_ROWS
 from robolink.config import Cell
 from robolink.errors import ConfigError, NotReadyError, NotReadyReason, RobolinkError
 from robolink.messages import tr
-from robolink.model import Controller, Recorded
+from robolink.model import Controller, EntryKind, Recorded
 from robolink.stations._station import Station, StationKind, apart_mm, station_of
 
 _PLACE = (
@@ -41,6 +41,16 @@ def find_stations(cell: Cell | None, entries: Iterable[Recorded]) -> dict[str, S
         elif declared.kind is newest.kind:
             stations[name] = _together(declared, newest)
     return stations
+
+
+def stations_on_record(controller: Controller, cell: Cell | None = None) -> dict[str, Station]:
+    """Return all stations by name, as :func:`find_stations`, from the record of a controller.
+
+    Args:
+        controller: Whose record is looked at.
+        cell: The cell, if one was named.
+    """
+    return find_stations(cell, controller.outcomes.recorded(kinds=(EntryKind.STATION,)))
 
 
 def find_station(

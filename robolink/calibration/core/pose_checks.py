@@ -3,7 +3,9 @@
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from typing import Any
 
+from robolink.calibration.core.result import COMPONENTS
 from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import Hand, Pose, ToolOffset
@@ -123,6 +125,25 @@ def keep_unmeasured(stored: ToolOffset | None, **measured: float) -> ToolOffset:
             others=("suspect_units",),
         )
     return offset
+
+
+def components(stored: ToolOffset | None, **measured: float) -> dict[str, Any]:
+    """Return what a result says of the components: the offset, what was measured of it, what not.
+
+    Args:
+        stored: The offset stored now; what was not measured is kept from it, or 0 without one.
+        measured: The components that were measured.
+
+    Raises:
+        CalibrationError: ``implausible_offset``.
+    """
+    others = tuple(name for name in COMPONENTS if name not in measured)
+    return {
+        "offset": keep_unmeasured(stored, **measured),
+        "measured": tuple(measured),
+        "kept": others,
+        "unobservable": others,
+    }
 
 
 def require_finite_poses(poses: Sequence[Pose]) -> None:

@@ -172,6 +172,12 @@ class ResidualVectors(Sequence[tuple[float, ...]]):
         return repr(self._looked_at())
 
 
+PLAIN_FIELDS: Final = (
+    "residuals_mm rejected rms_mm max_residual_mm covariance half_width95 sigma_mm sigma_stated "
+    "dof sigma_gain condition_number warnings"
+).split()
+"""Fields of a result that stand on record as they are, under their own names."""
+
 LEAST_HALF_WIDTH: Final = 0.0005
 """No interval is stated narrower: half of the last digit that a controller prints, and that anybody
 reads, in mm and in degrees (docs/reference/evidence.md 6)."""

@@ -304,6 +304,8 @@ def standing_payload(standing: "Standing") -> dict[str, object]:
 
     What a tool holds is ``null`` where it is undefined, and where ``known`` is false.
     """
+    from robolink.model import json_fields  # here, because --help needs none
+
     return {
         "tools": {
             str(number): {
@@ -315,12 +317,8 @@ def standing_payload(standing: "Standing") -> dict[str, object]:
             for number, tool in standing.tools.items()
         },
         "selected_tool": standing.selected if standing.selection_known else None,
-        "selected_before": standing.selected_before,
-        "carried_out": list(standing.carried_out),
-        "doubtful": list(standing.doubtful),
-        "moving": list(standing.moving),
-        "settled": standing.settled,
-        "left_open": standing.left_open,
+        **json_fields(standing, "selected_before", "carried_out", "doubtful", "moving"),
+        **json_fields(standing, "settled", "left_open"),
     }
 
 

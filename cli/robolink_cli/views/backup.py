@@ -1,12 +1,12 @@
 """What backup and compare show."""
 
-from dataclasses import asdict
 from pathlib import Path
 
 from robolink.backup import Backup, Comparison, ComparisonTolerance, ToolComparison
 from robolink.messages import tr
+from robolink.model import json_fields, json_value
 from robolink_cli.console.render import say, table
-from robolink_cli.views.documents import number, offset_payload
+from robolink_cli.views.documents import number
 
 
 def backup_payload(backup: Backup, file: Path) -> dict[str, object]:
@@ -14,11 +14,9 @@ def backup_payload(backup: Backup, file: Path) -> dict[str, object]:
     tools = backup.state.tools
     return {
         "file": str(file),
-        "controller": backup.controller,
-        "saved_at": backup.saved_at,
-        "facts": asdict(backup.facts),
+        **json_fields(backup, "controller", "saved_at", "facts"),
         "selected_tool": backup.state.selected,
-        "tools": {str(tool): offset_payload(offset) for tool, offset in tools.items()},
+        "tools": {str(tool): json_value(offset) for tool, offset in tools.items()},
     }
 
 
@@ -100,12 +98,8 @@ def show_comparison(comparison: Comparison, tolerance: ComparisonTolerance, iden
 
 
 def _tool_payload(tool: ToolComparison) -> dict[str, object]:
-    return {
-        "tool": tool.tool,
-        "expected": offset_payload(tool.expected),
-        "found": offset_payload(tool.found),
-        "components": [asdict(part) | {"equal": part.equal} for part in tool.components],
-    }
+    parts = [json_fields(part) | {"equal": part.equal} for part in tool.components]
+    return {**json_fields(tool, "tool", "expected", "found"), "components": parts}
 
 
 def _rows(tool: ToolComparison) -> list[list[object]]:

@@ -14,6 +14,7 @@ from robolink.model import (
     ToolOffset,
     angle_difference_deg,
     describe_offset,
+    json_value,
     read_offset,
     with_method_name_now,
 )
@@ -65,14 +66,9 @@ def entry_payload(entry: Recorded, *, as_stored: bool = False) -> dict[str, obje
     for key, names in (("before", ("before",)), ("after", AFTER)):
         known, offset = first_offset(entry.details, names)
         if known:
-            payload[key] = offset_payload(offset)
+            payload[key] = json_value(offset)
     payload["details"] = dict(entry.details) if as_stored else with_method_name_now(entry.details)
     return payload | asdict(entry.signature) | {"previous": entry.previous, "hash": entry.hash}
-
-
-def offset_payload(offset: ToolOffset | None) -> dict[str, float] | None:
-    """Return an offset with its units in the keys, ``None`` for an undefined tool."""
-    return None if offset is None else dict(zip(COMPONENTS, offset.components(), strict=True))
 
 
 def first_offset(
@@ -368,8 +364,8 @@ def diff_payload(a: Sequence[Recorded], b: Sequence[Recorded]) -> dict[str, obje
             "tool": {"a": numbers[0], "b": numbers[1]},
             **{
                 key: {
-                    "a": offset_payload(first),
-                    "b": offset_payload(second),
+                    "a": json_value(first),
+                    "b": json_value(second),
                     "difference": _difference(first, second),
                 }
                 for key, first, second in _offsets(values)

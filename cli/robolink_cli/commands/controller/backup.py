@@ -9,7 +9,7 @@ import click
 from robolink.backup import RestorePlan, keep_first_backup
 from robolink.backup import restore as restore_tools
 from robolink.messages import tr
-from robolink.model import Controller, ToolReceipt, require_engineer
+from robolink.model import Controller, ToolReceipt, json_value, require_engineer
 from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import note, say
@@ -19,7 +19,7 @@ from robolink_cli.prompts.questions import AcceptedAngle, AcceptedLength, accept
 from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
-from robolink_cli.views.documents import offset_payload, receipt_payload
+from robolink_cli.views.documents import receipt_payload
 from robolink_cli.views.tables import show_change
 
 _FILE = click.Path(dir_okay=False, path_type=Path)
@@ -177,8 +177,8 @@ class Restoration:
         for change in self._plan.changes:
             show_change(
                 change.tool,
-                offset_payload(change.now),
-                offset_payload(change.wanted),
+                json_value(change.now),
+                json_value(change.wanted),
                 after_name=tr("backup"),
             )
         if self._plan.select is not None:

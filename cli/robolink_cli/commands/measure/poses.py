@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import click
 
 from robolink.messages import tr
+from robolink.model import json_fields
 from robolink_cli.console.render import emit_json, json_is_on, say, table
 from robolink_cli.options.declaration import CliArgument
 from robolink_cli.options.pose_source import reading_options
@@ -43,15 +44,12 @@ def _payload(found: "PoseTable") -> dict[str, object]:
     read_as: dict[str, object] = {
         "encoding": how.encoding,
         "format": how.layout,
-        "length": str(how.length),
-        "length_by": how.length_by,
+        **json_fields(how, "length", "length_by"),
         "angle": how.angle or None,
         "rotation": how.rotation,
         "separator": how.separator or None,
         "decimal": how.decimal or None,
-        "columns": list(how.columns),
-        "ignored": list(how.ignored),
-        "skipped": how.skipped,
+        **json_fields(how, "columns", "ignored", "skipped"),
     }
     poses = [_pose_payload(entry) for entry in found.entries]
     # What one pose has all have, so that a list from which something was lost shows it.

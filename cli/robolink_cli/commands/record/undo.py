@@ -7,7 +7,7 @@ import click
 from robolink.backup import keep_first_backup
 from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import tr
-from robolink.model import Controller
+from robolink.model import Controller, json_value
 from robolink.transaction import Undone, UndoPlan
 from robolink.transaction import undo as take_back
 from robolink_cli.console.render import note, say
@@ -17,7 +17,7 @@ from robolink_cli.prompts.questions import agree, on_terminal
 from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
-from robolink_cli.views.documents import offset_payload, receipt_payload
+from robolink_cli.views.documents import receipt_payload
 from robolink_cli.views.tables import show_change
 
 
@@ -128,7 +128,7 @@ class Undoing:
         for remark in self._plan.remarks:
             say(f"  {remark}")
         for step in self._plan.steps:
-            shown = offset_payload(step.before), offset_payload(step.requested)
+            shown = json_value(step.before), json_value(step.requested)
             show_change(step.tool, *shown, after_name=tr("restored"))
 
     def run(self) -> dict[str, object]:

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Final, NoReturn
 
 from robolink.backup._comparison import (
-    COMPONENTS,
     TOOLS,
     Backup,
     ToolHolder,
@@ -24,7 +23,15 @@ from robolink.errors import ConfigError
 from robolink.files.durable import file_name, make_folder, state_folder
 from robolink.files.named import read_named, save_named
 from robolink.messages import tr
-from robolink.model import ControllerFacts, EntryKind, NewEntry, ToolOffset, json_fields, json_value
+from robolink.model import (
+    COMPONENTS,
+    ControllerFacts,
+    EntryKind,
+    NewEntry,
+    ToolOffset,
+    json_fields,
+    json_value,
+)
 
 
 class JsonReader:

@@ -103,6 +103,7 @@ if TYPE_CHECKING:
     from robolink.model._tip_sensor import SpotUnit as SpotUnit
     from robolink.model._tip_sensor import TipSensor as TipSensor
     from robolink.model._tools import ANY as ANY
+    from robolink.model._tools import COMPONENTS as COMPONENTS
     from robolink.model._tools import Expect as Expect
     from robolink.model._tools import Expected as Expected
     from robolink.model._tools import Jump as Jump
@@ -159,7 +160,7 @@ else:
             "_status": "ControllerState ControllerStatus",
             "_tip_sensor": "ControllerSensor LookingController Spot SpotUnit TIP TipSensor",
             "_tools": (
-                "ANY Expect Expected Jump KinematicToolTable ToolOffset ToolReceipt "
+                "ANY COMPONENTS Expect Expected Jump KinematicToolTable ToolOffset ToolReceipt "
                 "ToolTable describe_offset of_no_tool plain_offset put_right "
                 "read_for_verdict read_offset "
                 "tool_changed"

@@ -71,6 +71,11 @@ def from_json(kind: type[T], document: Mapping[str, Any], *, partial: bool = Fal
 
     Raises:
         KeyError, TypeError, ValueError: It is no such object.
+
+    Example:
+        >>> from robolink.model import ToolOffset, from_json
+        >>> from_json(ToolOffset, {"x_mm": 12, "y_mm": -3.5}, partial=True).x_mm
+        12.0
     """
     found = _annotations(kind).items()  # type: ignore[arg-type] # a class can be hashed
     known = [(name, as_) for name, as_ in found if name in document or not partial]
@@ -90,7 +95,7 @@ def _read(kind: Any, value: Any, partial: bool) -> Any:  # noqa: ANN401 - any of
         return None if value is None else _read(other, value, partial)
     if origin in (tuple, Sequence):
         return tuple(_read(inner[0], one, partial) for one in value)
-    if origin is Literal or kind is str or isinstance(value, kind):
+    if origin in (Literal, Mapping) or kind is str or isinstance(value, kind):
         return value
     if own := getattr(kind, "from_json", None):
         return own(value)

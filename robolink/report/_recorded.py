@@ -131,10 +131,7 @@ def report_of_tool(
 
 def _facts(said: Mapping[str, Any] | None) -> ControllerFacts:
     """Return what the controller said of itself when it was measured; nothing in old entries."""
-    if said is None:
-        return ControllerFacts()
-    lists = {name: tuple(said.get(name, ())) for name in ("robot_models", "robot_serials")}
-    return ControllerFacts(**{**said, **lists})
+    return from_json(ControllerFacts, said or {}, partial=True)
 
 
 def _touch(said: Mapping[str, Any]) -> TouchOnRecord:

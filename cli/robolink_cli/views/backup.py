@@ -51,12 +51,13 @@ def comparison_payload(comparison: Comparison, tolerance: ComparisonTolerance) -
         "equal": comparison.equal,
         "tolerance_mm": tolerance.length_mm,
         "tolerance_deg": tolerance.angle_deg,
-        "selected_tool": {
-            "expected": comparison.expected_selected,
-            "found": comparison.found_selected,
-            "equal": comparison.same_selection,
-            "counts": comparison.selection_counts,
-        },
+        "selected_tool": json_fields(
+            comparison,
+            expected="expected_selected",
+            found="found_selected",
+            equal="same_selection",
+            counts="selection_counts",
+        ),
         "differing": [_tool_payload(tool) for tool in comparison.differing],
     }
 

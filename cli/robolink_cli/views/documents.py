@@ -3,15 +3,12 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from robolink.model import Controller, json_fields, json_value
+from robolink.model import COMPONENTS, Controller, angle_difference_deg, json_fields, json_value
 
 if TYPE_CHECKING:
     from robolink.calibration import CalibrationResult, VerifyResult
     from robolink.calibration_run import Proposal
-    from robolink.model import Finding, Pose, ToolReceipt
-
-
-COMPONENTS = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
+    from robolink.model import Finding, Pose, ToolOffset, ToolReceipt
 
 
 def pose_payload(pose: "Pose") -> dict[str, object]:
@@ -116,6 +113,15 @@ def status_payload(controller: "Controller") -> dict[str, object]:
         *("emergency_stop", "guard_open", "warning", "teach", "test", "code"),
     )
     return {"controller": controller.identity, **known, **controller.condition()}
+
+
+def offset_difference(before: "ToolOffset", after: "ToolOffset") -> dict[str, float]:
+    """Return how far each component of an offset moved, angles by the shorter way."""
+    pairs = zip(COMPONENTS, after.components(), before.components(), strict=True)
+    return {
+        name: angle_difference_deg(new, old) if name.endswith("_deg") else new - old
+        for name, new, old in pairs
+    }
 
 
 def number(value: object) -> str:

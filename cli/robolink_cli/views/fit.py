@@ -238,8 +238,8 @@ def show_proposal(proposal: Proposal) -> None:
     """Show what was measured next to what is stored, how accurate it is, and what is in doubt."""
     show_change(
         proposal.tool,
-        json_value(proposal.before),
-        json_value(proposal.offset),
+        proposal.before,
+        proposal.offset,
         after_name=tr("measured") if proposal.measured is None else tr("proposed"),
         unmeasured=proposal.kept,
     )
@@ -335,7 +335,7 @@ def _steps(report: ToolReport) -> tuple[NextStep, ...]:
 
 def _following(report: ToolReport) -> dict[str, object]:
     steps = _steps(report)
-    return {"next_steps": [step.as_json() for step in steps]} if steps else {}
+    return {"next_steps": json_value(steps)} if steps else {}
 
 
 def show_course(steps: Sequence[PlannedStep]) -> None:

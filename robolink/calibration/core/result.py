@@ -99,9 +99,6 @@ class FitEvidence:
         return {name: value for name, value in found.items() if value not in (None, [])}
 
 
-COMPONENTS = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
-
-
 class ResidualVectors(Sequence[tuple[float, ...]]):
     """Residual vectors as a fit has them, which become tuples where somebody looks at one.
 

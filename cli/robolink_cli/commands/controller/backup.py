@@ -9,7 +9,7 @@ import click
 from robolink.backup import RestorePlan, keep_first_backup
 from robolink.backup import restore as restore_tools
 from robolink.messages import tr
-from robolink.model import Controller, ToolReceipt, json_value, require_engineer
+from robolink.model import Controller, ToolReceipt, require_engineer
 from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import note, say
@@ -175,12 +175,7 @@ class Restoration:
     def show(self) -> None:
         """Show what would change."""
         for change in self._plan.changes:
-            show_change(
-                change.tool,
-                json_value(change.now),
-                json_value(change.wanted),
-                after_name=tr("backup"),
-            )
+            show_change(change.tool, change.now, change.wanted, after_name=tr("backup"))
         if self._plan.select is not None:
             say(tr("tool {tool} will be selected", tool=self._plan.select))
 

@@ -248,13 +248,11 @@ class _Setting:
         self, controller: "Controller", before: "ToolOffset | None", wanted: "ToolOffset"
     ) -> None:
         """Show a person what the tool holds, and what it is to hold."""
-        from robolink.model import json_value
         from robolink_cli.views.tables import show_change
 
         controller.tools.selected()  # read now: the last line of a failure names it
         if not self._context.json:
-            shown = json_value(before), json_value(wanted)
-            show_change(self._number, *shown, after_name=tr("new"))
+            show_change(self._number, before, wanted, after_name=tr("new"))
 
     def ask(self, controller: "Controller", *, agreed: bool, yes: bool) -> None:
         """Have a person agree who did not yet; back up before the first write."""

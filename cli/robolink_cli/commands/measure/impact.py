@@ -80,12 +80,12 @@ def impact(
         simulated = says_it_is_simulated(controller)
         found = impact_on(request.read(controller), old=before, new=after)
         draft.offer(tool, before=before, after=after, given=tuple(changes), impact=found)
-    shown = json_value(before), json_value(after)
-    payload = {"tool": tool, "before": shown[0], "after": shown[1], **impact_payload(found)}
+    values = {"before": json_value(before), "after": json_value(after)}
+    payload = {"tool": tool, **values, **impact_payload(found)}
     payload |= {"simulated": simulated, "report": draft.saved}
 
     def show() -> None:
-        show_change(tool, *shown, after_name=tr("new"))
+        show_change(tool, before, after, after_name=tr("new"))
         show_impact(tool, found)
         say(tr("Nothing was written."))
 

@@ -66,18 +66,17 @@ _BESIDE: Final = ("name", "number", "hand", "local", "tool")
 
 def _pose_payload(entry: "TabledPose") -> dict[str, object]:
     """Return a pose with its units in the keys; ``None`` for what the file does not say."""
-    from robolink_cli.views.documents import COMPONENTS
+    from robolink.model import COMPONENTS, json_fields
 
     pose = entry.pose
-    payload: dict[str, object] = dict(zip(COMPONENTS, pose.coordinates(), strict=True))
-    known = {
+    return {
+        **json_fields(pose, *COMPONENTS),
         "name": entry.name or None,
         "number": entry.number,
         "hand": pose.hand,
         "local": pose.local if "local" in entry.stated else None,
         "tool": pose.tool,
     }
-    return payload | known
 
 
 def _show_table(file: Path, found: "PoseTable") -> None:

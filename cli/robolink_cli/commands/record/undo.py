@@ -7,7 +7,7 @@ import click
 from robolink.backup import keep_first_backup
 from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import tr
-from robolink.model import Controller, json_value
+from robolink.model import Controller
 from robolink.transaction import Undone, UndoPlan
 from robolink.transaction import undo as take_back
 from robolink_cli.console.render import note, say
@@ -128,8 +128,7 @@ class Undoing:
         for remark in self._plan.remarks:
             say(f"  {remark}")
         for step in self._plan.steps:
-            shown = json_value(step.before), json_value(step.requested)
-            show_change(step.tool, *shown, after_name=tr("restored"))
+            show_change(step.tool, step.before, step.requested, after_name=tr("restored"))
 
     def run(self) -> dict[str, object]:
         """Carry it out and return the document; nothing is sent when nothing differs."""

@@ -28,7 +28,7 @@ from robolink.calibration_run import (
 from robolink.errors import CalibrationError, VerifyError
 from robolink.journal import memory_journal
 from robolink.messages import tr
-from robolink.model import Controller, ToolOffset, json_value
+from robolink.model import Controller, ToolOffset, json_fields, json_value
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.options.declaration import CliOption
@@ -89,13 +89,7 @@ class DemonstratedChange(ABC):
 
     def payload(self) -> dict[str, object]:
         """Return it as plain JSON."""
-        return {
-            "kind": self.kind,
-            "robot": self.robot,
-            "truth": json_value(self.truth),
-            "exchanges": self.exchanges,
-            **self.end(),
-        }
+        return {**json_fields(self, "kind", "robot", "truth", "exchanges"), **self.end()}
 
     @abstractmethod
     def end(self) -> dict[str, object]:

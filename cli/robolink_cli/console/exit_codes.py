@@ -284,9 +284,6 @@ def _plug_in(error: BaseException) -> "PlugInModule | None":
     return plug_in_module(error)
 
 
-_NAMES: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
-
-
 def tell_standing(error: BaseException, typed: Sequence[str] = ()) -> None:
     """Say on stderr what stands; nothing of a command that had no controller, or only looked."""
     from robolink.standing import UNTOUCHED, standing_after
@@ -323,4 +320,6 @@ def standing_payload(standing: "Standing") -> dict[str, object]:
 
 
 def _named(components: "Components") -> dict[str, float] | None:
-    return None if components is None else dict(zip(_NAMES, components, strict=True))
+    from robolink.model import COMPONENTS  # here, because --help needs none
+
+    return None if components is None else dict(zip(COMPONENTS, components, strict=True))

@@ -38,7 +38,7 @@ from robolink.methods.shared_parameters import (
     LookParameters,
     camera_at,
 )
-from robolink.model import Pose, TipSensor, ToolOffset
+from robolink.model import Pose, TipSensor, ToolOffset, json_fields
 from robolink.procedures import (
     NO_OFFSET,
     CameraDrive,
@@ -300,19 +300,14 @@ class CameraAffineSource(LookSource):
         return Found(
             id=self.name,
             kind=StationKind.CAMERA,
-            x_mm=self.station.x_mm,
-            y_mm=self.station.y_mm,
-            z_mm=self.station.z_mm,
+            **json_fields(self.station, "x_mm", "y_mm", "z_mm"),
             sigma_mm=offset_sigma_mm(result),
             how=tr("{method} with tool {tool}", method=result.method, tool=tool),
             tool=tool,
             details={
                 "seen_by": sensor_name(self.sensor),
-                "mm_per_px": [list(row) for row in model.mm_per_px],
-                "origin_mm": list(model.origin_mm),
-                "centre_mm": None if model.centre_mm is None else list(model.centre_mm),
-                "place_sigma_mm": model.place_sigma_mm,
-                "scale_sigma": model.scale_sigma,
+                **json_fields(model, "mm_per_px", "origin_mm", "centre_mm"),
+                **json_fields(model, "place_sigma_mm", "scale_sigma"),
             },
         )
 

@@ -48,6 +48,9 @@ if TYPE_CHECKING:
     from robolink.model._journal_entries import finding_named_now as finding_named_now
     from robolink.model._journal_entries import method_name_now as method_name_now
     from robolink.model._journal_entries import with_method_name_now as with_method_name_now
+    from robolink.model._json_values import from_json as from_json
+    from robolink.model._json_values import json_fields as json_fields
+    from robolink.model._json_values import json_value as json_value
     from robolink.model._kinematics import AxisKind as AxisKind
     from robolink.model._kinematics import AxisPositions as AxisPositions
     from robolink.model._kinematics import CsTool as CsTool
@@ -100,6 +103,7 @@ if TYPE_CHECKING:
     from robolink.model._tip_sensor import SpotUnit as SpotUnit
     from robolink.model._tip_sensor import TipSensor as TipSensor
     from robolink.model._tools import ANY as ANY
+    from robolink.model._tools import COMPONENTS as COMPONENTS
     from robolink.model._tools import Expect as Expect
     from robolink.model._tools import Expected as Expected
     from robolink.model._tools import Jump as Jump
@@ -115,4 +119,51 @@ if TYPE_CHECKING:
     from robolink.model._tools import read_offset as read_offset
     from robolink.model._tools import tool_changed as tool_changed
 else:
-    __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)
+    __getattr__, __dir__, __all__ = lazy_exports(
+        __name__,
+        {
+            "_change_limits": (
+                "ChangeGuard ChangeLimits PersonRole refuse_operator require_engineer"
+            ),
+            "_controller": (
+                "Act AlarmList Capabilities Controller DigitalIo PointReader Value "
+                "ValueReceipt ValueT VariableTable are_simulated_facts "
+                "is_simulated_name says_it_is_simulated"
+            ),
+            "_geometry": (
+                "Elbow Hand Pose Posture Wrist angle_difference_deg describe_pose rotate_xy"
+            ),
+            "_identity": "ControllerFacts Identity Secret Who is_own_name",
+            "_journal_entries": (
+                "AnsweredBy EntryKind NO_HISTORY NewEntry PROOFS Recorded "
+                "Signature answer_entry answered_by_in_words finding_named_now "
+                "method_name_now with_method_name_now"
+            ),
+            "_json_values": "from_json json_fields json_value",
+            "_kinematics": (
+                "AxisKind AxisPositions CsTool Direction3 FlangeFrame "
+                "ISMKinematicsWithOrientationImage "
+                "ISMOrientationKinematicsWithOriImage2 ISMPositionKinematics2 "
+                "MCKinRefSM3 NotReachable OrientationDof OrientationImage "
+                "OrientationSpace RotationMatrix combined_space is_custom "
+                "kinematics_class kinematics_object"
+            ),
+            "_ledger": "Account Ledger describe_standing",
+            "_movement": (
+                "InputEdge Motion MotionGroup MotionOutcome MotionProfile MotionTerms "
+                "MotionUntilInput Path WorkBox"
+            ),
+            "_outcomes": (
+                "ClientRun Finding Marker MarkerKind OutcomeLog Resolver Verdict "
+                "begun_in_words new_operation"
+            ),
+            "_status": "ControllerState ControllerStatus",
+            "_tip_sensor": "ControllerSensor LookingController Spot SpotUnit TIP TipSensor",
+            "_tools": (
+                "ANY COMPONENTS Expect Expected Jump KinematicToolTable ToolOffset ToolReceipt "
+                "ToolTable describe_offset of_no_tool plain_offset put_right "
+                "read_for_verdict read_offset "
+                "tool_changed"
+            ),
+        },
+    )

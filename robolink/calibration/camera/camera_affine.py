@@ -39,7 +39,7 @@ from robolink.calibration.quality.doubts import PLANAR_TOLERANCE, Tolerance
 from robolink.calibration.quality.fit_quality import judged
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.model import Pose, ToolOffset
+from robolink.model import Pose, ToolOffset, json_fields
 
 UNKNOWNS = 8
 
@@ -74,17 +74,8 @@ class CameraCalibration(CalibrationResult):
 
     def details(self) -> dict[str, object]:
         """Return the camera."""
-        return {
-            "camera": {
-                "mm_per_px": [list(row) for row in self.camera.mm_per_px],
-                "origin_mm": list(self.camera.origin_mm),
-                "scale_mm_per_px": list(self.camera.scale_mm_per_px),
-                "turn_deg": self.camera.turn_deg,
-                "shear_deg": self.camera.shear_deg,
-                "mirrored": self.camera.mirrored,
-                "rms_px": self.rms_px,
-            }
-        }
+        shown = ("mm_per_px", "origin_mm", "scale_mm_per_px", "turn_deg", "shear_deg", "mirrored")
+        return {"camera": {**json_fields(self.camera, *shown), "rms_px": self.rms_px}}
 
 
 def solve_camera_affine(

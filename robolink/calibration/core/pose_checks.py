@@ -5,10 +5,9 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Any
 
-from robolink.calibration.core.result import COMPONENTS
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.model import Hand, Pose, ToolOffset
+from robolink.model import COMPONENTS, Hand, Pose, ToolOffset
 
 MAX_OFFSET_MM = 1000.0
 """A tool longer than this is taken for a mistake (docs/reference/calibration.md 3)."""
@@ -152,11 +151,10 @@ def require_finite_poses(poses: Sequence[Pose]) -> None:
     Raises:
         CalibrationError: ``non_finite``, with pose and name.
     """
-    names = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
     for number, pose in enumerate(poses, start=1):
         if all(type(value) is float and math.isfinite(value) for value in pose.coordinates()):
             continue  # nearly always; what is no float may be one all the same
-        for name, value in zip(names, pose.coordinates(), strict=True):
+        for name, value in zip(COMPONENTS, pose.coordinates(), strict=True):
             if not isinstance(value, (int, float)) or not math.isfinite(value):
                 raise CalibrationError(
                     "non_finite",

@@ -19,7 +19,7 @@ from robolink.calibration.pin.needle_chain import NeedleChain, NeedleLimits, Sto
 from robolink.calibration.pin.one_touch import one_touch_sources
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.model import Pose, ToolOffset
+from robolink.model import Pose, ToolOffset, json_fields
 
 Point = tuple[float, ...]
 """(x, y) or (x, y, z) in the base, mm."""
@@ -55,11 +55,7 @@ class NeedleChangeResult(CalibrationResult):
         """Return the change of Z by name, and what is known of what it is added to."""
         if self.stored_z is None:
             return {}
-        return {
-            "change_z_mm": self.change_z_mm,
-            "change_z_half95_mm": self.change_z_half95_mm,
-            "stored_z": self.stored_z.as_json(),
-        }
+        return json_fields(self, "change_z_mm", "change_z_half95_mm", "stored_z")
 
     def added_to(self, stored: StoredZ, *, touch_sigma_mm: float) -> "NeedleChangeResult":
         """Return the same with Z named for what it is: a change of the stored one.

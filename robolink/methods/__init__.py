@@ -150,8 +150,9 @@ else:
             "pivot.tilts": "OverPin Tilt informative_tilts proving_tilts",
             "points": "PointsParameters",
             "registry": "METHODS_GROUP all_methods find_method method_names register",
-            "runout_table": "AllRoundPlan RunoutTableParameters RunoutTableSource",
-            "runout_table_procedure": "measure_runout_table",
+            "runout_table": (
+                "AllRoundPlan RunoutTableParameters RunoutTableSource measure_runout_table"
+            ),
             "shared_parameters": "LookParameters PinParameters UprightPinParameters",
             "station_reference": "learn_station",
             "surface_touch": "SurfaceParameters",

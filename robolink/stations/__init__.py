@@ -35,8 +35,8 @@ else:
         __name__,
         {
             "_lookup": (
-                "base_now find_station find_stations learnt_elsewhere "
-                "require_base_of stations_on_record"
+                "base_now find_station find_stations learnt_elsewhere require_base_of "
+                "stations_on_record"
             ),
             "_places": (
                 "BeamStation CameraStation TouchStation beam_station camera_station "

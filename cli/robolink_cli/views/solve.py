@@ -11,6 +11,17 @@ SOLVED: Final = "solved"
 """Under this key stands the result itself, until what it is accurate to takes its place."""
 
 
+def plain(found: object, names: str) -> dict[str, object]:
+    """Return attributes of a result under their own names, tuples as lists.
+
+    Args:
+        found: The result.
+        names: The attributes, apart by blanks.
+    """
+    values = {name: getattr(found, name) for name in names.split()}
+    return {name: list(v) if isinstance(v, tuple) else v for name, v in values.items()}
+
+
 def result_payload(result: CalibrationResult) -> dict[str, object]:
     """Return a result as plain values; lengths in mm, angles in degrees.
 
@@ -31,25 +42,19 @@ def result_payload(result: CalibrationResult) -> dict[str, object]:
         payload[where] = list(result.reference_point_mm)
     payload |= result.evidence.as_json() if result.evidence is not None else {}
     return payload | {
-        "notes": list(result.notes),
-        "measured": list(result.measured),
-        "unobservable": list(result.unobservable),
+        **plain(result, "notes measured unobservable"),
         "interval95": {name: list(ends) for name, ends in result.interval95.items()},
         "half_width95": list(result.half_width95) or None,
         "interval_from": result.interval_from or None,
-        "region95_radius_mm": result.region95_radius_mm,
+        **plain(result, "region95_radius_mm"),
         "budget": None if result.budget is None else result.budget.as_json(),
         "covariance": [list(row) for row in result.covariance],
-        "sigma_mm": result.sigma_mm,
-        "sigma_stated": result.sigma_stated,
+        **plain(result, "sigma_mm sigma_stated"),
         "sigma_gain_per_axis": result.sigma_gain,
         "rms_residual": result.rms_mm,
         "max_residual": result.max_residual_mm,
         "residuals": list(result.residual_distances_mm),
-        "rejected": list(result.rejected),
-        "condition_number": result.condition_number,
-        "rank": result.rank,
-        "dof": result.dof,
+        **plain(result, "rejected condition_number rank dof"),
     }
 
 

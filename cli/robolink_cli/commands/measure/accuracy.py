@@ -27,8 +27,8 @@ from robolink.messages import spoken, tr
 from robolink.model import Controller, EntryKind, require_engineer
 from robolink.stations import StationKind, find_station
 from robolink.timing import wall_time
+from robolink_cli.commands.measure.solve.lasting_cases import study_values
 from robolink_cli.commands.measure.solve.solving import load
-from robolink_cli.commands.measure.solve.touch_cases import study_values
 from robolink_cli.console.numbers import NumberInside, decimal
 from robolink_cli.console.render import note
 from robolink_cli.options.consent import Yes

@@ -4,8 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
-from robolink.model import Controller
-
 if TYPE_CHECKING:
     from robolink.calibration import CalibrationResult, VerifyResult
     from robolink.calibration_run import Proposal
@@ -13,6 +11,17 @@ if TYPE_CHECKING:
 
 
 COMPONENTS = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
+
+
+def plain(found: object, names: str) -> dict[str, object]:
+    """Return attributes under their own names, as a document has them: tuples as lists.
+
+    Args:
+        found: What has them.
+        names: The attributes, apart by blanks.
+    """
+    values = {name: getattr(found, name) for name in names.split()}
+    return {name: list(v) if isinstance(v, tuple) else v for name, v in values.items()}
 
 
 def offset_payload(offset: "ToolOffset | None") -> dict[str, float] | None:
@@ -55,9 +64,7 @@ def proposal_payload(proposal: "Proposal") -> dict[str, object]:
         "changed": list(result.changed),
         "kept": list(proposal.kept),
         "change_mm": proposal.change_mm,
-        "reference_point_mm": list(result.reference_point_mm),
-        "sigma_gain": result.sigma_gain,
-        "warnings": list(result.warnings),
+        **plain(result, "reference_point_mm sigma_gain warnings"),
         "poses": [pose_payload(pose) for pose in result.inputs],
         **_touches_payload(result.inputs),
         "fit": fit_payload(result),
@@ -80,12 +87,7 @@ def length_payload(proposal: "Proposal") -> dict[str, object] | None:
     if told is None:
         return None
     return {
-        "changed": told.changed,
-        "height_change_mm": told.height_change_mm,
-        "u_mm": told.u_mm,
-        "limit_mm": told.limit_mm,
-        "stored_z_mm": told.stored_z_mm,
-        "z_by_difference_mm": told.z_by_difference_mm,
+        **plain(told, "changed height_change_mm u_mm limit_mm stored_z_mm z_by_difference_mm"),
         "written": "difference" if told.changed and proposal.z_from == "measured" else "keep",
     }
 
@@ -115,10 +117,7 @@ def fit_payload(result: "CalibrationResult") -> dict[str, object]:
         "rms_mm": result.rms_mm,
         "max_residual_mm": result.max_residual_mm,
         "residuals_mm": [list(residual) for residual in result.residuals_mm],
-        "rejected": list(result.rejected),
-        "condition_number": result.condition_number,
-        "dof": result.dof,
-        "unobservable": list(result.unobservable),
+        **plain(result, "rejected condition_number dof unobservable"),
         "chain": {"changes": chain.changes, "sigma_mm": chain.sigma_mm} if chain else None,
     }
 
@@ -128,18 +127,12 @@ def verification_payload(result: "VerifyResult | None") -> dict[str, object] | N
     if result is None:
         return None
     return {
-        "max_drift_mm": result.max_drift_mm,
-        "tolerance_mm": result.tolerance_mm,
-        "passed": result.passed,
+        **plain(result, "max_drift_mm tolerance_mm passed"),
         "judgement": result.judgement.as_json() if result.judgement else None,
         "accurate_to_mm": result.accurate_to_mm,
         "drifts": [
             {
-                "u_deg": drift.u_deg,
-                "dx_mm": drift.dx_mm,
-                "dy_mm": drift.dy_mm,
-                "dz_mm": drift.dz_mm,
-                "distance_mm": drift.distance_mm,
+                **plain(drift, "u_deg dx_mm dy_mm dz_mm distance_mm"),
             }
             for drift in result.drifts
         ],
@@ -150,13 +143,8 @@ def verification_payload(result: "VerifyResult | None") -> dict[str, object] | N
 def finding_payload(finding: "Finding") -> dict[str, object]:
     """Return what was found out about an open marker."""
     return {
-        "operation": finding.marker.operation,
-        "kind": finding.marker.kind,
-        "request": finding.marker.request,
-        "begun_at": finding.marker.begun_at,
-        "verdict": finding.verdict,
-        "sentence": finding.sentence,
-        "action": finding.action,
+        **plain(finding.marker, "operation kind request begun_at"),
+        **plain(finding, "verdict sentence action"),
     }
 
 
@@ -165,19 +153,8 @@ def status_payload(controller: "Controller") -> dict[str, object]:
     status = controller.status()
     return {
         "controller": controller.identity,
-        "state": status.state,
-        "remote": status.remote,
-        "ready": status.ready,
-        "running": status.running,
-        "paused": status.paused,
-        "fault": status.fault,
-        "serious_fault": status.serious_fault,
-        "emergency_stop": status.emergency_stop,
-        "guard_open": status.guard_open,
-        "warning": status.warning,
-        "teach": status.teach,
-        "test": status.test,
-        "code": status.code,
+        **plain(status, "state remote ready running paused fault serious_fault emergency_stop"),
+        **plain(status, "guard_open warning teach test code"),
         **controller.condition(),
     }
 

@@ -34,6 +34,7 @@ from robolink_cli.prompts.present import present_desk
 from robolink_cli.views.documents import (
     number,
     offset_payload,
+    plain,
     proposal_payload,
     receipt_payload,
     verification_payload,
@@ -316,10 +317,7 @@ def judged_payload(proposal: Proposal, verdicts: Sequence[LimitVerdict]) -> dict
     """Return a proposal with what the limits say about it."""
     judged = [
         {
-            "code": verdict.code,
-            "found_mm": verdict.found_mm,
-            "limit_mm": verdict.limit_mm,
-            "passed": verdict.passed,
+            **plain(verdict, "code found_mm limit_mm passed"),
         }
         for verdict in verdicts
     ]

@@ -6,20 +6,10 @@ from typing import Final
 from robolink.calibration import Accuracy, CalibrationResult, rows_in_words, stated_mm
 from robolink.messages import declared, spoken, tr
 from robolink_cli.console.render import say
+from robolink_cli.views.documents import plain
 
 SOLVED: Final = "solved"
 """Under this key stands the result itself, until what it is accurate to takes its place."""
-
-
-def plain(found: object, names: str) -> dict[str, object]:
-    """Return attributes of a result under their own names, tuples as lists.
-
-    Args:
-        found: The result.
-        names: The attributes, apart by blanks.
-    """
-    values = {name: getattr(found, name) for name in names.split()}
-    return {name: list(v) if isinstance(v, tuple) else v for name, v in values.items()}
 
 
 def result_payload(result: CalibrationResult) -> dict[str, object]:

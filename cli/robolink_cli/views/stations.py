@@ -11,7 +11,7 @@ from robolink.stations import Station, find_station, find_stations
 from robolink.timing import local_label
 from robolink_cli.console.render import say, table
 from robolink_cli.session.context import CliContext
-from robolink_cli.views.documents import number
+from robolink_cli.views.documents import number, plain
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,11 +87,7 @@ def station_payload(station: Station, *, robot: str = "") -> dict[str, Any]:
         "id": station.id,
         "robot": robot or None,
         "kind": station.kind.value,
-        "x_mm": station.x_mm,
-        "y_mm": station.y_mm,
-        "z_mm": station.z_mm,
-        "sigma_mm": station.sigma_mm,
-        "how": station.how,
+        **plain(station, "x_mm y_mm z_mm sigma_mm how"),
         "found_at": station.found_at or None,
         "entry": station.entry,
         "base": None if station.base is None else list(station.base),

@@ -30,6 +30,7 @@ from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.questions import on_terminal
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.operator_identity import signature_of
+from robolink_cli.views.documents import plain
 
 if TYPE_CHECKING:
     from robolink.controllers import PlcMapController
@@ -79,10 +80,7 @@ def _start(context: CliContext, register_list: Path) -> None:
     draft = draft_from_csv(register_list)
     payload: dict[str, object] = {
         "map": draft.text,
-        "found": draft.found,
-        "left": list(draft.left),
-        "bad": list(draft.bad),
-        "notes": list(draft.notes),
+        **plain(draft, "found left bad notes"),
     }
     context.emit("plc-map-draft", payload, lambda: say(draft.text.rstrip()))
     for remark in (*draft.notes, *draft.bad):
@@ -99,7 +97,6 @@ def _start(context: CliContext, register_list: Path) -> None:
 
 def _check_file(context: CliContext, file: Path) -> None:
     from robolink.register_maps import load_map
-    from robolink_cli.commands.companions.check_map import place_rows
 
     found = load_map(file)
     rows = place_rows(found)
@@ -117,8 +114,6 @@ def _check_file(context: CliContext, file: Path) -> None:
 
 
 def _check_values(context: CliContext, shows: tuple[str, ...]) -> None:
-    from robolink.register_maps import confirmation_of
-    from robolink_cli.commands.companions.check_map import MapComparison, MapValues
 
     with _opened(context) as controller:
         register_map = controller.register_map

@@ -102,8 +102,6 @@ def check(
     limits. Each check goes on record as one entry of the journal. Exit code 1 when somebody should
     see to something; when a cell could not be checked, the code of why not.
     """
-    from robolink_cli.commands.computer.cell_check import SensorCheck
-
     contexts = _contexts(context, cells)
     sensor = None if recipe is None else SensorCheck.of(recipe, cells=len(contexts))
     scope = CheckScope(published, f"{since:%Y-%m-%d}" if since else "", sensor)

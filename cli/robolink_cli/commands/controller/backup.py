@@ -121,7 +121,6 @@ def restore(
     the cell's max_change_mm or max_change_deg is asked about, even with --yes.
     """
     from robolink.backup import load, plan_restore, read_tools, require_same_controller
-    from robolink_cli.commands.controller.backup import Restoration
 
     wanted = load(file)
     with open_controller(context, changes=not dry_run) as controller:

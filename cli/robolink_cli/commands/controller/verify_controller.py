@@ -13,6 +13,7 @@ from robolink_cli.console.render import say, table
 from robolink_cli.options.declaration import CliOption
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import password_of
+from robolink_cli.views.documents import plain
 
 if TYPE_CHECKING:
     from robolink.controllers.epson.verify import Fact, Verification
@@ -139,9 +140,7 @@ def _write(path: Path, text: str) -> None:
 
 def _fact_payload(fact: "Fact") -> dict[str, object]:
     return {
-        "name": fact.name,
-        "finding": fact.finding,
-        "settled": fact.settled,
+        **plain(fact, "name finding settled"),
         "option": fact.option or None,
         "value": fact.value,
         "evidence": fact.evidence,

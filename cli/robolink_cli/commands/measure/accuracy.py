@@ -134,8 +134,6 @@ def measure(
 
     Other rows are learnt without this command, or stated; it says how.
     """
-    from robolink_cli.commands.measure.accuracy import Asked, measure_row
-
     asked = Asked(
         tool=tool,
         true=true,

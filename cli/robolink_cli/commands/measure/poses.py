@@ -10,6 +10,7 @@ from robolink_cli.console.render import emit_json, json_is_on, say, table
 from robolink_cli.options.declaration import CliArgument
 from robolink_cli.options.pose_source import reading_options
 from robolink_cli.options.shared import json_option
+from robolink_cli.views.documents import plain
 
 if TYPE_CHECKING:
     from robolink.pose_tables import HowRead, PoseTable, ReadingChoices, TabledPose
@@ -49,9 +50,7 @@ def _payload(found: "PoseTable") -> dict[str, object]:
         "rotation": how.rotation,
         "separator": how.separator or None,
         "decimal": how.decimal or None,
-        "columns": list(how.columns),
-        "ignored": list(how.ignored),
-        "skipped": how.skipped,
+        **plain(how, "columns ignored skipped"),
     }
     poses = [_pose_payload(entry) for entry in found.entries]
     # What one pose has all have, so that a list from which something was lost shows it.

@@ -30,6 +30,7 @@ from robolink_cli.session.motion_consent import agree_to_motion, motion_question
 from robolink_cli.session.opening import open_controller
 from robolink_cli.session.ordering import ordered, show_done, with_order
 from robolink_cli.views.documents import (
+    plain,
     pose_payload,
     proposal_payload,
     receipt_payload,
@@ -383,9 +384,7 @@ class Recalibration:
             "prompts": [{"at": prompt.at, "text": prompt.text} for prompt in recipe.prompts],
             "outputs": [
                 {
-                    "at": output.at,
-                    "output": output.output,
-                    "on": output.on,
+                    **plain(output, "at output on"),
                     "requests": list(io_of(controller).preview_output(output.output, output.on)),
                 }
                 for output in recipe.outputs

@@ -25,6 +25,7 @@ from robolink_cli.options.consent import Overwrite
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
 from robolink_cli.session.completing import complete_tool
+from robolink_cli.views.documents import plain
 
 if TYPE_CHECKING:
     from robolink.journal import Journal
@@ -198,9 +199,7 @@ def verify() -> int:
         found = opened.verify(progress)
     payload = {
         "entry_count": found.checked,
-        "problems": list(found.problems),
-        "last_number": found.last_number,
-        "last_hash": found.last_hash,
+        **plain(found, "problems last_number last_hash"),
         "keyed": False,
     }
     if json_is_on():

@@ -22,9 +22,9 @@ from robolink_cli.options.consent import Overwrite
 from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.shared import json_option
 from robolink_cli.session.completing import complete_tool
+from robolink_cli.views.documents import plain
 
 if TYPE_CHECKING:
-    from robolink.drift import CellDrift
     from robolink.journal import Journal
     from robolink.model import Recorded
 
@@ -62,7 +62,6 @@ def drift(
     changes that were measured and kept count. Exit code 1 when something stands out.
     """
     from robolink.journal import default_location, may_exist
-    from robolink_cli.commands.record.journal_drift import drift_payload, show_drift
 
     if page is not None:
         from robolink.files.named import require_free
@@ -265,9 +264,7 @@ def drift_payload(cells: Sequence[CellDrift]) -> dict[str, object]:
                 "findings": [
                     {
                         "code": str(finding.code),
-                        "subject": list(finding.subject),
-                        "since": finding.since,
-                        "change": finding.change,
+                        **plain(finding, "subject since change"),
                         "shift_mm": dict(finding.shift_mm),
                         "text": finding.sentence,
                         "remedy": finding.remedy,
@@ -295,11 +292,7 @@ def _chart(chart: Chart) -> dict[str, object]:
                 "at": point.change.at,
                 "change": point.change.change,
                 "nozzle": point.change.nozzle or None,
-                "value_mm": point.value_mm,
-                "repeat": point.repeat,
-                "outside": point.outside,
-                "mean_mm": point.mean_mm,
-                "mean_outside": point.mean_outside,
+                **plain(point, "value_mm repeat outside mean_mm mean_outside"),
                 "repeatable_to_mm": point.change.repeatable_to_mm,
                 "accurate_to_mm": point.change.accurate_to_mm,
             }

@@ -52,15 +52,8 @@ def report(
     """
     from robolink.files.named import require_free
     from robolink.report import save
-    from robolink.transaction import id_of_change
     from robolink_cli.access.change_page import free_page, reports_from
     from robolink_cli.commands.record.journal_lookup import journal_to_read
-    from robolink_cli.commands.record.report import (
-        find_change,
-        report_payload,
-        with_points,
-    )
-    from robolink_cli.options.impact import ImpactRequest
 
     if change is not None and file is None and change.lower().endswith(_ENDINGS):
         file, change = Path(change), None

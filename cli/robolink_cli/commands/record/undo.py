@@ -49,7 +49,6 @@ def undo(
     """
     from robolink.transaction import plan_undo
     from robolink_cli.commands.record.journal_lookup import change_named
-    from robolink_cli.commands.record.undo import Undoing
 
     if change is not None and to is not None:
         raise ConfigError(

@@ -45,8 +45,6 @@ def purpose_of(path: Path) -> str:
     Args:
         path: One that comes along.
     """
-    from robolink_cli.commands.shipped.recipe import PURPOSES
-
     return PURPOSES.get(path.stem) or first_comment(path)
 
 

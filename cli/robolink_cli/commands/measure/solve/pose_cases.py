@@ -18,7 +18,8 @@ from robolink_cli.commands.measure.solve.case import (
     read_poses,
     unusable,
 )
-from robolink_cli.views.solve import plain, result_payload
+from robolink_cli.views.documents import plain
+from robolink_cli.views.solve import result_payload
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,8 @@ from robolink_cli.commands.measure.solve.case import (
     read_sighting,
     unusable,
 )
-from robolink_cli.views.solve import plain, result_payload, space_payload
+from robolink_cli.views.documents import plain
+from robolink_cli.views.solve import result_payload, space_payload
 
 
 def up_camera(node: Node) -> Payload:

@@ -6,7 +6,8 @@ from robolink import calibration as cal
 from robolink.errors import CalibrationError
 from robolink.messages import declared, spoken, tr
 from robolink_cli.commands.measure.solve.case import Node, Payload, read_place, read_pose, unusable
-from robolink_cli.views.solve import plain, result_payload, space_payload
+from robolink_cli.views.documents import plain
+from robolink_cli.views.solve import result_payload, space_payload
 
 
 def needle_change(node: Node) -> Payload:

@@ -52,7 +52,6 @@ def sim_run(
     the file.
     """
     from robolink_cli.commands.simulate.run.cells_file import read_cells
-    from robolink_cli.commands.simulate.run.sim_run import parent_of_starter, start_and_wait
 
     cells = read_cells(file, _serving_commands())
     if only_checked:
@@ -64,7 +63,6 @@ def sim_run(
         return 0
     if wait_ready:
         return start_and_wait([str(file), *_as_typed(life)])
-    from robolink_cli.commands.simulate.run.sim_run import run_cells
 
     run_cells(file, cells, life._replace(parent=parent_of_starter()))
     return 0

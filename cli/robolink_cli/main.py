@@ -14,6 +14,7 @@ from robolink.interrupts import Interrupted, one_ending
 from robolink.messages import declared, spoken
 from robolink.ways import speaking
 from robolink_cli.command_map import RENAMED, SECTIONS, SHORT_NAMES
+from robolink_cli.console.closed_window import closing_in_order
 from robolink_cli.console.help_pages import in_language
 from robolink_cli.console.language import speaking_for
 from robolink_cli.console.output import (
@@ -25,8 +26,7 @@ from robolink_cli.console.output import (
     watched_output,
 )
 from robolink_cli.console.render import dumps, json_is_on, note, print_document, say
-from robolink_cli.console.ways import SHELL_WAYS
-from robolink_cli.console.window_closing import closing_in_order
+from robolink_cli.console.shell_words import SHELL_WAYS
 from robolink_cli.lazy_group import FrontPage
 from robolink_cli.options.shared import TYPED, all_shared
 

@@ -12,7 +12,7 @@ from robolink_cli.access.warnings import marker_notice, note_unsettled
 from robolink_cli.command_map import SECTIONS
 from robolink_cli.commands.groups import cell, expert, robot
 from robolink_cli.console.render import note
-from robolink_cli.session.opening import open_controller
+from robolink_cli.session.connection import open_controller
 
 import robolink
 from robolink.errors import NotReadyError, NotReadyReason

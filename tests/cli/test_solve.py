@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from robolink_cli import main
-from robolink_cli.commands.measure.solve.solving import METHODS
+from robolink_cli.commands.measure.solve.answer import METHODS
 
 from robolink.calibration import Beam
 from robolink.model import rotate_xy

@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli.access.capabilities import points_of
-from robolink_cli.console.render import say, table
+from robolink_cli.console.render import plain, say, table
 from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.pose_source import point_numbers
-from robolink_cli.views.documents import plain
 
 if TYPE_CHECKING:
     from robolink.calibration import Impact

@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
+from robolink_cli.console.render import plain
+
 if TYPE_CHECKING:
     from robolink.calibration import CalibrationResult, VerifyResult
     from robolink.calibration_run import Proposal
@@ -11,17 +13,7 @@ if TYPE_CHECKING:
 
 
 COMPONENTS = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
-
-
-def plain(found: object, names: str) -> dict[str, object]:
-    """Return attributes under their own names, as a document has them: tuples as lists.
-
-    Args:
-        found: What has them.
-        names: The attributes, apart by blanks.
-    """
-    values = {name: getattr(found, name) for name in names.split()}
-    return {name: list(v) if isinstance(v, tuple) else v for name, v in values.items()}
+AXES = ("X mm", "Y mm", "Z mm", "U deg", "V deg", "W deg")
 
 
 def offset_payload(offset: "ToolOffset | None") -> dict[str, float] | None:

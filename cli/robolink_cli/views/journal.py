@@ -19,9 +19,7 @@ from robolink.model import (
 )
 from robolink.transaction import id_of_change
 from robolink_cli.console.render import say, table
-
-COMPONENTS: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
-AXES: Final = ("X mm", "Y mm", "Z mm", "U deg", "V deg", "W deg")
+from robolink_cli.views.documents import AXES, COMPONENTS, offset_payload
 
 SHORT: Final = 8
 """How many characters of an id a table shows."""
@@ -68,11 +66,6 @@ def entry_payload(entry: Recorded, *, as_stored: bool = False) -> dict[str, obje
             payload[key] = offset_payload(offset)
     payload["details"] = dict(entry.details) if as_stored else with_method_name_now(entry.details)
     return payload | asdict(entry.signature) | {"previous": entry.previous, "hash": entry.hash}
-
-
-def offset_payload(offset: ToolOffset | None) -> dict[str, float] | None:
-    """Return an offset with its units in the keys, ``None`` for an undefined tool."""
-    return None if offset is None else dict(zip(COMPONENTS, offset.components(), strict=True))
 
 
 def first_offset(

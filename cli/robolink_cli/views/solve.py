@@ -5,8 +5,7 @@ from typing import Final
 
 from robolink.calibration import Accuracy, CalibrationResult, rows_in_words, stated_mm
 from robolink.messages import declared, spoken, tr
-from robolink_cli.console.render import say
-from robolink_cli.views.documents import plain
+from robolink_cli.console.render import plain, say
 
 SOLVED: Final = "solved"
 """Under this key stands the result itself, until what it is accurate to takes its place."""

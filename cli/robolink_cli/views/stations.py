@@ -9,9 +9,9 @@ from robolink.messages import tr
 from robolink.model import EntryKind, Recorded
 from robolink.stations import Station, find_station, find_stations
 from robolink.timing import local_label
-from robolink_cli.console.render import say, table
+from robolink_cli.console.render import plain, say, table
 from robolink_cli.session.context import CliContext
-from robolink_cli.views.documents import number, plain
+from robolink_cli.views.documents import number
 
 
 @dataclass(frozen=True, slots=True)

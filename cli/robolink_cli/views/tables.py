@@ -5,11 +5,8 @@ from collections.abc import Mapping, Sequence
 from robolink.messages import tr
 from robolink.model import angle_difference_deg, of_no_tool
 from robolink_cli.console.render import say, table
-from robolink_cli.console.ways import hand_words, power_words, state_word
-from robolink_cli.views.documents import number, offset_cells
-
-AXES = ("X mm", "Y mm", "Z mm", "U deg", "V deg", "W deg")
-
+from robolink_cli.console.shell_words import hand_words, power_words, state_word
+from robolink_cli.views.documents import AXES, number, offset_cells
 
 _SAID = ("controller", "state", "code", "text")
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import click
+from robolink_cli.prompts.current_desk import sitting_at
 from robolink_cli.prompts.operator import AssistedOperator
-from robolink_cli.prompts.present import sitting_at
 from robolink_cli.session.check_before_start import check_before_start
 from robolink_cli.wizard.faces.lines import carry_out
 from robolink_cli.wizard.flow import advance

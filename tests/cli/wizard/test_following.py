@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 import pytest
-from robolink_cli.prompts.present import sitting_at
-from robolink_cli.session.stop_listening import watched_at_desk
+from robolink_cli.prompts.current_desk import sitting_at
+from robolink_cli.session.stop_listener import watched_at_desk
 from robolink_cli.wizard.flow import advance
 from robolink_cli.wizard.happenings import CellIs, Reading, WasRead, WasRegarded
 from robolink_cli.wizard.screens.drawing import screen_of

@@ -25,12 +25,11 @@ from robolink.register_maps import (
     values_of,
 )
 from robolink.timing import local_label
-from robolink_cli.console.render import note, say, table
+from robolink_cli.console.render import note, plain, say, table
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.questions import on_terminal
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.operator_identity import signature_of
-from robolink_cli.views.documents import plain
 
 if TYPE_CHECKING:
     from robolink.controllers import PlcMapController

@@ -8,13 +8,13 @@ import click
 from robolink.errors import CalibrationError, RobolinkError
 from robolink.messages import tr
 from robolink.serving import PermitCall, free_machine
-from robolink_cli.commands.simulate.serving import Termination
+from robolink_cli.commands.simulate.service import Termination
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.output import hand_over, show
 from robolink_cli.console.render import json_is_on, note
 from robolink_cli.options.declaration import CliOption
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, optional_controller
-from robolink_cli.session.opening import open_controller
 
 if TYPE_CHECKING:
     from robolink.model import ToolOffset
@@ -132,7 +132,7 @@ def _serve_programs(
     from robolink import __version__
     from robolink.journal import open_journal, signature_here
     from robolink.serving import CallbackConversation, CallbackServer
-    from robolink_cli.commands.simulate.serving import host_and_port
+    from robolink_cli.commands.simulate.service import host_and_port
 
     host, port = host_and_port(address, "--spel")
     journal, signature = open_journal(), signature_here(__version__)

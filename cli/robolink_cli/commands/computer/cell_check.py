@@ -22,10 +22,10 @@ from robolink_cli.options.consent import Published
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.operator import terminal
 from robolink_cli.prompts.questions import on_terminal
-from robolink_cli.session.completing import complete_recipe
+from robolink_cli.session.completion import complete_recipe
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, context_of_cell, optional_controller
 from robolink_cli.session.motion_consent import agree_to_motion, motion_question
-from robolink_cli.session.opening import open_controller
 
 if TYPE_CHECKING:
     from robolink.backup import ToolState

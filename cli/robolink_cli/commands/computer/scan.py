@@ -52,9 +52,14 @@ def scan(
     and tell the status. That changes and moves nothing on an EPSON controller; do not name a line
     with a device on it that these five bytes could harm.
     """
-    from robolink_cli.commands.computer.checkup import tried
-    from robolink_cli.commands.computer.lines import as_json, ask_lines, show_lines
-    from robolink_cli.commands.computer.serial_ports import ports_unknown, serial_ports
+    from robolink_cli.commands.computer.doctor import tried
+    from robolink_cli.commands.computer.lines import (
+        as_json,
+        ask_lines,
+        ports_unknown,
+        serial_ports,
+        show_lines,
+    )
 
     if addresses is None and not lines:
         raise click.UsageError(tr("Give a range of addresses, or a serial line with --line."))

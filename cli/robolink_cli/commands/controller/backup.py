@@ -1,26 +1,154 @@
 """backup, restore, compare: the tools of a controller and a file."""
 
 from contextlib import ExitStack
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
 import click
 
-from robolink.backup import RestorePlan, keep_first_backup
+from robolink.backup import (
+    Backup,
+    Comparison,
+    ComparisonTolerance,
+    RestorePlan,
+    ToolComparison,
+    keep_first_backup,
+)
 from robolink.backup import restore as restore_tools
 from robolink.messages import tr
 from robolink.model import Controller, ToolReceipt, require_engineer
 from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.numbers import NumberInside
-from robolink_cli.console.render import note, say
+from robolink_cli.console.render import note, say, table
 from robolink_cli.options.consent import DryRun, Overwrite, Published, Yes
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.questions import AcceptedAngle, AcceptedLength, accepted_jump, agree
-from robolink_cli.session.completing import complete_tool
+from robolink_cli.session.completion import complete_tool
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, controller_options
-from robolink_cli.session.opening import open_controller
-from robolink_cli.views.documents import offset_payload, receipt_payload
+from robolink_cli.views.documents import number, offset_payload, receipt_payload
 from robolink_cli.views.tables import show_change
+
+
+def backup_payload(backup: Backup, file: Path) -> dict[str, object]:
+    """Return what was saved."""
+    tools = backup.state.tools
+    return {
+        "file": str(file),
+        "controller": backup.controller,
+        "saved_at": backup.saved_at,
+        "facts": asdict(backup.facts),
+        "selected_tool": backup.state.selected,
+        "tools": {str(tool): offset_payload(offset) for tool, offset in tools.items()},
+    }
+
+
+def show_backup(backup: Backup, file: Path) -> None:
+    """Say what was saved, and of which controller."""
+    facts, tools = backup.facts, backup.state.tools
+    unknown = tr("unknown")
+    say(
+        tr(
+            "{url}: robot {models}, serial {serials}, firmware {firmware}",
+            url=backup.controller,
+            models=", ".join(facts.robot_models) or unknown,
+            serials=", ".join(facts.robot_serials) or unknown,
+            firmware=facts.firmware or unknown,
+        )
+    )
+    say(
+        tr(
+            "Saved in {file}: {defined} of {count} tools are defined.",
+            file=file,
+            defined=sum(offset is not None for offset in tools.values()),
+            count=len(tools),
+        )
+    )
+    if backup.state.selected is not None:
+        say(tr("Tool {tool} is selected.", tool=backup.state.selected))
+
+
+def comparison_payload(comparison: Comparison, tolerance: ComparisonTolerance) -> dict[str, object]:
+    """Return every tool that differs, with all its components."""
+    return {
+        "equal": comparison.equal,
+        "tolerance_mm": tolerance.length_mm,
+        "tolerance_deg": tolerance.angle_deg,
+        "selected_tool": {
+            "expected": comparison.expected_selected,
+            "found": comparison.found_selected,
+            "equal": comparison.same_selection,
+            "counts": comparison.selection_counts,
+        },
+        "differing": [_tool_payload(tool) for tool in comparison.differing],
+    }
+
+
+def show_comparison(comparison: Comparison, tolerance: ComparisonTolerance, identity: str) -> None:
+    """Print a row for each component of each tool that differs."""
+    rows = [row for tool in comparison.differing for row in _rows(tool)]
+    if rows:
+        columns = (
+            tr("tool"),
+            "",
+            tr("file"),
+            tr("controller"),
+            tr("difference"),
+            tr("allowed"),
+            "",
+        )
+        table(identity, columns, rows)
+    if not comparison.same_selection:
+        say(
+            tr(
+                "  selected tool: {expected} in the file, {found} on the controller",
+                expected=comparison.expected_selected,
+                found=comparison.found_selected,
+            )
+        )
+    if comparison.equal:
+        say(
+            tr(
+                "Equal: all tools of {url} are as in the file, within {mm:g} mm and {deg:g} deg.",
+                url=identity,
+                mm=tolerance.length_mm,
+                deg=tolerance.angle_deg,
+            )
+        )
+    elif rows:
+        numbers = ", ".join(str(tool.tool) for tool in comparison.differing)
+        say(tr("Different tools: {numbers}.", numbers=numbers))
+
+
+def _tool_payload(tool: ToolComparison) -> dict[str, object]:
+    return {
+        "tool": tool.tool,
+        "expected": offset_payload(tool.expected),
+        "found": offset_payload(tool.found),
+        "components": [asdict(part) | {"equal": part.equal} for part in tool.components],
+    }
+
+
+def _rows(tool: ToolComparison) -> list[list[object]]:
+    if not tool.components:
+        defined, undefined = tr("defined"), tr("undefined")
+        sides = (tool.expected, tool.found)
+        return [[tool.tool, "", *(undefined if s is None else defined for s in sides), "", "", "<"]]
+    return [
+        [
+            tool.tool,
+            part.name.replace("_", " ").upper().replace("MM", "mm").replace("DEG", "deg"),
+            number(part.expected),
+            number(part.found),
+            f"{part.delta:+.3f}",
+            f"{part.tolerance:g}",
+            "" if part.equal else "<",
+        ]
+        for part in tool.components
+        if part.expected or part.found or not part.name.startswith(("v", "w"))
+    ]
+
 
 _FILE = click.Path(dir_okay=False, path_type=Path)
 
@@ -36,7 +164,6 @@ def backup(
     """Save all fifteen tools, the one that is selected, and which controller it is. Reads only."""
     from robolink.backup import save, take_backup
     from robolink.files.named import require_free
-    from robolink_cli.views.backup import backup_payload, show_backup
 
     require_free(file, replace=force)
     with open_controller(context) as controller:
@@ -74,10 +201,9 @@ def compare(
 
     The file may be of another controller: one good file can be compared with many cells.
     """
-    from robolink.backup import ComparisonTolerance, load
     from robolink.backup import compare as compare_tools
+    from robolink.backup import load
     from robolink_cli.session.context import find_tools
-    from robolink_cli.views.backup import comparison_payload, show_comparison
 
     expected, tolerance = load(file), ComparisonTolerance(length_mm, angle_deg)
     with open_controller(context) as controller:

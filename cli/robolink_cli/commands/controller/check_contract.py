@@ -141,7 +141,7 @@ def _of_a_cell(context: CliContext, asked: _Asked, report: "ContractReport") -> 
     """Check a controller of a cell; what was there stands on its record meanwhile."""
     from robolink.testing import kept_on_site
     from robolink_cli.commands.controller.contract_report import TrialConnections
-    from robolink_cli.session.opening import open_controller
+    from robolink_cli.session.connection import open_controller
 
     trials = TrialConnections(context)
     with ExitStack() as stack:

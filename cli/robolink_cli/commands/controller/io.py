@@ -9,12 +9,12 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli.access.capabilities import io_of, require_epson
 from robolink_cli.console.render import say
-from robolink_cli.console.ways import io_words
+from robolink_cli.console.shell_words import io_words
 from robolink_cli.options.consent import DryRun, Yes
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.questions import agree
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, controller_options
-from robolink_cli.session.opening import open_controller
 
 if TYPE_CHECKING:
     from robolink.model import Controller, ValueReceipt

@@ -13,9 +13,9 @@ from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.output import may_be_guided
 from robolink_cli.options.consent import DryRun, Plain, Yes
 from robolink_cli.options.declaration import CliArgument, CliOption
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, controller_options, guided_if_alone
 from robolink_cli.session.motion_consent import agree_to_motion, motion_question
-from robolink_cli.session.opening import open_controller
 
 if TYPE_CHECKING:
     from robolink.model import Pose
@@ -122,7 +122,7 @@ def _jogged(
     yes: bool,
 ) -> "Pose | None":
     """Jog, and return where the tool is then; ``None`` where requests were only shown."""
-    from robolink_cli.prompts.jogging import jog_by_hand, jog_by_steps, plan_jog
+    from robolink_cli.prompts.jog_keys import jog_by_hand, jog_by_steps, plan_jog
 
     with open_controller(context) as controller:
         if dry_run:
@@ -153,7 +153,7 @@ class _Turning:
 
     def done(self, context: CliContext, *, dry_run: bool, yes: bool) -> "Pose | None":
         """Carry it out, and return where the tool is then; ``None`` where it was only shown."""
-        from robolink_cli.prompts.jogging import plan_turn, require_turn, turn
+        from robolink_cli.prompts.jog_keys import plan_turn, require_turn, turn
 
         how = {"lift_mm": self.lift_mm, "speed_mm_s": self.speed_mm_s, "box_mm": self.box_mm}
         with open_controller(context) as controller:

@@ -10,11 +10,12 @@ from robolink.model import Act
 from robolink_cli.access.capabilities import preferences_of, require_epson, require_softmotion
 from robolink_cli.access.warnings import note_unsettled
 from robolink_cli.console.render import note, say
-from robolink_cli.console.ways import state_word
+from robolink_cli.console.shell_words import state_word
 from robolink_cli.options.consent import DryRun, Yes
 from robolink_cli.options.declaration import CliArgument
 from robolink_cli.options.shared import shared_options
 from robolink_cli.prompts.questions import agree, on_terminal
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import (
     CliContext,
     calming_options,
@@ -25,7 +26,6 @@ from robolink_cli.session.context import (
     stop_request,
 )
 from robolink_cli.session.motion_consent import agree_to_motion
-from robolink_cli.session.opening import open_controller
 from robolink_cli.stopping.notes import forget_stop, own_name_of
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def status(context: CliContext) -> None:
     it: who that is, and what it saw last, is shown instead.
     """
     from robolink_cli.session.motion_consent import note_doubts
-    from robolink_cli.session.stop_listening import seen_by_another
+    from robolink_cli.session.stop_listener import seen_by_another
     from robolink_cli.views.documents import status_payload
     from robolink_cli.views.tables import show_seen, show_status
 

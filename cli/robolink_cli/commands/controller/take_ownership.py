@@ -10,8 +10,8 @@ from robolink_cli.access.capabilities import require_softmotion
 from robolink_cli.console.render import say
 from robolink_cli.options.consent import DryRun, Yes
 from robolink_cli.prompts.questions import agree, on_terminal
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, controller_options
-from robolink_cli.session.opening import open_controller
 
 if TYPE_CHECKING:
     from robolink.controllers import SoftMotionController

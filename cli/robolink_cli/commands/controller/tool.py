@@ -20,10 +20,10 @@ from robolink_cli.options.consent import (
 )
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.questions import AcceptedAngle, AcceptedLength, accepted_jump, agree
-from robolink_cli.session.completing import complete_tool
+from robolink_cli.session.completion import complete_tool
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, controller_options
-from robolink_cli.session.opening import open_controller
-from robolink_cli.session.ordering import (
+from robolink_cli.session.order import (
     OrderId,
     ordered,
     require_no_dry_run,

@@ -8,12 +8,11 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_cli.access.recording import recording
-from robolink_cli.console.render import say, table
+from robolink_cli.access.record import recording
+from robolink_cli.console.render import plain, say, table
 from robolink_cli.options.declaration import CliOption
+from robolink_cli.session.connection import password_of
 from robolink_cli.session.context import CliContext, controller_options
-from robolink_cli.session.opening import password_of
-from robolink_cli.views.documents import plain
 
 if TYPE_CHECKING:
     from robolink.controllers.epson.verify import Fact, Verification

@@ -27,17 +27,17 @@ from robolink.messages import spoken, tr
 from robolink.model import Controller, EntryKind, require_engineer
 from robolink.stations import StationKind, find_station
 from robolink.timing import wall_time
+from robolink_cli.commands.measure.solve.answer import load
 from robolink_cli.commands.measure.solve.lasting_cases import study_values
-from robolink_cli.commands.measure.solve.solving import load
 from robolink_cli.console.numbers import NumberInside, decimal
 from robolink_cli.console.render import note
 from robolink_cli.options.consent import Yes
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import LINE
 from robolink_cli.prompts.questions import agree
-from robolink_cli.session.completing import complete_station, complete_tool
+from robolink_cli.session.completion import complete_station, complete_tool
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, controller_options
-from robolink_cli.session.opening import open_controller
 from robolink_cli.views.accuracy import show_tips
 
 _ROWS = (

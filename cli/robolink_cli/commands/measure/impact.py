@@ -12,9 +12,9 @@ from robolink_cli.console.render import say
 from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.impact import impact_payload, impact_request, show_impact
 from robolink_cli.options.report import ForceReport, ReportPath, report_request, reporting
-from robolink_cli.session.completing import complete_tool
+from robolink_cli.session.completion import complete_tool
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, controller_options
-from robolink_cli.session.opening import open_controller
 
 
 class _Components(NamedTuple):

@@ -6,11 +6,10 @@ from typing import TYPE_CHECKING, Annotated, Final
 import click
 
 from robolink.messages import tr
-from robolink_cli.console.render import emit_json, json_is_on, say, table
+from robolink_cli.console.render import emit_json, json_is_on, plain, say, table
 from robolink_cli.options.declaration import CliArgument
 from robolink_cli.options.pose_source import reading_options
 from robolink_cli.options.shared import json_option
-from robolink_cli.views.documents import plain
 
 if TYPE_CHECKING:
     from robolink.pose_tables import HowRead, PoseTable, ReadingChoices, TabledPose

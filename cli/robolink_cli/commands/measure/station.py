@@ -8,7 +8,7 @@ from robolink.messages import tr
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.options.consent import DryRun, Yes
 from robolink_cli.options.declaration import CliArgument, CliOption
-from robolink_cli.session.completing import complete_station, complete_tool
+from robolink_cli.session.completion import complete_station, complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 
 

@@ -30,12 +30,11 @@ from robolink.stations import (
 )
 from robolink_cli.console.render import note, table
 from robolink_cli.prompts.operator import operator_at
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext
 from robolink_cli.session.motion_consent import agree_to_motion, motion_question
-from robolink_cli.session.opening import open_controller
 from robolink_cli.views.documents import number
-from robolink_cli.views.fit import show_plan
-from robolink_cli.views.planned_steps import steps_payload
+from robolink_cli.views.fit import show_plan, steps_payload
 from robolink_cli.views.stations import station_payload
 
 

@@ -19,13 +19,12 @@ from robolink_cli.commands.record.journal_lookup import (
     journal_to_read,
 )
 from robolink_cli.console.exit_codes import DIFFERENT
-from robolink_cli.console.render import emit_json, json_is_on, say
+from robolink_cli.console.render import emit_json, json_is_on, plain, say
 from robolink_cli.lazy_group import LazyGroup
 from robolink_cli.options.consent import Overwrite
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
-from robolink_cli.session.completing import complete_tool
-from robolink_cli.views.documents import plain
+from robolink_cli.session.completion import complete_tool
 
 if TYPE_CHECKING:
     from robolink.journal import Journal

@@ -20,8 +20,8 @@ from robolink_cli.options.consent import Overwrite
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.impact import ImpactRequest, judge
 from robolink_cli.options.pose_source import point_numbers
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, optional_controller
-from robolink_cli.session.opening import open_controller
 from robolink_cli.views.documents import offset_payload, verification_payload
 
 _ENDINGS = (".html", ".htm")

@@ -14,9 +14,9 @@ from robolink_cli.console.render import note, say
 from robolink_cli.options.consent import DryRun, ThenSelect, Yes
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.questions import agree, on_terminal
-from robolink_cli.session.completing import complete_tool
+from robolink_cli.session.completion import complete_tool
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, controller_options
-from robolink_cli.session.opening import open_controller
 from robolink_cli.views.documents import offset_payload, receipt_payload
 from robolink_cli.views.tables import show_change
 

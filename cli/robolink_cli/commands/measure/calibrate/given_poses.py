@@ -24,17 +24,16 @@ from robolink.procedures import MeasurementContext, PoseMethod
 from robolink.transaction import Order, earlier_corrections
 from robolink_cli.access.warnings import note_change
 from robolink_cli.commands.measure.calibrate.listener import CalibrationListener
-from robolink_cli.commands.measure.calibrate.request import CalibrationRequest
-from robolink_cli.commands.measure.calibrate.stations import remark_on_pin
+from robolink_cli.commands.measure.calibrate.request import CalibrationRequest, remark_on_pin
 from robolink_cli.console.render import note, say
 from robolink_cli.options.impact import impact_payload, show_impact
 from robolink_cli.options.pose_source import PoseSource
 from robolink_cli.options.report import ReportDraft, reporting
 from robolink_cli.prompts.operator import terminal
 from robolink_cli.prompts.questions import agree, on_terminal
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext
-from robolink_cli.session.opening import open_controller
-from robolink_cli.session.ordering import ordered, show_done, with_order
+from robolink_cli.session.order import ordered, show_done, with_order
 from robolink_cli.views.fit import judged_payload, report_payload
 
 

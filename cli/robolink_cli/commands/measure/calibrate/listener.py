@@ -5,7 +5,7 @@ from robolink.calibration_run import AcceptanceCriteria, ChangeReport, Listener,
 from robolink.model import Controller, Pose, ToolReceipt
 from robolink_cli.options.impact import ImpactRequest, judge
 from robolink_cli.options.report import ReportDraft
-from robolink_cli.prompts.present import present_desk
+from robolink_cli.prompts.current_desk import current_desk
 from robolink_cli.views.fit import show_proposal, show_verdicts, tell_written
 
 
@@ -48,7 +48,7 @@ class CalibrationListener(Listener):
     def propose(self, proposal: Proposal, *, source: str, warnings: tuple[str, ...]) -> None:
         """Show the proposal, the verdict, and what it means for taught points."""
         self.impact = judge(self._points, old=proposal.before, new=proposal.offset)
-        desk = present_desk()
+        desk = current_desk()
         if desk is not None and self.impact is not None:
             from robolink_cli.wizard.happenings import TaughtPoints
 

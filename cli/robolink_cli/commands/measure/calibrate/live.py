@@ -21,24 +21,23 @@ from robolink.procedures import TipSource
 from robolink.transaction import Order, earlier_corrections
 from robolink_cli.access.warnings import note_change
 from robolink_cli.commands.measure.calibrate.listener import CalibrationListener
-from robolink_cli.commands.measure.calibrate.request import CalibrationRequest
-from robolink_cli.commands.measure.calibrate.stations import remark_on_pin
+from robolink_cli.commands.measure.calibrate.request import CalibrationRequest, remark_on_pin
 from robolink_cli.console.render import note
 from robolink_cli.options.impact import ImpactRequest, impact_payload, show_impact
 from robolink_cli.options.report import ReportDraft, reporting
+from robolink_cli.prompts.current_desk import current_desk
 from robolink_cli.prompts.operator import operator_at
-from robolink_cli.prompts.present import present_desk
 from robolink_cli.session.check_before_start import agree_to_procedure
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import guided_if_alone
-from robolink_cli.session.opening import open_controller
-from robolink_cli.session.ordering import ordered, show_done, with_order
+from robolink_cli.session.order import ordered, show_done, with_order
 from robolink_cli.views.fit import (
     report_payload,
     show_course,
     show_plan,
     show_report,
+    steps_payload,
 )
-from robolink_cli.views.planned_steps import steps_payload
 
 
 class _LiveListener(CalibrationListener):
@@ -167,7 +166,7 @@ def _change(
         report = change.run()
         listener.note_proved(report)
     # Now, because Ctrl-C may come before the logout is answered.
-    desk = present_desk()
+    desk = current_desk()
     if desk is None:
         show_report(report.tools[0])
     else:

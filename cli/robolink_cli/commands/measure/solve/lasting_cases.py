@@ -6,7 +6,7 @@ from typing import Final, cast
 from robolink import calibration as cal
 from robolink.messages import tr
 from robolink_cli.commands.measure.solve.case import Node, Payload, finite, unusable
-from robolink_cli.views.documents import plain
+from robolink_cli.console.render import plain
 
 _SHARED: Final = "previous_touch"
 _AXES: Final = ("nozzle", "person", "repeat")

@@ -14,7 +14,7 @@ from robolink_cli.commands.measure.solve.case import (
     read_sighting,
     unusable,
 )
-from robolink_cli.views.documents import plain
+from robolink_cli.console.render import plain
 from robolink_cli.views.solve import result_payload, space_payload
 
 

@@ -6,7 +6,7 @@ from robolink import calibration as cal
 from robolink.errors import CalibrationError
 from robolink.messages import declared, spoken, tr
 from robolink_cli.commands.measure.solve.case import Node, Payload, read_place, read_pose, unusable
-from robolink_cli.views.documents import plain
+from robolink_cli.console.render import plain
 from robolink_cli.views.solve import result_payload, space_payload
 
 

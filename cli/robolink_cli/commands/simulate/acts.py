@@ -8,7 +8,7 @@ from robolink_simulators.control.client import ControlClient
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_cli.commands.simulate.serving import named_values
+from robolink_cli.commands.simulate.service import named_values
 from robolink_cli.console.numbers import decimal
 from robolink_cli.console.render import emit_json, json_is_on, say
 

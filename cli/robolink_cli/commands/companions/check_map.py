@@ -25,7 +25,7 @@ from robolink.register_maps import (
     values_of,
 )
 from robolink.timing import local_label
-from robolink_cli.console.render import note, plain, say, table
+from robolink_cli.console.render import emit, json_is_on, note, plain, say, table
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.questions import on_terminal
 from robolink_cli.session.context import CliContext, controller_options
@@ -66,14 +66,14 @@ def check_map(
     of each tool are enough; a component that is 0 needs a test value.
     """
     if register_list is not None:
-        _start(context, register_list)
+        _start(register_list)
     elif file is not None:
-        _check_file(context, file)
+        _check_file(file)
     else:
         _check_values(context, shows)
 
 
-def _start(context: CliContext, register_list: Path) -> None:
+def _start(register_list: Path) -> None:
     from robolink.register_maps import draft_from_csv
 
     draft = draft_from_csv(register_list)
@@ -81,7 +81,7 @@ def _start(context: CliContext, register_list: Path) -> None:
         "map": draft.text,
         **plain(draft, "found left bad notes"),
     }
-    context.emit("plc-map-draft", payload, lambda: say(draft.text.rstrip()))
+    emit("plc-map-draft", payload, lambda: say(draft.text.rstrip()))
     for remark in (*draft.notes, *draft.bad):
         note(remark)
     note(
@@ -94,7 +94,7 @@ def _start(context: CliContext, register_list: Path) -> None:
     )
 
 
-def _check_file(context: CliContext, file: Path) -> None:
+def _check_file(file: Path) -> None:
     from robolink.register_maps import load_map
 
     found = load_map(file)
@@ -109,7 +109,7 @@ def _check_file(context: CliContext, file: Path) -> None:
         table(found.name, (tr("what"), tr("place"), tr("how")), rows)
         say(tr("The file is right. With -c its values are compared with the HMI."))
 
-    context.emit("plc-map", payload, show)
+    emit("plc-map", payload, show)
 
 
 def _check_values(context: CliContext, shows: tuple[str, ...]) -> None:
@@ -117,7 +117,7 @@ def _check_values(context: CliContext, shows: tuple[str, ...]) -> None:
     with _opened(context) as controller:
         register_map = controller.register_map
         values = MapValues(controller)
-        if not context.json:
+        if not json_is_on():
             values.show()
         controller.require_probe()
         comparison = MapComparison(context, controller)
@@ -154,7 +154,7 @@ def _check_values(context: CliContext, shows: tuple[str, ...]) -> None:
                 )
             )
 
-    context.emit("plc-map-values", payload, show)
+    emit("plc-map-values", payload, show)
 
 
 def _opened(context: CliContext) -> "PlcMapController":

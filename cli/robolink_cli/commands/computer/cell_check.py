@@ -17,7 +17,7 @@ from robolink.model import Controller
 from robolink.recipe import LoadedRecipe, load_recipe
 from robolink_cli.access.cell import complete_cell
 from robolink_cli.console.exit_codes import DIFFERENT, exit_code
-from robolink_cli.console.render import note, say
+from robolink_cli.console.render import emit, note, say
 from robolink_cli.options.consent import Published
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.operator import terminal
@@ -107,7 +107,7 @@ def check(
     scope = CheckScope(published, f"{since:%Y-%m-%d}" if since else "", sensor)
     checked = [_checked(one, scope) for one in contexts]
     payload = {"ok": all(one.well for one in checked), "cells": [_payload(one) for one in checked]}
-    context.emit("check", payload, lambda: _show(checked))
+    emit("check", payload, lambda: _show(checked))
     for one in checked:
         if one.error is not None:
             return exit_code(one.error)

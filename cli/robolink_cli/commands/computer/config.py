@@ -5,10 +5,10 @@ from typing import Annotated
 
 import click
 
-from robolink_cli.console.render import emit_json, json_is_on
+from robolink_cli.console.render import emit
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
-from robolink_cli.session.context import CliContext, emit, optional_controller
+from robolink_cli.session.context import CliContext, optional_controller
 
 
 @click.command()
@@ -18,10 +18,7 @@ def path() -> None:
     from robolink_cli.views.cells import files_payload, show_files
 
     payload = files_payload()
-    if json_is_on():
-        emit_json("robolink/config-path/1", {"files": payload})
-    else:
-        show_files(payload)
+    emit("config-path", {"files": payload}, lambda: show_files(payload))
 
 
 @click.command()
@@ -34,10 +31,7 @@ def check(
     from robolink_cli.views.cells import check_payload, show_check
 
     payload = check_payload(file)
-    if json_is_on():
-        emit_json("robolink/config-check/1", payload)
-    else:
-        show_check(payload)
+    emit("config-check", payload, lambda: show_check(payload))
     return 0 if payload["ok"] else 2
 
 
@@ -60,10 +54,10 @@ def show(
     chosen = find_cell(cell) if cell else context.cell
     if chosen is None:
         payload = cells_payload(load_cells().values())
-        context.emit("config-cells", payload, lambda: show_cells(payload))
+        emit("config-cells", payload, lambda: show_cells(payload))
     else:
         payload = cell_payload(chosen, context, origin=origin)
-        context.emit("config-show", payload, lambda: show_cell(payload))
+        emit("config-show", payload, lambda: show_cell(payload))
 
 
 @click.command("list")
@@ -90,4 +84,4 @@ def people(
 
     chosen = find_cell(cell) if cell else context.cell
     payload = people_payload([chosen] if chosen else load_cells().values())
-    context.emit("cell-people", payload, lambda: show_people(payload))
+    emit("cell-people", payload, lambda: show_people(payload))

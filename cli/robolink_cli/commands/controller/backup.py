@@ -20,7 +20,7 @@ from robolink.messages import tr
 from robolink.model import Controller, ToolReceipt, require_engineer
 from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.numbers import NumberInside
-from robolink_cli.console.render import note, say, table
+from robolink_cli.console.render import emit, json_is_on, note, say, show_requests, table
 from robolink_cli.options.consent import DryRun, Overwrite, Published, Yes
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.questions import AcceptedAngle, AcceptedLength, accepted_jump, agree
@@ -169,7 +169,7 @@ def backup(
     with open_controller(context) as controller:
         taken = take_backup(controller)
     save(taken, file, replace=force)
-    context.emit("backup-saved", backup_payload(taken, file), lambda: show_backup(taken, file))
+    emit("backup-saved", backup_payload(taken, file), lambda: show_backup(taken, file))
 
 
 @click.command()
@@ -218,7 +218,7 @@ def compare(
         "source": "published" if published else "controller",
         **comparison_payload(comparison, tolerance),
     }
-    context.emit("compare", payload, lambda: show_comparison(comparison, tolerance, identity))
+    emit("compare", payload, lambda: show_comparison(comparison, tolerance, identity))
     return 0 if comparison.equal else DIFFERENT
 
 
@@ -256,18 +256,18 @@ def restore(
         restoration = Restoration(controller, plan)
         requests = restoration.requests()
         if dry_run:
-            context.show_requests(requests)
+            show_requests(requests)
             return
         if not plan.empty:
-            if not context.json:
+            if not json_is_on():
                 restoration.show()
             agree(
                 tr("Write these values to the controller? 'robolink undo' takes them back."),
                 yes=yes,
-                asks=not context.json,
+                asks=not json_is_on(),
             )
         payload = restoration.run(accepted_mm=accepted_mm, accepted_deg=accepted_deg)
-    context.emit("restore", {"file": str(file), **payload}, restoration.show_end)
+    emit("restore", {"file": str(file), **payload}, restoration.show_end)
 
 
 class Restoration:

@@ -12,11 +12,11 @@ from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import joined, tr
 from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.numbers import NumberInside
-from robolink_cli.console.render import note, say, table
+from robolink_cli.console.render import emit, note, say, table
 from robolink_cli.options.consent import Yes
 from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.shared import controller_argument
-from robolink_cli.session.context import CliContext, controller_options, emit
+from robolink_cli.session.context import CliContext, controller_options
 
 if TYPE_CHECKING:
     from robolink.model import Controller

@@ -11,6 +11,7 @@ from robolink.messages import tr
 from robolink_cli.access.cell import with_cell_limits
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.output import may_be_guided
+from robolink_cli.console.render import emit, show_requests
 from robolink_cli.options.consent import DryRun, Plain, Yes
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.session.connection import open_controller
@@ -109,7 +110,7 @@ def jog(
     pose = guided_if_alone(context, work, job=tr("Jog"), alone=keys)
     if pose is not None:
         payload = pose_payload(pose)
-        context.emit("jog", payload, lambda: show_pose(payload))
+        emit("jog", payload, lambda: show_pose(payload))
 
 
 def _jogged(
@@ -126,7 +127,7 @@ def _jogged(
 
     with open_controller(context) as controller:
         if dry_run:
-            context.show_requests(plan_jog(controller, steps, speed_mm_s, box_mm))
+            show_requests(plan_jog(controller, steps, speed_mm_s, box_mm))
             return None
         question = motion_question(
             controller,
@@ -169,7 +170,7 @@ class _Turning:
 
             require_inside()
             if dry_run:
-                context.show_requests(plan_turn(controller, self.turn_deg, **how))
+                show_requests(plan_turn(controller, self.turn_deg, **how))
                 return None
             purpose = tr(
                 "with tool {tool}: up by {lift:g} mm, then U by {turn:+g} degrees, and stay there",

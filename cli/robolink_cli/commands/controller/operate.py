@@ -9,7 +9,7 @@ from robolink.messages import tr
 from robolink.model import Act
 from robolink_cli.access.capabilities import preferences_of, require_epson, require_softmotion
 from robolink_cli.access.warnings import note_unsettled
-from robolink_cli.console.render import note, say
+from robolink_cli.console.render import emit, note, say, show_requests
 from robolink_cli.console.shell_words import state_word
 from robolink_cli.options.consent import DryRun, Yes
 from robolink_cli.options.declaration import CliArgument
@@ -20,9 +20,7 @@ from robolink_cli.session.context import (
     CliContext,
     calming_options,
     controller_options,
-    emit,
     looking_options,
-    show_requests,
     stop_request,
 )
 from robolink_cli.session.motion_consent import agree_to_motion
@@ -48,12 +46,12 @@ def status(context: CliContext) -> None:
     named = context.expected.cell if context.expected else context.require_url()
     beside = seen_by_another(context.require_url())
     if beside is not None:
-        context.emit("status-beside", beside, lambda: show_seen(beside, named))
+        emit("status-beside", beside, lambda: show_seen(beside, named))
         return
     with open_controller(context, looks=True) as controller:
         payload = status_payload(controller)
         note_doubts(payload, controller, context.expected)
-    context.emit("status", payload, lambda: show_status(payload))
+    emit("status", payload, lambda: show_status(payload))
 
 
 @click.command()
@@ -67,7 +65,7 @@ def where(context: CliContext) -> None:
         group = controller.groups[0]
         pose, axes = group.pose(), group.axes()
     payload = pose_payload(pose) | {name: list(values) for name, values in axes.items()}
-    context.emit("where", payload, lambda: show_pose(payload))
+    emit("where", payload, lambda: show_pose(payload))
 
 
 @click.command()
@@ -134,7 +132,7 @@ def reset(
     """Clear an error. May switch outputs off: a gripper may drop its part."""
     with open_controller(context, calms=True, quiet=True) as controller:
         if dry_run:
-            context.show_requests(controller.preview(Act.RESET))
+            show_requests(controller.preview(Act.RESET))
             return
         effect, told = _effect_of_reset(controller)
         if told and (yes or not on_terminal()):
@@ -150,7 +148,7 @@ def reset(
         note_unsettled(controller, left, named)
     forget_stop(context.require_url(), name)
     payload: dict[str, object] = {"state": state}
-    context.emit(
+    emit(
         "reset",
         payload,
         lambda: say(
@@ -192,13 +190,13 @@ def motors(
     on = switch == "on"
     with open_controller(context, calms=not on) as controller:
         if dry_run:
-            context.show_requests(controller.preview(Act.MOTORS_ON if on else Act.MOTORS_OFF))
+            show_requests(controller.preview(Act.MOTORS_ON if on else Act.MOTORS_OFF))
             return
         if on:
             agree(tr("Switch the motors on? Nobody may be in the cell."), yes=yes)
         controller.motors(on)
     payload: dict[str, object] = {"motors_on": on}
-    context.emit(
+    emit(
         "motors",
         payload,
         lambda: say(tr("The motors are {switch}.", switch=tr("on") if on else tr("off"))),
@@ -233,14 +231,14 @@ def _switch_group(context: CliContext, *, on: bool, dry_run: bool, yes: bool) ->
     with open_controller(context) as controller:
         require_softmotion(controller)
         if dry_run:
-            context.show_requests(controller.preview(Act.MOTORS_ON if on else Act.MOTORS_OFF))
+            show_requests(controller.preview(Act.MOTORS_ON if on else Act.MOTORS_OFF))
             return
         if on:
             agree(tr("Enable the axis group? Nobody may be at the machine."), yes=yes)
         controller.motors(on)
     payload: dict[str, object] = {"enabled": on}
     state = tr("enabled") if on else tr("disabled")
-    context.emit("group", payload, lambda: say(tr("The axis group is {state}.", state=state)))
+    emit("group", payload, lambda: say(tr("The axis group is {state}.", state=state)))
 
 
 @click.command("execute-raw")
@@ -264,4 +262,4 @@ def execute_raw(
         )
         printed = require_epson(controller, tr("SPEL+ statements")).execute_raw(statement)
     payload: dict[str, object] = {"statement": statement, "printed": printed}
-    context.emit("execute-raw", payload, lambda: say(printed or tr("carried out")))
+    emit("execute-raw", payload, lambda: say(printed or tr("carried out")))

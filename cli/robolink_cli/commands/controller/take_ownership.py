@@ -7,7 +7,7 @@ import click
 from robolink.errors import DeclinedError, LeaseHeldError
 from robolink.messages import tr
 from robolink_cli.access.capabilities import require_softmotion
-from robolink_cli.console.render import say
+from robolink_cli.console.render import emit, say, show_requests
 from robolink_cli.options.consent import DryRun, Yes
 from robolink_cli.prompts.questions import agree, on_terminal
 from robolink_cli.session.connection import open_controller
@@ -33,7 +33,7 @@ def take_ownership(
     with open_controller(context, changes=not dry_run) as controller:
         plc = require_softmotion(controller)
         if dry_run:
-            context.show_requests((plc.preview_take(insist=True),))
+            show_requests((plc.preview_take(insist=True),))
             return
         held = _holder(plc)
         if held is not None:
@@ -41,7 +41,7 @@ def take_ownership(
             _record(plc, held)
             plc.take(insist=True)
     payload: dict[str, object] = {"taken_from": held}
-    context.emit(
+    emit(
         "ownership",
         payload,
         lambda: say(

@@ -9,6 +9,7 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink_cli.console.render import emit
 from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, controller_options
 
@@ -41,7 +42,7 @@ def cell_tools(context: CliContext) -> None:
         "selected_tool": found.selected,
         "tools": tools,
     }
-    context.emit("cell-tools", payload, lambda: show_cell_tools(payload))
+    emit("cell-tools", payload, lambda: show_cell_tools(payload))
 
 
 def _told(

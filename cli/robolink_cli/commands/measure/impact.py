@@ -8,7 +8,7 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_cli.console.render import say
+from robolink_cli.console.render import emit, say
 from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.impact import impact_payload, impact_request, show_impact
 from robolink_cli.options.report import ForceReport, ReportPath, report_request, reporting
@@ -90,7 +90,7 @@ def impact(
         show_impact(tool, found)
         say(tr("Nothing was written."))
 
-    context.emit("impact", payload, show)
+    emit("impact", payload, show)
 
 
 def _changes(given: dict[str, float | None]) -> dict[str, float]:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Final
 import click
 
 from robolink.messages import tr
-from robolink_cli.console.render import emit_json, json_is_on, plain, say, table
+from robolink_cli.console.render import emit, plain, say, table
 from robolink_cli.options.declaration import CliArgument
 from robolink_cli.options.pose_source import reading_options
 from robolink_cli.options.shared import json_option
@@ -32,10 +32,7 @@ def show(*, file: Annotated[Path, CliArgument()], choices: "ReadingChoices") -> 
     from robolink.pose_tables import read_poses
 
     found = read_poses(file, choices)
-    if json_is_on():
-        emit_json("robolink/poses/1", _payload(found))
-        return
-    _show_table(file, found)
+    emit("poses", _payload(found), lambda: _show_table(file, found))
 
 
 def _payload(found: "PoseTable") -> dict[str, object]:

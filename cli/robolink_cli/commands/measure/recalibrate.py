@@ -9,6 +9,7 @@ import click
 from robolink.errors import ConfigError
 from robolink.messages import declared, tr
 from robolink_cli.console.numbers import NumberInside
+from robolink_cli.console.render import json_is_on
 from robolink_cli.options.consent import DryRun, Plain, Yes
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import TYPED
@@ -194,7 +195,7 @@ def recalibrate(
         alone = recipe is None or (assist is None and not dry_run and order is None)
         job = tr("Change needle")
         # A program that reads what comes of it waits for one result.
-        following = None if jsonl or context.json else another
+        following = None if jsonl or json_is_on() else another
         guided_if_alone(context, change, job=job, alone=alone, following=following, steps=_STEPS)
 
 

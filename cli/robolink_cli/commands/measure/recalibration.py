@@ -20,7 +20,7 @@ from robolink.transaction import Order
 from robolink_cli.access.capabilities import io_of
 from robolink_cli.console.exit_codes import error_body, exit_code
 from robolink_cli.console.output import drawn_elsewhere, hand_over
-from robolink_cli.console.render import note, plain, say, switch_json_on
+from robolink_cli.console.render import emit, note, plain, say, switch_json_on
 from robolink_cli.prompts.current_desk import current_desk
 from robolink_cli.prompts.operator import operator_at
 from robolink_cli.prompts.questions import asked, keep_answer, on_terminal
@@ -225,9 +225,7 @@ class Recalibration:
         payload = with_order(document, order)
         self.events.emit("result", **payload)
         if not self.events.on:
-            self.context.emit(
-                "recalibration", payload, lambda: _show_plan(payload) if dry_run else None
-            )
+            emit("recalibration", payload, lambda: _show_plan(payload) if dry_run else None)
 
     @contextmanager
     def _opened(self) -> Iterator[tuple[Controller, Order | None]]:

@@ -15,7 +15,7 @@ from robolink.report import Report
 from robolink.transaction import id_of_change
 from robolink_cli.commands.record.journal_lookup import controller_meant, entries_of_change
 from robolink_cli.console.exit_codes import DIFFERENT
-from robolink_cli.console.render import note, say
+from robolink_cli.console.render import emit, note, say
 from robolink_cli.options.consent import Overwrite
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.impact import ImpactRequest, judge
@@ -71,7 +71,7 @@ def report(
     for problem in problems:
         note(problem)
     payload = report_payload(reports, path)
-    context.emit("report", payload, lambda: say(tr("Report: {path}", path=path)))
+    emit("report", payload, lambda: say(tr("Report: {path}", path=path)))
     return DIFFERENT if problems else 0
 
 

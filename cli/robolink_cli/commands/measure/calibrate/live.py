@@ -22,7 +22,7 @@ from robolink.transaction import Order, earlier_corrections
 from robolink_cli.access.warnings import note_change
 from robolink_cli.commands.measure.calibrate.listener import CalibrationListener
 from robolink_cli.commands.measure.calibrate.request import CalibrationRequest, remark_on_pin
-from robolink_cli.console.render import note
+from robolink_cli.console.render import emit, note
 from robolink_cli.options.impact import ImpactRequest, impact_payload, show_impact
 from robolink_cli.options.report import ReportDraft, reporting
 from robolink_cli.prompts.current_desk import current_desk
@@ -96,9 +96,9 @@ def _calibrate(frame: CalibrationRequest, source: Callable[[Controller], TipSour
         else:
             payload = _measure(controller, frame, frame.plan(source(controller), controller), order)
     if frame.dry_run:
-        context.emit("dry-run", payload, lambda: show_plan(payload))
+        emit("dry-run", payload, lambda: show_plan(payload))
     else:
-        context.emit("calibration", with_order(payload, order), lambda: None)
+        emit("calibration", with_order(payload, order), lambda: None)
 
 
 def _measure(

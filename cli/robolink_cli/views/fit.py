@@ -37,9 +37,9 @@ from robolink_cli.views.documents import (
     pose_payload,
     proposal_payload,
     receipt_payload,
+    show_change,
     verification_payload,
 )
-from robolink_cli.views.tables import show_change
 
 
 def steps_payload(controller: Controller, steps: Sequence[PlannedStep]) -> list[dict[str, object]]:

@@ -26,9 +26,9 @@ from robolink_cli.wizard.happenings import (
     TooFast,
     WaitsForAnswer,
 )
-from robolink_cli.wizard.screens.drawing import screen_of
-from robolink_cli.wizard.screens.ending import ended_of
-from robolink_cli.wizard.screens.told import told_before, told_question
+from robolink_cli.wizard.screens.end import ended_of
+from robolink_cli.wizard.screens.screen import screen_of
+from robolink_cli.wizard.screens.sentences import told_before, told_question
 from robolink_cli.wizard.state import CheckSubject, Header, Mark, WizardState
 from robolink_cli.wizard.work import Desk, Work
 from robolink_simulators.assist.port import InProcessEyes

@@ -17,10 +17,10 @@ from robolink_cli.session.check_before_start import check_before_start
 from robolink_cli.session.context import context_of_cell
 from robolink_cli.wizard.glance import ControllerGlance
 from robolink_cli.wizard.happenings import Reading, WasAsked, WasRegarded, WasTold
-from robolink_cli.wizard.screens.choosing import point_rows
-from robolink_cli.wizard.screens.drawing import screen_of
+from robolink_cli.wizard.screens.choice import point_rows
 from robolink_cli.wizard.screens.layout import JobStep, status_row, title_row
-from robolink_cli.wizard.screens.told import told_before
+from robolink_cli.wizard.screens.screen import screen_of
+from robolink_cli.wizard.screens.sentences import told_before
 from robolink_cli.wizard.state import (
     CheckPoint,
     CheckSubject,

@@ -17,9 +17,8 @@ from robolink_cli.console.exit_codes import USAGE
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import emit_json, json_is_on, note, say
 from robolink_cli.options.declaration import CliArgument, CliOption
-from robolink_cli.options.program_encoding import Encoding, tell_encoding
 from robolink_cli.options.shared import json_option
-from robolink_cli.options.simulation import ProjectOptions
+from robolink_cli.options.simulation import Encoding, ProjectOptions, tell_encoding
 
 if TYPE_CHECKING:
     from robolink_simulators.epson import EpsonSimulator

@@ -27,8 +27,7 @@ from robolink_cli.prompts.questions import AcceptedAngle, AcceptedLength, accept
 from robolink_cli.session.completion import complete_tool
 from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, controller_options
-from robolink_cli.views.documents import number, offset_payload, receipt_payload
-from robolink_cli.views.tables import show_change
+from robolink_cli.views.documents import number, offset_payload, receipt_payload, show_change
 
 
 def backup_payload(backup: Backup, file: Path) -> dict[str, object]:

@@ -89,8 +89,7 @@ def jog(
     of them is an emergency stop.
     """
     from robolink.runner import parse_steps
-    from robolink_cli.views.documents import pose_payload
-    from robolink_cli.views.tables import show_pose
+    from robolink_cli.views.documents import pose_payload, show_pose
 
     if keys:
         _require_keys(steps, dry_run=dry_run)

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import click
 
-from robolink.errors import JournalError
+from robolink.errors import DeclinedError, JournalError, LeaseHeldError
 from robolink.messages import tr
 from robolink.model import Act
 from robolink_cli.access.capabilities import preferences_of, require_epson, require_softmotion
@@ -27,6 +27,7 @@ from robolink_cli.session.motion_consent import agree_to_motion
 from robolink_cli.stopping.notes import forget_stop, own_name_of
 
 if TYPE_CHECKING:
+    from robolink.controllers import SoftMotionController
     from robolink.model import Controller, Marker
 
 
@@ -40,8 +41,7 @@ def status(context: CliContext) -> None:
     """
     from robolink_cli.session.motion_consent import note_doubts
     from robolink_cli.session.stop_listener import seen_by_another
-    from robolink_cli.views.documents import status_payload
-    from robolink_cli.views.tables import show_seen, show_status
+    from robolink_cli.views.documents import show_seen, show_status, status_payload
 
     named = context.expected.cell if context.expected else context.require_url()
     beside = seen_by_another(context.require_url())
@@ -58,8 +58,7 @@ def status(context: CliContext) -> None:
 @looking_options
 def where(context: CliContext) -> None:
     """Show where the selected tool is (measured), and the joints."""
-    from robolink_cli.views.documents import pose_payload
-    from robolink_cli.views.tables import show_pose
+    from robolink_cli.views.documents import pose_payload, show_pose
 
     with open_controller(context, looks=True) as controller:
         group = controller.groups[0]
@@ -263,3 +262,89 @@ def execute_raw(
         printed = require_epson(controller, tr("SPEL+ statements")).execute_raw(statement)
     payload: dict[str, object] = {"statement": statement, "printed": printed}
     emit("execute-raw", payload, lambda: say(printed or tr("carried out")))
+
+
+@click.command("take-ownership")
+@controller_options
+def take_ownership(
+    context: CliContext,
+    *,
+    dry_run: DryRun = False,
+    yes: Yes = False,
+) -> None:
+    """Take a PLC's mailbox from the client that holds it; nobody has it afterwards.
+
+    For a program that hangs or that nobody finds. What that client has under way is halted by
+    the PLC within half a second, and it is refused from then on.
+    """
+    with open_controller(context, changes=not dry_run) as controller:
+        plc = require_softmotion(controller)
+        if dry_run:
+            show_requests((plc.preview_take(insist=True),))
+            return
+        held = _holder(plc)
+        if held is not None:
+            _ask(plc, held, yes=yes)
+            _record(plc, held)
+            plc.take(insist=True)
+    payload: dict[str, object] = {"taken_from": held}
+    emit(
+        "ownership",
+        payload,
+        lambda: say(
+            tr("Nobody else held the mailbox. It is free.")
+            if held is None
+            else tr("The mailbox was taken from client {holder}, and is free now.", holder=held)
+        ),
+    )
+
+
+def _holder(plc: "SoftMotionController") -> str | None:
+    """Ask for the mailbox as everybody does; return who holds it, ``None`` when it was given."""
+    try:
+        plc.take()
+    except LeaseHeldError as error:
+        return error.holder
+    return None
+
+
+def _ask(plc: "SoftMotionController", holder: str, *, yes: bool) -> None:
+    """Have a person insist.
+
+    Raises:
+        DeclinedError: The answer was no, or nobody could be asked.
+    """
+    if not yes and not on_terminal():
+        raise DeclinedError(
+            tr(
+                "Client {holder} holds the mailbox of {controller}, but there is nobody to ask.",
+                holder=holder,
+                controller=plc.identity,
+            ),
+            remedy=tr(
+                "End that program; 10 s after its last sign the mailbox is free. To insist all the "
+                "same, run it on a terminal, or give --yes."
+            ),
+            controller=plc.identity,
+        )
+    if plc.status().running:
+        question = tr(
+            "Client {holder} holds the mailbox, and the axis group moves: the PLC will halt "
+            "it. Take the mailbox away? Only if you see the cell.",
+            holder=holder,
+        )
+    else:
+        question = tr(
+            "Client {holder} holds the mailbox. Take it away? Only if you see the cell.",
+            holder=holder,
+        )
+    agree(question, yes=yes)
+
+
+def _record(plc: "SoftMotionController", holder: str) -> None:
+    from robolink.model import EntryKind, NewEntry
+
+    verdict = tr("the mailbox was taken from client {holder}", holder=holder)
+    plc.outcomes.append(
+        NewEntry(EntryKind.DECISION, verdict=verdict, details={"taken_from": holder})
+    )

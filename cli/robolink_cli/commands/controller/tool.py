@@ -68,8 +68,7 @@ def list_tools(
 ) -> None:
     """Show all tools and which one is selected."""
     from robolink_cli.session.context import find_tools
-    from robolink_cli.views.documents import offset_payload
-    from robolink_cli.views.tables import show_tools
+    from robolink_cli.views.documents import offset_payload, show_tools
 
     with open_controller(context, looks=True) as controller:
         found = find_tools(controller, published=published)
@@ -95,8 +94,7 @@ def get(
     ] = None,
 ) -> None:
     """Show one tool; 0 is the flange."""
-    from robolink_cli.views.documents import offset_payload
-    from robolink_cli.views.tables import show_tools
+    from robolink_cli.views.documents import offset_payload, show_tools
 
     if (number is None) == (mode is None):
         raise ConfigError(
@@ -124,8 +122,7 @@ def _get_by_mode(context: CliContext, mode: str) -> None:
     """Show what the PLC's own reading block says about the tool in force."""
     from robolink.protocols.mailbox import ReadMode
     from robolink_cli.access.capabilities import require_softmotion
-    from robolink_cli.views.documents import offset_payload
-    from robolink_cli.views.tables import show_offset
+    from robolink_cli.views.documents import offset_payload, show_offset
 
     modes = {"set": ReadMode.SET, "active": ReadMode.ACTIVE, "last": ReadMode.LAST_COMMANDED}
     with open_controller(context, looks=True) as controller:
@@ -248,8 +245,7 @@ class _Setting:
         self, controller: "Controller", before: "ToolOffset | None", wanted: "ToolOffset"
     ) -> None:
         """Show a person what the tool holds, and what it is to hold."""
-        from robolink_cli.views.documents import offset_payload
-        from robolink_cli.views.tables import show_change
+        from robolink_cli.views.documents import offset_payload, show_change
 
         controller.tools.selected()  # read now: the last line of a failure names it
         if not json_is_on():

@@ -59,8 +59,7 @@ def impact(
     from robolink.calibration import impact_on
     from robolink.errors import UndefinedToolError
     from robolink.model import says_it_is_simulated
-    from robolink_cli.views.documents import offset_payload
-    from robolink_cli.views.tables import show_change
+    from robolink_cli.views.documents import offset_payload, show_change
 
     request = impact_request(points, path, names=("--points", "--pts"))
     if request is None:

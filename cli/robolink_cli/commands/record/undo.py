@@ -17,8 +17,7 @@ from robolink_cli.prompts.questions import agree, on_terminal
 from robolink_cli.session.completion import complete_tool
 from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, controller_options
-from robolink_cli.views.documents import offset_payload, receipt_payload
-from robolink_cli.views.tables import show_change
+from robolink_cli.views.documents import offset_payload, receipt_payload, show_change
 
 
 @click.command()

@@ -24,7 +24,7 @@ from robolink.model import Secret
 from robolink_cli.commands.simulate.service import host_and_port, named_values, world_from
 from robolink_cli.commands.simulate.simulated_kind import SimulatedKind, plan_faults
 from robolink_cli.console.render import note
-from robolink_cli.options.program_encoding import tell_encoding
+from robolink_cli.options.simulation import tell_encoding
 
 
 def make_epson(

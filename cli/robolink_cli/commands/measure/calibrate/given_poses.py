@@ -23,7 +23,7 @@ from robolink.model import Controller
 from robolink.procedures import MeasurementContext, PoseMethod
 from robolink.transaction import Order, earlier_corrections
 from robolink_cli.access.warnings import note_change
-from robolink_cli.commands.measure.calibrate.listener import CalibrationListener
+from robolink_cli.commands.measure.calibrate.live import CalibrationListener
 from robolink_cli.commands.measure.calibrate.request import CalibrationRequest, remark_on_pin
 from robolink_cli.console.render import emit, json_is_on, note, say
 from robolink_cli.options.impact import impact_payload, show_impact

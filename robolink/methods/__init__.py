@@ -91,7 +91,7 @@ if TYPE_CHECKING:
     from robolink.methods.runout_table import AllRoundPlan as AllRoundPlan
     from robolink.methods.runout_table import RunoutTableParameters as RunoutTableParameters
     from robolink.methods.runout_table import RunoutTableSource as RunoutTableSource
-    from robolink.methods.runout_table_procedure import measure_runout_table as measure_runout_table
+    from robolink.methods.runout_table import measure_runout_table as measure_runout_table
     from robolink.methods.shared_parameters import LookParameters as LookParameters
     from robolink.methods.shared_parameters import PinParameters as PinParameters
     from robolink.methods.shared_parameters import UprightPinParameters as UprightPinParameters

@@ -76,17 +76,6 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) 
     console.print(shown, crop=False)
 
 
-def plain(found: object, names: str) -> dict[str, object]:
-    """Return attributes under their own names, as a document has them: tuples as lists.
-
-    Args:
-        found: What has them.
-        names: The attributes, apart by blanks.
-    """
-    values = {name: getattr(found, name) for name in names.split()}
-    return {name: list(v) if isinstance(v, tuple) else v for name, v in values.items()}
-
-
 def emit(kind: str, payload: Mapping[str, object], show: Callable[[], None]) -> None:
     """Give the result: the document ``robolink/KIND/1`` to a machine, else ``show()``."""
     if json_is_on():

@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Annotated
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.model import json_fields
 from robolink_cli.access.capabilities import points_of
-from robolink_cli.console.render import plain, say, table
+from robolink_cli.console.render import say, table
 from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.pose_source import point_numbers
 
@@ -84,8 +85,8 @@ def impact_payload(impact: "Impact") -> dict[str, object]:
         "points": [
             {
                 "point": entry.number,
-                **plain(entry.pose, "x_mm y_mm z_mm u_deg"),
-                **plain(entry, "dx_mm dy_mm dz_mm turn_deg distance_mm"),
+                **json_fields(entry.pose, "x_mm", "y_mm", "z_mm", "u_deg"),
+                **json_fields(entry, "dx_mm", "dy_mm", "dz_mm", "turn_deg", "distance_mm"),
             }
             for entry in impact.entries
         ],

@@ -6,10 +6,10 @@ from typing import Any
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.model import EntryKind, Recorded
+from robolink.model import EntryKind, Recorded, json_fields
 from robolink.stations import Station, find_station, find_stations
 from robolink.timing import local_label
-from robolink_cli.console.render import plain, say, table
+from robolink_cli.console.render import say, table
 from robolink_cli.session.context import CliContext
 from robolink_cli.views.documents import number
 
@@ -87,16 +87,14 @@ def station_payload(station: Station, *, robot: str = "") -> dict[str, Any]:
         "id": station.id,
         "robot": robot or None,
         "kind": station.kind.value,
-        **plain(station, "x_mm y_mm z_mm sigma_mm how"),
+        **json_fields(station, "x_mm", "y_mm", "z_mm", "sigma_mm", "how"),
         "found_at": station.found_at or None,
-        "entry": station.entry,
-        "base": None if station.base is None else list(station.base),
+        **json_fields(station, "entry", "base"),
         "gauge": station.gauge or None,
         "gauge_due": station.gauge_due or None,
         "check_due": due.isoformat() if due else None,
         "remark": station.remark() or None,
-        "declared": station.declared,
-        "details": dict(station.details),
+        **json_fields(station, "declared", "details"),
     }
 
 

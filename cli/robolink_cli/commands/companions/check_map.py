@@ -8,6 +8,7 @@ import click
 
 from robolink.errors import ConfigError, DeclinedError, RobolinkError
 from robolink.messages import joined, tr
+from robolink.model import json_fields
 from robolink.register_maps import (
     COMPONENTS,
     ComparedValue,
@@ -25,7 +26,7 @@ from robolink.register_maps import (
     values_of,
 )
 from robolink.timing import local_label
-from robolink_cli.console.render import emit, json_is_on, note, plain, say, table
+from robolink_cli.console.render import emit, json_is_on, note, say, table
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.questions import on_terminal
 from robolink_cli.session.context import CliContext, controller_options
@@ -77,10 +78,7 @@ def _start(register_list: Path) -> None:
     from robolink.register_maps import draft_from_csv
 
     draft = draft_from_csv(register_list)
-    payload: dict[str, object] = {
-        "map": draft.text,
-        **plain(draft, "found left bad notes"),
-    }
+    payload = {"map": draft.text, **json_fields(draft, "found", "left", "bad", "notes")}
     emit("plc-map-draft", payload, lambda: say(draft.text.rstrip()))
     for remark in (*draft.notes, *draft.bad):
         note(remark)

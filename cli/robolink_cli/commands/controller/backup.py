@@ -1,7 +1,6 @@
 """backup, restore, compare: the tools of a controller and a file."""
 
 from contextlib import ExitStack
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -17,7 +16,7 @@ from robolink.backup import (
 )
 from robolink.backup import restore as restore_tools
 from robolink.messages import tr
-from robolink.model import Controller, ToolReceipt, require_engineer
+from robolink.model import Controller, ToolReceipt, json_fields, json_value, require_engineer
 from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import emit, json_is_on, note, say, show_requests, table
@@ -27,7 +26,7 @@ from robolink_cli.prompts.questions import AcceptedAngle, AcceptedLength, accept
 from robolink_cli.session.completion import complete_tool
 from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, controller_options
-from robolink_cli.views.documents import number, offset_payload, receipt_payload, show_change
+from robolink_cli.views.documents import number, receipt_payload, show_change
 
 
 def backup_payload(backup: Backup, file: Path) -> dict[str, object]:
@@ -35,11 +34,9 @@ def backup_payload(backup: Backup, file: Path) -> dict[str, object]:
     tools = backup.state.tools
     return {
         "file": str(file),
-        "controller": backup.controller,
-        "saved_at": backup.saved_at,
-        "facts": asdict(backup.facts),
+        **json_fields(backup, "controller", "saved_at", "facts"),
         "selected_tool": backup.state.selected,
-        "tools": {str(tool): offset_payload(offset) for tool, offset in tools.items()},
+        "tools": {str(tool): json_value(offset) for tool, offset in tools.items()},
     }
 
 
@@ -74,12 +71,13 @@ def comparison_payload(comparison: Comparison, tolerance: ComparisonTolerance) -
         "equal": comparison.equal,
         "tolerance_mm": tolerance.length_mm,
         "tolerance_deg": tolerance.angle_deg,
-        "selected_tool": {
-            "expected": comparison.expected_selected,
-            "found": comparison.found_selected,
-            "equal": comparison.same_selection,
-            "counts": comparison.selection_counts,
-        },
+        "selected_tool": json_fields(
+            comparison,
+            expected="expected_selected",
+            found="found_selected",
+            equal="same_selection",
+            counts="selection_counts",
+        ),
         "differing": [_tool_payload(tool) for tool in comparison.differing],
     }
 
@@ -121,12 +119,8 @@ def show_comparison(comparison: Comparison, tolerance: ComparisonTolerance, iden
 
 
 def _tool_payload(tool: ToolComparison) -> dict[str, object]:
-    return {
-        "tool": tool.tool,
-        "expected": offset_payload(tool.expected),
-        "found": offset_payload(tool.found),
-        "components": [asdict(part) | {"equal": part.equal} for part in tool.components],
-    }
+    parts = [json_fields(part) | {"equal": part.equal} for part in tool.components]
+    return {**json_fields(tool, "tool", "expected", "found"), "components": parts}
 
 
 def _rows(tool: ToolComparison) -> list[list[object]]:
@@ -299,12 +293,7 @@ class Restoration:
     def show(self) -> None:
         """Show what would change."""
         for change in self._plan.changes:
-            show_change(
-                change.tool,
-                offset_payload(change.now),
-                offset_payload(change.wanted),
-                after_name=tr("backup"),
-            )
+            show_change(change.tool, change.now, change.wanted, after_name=tr("backup"))
         if self._plan.select is not None:
             say(tr("tool {tool} will be selected", tool=self._plan.select))
 

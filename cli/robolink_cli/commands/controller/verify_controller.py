@@ -8,8 +8,9 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.model import json_fields
 from robolink_cli.access.record import recording
-from robolink_cli.console.render import emit, note, plain, say, table
+from robolink_cli.console.render import emit, note, say, table
 from robolink_cli.options.declaration import CliOption
 from robolink_cli.session.connection import password_of
 from robolink_cli.session.context import CliContext, controller_options
@@ -139,10 +140,9 @@ def _write(path: Path, text: str) -> None:
 
 def _fact_payload(fact: "Fact") -> dict[str, object]:
     return {
-        **plain(fact, "name finding settled"),
+        **json_fields(fact, "name", "finding", "settled"),
         "option": fact.option or None,
-        "value": fact.value,
-        "evidence": fact.evidence,
+        **json_fields(fact, "value", "evidence"),
     }
 
 

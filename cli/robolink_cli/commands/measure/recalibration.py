@@ -12,7 +12,7 @@ from robolink.calibration import VerifyResult
 from robolink.calibration_run import ChangeReport, Listener, Moment, Proposal, RecipeRun, preview
 from robolink.errors import CalibrationError, DeclinedError
 from robolink.messages import tr
-from robolink.model import AnsweredBy, Controller, ToolReceipt
+from robolink.model import AnsweredBy, Controller, ToolReceipt, json_fields
 from robolink.procedures import MeasurementContext
 from robolink.recipe import Answers, LoadedRecipe, require_answers
 from robolink.runner import Ask, Confirm, Notify, StepDone, TakenStep
@@ -20,7 +20,7 @@ from robolink.transaction import Order
 from robolink_cli.access.capabilities import io_of
 from robolink_cli.console.exit_codes import error_body, exit_code
 from robolink_cli.console.output import drawn_elsewhere, hand_over
-from robolink_cli.console.render import emit, note, plain, say, switch_json_on
+from robolink_cli.console.render import emit, note, say, switch_json_on
 from robolink_cli.prompts.current_desk import current_desk
 from robolink_cli.prompts.operator import operator_at
 from robolink_cli.prompts.questions import asked, keep_answer, on_terminal
@@ -380,7 +380,7 @@ class Recalibration:
             "prompts": [{"at": prompt.at, "text": prompt.text} for prompt in recipe.prompts],
             "outputs": [
                 {
-                    **plain(output, "at output on"),
+                    **json_fields(output, "at", "output", "on"),
                     "requests": list(io_of(controller).preview_output(output.output, output.on)),
                 }
                 for output in recipe.outputs

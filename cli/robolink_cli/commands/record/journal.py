@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal, NamedTuple
 import click
 
 from robolink.messages import declared, tr
-from robolink.model import EntryKind
+from robolink.model import EntryKind, json_fields
 from robolink_cli.commands.record.journal_drift import drift
 from robolink_cli.commands.record.journal_lookup import (
     OfController,
@@ -19,7 +19,7 @@ from robolink_cli.commands.record.journal_lookup import (
     journal_to_read,
 )
 from robolink_cli.console.exit_codes import DIFFERENT
-from robolink_cli.console.render import emit, emit_json, json_is_on, plain, say
+from robolink_cli.console.render import emit, emit_json, json_is_on, say
 from robolink_cli.lazy_group import LazyGroup
 from robolink_cli.options.consent import Overwrite
 from robolink_cli.options.declaration import CliArgument, CliOption
@@ -193,11 +193,8 @@ def verify() -> int:
     opened = journal_to_read()
     with _progress(opened) as progress:
         found = opened.verify(progress)
-    payload = {
-        "entry_count": found.checked,
-        **plain(found, "problems last_number last_hash"),
-        "keyed": False,
-    }
+    said_of = ("problems", "last_number", "last_hash")
+    payload = {"entry_count": found.checked, **json_fields(found, *said_of), "keyed": False}
     if json_is_on():
         emit_json("robolink/journal-verified/1", payload)
     else:

@@ -11,8 +11,7 @@ from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.model import Recorded, Signature
-from robolink_cli.views.documents import COMPONENTS
+from robolink.model import COMPONENTS, Recorded, Signature
 from robolink_cli.views.journal import entry_payload
 
 _OFFSETS: Final = ("before", "after")

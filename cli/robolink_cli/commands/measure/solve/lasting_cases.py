@@ -5,8 +5,8 @@ from typing import Final, cast
 
 from robolink import calibration as cal
 from robolink.messages import tr
+from robolink.model import json_fields
 from robolink_cli.commands.measure.solve.case import Node, Payload, finite, unusable
-from robolink_cli.console.render import plain
 
 _SHARED: Final = "previous_touch"
 _AXES: Final = ("nozzle", "person", "repeat")
@@ -25,7 +25,7 @@ def length_change(node: Node) -> Payload:
     payload: Payload = {
         "status": "error" if undecided else "warn" if found.changed else "ok",
         "codes": ["length_changed"] if found.changed else [],
-        **plain(found, "height_change_mm u_mm limit_mm z_by_difference_mm"),
+        **json_fields(found, "height_change_mm", "u_mm", "limit_mm", "z_by_difference_mm"),
         "offset_z": None if undecided else found.z_mm(decision),
     }
     if undecided:
@@ -53,7 +53,7 @@ def station_shift(node: Node) -> Payload:
         "codes": [],
         "common_mm": list(found.vector_mm),
         "u_mm": list(found.sigma_mm),
-        **plain(found, "chi_square chi_square_limit detectable_mm"),
+        **json_fields(found, "chi_square", "chi_square_limit", "detectable_mm"),
     }
     if found.moved:
         return payload | {
@@ -85,7 +85,7 @@ def station_chain(node: Node) -> Payload:
     shared = node.call(cal.shared_station, "u_station_mm sigma_mm")
     return {
         "u_mm": [shared.u_mm] * len(node.numbers("tools")),
-        **plain(shared, "correlation u_difference_mm"),
+        **json_fields(shared, "correlation", "u_difference_mm"),
     }
 
 
@@ -119,10 +119,11 @@ def gauge_rr(node: Node) -> Payload:
     study = node.call(cal.gauge_study, "tolerance_mm", values_mm=_table(node, axes))
     return {
         "codes": list(study.warnings),
-        **plain(study, "notes repeatability_mm reproducibility_mm grr_mm part_mm interaction_p"),
-        **plain(study, "interaction_pooled percent_of_tolerance percent_of_total ndc"),
-        **plain(study, "repeatability_dof repeatability_limits_mm reproducibility_limits_mm"),
-        **plain(study, "reproducibility_upper95_mm"),
+        **json_fields(study, "notes", "repeatability_mm", "reproducibility_mm", "grr_mm"),
+        **json_fields(study, "part_mm", "interaction_p", "interaction_pooled"),
+        **json_fields(study, "percent_of_tolerance", "percent_of_total", "ndc"),
+        **json_fields(study, "repeatability_dof", "repeatability_limits_mm"),
+        **json_fields(study, "reproducibility_limits_mm", "reproducibility_upper95_mm"),
     }
 
 
@@ -136,7 +137,8 @@ def control_chart(node: Node) -> Payload:
     )
     return {
         "codes": list(chart.warnings),
-        **plain(chart, "notes centre sigma_mm limits points_out ewma ewma_first"),
+        **json_fields(chart, "notes", "centre", "sigma_mm", "limits", "points_out"),
+        **json_fields(chart, "ewma", "ewma_first"),
     }
 
 

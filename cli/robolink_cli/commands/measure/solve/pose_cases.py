@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from robolink import calibration as cal
 from robolink.calibration import CalibrationResult
 from robolink.messages import tr
-from robolink.model import Pose, ToolOffset
+from robolink.model import Pose, ToolOffset, json_fields
 from robolink_cli.commands.measure.solve.case import (
     EULER,
     Node,
@@ -18,7 +18,6 @@ from robolink_cli.commands.measure.solve.case import (
     read_poses,
     unusable,
 )
-from robolink_cli.console.render import plain
 from robolink_cli.views.solve import result_payload
 
 
@@ -90,13 +89,13 @@ def pivot_robust(node: Node) -> Payload:
 def six_point(node: Node) -> Payload:
     """A pivot and two ways along the tool's axes."""
     result = node.call(cal.solve_six_point, "second_is pivot_poses along_x second start sigma_mm")
-    return result_payload(result) | plain(result, "off_square_deg")
+    return result_payload(result) | json_fields(result, "off_square_deg")
 
 
 def tool_axis(node: Node) -> Payload:
     """Two touches along one axis of the tool."""
     axis = node.call(cal.solve_tool_axis, "first second sigma_mm")
-    return plain(axis, "direction tilt_deg sigma_deg")
+    return json_fields(axis, "direction", "tilt_deg", "sigma_deg")
 
 
 def joint(node: Node) -> Payload:
@@ -116,8 +115,8 @@ def verify(node: Node) -> Payload:
     result = node.call(cal.verify_drift, "poses offset tolerance_mm")
     return {
         "codes": [*result.warnings, *([] if result.passed else ["large_drift"])],
-        **plain(result, "passed max_drift_mm tolerance_mm"),
-        "drifts": [plain(drift, "u_deg distance_mm") for drift in result.drifts],
+        **json_fields(result, "passed", "max_drift_mm", "tolerance_mm"),
+        "drifts": [json_fields(drift, "u_deg", "distance_mm") for drift in result.drifts],
     }
 
 

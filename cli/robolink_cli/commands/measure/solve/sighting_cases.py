@@ -3,7 +3,7 @@
 from robolink import calibration as cal
 from robolink.messages import tr
 from robolink.methods import BeamsParameters
-from robolink.model import Pose
+from robolink.model import Pose, json_fields
 from robolink_cli.commands.measure.solve.case import (
     EULER,
     Node,
@@ -14,7 +14,6 @@ from robolink_cli.commands.measure.solve.case import (
     read_sighting,
     unusable,
 )
-from robolink_cli.console.render import plain
 from robolink_cli.views.solve import result_payload, space_payload
 
 
@@ -34,8 +33,8 @@ def camera_affine(node: Node) -> Payload:
     return result_payload(result) | {
         "mm_per_px_matrix": [value for row in camera.mm_per_px for value in row],
         "camera_origin": list(camera.origin_mm),
-        **plain(camera, "mirrored scale_mm_per_px turn_deg shear_deg"),
-        **plain(result, "rms_px"),
+        **json_fields(camera, "mirrored", "scale_mm_per_px", "turn_deg", "shear_deg"),
+        **json_fields(result, "rms_px"),
     }
 
 
@@ -73,9 +72,9 @@ def crossed_beams(node: Node) -> Payload:
     result = node.call(cal.solve_crossed_beams, "crossings sigma_mm shaft step_mm", **given)
     require_straight(result, node.number_or("max_lean_deg", BeamsParameters.max_lean_deg))
     return result_payload(result) | {
-        **plain(result, "lag_mm"),
+        **json_fields(result, "lag_mm"),
         "u_mm": [row[index] ** 0.5 for index, row in enumerate(result.covariance)],
-        **plain(result, "u_without_beams_mm half_width95"),
+        **json_fields(result, "u_without_beams_mm", "half_width95"),
         **result.details(),
     }
 
@@ -88,8 +87,9 @@ def find_beams(node: Node) -> Payload:
         crossings=node.each("crossings", cal.Crossing),
         tip_mm=read_place(node.child("tip"), "xy"),
     )
-    rest = "direction_deg sigma_mm direction_sigma_deg correlation"
-    return {"beams": [{"x": beam.x_mm, "y": beam.y_mm, **plain(beam, rest)} for beam in beams]}
+    rest = ("direction_deg", "sigma_mm", "direction_sigma_deg", "correlation")
+    places = [{"x": beam.x_mm, "y": beam.y_mm, **json_fields(beam, *rest)} for beam in beams]
+    return {"beams": places}
 
 
 def runout(node: Node) -> Payload:
@@ -103,10 +103,11 @@ def runout(node: Node) -> Payload:
     return {
         "codes": list(report.warnings),
         "offset": list(report.tip_mm),
-        **plain(report, "half_width95_mm"),
+        **json_fields(report, "half_width95_mm"),
         "centre": list(report.centre_mm),
-        **plain(report, "centre_mm runout_mm ellipse_mm second_mm amplitude_limit_mm"),
-        **plain(report, "distinct_angles rank rms_mm peak_mm harmonics_matter"),
+        **json_fields(report, "centre_mm", "runout_mm", "ellipse_mm", "second_mm"),
+        **json_fields(report, "amplitude_limit_mm", "distinct_angles", "rank", "rms_mm"),
+        **json_fields(report, "peak_mm", "harmonics_matter"),
     }
 
 

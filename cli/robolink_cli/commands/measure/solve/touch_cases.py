@@ -5,8 +5,8 @@ from typing import Final
 from robolink import calibration as cal
 from robolink.errors import CalibrationError
 from robolink.messages import declared, spoken, tr
+from robolink.model import json_fields
 from robolink_cli.commands.measure.solve.case import Node, Payload, read_place, read_pose, unusable
-from robolink_cli.console.render import plain
 from robolink_cli.views.solve import result_payload, space_payload
 
 
@@ -21,9 +21,9 @@ def needle_change(node: Node) -> Payload:
         after_mm=read_place(node.child("after")),
     )
     return space_payload(result) | {
-        **plain(result, "shift_mm"),
-        "chain": plain(result.chain, "sigma_mm changes"),
-        **plain(result, "full_calibration_due"),
+        **json_fields(result, "shift_mm"),
+        "chain": json_fields(result.chain, "sigma_mm", "changes"),
+        **json_fields(result, "full_calibration_due"),
     }
 
 
@@ -46,7 +46,7 @@ def z_touch(node: Node) -> Payload:
     return result_payload(result) | {
         "offset_z": result.offset.z_mm,
         "flange_z": result.flange_z_mm,
-        **plain(result, "latency_s overshoot_s2_per_mm f_quadratic f_limit"),
+        **json_fields(result, "latency_s", "overshoot_s2_per_mm", "f_quadratic", "f_limit"),
     }
 
 
@@ -70,8 +70,8 @@ def touch_evidence(node: Node) -> Payload:
     evidence = node.call(cal.judge_touches, "resolution_mm sigma_z_mm", touches=touches)
     seen = any(touch.arrival is not None or touch.contact for touch in touches)
     return {
-        **plain(evidence, "z_range_mm z_limit_mm jog_mm gamma gamma_upper99"),
-        **plain(evidence, "not_touched typed_ahead"),
+        **json_fields(evidence, "z_range_mm", "z_limit_mm", "jog_mm", "gamma", "gamma_upper99"),
+        **json_fields(evidence, "not_touched", "typed_ahead"),
         "max_residual": evidence.max_residual_mm,
         "notes": [] if seen else ["touches_not_witnessed"],
         **_verdict(evidence.codes, refuses=True),

@@ -10,7 +10,7 @@ from typing import Final
 from robolink.model import EntryKind, ToolOffset
 from tests.faults._epson_recipe_cell import EpsonRecipeCell
 from tests.faults._nozzle_cell import OF_A_CALIBRATION, numbers
-from tests.faults._recipe_instants import Instant
+from tests.faults._recipe_instants import EVERYTHING, Instant
 from tests.faults._requests import changes
 
 _EVERY: Final = 48
@@ -30,11 +30,17 @@ class Dealt:
     """Chooses the instants of a share: all of them, or without the switch a fixed sample.
 
     The sample has both moments of a write, and of other exchanges one.
+
+    Args:
+        share: Which one, from 0.
+        shares: Into how many they are dealt.
+        every_commit: Of the durable transactions of the journal, before and after which something
+            may come, one in so many belongs to the sample; 0 for none.
     """
 
-    def __init__(self, share: int, shares: int, *, everything: bool) -> None:
+    def __init__(self, share: int, shares: int, *, every_commit: int = 0) -> None:
         self._share, self._shares = share, shares
-        self._everything = everything
+        self._every_commit = every_commit
         self._moves = 0
         self._chosen = 0
 
@@ -46,10 +52,10 @@ class Dealt:
         return self._chosen % self._shares == self._share
 
     def _in_sample(self, at: Instant) -> bool:
-        if self._everything or _WRITES.match(at.what):
+        if EVERYTHING or _WRITES.match(at.what):
             return True
         if at.kind == "commit":
-            return False
+            return bool(self._every_commit) and at.number % self._every_commit == 1
         if _MOVES.match(at.what):
             self._moves += 1
             return self._moves % _EVERY_MOVE == 1

@@ -24,6 +24,9 @@ from robolink_simulators.device.hosted import HostedDevice
 from robolink.journal.store.store import Store, Tables
 from robolink.runner import Question
 
+EVERYTHING: Final = os.environ.get("ROBOLINK_ALL_KILL_POINTS") == "1"
+"""Whether something comes in at all instants, not at a sample of them."""
+
 Kind = Literal["request", "answer", "wait", "question", "commit"]
 _EVERY: Final = 97
 """Every 97th instant belongs to the sample,"""
@@ -165,7 +168,7 @@ def chosen(instants: Sequence[Instant], matters: re.Pattern[str], turn: int) -> 
         matters: What is worth more than one instant in so many.
         turn: Which of several samples that complement each other.
     """
-    if os.environ.get("ROBOLINK_ALL_KILL_POINTS") == "1":
+    if EVERYTHING:
         return list(instants)
     worth = [i for n, i in enumerate(instants) if n % _EVERY == 0 or matters.match(i.what)]
     return worth[turn % _TURNS :: _TURNS]

@@ -11,7 +11,6 @@ and after the write of a tool, and before and after the transaction that ends it
 what was acknowledged must be in the journal's file.
 """
 
-import os
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from functools import partial
@@ -32,14 +31,13 @@ from tests.faults._kill_points import (
     check_recovered,
     check_recovers,
 )
-from tests.faults._recipe_instants import Instant
+from tests.faults._recipe_instants import EVERYTHING, Instant
 from tests.faults._softmotion_change_cell import plc_change_cell
 from tests.faults._worlds import Worlds
 
 pytestmark = pytest.mark.timeout(3600)
 
 SOAK: Final = pytest.mark.soak
-EVERYTHING: Final = os.environ.get("ROBOLINK_ALL_KILL_POINTS") == "1"
 KINDS: Final[dict[str, Callable[[Path], AbstractContextManager[ChangeCell]]]] = {
     "EPSON": partial(change_cell, wire="sim"),
     "PLC": partial(plc_change_cell, wire="sim"),
@@ -200,7 +198,7 @@ CALIBRATION_SHARES: Final = 4
 @pytest.mark.fault("F60")
 def test_f60_a_calibration_killed_anywhere_leaves_the_old_or_the_new_value(share):
     cell = EpsonRecipeCell((1,))
-    worlds = Worlds(calibrations.Dealt(share, CALIBRATION_SHARES, everything=EVERYTHING))
+    worlds = Worlds(calibrations.Dealt(share, CALIBRATION_SHARES))
     calibrations.meet(cell)
     ended = worlds.explore(
         lambda: cell.run(*calibrations.words(cell), instants=worlds),

@@ -16,10 +16,10 @@ from robolink_cli.commands.record.journal_drift import show_drift
 from robolink_cli.console import render
 from robolink_cli.console.tables import column_widths, drawn_table, is_figures, within
 from robolink_cli.options.impact import show_impact
+from robolink_cli.views.documents import show_change, show_pose, show_tools
 from robolink_cli.views.fit import show_proposal
 from robolink_cli.views.journal import show_entry, show_list
-from robolink_cli.views.tables import show_change, show_pose, show_tools
-from robolink_cli.wizard.screens.told import told_before, told_question
+from robolink_cli.wizard.screens.sentences import told_before, told_question
 from wcwidth import wcswidth, wcwidth
 
 from robolink import Pose, ToolOffset, messages

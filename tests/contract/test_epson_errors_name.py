@@ -10,10 +10,13 @@ import robolink
 from robolink import Secret
 from robolink.controllers import stop_now
 from robolink.errors import (
+    ConfigError,
     ControllerFaultError,
     LoginRefusedError,
     LoginUnansweredError,
     NotReadyError,
+    ReadBackError,
+    RejectedError,
     RemoteProtocolError,
     RobolinkError,
     TransportBrokenError,
@@ -122,3 +125,12 @@ def test_an_answer_that_nobody_asked_for(simulator, controller, named):
     simulator.faults.add(Fault(FaultAction.DUPLICATE_REPLY, match="GetStatus"))
     controller.status()
     assert named(controller.status) == (RemoteProtocolError, True, "")
+
+
+def test_values_that_are_not_there_or_make_no_sense(controller, named, monkeypatch):
+    monkeypatch.setattr(controller.io, "read_memory", lambda _bit: False)
+    memory = controller.io.set_memory
+    assert named(memory, 3, True) == (ReadBackError, True, "$SetMemIO,3,1")
+    assert named(controller.variables.text, "nobody") == (RejectedError, True, "GetVariable")
+    assert named(controller.alarms.reset, 501) == (RejectedError, True, "ResetAlm")
+    assert named(controller.require_looks) == (ConfigError, True, "")

@@ -7,7 +7,7 @@ from pathlib import Path
 from statistics import fmean, pstdev
 
 import pytest
-from robolink_cli.commands.simulate.serving import world_from
+from robolink_cli.commands.simulate.service import world_from
 from robolink_simulators.cell.camera import CameraOptics, CameraTruth
 from robolink_simulators.cell.tip_switches import LightBeam, TouchPlate
 from robolink_simulators.cell.world_parameters import (

@@ -11,8 +11,8 @@ from robolink.messages import tr
 from robolink.model import AnsweredBy
 from robolink.runner import FINEST_STEP, Operator, Question, parse_steps
 from robolink_cli.console.render import note
+from robolink_cli.prompts.current_desk import current_desk
 from robolink_cli.prompts.lines import QUIET_S, Lines, open_lines
-from robolink_cli.prompts.present import present_desk
 
 if TYPE_CHECKING:
     from robolink_simulators.cell.habits import PersonManner
@@ -100,7 +100,7 @@ def terminal() -> Operator:
 
     While a wizard shows it, that is the one whom the wizard asks.
     """
-    return present_desk() or _plain_terminal()
+    return current_desk() or _plain_terminal()
 
 
 @cache

@@ -27,17 +27,39 @@ from robolink.calibration_run import (
 )
 from robolink.messages import tr
 from robolink.methods import NextStep
-from robolink.model import ToolOffset, ToolReceipt, describe_offset, json_fields, json_value
+from robolink.model import (
+    Controller,
+    ToolOffset,
+    ToolReceipt,
+    describe_offset,
+    json_fields,
+    json_value,
+)
 from robolink.runner import TeachPrompt
 from robolink_cli.console.render import next_lines, note, say, table
-from robolink_cli.prompts.present import present_desk
+from robolink_cli.prompts.current_desk import current_desk
 from robolink_cli.views.documents import (
     number,
+    pose_payload,
     proposal_payload,
     receipt_payload,
+    show_change,
     verification_payload,
 )
-from robolink_cli.views.tables import show_change
+
+
+def steps_payload(controller: Controller, steps: Sequence[PlannedStep]) -> list[dict[str, object]]:
+    """Return foreseen steps with their requests and limit checks."""
+    group = controller.groups[0]
+    return [
+        {
+            "text": step.text,
+            "target": pose_payload(step.target) if step.target else None,
+            "requests": list(step.requests(group)),
+            "refusal": step.refusal,
+        }
+        for step in steps
+    ]
 
 
 def remarks(result: CalibrationResult) -> Iterator[str]:
@@ -258,7 +280,7 @@ def show_proposal(proposal: Proposal) -> None:
 
 def tell_written(receipt: ToolReceipt) -> None:
     """Tell whoever is guided what the controller reads back, before the turn test is made."""
-    if present_desk() is None:
+    if current_desk() is None:
         return
     value = describe_offset(receipt.read_back or ToolOffset())
     told = tr(

@@ -21,9 +21,7 @@ from robolink.model import (
 )
 from robolink.transaction import id_of_change
 from robolink_cli.console.render import say, table
-from robolink_cli.views.documents import offset_difference
-
-AXES: Final = ("X mm", "Y mm", "Z mm", "U deg", "V deg", "W deg")
+from robolink_cli.views.documents import AXES, offset_difference
 
 SHORT: Final = 8
 """How many characters of an id a table shows."""

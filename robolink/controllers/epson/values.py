@@ -18,7 +18,7 @@ from decimal import Decimal
 from operator import eq
 from typing import Final
 
-from robolink.controllers.driver_link import MarkedCommand
+from robolink.controllers.driver_link import DriverPart, MarkedCommand
 from robolink.controllers.epson.link import EpsonLink
 from robolink.controllers.epson.session import as_sent
 from robolink.errors import ConfigError, ReadBackError, RejectedError, RemoteProtocolError
@@ -87,7 +87,6 @@ class ValueChange(MarkedCommand[ValueT]):
                     requested=requested,
                 ),
                 remedy=tr("A program or the PLC may set it too. Nothing was repeated."),
-                controller=self._link.identity,
                 request=request,
             )
         return ValueReceipt(request, before, requested, found, skipped=False)
@@ -119,7 +118,7 @@ _BYTE: Final = re.compile("[0-9A-Fa-f]{2}")
 _WORD: Final = re.compile("[0-9A-Fa-f]{4}")
 
 
-class EpsonIo:
+class EpsonIo(DriverPart):
     """Bits, counted from 0; a byte is eight of them, a word sixteen, lowest bit first.
 
     Reading inputs and memory is legal at any time, while production runs and for a client
@@ -131,6 +130,7 @@ class EpsonIo:
     """
 
     def __init__(self, link: EpsonLink) -> None:
+        super().__init__(link)
         self._link = link
         self._session = link.session
         self._window = link.window
@@ -212,7 +212,6 @@ class EpsonIo:
         return RemoteProtocolError(
             tr("The controller answered {name} with {answer!r}.", name=name, answer=reply.fields),
             remedy=tr("Keep this text and report it with the controller's firmware version."),
-            controller=self._session.identity,
             request=name,
             raw=",".join(reply.fields).encode("utf-8", "backslashreplace"),
         )
@@ -249,7 +248,7 @@ _RELATIVE: Final = {VariableType.REAL: 5e-6, VariableType.DOUBLE: 5e-14}
 """Half of the last of the valid digits, 6 and 14 (docs/reference/spel.md 2)."""
 
 
-class EpsonVariables:
+class EpsonVariables(DriverPart):
     """Variables that the project in the controller declares Global Preserve.
 
     Reading is legal at any time, while production runs and for a client that may only
@@ -261,6 +260,7 @@ class EpsonVariables:
     """
 
     def __init__(self, link: EpsonLink) -> None:
+        super().__init__(link)
         self._link = link
         self._session = link.session
 
@@ -315,7 +315,6 @@ class EpsonVariables:
                     found=len(fields),
                 ),
                 remedy=tr("Keep this text and report it with the controller's firmware version."),
-                controller=self._session.identity,
                 request=f"GetVariable,{element}",
             )
         return tuple(_from_text(field, kind) for field in fields)

@@ -66,7 +66,6 @@ class EpsonLooks:
                 remedy=tr(
                     "Write it with 'robolink expert spel export', add it to the project, build."
                 ),
-                controller=self._link.identity,
             ) from error
 
     def look(self, mark: int, *, program: int) -> tuple[Spot, ...]:
@@ -84,7 +83,6 @@ class EpsonLooks:
                 tr("The vision program ended with error {code}: {text}", code=failure, text=text),
                 code=failure,
                 remedy=tr("Check its sequences, their calibration and the camera in RC+."),
-                controller=self._link.identity,
                 request=shown,
             )
         return places

@@ -34,12 +34,12 @@ from robolink.controllers.softmotion.ownership import Bystanders, Ownership
 from robolink.controllers.softmotion.snapshots import Snapshots
 from robolink.controllers.softmotion.wire import MailboxWire, has_ended
 from robolink.errors import (
+    Concerning,
     ConfigError,
     ControllerError,
     OutcomeUnknownError,
     RejectedError,
     RemoteProtocolError,
-    RobolinkError,
     StoppedError,
     TransportTimeoutError,
     UnclearAnswerError,
@@ -233,14 +233,9 @@ class CommandSender:
             self.ownership.lose()
         return motion_failure(request, now, error_class)
 
-    @contextmanager
-    def _naming(self, draft: Command) -> Iterator[None]:
+    def _naming(self, draft: Command) -> Concerning:
         """Let each error that leaves the block name the PLC and the command."""
-        try:
-            yield
-        except RobolinkError as error:
-            error.concern(self._wire.identity, describe(draft))
-            raise
+        return Concerning(self._wire.identity, describe(draft))
 
     def _possess(self, draft: Command) -> None:
         if draft.needs_owner:
@@ -253,7 +248,7 @@ class CommandSender:
 
     def _to_end(self, draft: Command) -> Ended:
         """Send a command and return how it ended."""
-        with self._naming(draft), self._wire.ahead() if draft.only_ends else nullcontext():
+        with self._wire.ahead() if draft.only_ends else nullcontext():
             return self._seen_to_end(draft)
 
     def _seen_to_end(self, draft: Command) -> Ended:

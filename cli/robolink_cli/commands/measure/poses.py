@@ -7,7 +7,7 @@ import click
 
 from robolink.messages import tr
 from robolink.model import json_fields
-from robolink_cli.console.render import emit_json, json_is_on, say, table
+from robolink_cli.console.render import emit, say, table
 from robolink_cli.options.declaration import CliArgument
 from robolink_cli.options.pose_source import reading_options
 from robolink_cli.options.shared import json_option
@@ -33,10 +33,7 @@ def show(*, file: Annotated[Path, CliArgument()], choices: "ReadingChoices") -> 
     from robolink.pose_tables import read_poses
 
     found = read_poses(file, choices)
-    if json_is_on():
-        emit_json("robolink/poses/1", _payload(found))
-        return
-    _show_table(file, found)
+    emit("poses", _payload(found), lambda: _show_table(file, found))
 
 
 def _payload(found: "PoseTable") -> dict[str, object]:
@@ -66,7 +63,7 @@ _BESIDE: Final = ("name", "number", "hand", "local", "tool")
 
 def _pose_payload(entry: "TabledPose") -> dict[str, object]:
     """Return a pose with its units in the keys; ``None`` for what the file does not say."""
-    from robolink.model import COMPONENTS, json_fields
+    from robolink.model import COMPONENTS
 
     pose = entry.pose
     return {

@@ -22,10 +22,9 @@ from robolink_cli.console.render import emit_json, json_is_on, say, table
 from robolink_cli.options.consent import Overwrite
 from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.shared import json_option
-from robolink_cli.session.completing import complete_tool
+from robolink_cli.session.completion import complete_tool
 
 if TYPE_CHECKING:
-    from robolink.drift import CellDrift
     from robolink.journal import Journal
     from robolink.model import Recorded
 
@@ -63,7 +62,6 @@ def drift(
     changes that were measured and kept count. Exit code 1 when something stands out.
     """
     from robolink.journal import default_location, may_exist
-    from robolink_cli.commands.record.journal_drift import drift_payload, show_drift
 
     if page is not None:
         from robolink.files.named import require_free

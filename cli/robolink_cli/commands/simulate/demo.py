@@ -62,8 +62,6 @@ def demo(
     The SCARA is reached over a TCP connection on this machine's loopback, the PLC through its
     mailbox inside this process. No machine is touched.
     """
-    from robolink_cli.commands.simulate.demo import DemoOperator, demonstrate
-
     demonstrate(seed=seed, speed=speed, operator=DemoOperator(operator))
 
 

@@ -35,7 +35,7 @@ class AskingDesk(Protocol):
 _desk: AskingDesk | None = None
 
 
-def present_desk() -> AskingDesk | None:
+def current_desk() -> AskingDesk | None:
     """Return the desk, ``None`` where questions are plain lines."""
     return _desk
 

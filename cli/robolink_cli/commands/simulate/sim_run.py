@@ -18,9 +18,9 @@ from robolink_simulators.hosting.garbage import RareFullCollections
 
 from robolink.errors import ConfigError, ConnectError, RobolinkError
 from robolink.messages import joined, tr
-from robolink_cli.commands.simulate.kinds.simulated_kind import ServedCell
-from robolink_cli.commands.simulate.run.cells_file import PlannedCell
-from robolink_cli.commands.simulate.serving import Termination, announce, controlled
+from robolink_cli.commands.simulate.cells_file import PlannedCell
+from robolink_cli.commands.simulate.service import Termination, announce, controlled
+from robolink_cli.commands.simulate.simulated_kind import ServedCell
 from robolink_cli.console.output import hand_over, show
 from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.options.declaration import CliArgument, CliOption
@@ -51,8 +51,7 @@ def sim_run(
     clients keep on record; with --json it is one JSON document. docs/simulated-fleet.md explains
     the file.
     """
-    from robolink_cli.commands.simulate.run.cells_file import read_cells
-    from robolink_cli.commands.simulate.run.sim_run import parent_of_starter, start_and_wait
+    from robolink_cli.commands.simulate.cells_file import read_cells
 
     cells = read_cells(file, _serving_commands())
     if only_checked:
@@ -64,7 +63,6 @@ def sim_run(
         return 0
     if wait_ready:
         return start_and_wait([str(file), *_as_typed(life)])
-    from robolink_cli.commands.simulate.run.sim_run import run_cells
 
     run_cells(file, cells, life._replace(parent=parent_of_starter()))
     return 0

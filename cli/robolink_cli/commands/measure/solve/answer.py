@@ -1,7 +1,7 @@
 """Solving a case, or a file of them, without any robot."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final, cast
 
@@ -9,29 +9,62 @@ from robolink.calibration import AccuracyFacts, CalibrationResult, assessed
 from robolink.errors import CalibrationError, ConfigError
 from robolink.files.named import read_named
 from robolink.messages import tr
+from robolink.pose_tables import ReadingChoices, TabledPose
+from robolink.pose_tables import read_poses as tabled_poses
+from robolink_cli.commands.measure.solve import (
+    lasting_cases,
+    pose_cases,
+    sighting_cases,
+    touch_cases,
+)
 from robolink_cli.commands.measure.solve.case import (
     Node,
+    Payload,
     read_facts,
     read_frames,
     read_poses,
     unusable,
 )
-from robolink_cli.commands.measure.solve.pose_cases import POSE_METHODS
-from robolink_cli.commands.measure.solve.sighting_cases import SEEING_METHODS
-from robolink_cli.commands.measure.solve.station_cases import STATION_METHODS
-from robolink_cli.commands.measure.solve.tip_cases import MORE_METHODS
-from robolink_cli.commands.measure.solve.touch_cases import STUDY_METHODS, TOUCH_METHODS
 from robolink_cli.views.solve import SOLVED
 
 CASE_SCHEMA: Final = "robolink-calibration-vectors/1"
-METHODS: Final = {
-    **POSE_METHODS,
-    **SEEING_METHODS,
-    **MORE_METHODS,
-    **STATION_METHODS,
-    **STUDY_METHODS,
-    **TOUCH_METHODS,
+METHODS: Final[Mapping[str, Callable[[Node], Payload]]] = {
+    "two_pose": pose_cases.two_pose,
+    "two_pose_general": pose_cases.two_pose,
+    "n_angle": pose_cases.n_angle,
+    "n_angle_robust": pose_cases.n_angle_robust,
+    "pivot": pose_cases.pivot,
+    "pivot_robust": pose_cases.pivot_robust,
+    "uncertainty_budget": pose_cases.uncertainty_budget,
+    "up_camera_single": sighting_cases.up_camera,
+    "up_camera_affine": sighting_cases.camera_affine,
+    "board_two_fiducials": sighting_cases.board,
+    "board_fit": sighting_cases.board_fit,
+    "orientation_convert": sighting_cases.orientation,
+    "needle_change": touch_cases.needle_change,
+    "one_touch": touch_cases.one_touch,
+    "crossed_beams": sighting_cases.crossed_beams,
+    "find_beams": sighting_cases.find_beams,
+    "z_touch": touch_cases.z_touch,
+    "six_point": pose_cases.six_point,
+    "tool_axis": pose_cases.tool_axis,
+    "runout": sighting_cases.runout,
+    "joint": pose_cases.joint,
+    "verify": pose_cases.verify,
+    "update_guard": lasting_cases.update_guard,
+    "suggest_poses": pose_cases.suggest_poses,
+    "length_change": lasting_cases.length_change,
+    "station_shift": lasting_cases.station_shift,
+    "needle_chain": lasting_cases.needle_chain,
+    "station_chain": lasting_cases.station_chain,
+    "plane_touch": touch_cases.plane_touch,
+    "sphere_touch": touch_cases.sphere_touch,
+    "gauge_rr": lasting_cases.gauge_rr,
+    "control_chart": lasting_cases.control_chart,
+    "touch_evidence": touch_cases.touch_evidence,
+    "verify_evidence": touch_cases.verify_evidence,
 }
+"""Methods by the names that the shared cases use."""
 
 _GAINS_OF: Final = ("two_pose", "two_pose_general", "n_angle", "n_angle_robust")
 _SEVERITY: Final = ("ok", "warn", "error")
@@ -192,3 +225,47 @@ def exit_code(document: Mapping[str, object], *, accept_residuals: bool = False)
         if not accept_residuals and beyond_tolerance(cast("list[str]", result["codes"])):
             return 7
     return 0
+
+
+def table_case(
+    path: Path,
+    *,
+    method: str,
+    choices: ReadingChoices,
+    sigma_mm: float | None,
+    threshold_mm: float | None,
+) -> Node:
+    """Return the case of a file of poses.
+
+    Args:
+        path: The file (docs/poses.md, "Files of poses").
+        method: A method that takes poses on one point.
+        choices: What the file does not say.
+        sigma_mm: Standard deviation of one placement, if it is known.
+        threshold_mm: Residual beyond which a robust method rejects a pose.
+
+    Raises:
+        AmbiguousPosesError: The file can be read in more than one way.
+        CalibrationError: ``non_finite``; ``tool_pose`` for poses of another tool.
+        ConfigError: It cannot be read or is no list of poses.
+    """
+    entries = tabled_poses(path, choices).entries
+    other = next((one.pose.tool for one in entries if one.pose.tool), None)
+    if other is not None:
+        raise CalibrationError(
+            "tool_pose",
+            tr("The poses were taken with tool {other}, not {tool}.", other=other, tool=0),
+            remedy=tr("Take them with the flange, Tool 0; offline nothing knows another tool."),
+        )
+    given: dict[str, object] = {"poses": [_as_case(one) for one in entries], "as_taught": True}
+    given |= {} if sigma_mm is None else {"sigma_mm": sigma_mm}
+    given |= {} if threshold_mm is None else {"inlier_threshold": threshold_mm}
+    return Node({"id": path.name, "method": method, "input": given}, "")
+
+
+def _as_case(entry: TabledPose) -> dict[str, object]:
+    pose = entry.pose
+    case: dict[str, object] = dict(zip("xyzuvw", pose.coordinates(), strict=True))
+    case["local"] = pose.local
+    case |= {} if pose.hand is None else {"hand": str(pose.hand)}
+    return case if pose.tool is None else {**case, "tool": pose.tool}

@@ -79,7 +79,7 @@ def ordered(
         controller: The controller, connected.
         order: Its id, ``None`` without one.
         command: What the job is called; its options are those of click's context.
-        of_job: What else the job is, plain JSON.
+        of_job: What else the job is JSON.
 
     Raises:
         RobolinkError: As :func:`robolink.transaction.carrying_out`.

@@ -5,12 +5,12 @@ from dataclasses import replace
 from robolink.calibration_run import WriteSubject
 from robolink.messages import tr
 from robolink.runner import FitSubject, Question
-from robolink_cli.wizard.screens.choosing import check_screen, choice_screen
-from robolink_cli.wizard.screens.ending import ended_screen
-from robolink_cli.wizard.screens.fitting import fit_screen
+from robolink_cli.wizard.screens.choice import check_screen, choice_screen
+from robolink_cli.wizard.screens.end import ended_screen
+from robolink_cli.wizard.screens.fit import fit_screen
 from robolink_cli.wizard.screens.layout import BODY, Screen, broken, status_row, title_row
-from robolink_cli.wizard.screens.moving import moving_screen
-from robolink_cli.wizard.screens.touching import touch_screen
+from robolink_cli.wizard.screens.move import moving_screen
+from robolink_cli.wizard.screens.touch import touch_screen
 from robolink_cli.wizard.screens.values import values_screen
 from robolink_cli.wizard.state import CheckSubject, ChoiceSubject, WizardState
 

@@ -21,10 +21,10 @@ from robolink_simulators.hosting.streams.epson import serve_serial, serve_tcp
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Secret
-from robolink_cli.commands.simulate.kinds.simulated_kind import SimulatedKind, plan_faults
-from robolink_cli.commands.simulate.serving import host_and_port, named_values, world_from
+from robolink_cli.commands.simulate.service import host_and_port, named_values, world_from
+from robolink_cli.commands.simulate.simulated_kind import SimulatedKind, plan_faults
 from robolink_cli.console.render import note
-from robolink_cli.options.program_encoding import tell_encoding
+from robolink_cli.options.simulation import tell_encoding
 
 
 def make_epson(

@@ -7,10 +7,10 @@ from robolink.locale.languages import ENGLISH
 from robolink.messages import joined, tr
 from robolink.model import describe_pose
 from robolink.runner import FitSubject, Question, TouchSubject
-from robolink_cli.wizard.screens.choosing import language_label, mark_of
-from robolink_cli.wizard.screens.fitting import fit_lines
+from robolink_cli.wizard.screens.choice import language_label, mark_of
+from robolink_cli.wizard.screens.fit import fit_lines
 from robolink_cli.wizard.screens.layout import WIDTH, mm
-from robolink_cli.wizard.screens.touching import angle_word, instruction, touch_title
+from robolink_cli.wizard.screens.touch import angle_word, instruction, touch_title
 from robolink_cli.wizard.screens.values import taught_lines
 from robolink_cli.wizard.state import CheckSubject, ChoiceSubject, WizardState
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Final
 from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import spoken, tr
 from robolink_cli.console.tables import columns, padded
-from robolink_cli.prompts.present import AskingDesk, present_desk
-from robolink_cli.session.completing import address_of, is_recipe
+from robolink_cli.prompts.current_desk import AskingDesk, current_desk
+from robolink_cli.session.completion import address_of, is_recipe
 from robolink_cli.wizard.state import ChoiceSubject, choose_in_either_language
 
 if TYPE_CHECKING:
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from robolink.recipe import LoadedRecipe, RecipePast
     from robolink_cli.session.context import CliContext
     from robolink_cli.wizard.state import Header
+
 
 _WIDE: Final = 78
 """Columns of a row of the list."""
@@ -47,7 +48,7 @@ def context_at_desk(context: "CliContext", job: str, *, steps: int = 0) -> "CliC
     """
     from robolink_cli.session.context import context_of_cell, header_of
 
-    desk = present_desk()
+    desk = current_desk()
     if context.url is not None or desk is None:
         return context
     cell = choose_cell(desk, lambda: header_of(context, spoken(job), steps=steps))

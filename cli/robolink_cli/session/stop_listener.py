@@ -11,7 +11,7 @@ from robolink.errors import RobolinkError
 from robolink.messages import tr
 from robolink.model import says_it_is_simulated
 from robolink_cli.console.render import note
-from robolink_cli.prompts.present import present_desk
+from robolink_cli.prompts.current_desk import current_desk
 
 if TYPE_CHECKING:
     from robolink.model import Controller, ControllerStatus
@@ -149,7 +149,7 @@ def seen_by_another(url: str) -> dict[str, object] | None:
 @contextmanager
 def watched_at_desk(controller: "Controller") -> Iterator[None]:
     """Let the desk of a wizard look at ``controller`` while a person is asked, for the block."""
-    desk = present_desk()
+    desk = current_desk()
     if desk is None:
         yield
         return

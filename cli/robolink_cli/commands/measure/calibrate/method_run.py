@@ -12,8 +12,7 @@ from robolink.model import Controller, EntryKind
 from robolink.stations import Station, StationKind, find_stations
 from robolink_cli.commands.measure.calibrate.given_poses import calibrate_from_poses
 from robolink_cli.commands.measure.calibrate.live import calibrate_live
-from robolink_cli.commands.measure.calibrate.request import CalibrationRequest
-from robolink_cli.commands.measure.calibrate.stations import station_at
+from robolink_cli.commands.measure.calibrate.request import CalibrationRequest, station_at
 from robolink_cli.console.numbers import decimal
 from robolink_cli.options.consent import refuse_motion_options
 from robolink_cli.options.pose_source import PoseSource

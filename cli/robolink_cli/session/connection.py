@@ -13,7 +13,7 @@ from robolink.interrupts import EndedBy, ended_by
 from robolink.messages import joined, tr
 from robolink.standing import UNTOUCHED, Standing, note_standing, standing_after
 from robolink_cli.access.cell import require_expected_robot
-from robolink_cli.access.recording import recording
+from robolink_cli.access.record import recording
 from robolink_cli.access.warnings import note_at_work, note_unsettled
 from robolink_cli.console.exit_codes import is_cut_off
 from robolink_cli.console.render import json_is_on, note
@@ -21,7 +21,7 @@ from robolink_cli.prompts.questions import WATCHED, asked, on_terminal
 from robolink_cli.session.context import CliContext
 from robolink_cli.session.motion_consent import CELL, REACHED
 from robolink_cli.session.operator_identity import signature_of
-from robolink_cli.session.stop_listening import (
+from robolink_cli.session.stop_listener import (
     listening_for_stop,
     remember_address,
     watched_at_desk,

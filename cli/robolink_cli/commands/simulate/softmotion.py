@@ -18,12 +18,13 @@ from robolink_simulators.softmotion.program.structured_plc import plc_maker
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_cli.commands.simulate.kinds.simulated_kind import SimulatedKind, plan_faults
-from robolink_cli.commands.simulate.serving import host_and_port, named_values, world_from
+from robolink_cli.commands.simulate.service import host_and_port, named_values, world_from
+from robolink_cli.commands.simulate.simulated_kind import SimulatedKind, plan_faults
 from robolink_cli.options.simulation import DEFAULT_ADDRESS
 
 if TYPE_CHECKING:
     from robolink_simulators.hosting.fieldbus.canopen_node import CanPlace
+
 
 _MULTICAST: Final = "udp_multicast"
 

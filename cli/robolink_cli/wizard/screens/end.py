@@ -23,7 +23,7 @@ from robolink_cli.console.exit_codes import next_of, was_refused
 from robolink_cli.console.render import next_lines
 from robolink_cli.wizard.happenings import WizardCommand
 from robolink_cli.wizard.screens.layout import Screen, title_row
-from robolink_cli.wizard.screens.touching import touch_title
+from robolink_cli.wizard.screens.touch import touch_title
 from robolink_cli.wizard.state import CheckSubject, ChoiceSubject, LastScreen, WizardState
 
 

@@ -10,8 +10,8 @@ from robolink_simulators.plc import PlcSimulator, serve_plc, serve_plc_line
 
 from robolink.messages import tr
 from robolink.register_maps import load_map
-from robolink_cli.commands.simulate.kinds.simulated_kind import SimulatedKind, plan_faults
-from robolink_cli.commands.simulate.serving import host_and_port
+from robolink_cli.commands.simulate.service import host_and_port
+from robolink_cli.commands.simulate.simulated_kind import SimulatedKind, plan_faults
 from robolink_cli.options.simulation import DEFAULT_ADDRESS
 
 

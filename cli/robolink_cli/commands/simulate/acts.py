@@ -1,6 +1,6 @@
 """Acting at a simulated cell from the shell."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from robolink_simulators.control.acts import texts_of
 from robolink_simulators.control.assist import AssistClient
@@ -8,9 +8,9 @@ from robolink_simulators.control.client import ControlClient
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_cli.commands.simulate.serving import named_values
+from robolink_cli.commands.simulate.service import named_values
 from robolink_cli.console.numbers import decimal
-from robolink_cli.console.render import emit_json, json_is_on, say
+from robolink_cli.console.render import emit, say
 
 
 def do_act(url: str, act: str, values: Sequence[str]) -> None:
@@ -23,12 +23,7 @@ def do_act(url: str, act: str, values: Sequence[str]) -> None:
     parameters = dict(_parsed(value) for value in values)
     with AssistClient(url) as client:
         answer = client.do(act, **parameters)
-    if json_is_on():
-        emit_json("robolink/assist/1", {"act": act, **answer})
-        return
-    say(tr("{act}: done", act=act))
-    for name, value in answer.items():
-        say(f"  {name}: {_shown(value)}")
+    emit("assist", {"act": act, **answer}, lambda: _show_answer(act, answer))
 
 
 def do_controlled(url: str, act: str, values: Sequence[str]) -> None:
@@ -45,9 +40,10 @@ def do_controlled(url: str, act: str, values: Sequence[str]) -> None:
     }
     with ControlClient(url) as client:
         answer = client.do(act, **given)
-    if json_is_on():
-        emit_json("robolink/control/1", {"act": act, **answer})
-        return
+    emit("control", {"act": act, **answer}, lambda: _show_answer(act, answer))
+
+
+def _show_answer(act: str, answer: Mapping[str, object]) -> None:
     say(tr("{act}: done", act=act))
     for name, value in answer.items():
         say(f"  {name}: {_shown(value)}")

@@ -16,6 +16,7 @@ from robolink_cli.options.shared import GIVEN
 if TYPE_CHECKING:
     from robolink.config import CellGlimpse
 
+
 _TOOLS: Final = range(1, 16)
 _RECIPE_MARK: Final = b"robolink/recipe/"
 _LOOKED_AT: Final = 64 * 1024

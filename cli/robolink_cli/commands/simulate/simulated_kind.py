@@ -15,7 +15,7 @@ from robolink_simulators.plc import PlcSimulator
 
 from robolink.messages import tr
 from robolink.timing import NS_PER_S
-from robolink_cli.commands.simulate.serving import Termination, announce, controlled
+from robolink_cli.commands.simulate.service import Termination, announce, controlled
 from robolink_cli.console.output import hand_over, show
 from robolink_cli.console.render import json_is_on
 from robolink_cli.options.simulation import ServedLife

@@ -1,12 +1,12 @@
 """What backup and compare show."""
 
-from dataclasses import asdict
 from pathlib import Path
 
 from robolink.backup import Backup, Comparison, ComparisonTolerance, ToolComparison
 from robolink.messages import tr
+from robolink.model import json_fields, json_value
 from robolink_cli.console.render import say, table
-from robolink_cli.views.documents import number, offset_payload
+from robolink_cli.views.documents import number
 
 
 def backup_payload(backup: Backup, file: Path) -> dict[str, object]:
@@ -14,11 +14,9 @@ def backup_payload(backup: Backup, file: Path) -> dict[str, object]:
     tools = backup.state.tools
     return {
         "file": str(file),
-        "controller": backup.controller,
-        "saved_at": backup.saved_at,
-        "facts": asdict(backup.facts),
+        **json_fields(backup, "controller", "saved_at", "facts"),
         "selected_tool": backup.state.selected,
-        "tools": {str(tool): offset_payload(offset) for tool, offset in tools.items()},
+        "tools": {str(tool): json_value(offset) for tool, offset in tools.items()},
     }
 
 
@@ -53,12 +51,13 @@ def comparison_payload(comparison: Comparison, tolerance: ComparisonTolerance) -
         "equal": comparison.equal,
         "tolerance_mm": tolerance.length_mm,
         "tolerance_deg": tolerance.angle_deg,
-        "selected_tool": {
-            "expected": comparison.expected_selected,
-            "found": comparison.found_selected,
-            "equal": comparison.same_selection,
-            "counts": comparison.selection_counts,
-        },
+        "selected_tool": json_fields(
+            comparison,
+            expected="expected_selected",
+            found="found_selected",
+            equal="same_selection",
+            counts="selection_counts",
+        ),
         "differing": [_tool_payload(tool) for tool in comparison.differing],
     }
 
@@ -100,12 +99,8 @@ def show_comparison(comparison: Comparison, tolerance: ComparisonTolerance, iden
 
 
 def _tool_payload(tool: ToolComparison) -> dict[str, object]:
-    return {
-        "tool": tool.tool,
-        "expected": offset_payload(tool.expected),
-        "found": offset_payload(tool.found),
-        "components": [asdict(part) | {"equal": part.equal} for part in tool.components],
-    }
+    parts = [json_fields(part) | {"equal": part.equal} for part in tool.components]
+    return {**json_fields(tool, "tool", "expected", "found"), "components": parts}
 
 
 def _rows(tool: ToolComparison) -> list[list[object]]:

@@ -1,44 +1,26 @@
 """What commands show: plain payloads, and the tables made from them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from typing import TYPE_CHECKING
 
-from robolink.model import Controller
+from robolink.model import COMPONENTS, Controller, angle_difference_deg, json_fields, json_value
 
 if TYPE_CHECKING:
     from robolink.calibration import CalibrationResult, VerifyResult
     from robolink.calibration_run import Proposal
-    from robolink.model import Controller, Finding, Pose, ToolOffset, ToolReceipt
-
-
-COMPONENTS = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
-
-
-def offset_payload(offset: "ToolOffset | None") -> dict[str, float] | None:
-    """Return an offset with its units in the keys, ``None`` for an undefined tool."""
-    if offset is None:
-        return None
-    return dict(zip(COMPONENTS, offset.components(), strict=True))
+    from robolink.model import Finding, Pose, ToolOffset, ToolReceipt
 
 
 def pose_payload(pose: "Pose") -> dict[str, object]:
     """Return a pose with its units in the keys."""
-    payload: dict[str, object] = dict(zip(COMPONENTS, pose.coordinates(), strict=True))
-    payload |= {"hand": pose.hand, "local": pose.local, "tool": pose.tool}
-    return payload if pose.posture is None else payload | {"posture": asdict(pose.posture)}
+    payload = json_fields(pose, *COMPONENTS, "hand", "local", "tool")
+    return payload if pose.posture is None else payload | json_fields(pose, "posture")
 
 
 def receipt_payload(receipt: "ToolReceipt") -> dict[str, object]:
     """Return what a write or clear did."""
-    return {
-        "tool": receipt.tool,
-        "before": offset_payload(receipt.before),
-        "requested": offset_payload(receipt.requested),
-        "read_back": offset_payload(receipt.read_back),
-        "skipped": receipt.skipped,
-        "unconditional": receipt.unconditional,
-    }
+    offsets = ("before", "requested", "read_back")
+    return json_fields(receipt, "tool", *offsets, "skipped", "unconditional")
 
 
 def proposal_payload(proposal: "Proposal") -> dict[str, object]:
@@ -47,22 +29,17 @@ def proposal_payload(proposal: "Proposal") -> dict[str, object]:
     return {
         "tool": proposal.tool,
         "method": result.method,
-        "before": offset_payload(proposal.before),
-        "proposed": offset_payload(result.offset),
-        "tip": offset_payload(proposal.tip),
-        "notes": list(proposal.notes),
-        "measured": list(result.measured),
-        "changed": list(result.changed),
-        "kept": list(proposal.kept),
-        "change_mm": proposal.change_mm,
-        "reference_point_mm": list(result.reference_point_mm),
-        "sigma_gain": result.sigma_gain,
-        "warnings": list(result.warnings),
+        "before": json_value(proposal.before),
+        "proposed": json_value(result.offset),
+        **json_fields(proposal, "tip", "notes"),
+        **json_fields(result, "measured", "changed"),
+        **json_fields(proposal, "kept", "change_mm"),
+        **json_fields(result, "reference_point_mm", "sigma_gain", "warnings"),
         "poses": [pose_payload(pose) for pose in result.inputs],
         **_touches_payload(result.inputs),
         "fit": fit_payload(result),
         "length": length_payload(proposal),
-        "seating": proposal.seating.as_json() if proposal.seating else None,
+        "seating": json_value(proposal.seating),
         **result.details(),
     }
 
@@ -79,15 +56,9 @@ def length_payload(proposal: "Proposal") -> dict[str, object] | None:
     told = proposal.length
     if told is None:
         return None
-    return {
-        "changed": told.changed,
-        "height_change_mm": told.height_change_mm,
-        "u_mm": told.u_mm,
-        "limit_mm": told.limit_mm,
-        "stored_z_mm": told.stored_z_mm,
-        "z_by_difference_mm": told.z_by_difference_mm,
-        "written": "difference" if told.changed and proposal.z_from == "measured" else "keep",
-    }
+    told_of = ("changed", "height_change_mm", "u_mm", "limit_mm", "stored_z_mm")
+    written = "difference" if told.changed and proposal.z_from == "measured" else "keep"
+    return {**json_fields(told, *told_of, "z_by_difference_mm"), "written": written}
 
 
 def fit_payload(result: "CalibrationResult") -> dict[str, object]:
@@ -101,25 +72,15 @@ def fit_payload(result: "CalibrationResult") -> dict[str, object]:
     chain = chain_of(result)
     accuracy = result.accuracy
     return {
-        "repeatable_to_mm": result.repeatable_to_mm,
-        "accurate_to_mm": result.accurate_to_mm,
+        **json_fields(result, "repeatable_to_mm", "accurate_to_mm"),
         "accuracy": accuracy.as_json(result.measured) if accuracy else None,
         "half_width95": dict(zip(result.measured, result.half_width95, strict=False)),
-        "sigma_mm": result.sigma_mm,
-        "sigma_stated": result.sigma_stated,
+        **json_fields(result, "sigma_mm", "sigma_stated"),
         "interval_from": result.interval_from or None,
-        "region95_radius_mm": result.region95_radius_mm,
-        "notes": list(result.notes),
-        "budget": result.budget.as_json() if result.budget else None,
-        "evidence": result.evidence.as_json() if result.evidence else None,
-        "rms_mm": result.rms_mm,
-        "max_residual_mm": result.max_residual_mm,
-        "residuals_mm": [list(residual) for residual in result.residuals_mm],
-        "rejected": list(result.rejected),
-        "condition_number": result.condition_number,
-        "dof": result.dof,
-        "unobservable": list(result.unobservable),
-        "chain": {"changes": chain.changes, "sigma_mm": chain.sigma_mm} if chain else None,
+        **json_fields(result, "region95_radius_mm", "notes", "budget", "evidence"),
+        **json_fields(result, "rms_mm", "max_residual_mm", "residuals_mm", "rejected"),
+        **json_fields(result, "condition_number", "dof", "unobservable"),
+        "chain": json_fields(chain, "changes", "sigma_mm") if chain else None,
     }
 
 
@@ -127,22 +88,11 @@ def verification_payload(result: "VerifyResult | None") -> dict[str, object] | N
     """Return the drift about the new tip."""
     if result is None:
         return None
+    drift = ("u_deg", "dx_mm", "dy_mm", "dz_mm", "distance_mm")
     return {
-        "max_drift_mm": result.max_drift_mm,
-        "tolerance_mm": result.tolerance_mm,
-        "passed": result.passed,
-        "judgement": result.judgement.as_json() if result.judgement else None,
-        "accurate_to_mm": result.accurate_to_mm,
-        "drifts": [
-            {
-                "u_deg": drift.u_deg,
-                "dx_mm": drift.dx_mm,
-                "dy_mm": drift.dy_mm,
-                "dz_mm": drift.dz_mm,
-                "distance_mm": drift.distance_mm,
-            }
-            for drift in result.drifts
-        ],
+        **json_fields(result, "max_drift_mm", "tolerance_mm", "passed"),
+        **json_fields(result, "judgement", "accurate_to_mm"),
+        "drifts": [json_fields(one, *drift) for one in result.drifts],
         **_touches_payload(result.inputs),
     }
 
@@ -150,35 +100,27 @@ def verification_payload(result: "VerifyResult | None") -> dict[str, object] | N
 def finding_payload(finding: "Finding") -> dict[str, object]:
     """Return what was found out about an open marker."""
     return {
-        "operation": finding.marker.operation,
-        "kind": finding.marker.kind,
-        "request": finding.marker.request,
-        "begun_at": finding.marker.begun_at,
-        "verdict": finding.verdict,
-        "sentence": finding.sentence,
-        "action": finding.action,
+        **json_fields(finding.marker, "operation", "kind", "request", "begun_at"),
+        **json_fields(finding, "verdict", "sentence", "action"),
     }
 
 
 def status_payload(controller: "Controller") -> dict[str, object]:
     """Return the flags, and what more can be read now."""
-    status = controller.status()
+    known = json_fields(
+        controller.status(),
+        *("state", "remote", "ready", "running", "paused", "fault", "serious_fault"),
+        *("emergency_stop", "guard_open", "warning", "teach", "test", "code"),
+    )
+    return {"controller": controller.identity, **known, **controller.condition()}
+
+
+def offset_difference(before: "ToolOffset", after: "ToolOffset") -> dict[str, float]:
+    """Return how far each component of an offset moved, angles by the shorter way."""
+    pairs = zip(COMPONENTS, after.components(), before.components(), strict=True)
     return {
-        "controller": controller.identity,
-        "state": status.state,
-        "remote": status.remote,
-        "ready": status.ready,
-        "running": status.running,
-        "paused": status.paused,
-        "fault": status.fault,
-        "serious_fault": status.serious_fault,
-        "emergency_stop": status.emergency_stop,
-        "guard_open": status.guard_open,
-        "warning": status.warning,
-        "teach": status.teach,
-        "test": status.test,
-        "code": status.code,
-        **controller.condition(),
+        name: angle_difference_deg(new, old) if name.endswith("_deg") else new - old
+        for name, new, old in pairs
     }
 
 

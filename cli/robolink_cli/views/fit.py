@@ -27,13 +27,12 @@ from robolink.calibration_run import (
 )
 from robolink.messages import tr
 from robolink.methods import NextStep
-from robolink.model import ToolOffset, ToolReceipt, describe_offset
+from robolink.model import ToolOffset, ToolReceipt, describe_offset, json_fields, json_value
 from robolink.runner import TeachPrompt
 from robolink_cli.console.render import next_lines, note, say, table
 from robolink_cli.prompts.present import present_desk
 from robolink_cli.views.documents import (
     number,
-    offset_payload,
     proposal_payload,
     receipt_payload,
     verification_payload,
@@ -239,8 +238,8 @@ def show_proposal(proposal: Proposal) -> None:
     """Show what was measured next to what is stored, how accurate it is, and what is in doubt."""
     show_change(
         proposal.tool,
-        offset_payload(proposal.before),
-        offset_payload(proposal.offset),
+        proposal.before,
+        proposal.offset,
         after_name=tr("measured") if proposal.measured is None else tr("proposed"),
         unmeasured=proposal.kept,
     )
@@ -314,15 +313,8 @@ def show_report(report: ToolReport) -> None:
 
 def judged_payload(proposal: Proposal, verdicts: Sequence[LimitVerdict]) -> dict[str, object]:
     """Return a proposal with what the limits say about it."""
-    judged = [
-        {
-            "code": verdict.code,
-            "found_mm": verdict.found_mm,
-            "limit_mm": verdict.limit_mm,
-            "passed": verdict.passed,
-        }
-        for verdict in verdicts
-    ]
+    said = ("code", "found_mm", "limit_mm", "passed")
+    judged = [json_fields(verdict, *said) for verdict in verdicts]
     return {**proposal_payload(proposal), "verdicts": judged}
 
 
@@ -343,7 +335,7 @@ def _steps(report: ToolReport) -> tuple[NextStep, ...]:
 
 def _following(report: ToolReport) -> dict[str, object]:
     steps = _steps(report)
-    return {"next_steps": [step.as_json() for step in steps]} if steps else {}
+    return {"next_steps": json_value(steps)} if steps else {}
 
 
 def show_course(steps: Sequence[PlannedStep]) -> None:

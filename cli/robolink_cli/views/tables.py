@@ -3,10 +3,10 @@
 from collections.abc import Mapping, Sequence
 
 from robolink.messages import tr
-from robolink.model import angle_difference_deg, of_no_tool
+from robolink.model import COMPONENTS, ToolOffset, of_no_tool
 from robolink_cli.console.render import say, table
 from robolink_cli.console.ways import hand_words, power_words, state_word
-from robolink_cli.views.documents import number, offset_cells
+from robolink_cli.views.documents import number, offset_cells, offset_difference
 
 AXES = ("X mm", "Y mm", "Z mm", "U deg", "V deg", "W deg")
 
@@ -160,20 +160,16 @@ def show_offset(title: str, offset: Mapping[str, object] | None) -> None:
 
 def show_change(
     tool: int,
-    before: Mapping[str, object] | None,
-    after: Mapping[str, object] | None,
+    before: ToolOffset | None,
+    after: ToolOffset | None,
     *,
     after_name: str,
     unmeasured: Sequence[str] = (),
 ) -> None:
     """Print an offset before and after, and which components were not measured."""
-    rows = [
-        [tr("before"), *offset_cells(before)],
-        [after_name, *offset_cells(after)],
-    ]
-    if before and after:
-        delta = {key: _difference(key, after[key], before[key]) for key in before}
-        rows.append([tr("change"), *offset_cells(delta)])
+    rows = [[tr("before"), *_cells(before)], [after_name, *_cells(after)]]
+    if before is not None and after is not None:
+        rows.append([tr("change"), *map(number, offset_difference(before, after).values())])
     table(tr("tool {tool}", tool=tool), ("", *AXES), rows)
     for name in unmeasured:
         if after is not None and name[0] in "xyzu":
@@ -181,11 +177,10 @@ def show_change(
                 tr(
                     "  {axis} {value}: not measured, stays.",
                     axis=name[0].upper(),
-                    value=number(after[name]),
+                    value=number(getattr(after, name)),
                 )
             )
 
 
-def _difference(name: str, new: object, old: object) -> float:
-    a, b = float(str(new)), float(str(old))
-    return angle_difference_deg(a, b) if name.endswith("_deg") else a - b
+def _cells(offset: ToolOffset | None) -> list[str]:
+    return ["-"] * len(COMPONENTS) if offset is None else [*map(number, offset.components())]

@@ -78,8 +78,6 @@ class EpsonAlarms:
                     tr("Alarm {number} is still there after its reset.", number=number),
                     code=number,
                     remedy=tr("Remove the cause; the alarm list in RC+ names it."),
-                    controller=self._session.identity,
-                    request=request,
                 )
 
 

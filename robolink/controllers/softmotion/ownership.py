@@ -219,12 +219,10 @@ class Ownership:
         return LeaseLostError(
             tr("{request!r} was not sent: another client took the mailbox.", request=request),
             remedy=tr("Connect again when it has ended."),
-            controller=self._wire.identity,
-            request=request,
         )
 
     def _held_by(self, holder: int) -> LeaseHeldError:
-        error = LeaseHeldError("", controller=self._wire.identity)
+        error = LeaseHeldError("")
         error.holder = f"{holder:08X}"
         run = self._run_of(error)
         insist = tr("A person at the cell can take it over: 'robolink robot take-ownership'.")

@@ -8,6 +8,7 @@ import click
 
 from robolink.errors import ConfigError, DeclinedError, RobolinkError
 from robolink.messages import joined, tr
+from robolink.model import json_fields
 from robolink.register_maps import (
     COMPONENTS,
     ComparedValue,
@@ -77,13 +78,7 @@ def _start(context: CliContext, register_list: Path) -> None:
     from robolink.register_maps import draft_from_csv
 
     draft = draft_from_csv(register_list)
-    payload: dict[str, object] = {
-        "map": draft.text,
-        "found": draft.found,
-        "left": list(draft.left),
-        "bad": list(draft.bad),
-        "notes": list(draft.notes),
-    }
+    payload = {"map": draft.text, **json_fields(draft, "found", "left", "bad", "notes")}
     context.emit("plc-map-draft", payload, lambda: say(draft.text.rstrip()))
     for remark in (*draft.notes, *draft.bad):
         note(remark)

@@ -8,6 +8,7 @@ import click
 
 from robolink.errors import ControllerFaultError
 from robolink.messages import tr
+from robolink.model import json_fields
 from robolink.timing import NS_PER_S
 from robolink_cli.console.exit_codes import USAGE
 from robolink_cli.console.numbers import NumberInside
@@ -82,15 +83,12 @@ def _document(checked: "CheckedProject") -> dict[str, object]:
         "files": [str(path) for path in checked.data.programs],
         "functions": list(checked.functions),
         "labels_known": checked.data.known,
-        "missing_points": list(checked.data.missing_points),
-        "encoding": checked.data.encoding,
+        **json_fields(checked.data, "missing_points", "encoding"),
         "faults": [
             {
-                "file": fault.place.file,
-                "line": fault.place.line,
+                **json_fields(fault.place, "file", "line"),
                 "column": fault.column or None,
-                "text": fault.text,
-                "expected": list(fault.expected),
+                **json_fields(fault, "text", "expected"),
             }
             for fault in checked.faults
         ],

@@ -204,7 +204,7 @@ def _not_looked(error: RobolinkError) -> "NewEntry":
 
 def _payload(one: CheckedCell) -> Mapping[str, object]:
     """Return what is known of one cell; ``None`` for what nobody could look at."""
-    from robolink_cli.views.documents import offset_payload
+    from robolink.model import json_value
 
     error = one.error and {
         "kind": type(one.error).__name__,
@@ -212,7 +212,7 @@ def _payload(one: CheckedCell) -> Mapping[str, object]:
         "remedy": one.error.remedy,
     }
     found = one.inspection
-    tools = found and {str(number): offset_payload(it) for number, it in found.tools.items()}
+    tools = found and {str(number): json_value(it) for number, it in found.tools.items()}
     return {
         "cell": one.name,
         "ok": one.well,

@@ -19,7 +19,7 @@ from robolink_cli.prompts.questions import AcceptedAngle, AcceptedLength, accept
 from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
-from robolink_cli.views.documents import offset_payload, receipt_payload
+from robolink_cli.views.documents import receipt_payload
 from robolink_cli.views.tables import show_change
 
 _FILE = click.Path(dir_okay=False, path_type=Path)
@@ -175,12 +175,7 @@ class Restoration:
     def show(self) -> None:
         """Show what would change."""
         for change in self._plan.changes:
-            show_change(
-                change.tool,
-                offset_payload(change.now),
-                offset_payload(change.wanted),
-                after_name=tr("backup"),
-            )
+            show_change(change.tool, change.now, change.wanted, after_name=tr("backup"))
         if self._plan.select is not None:
             say(tr("tool {tool} will be selected", tool=self._plan.select))
 

@@ -67,13 +67,13 @@ def list_tools(
     published: Published = False,
 ) -> None:
     """Show all tools and which one is selected."""
+    from robolink.model import json_value
     from robolink_cli.session.context import find_tools
-    from robolink_cli.views.documents import offset_payload
     from robolink_cli.views.tables import show_tools
 
     with open_controller(context, looks=True) as controller:
         found = find_tools(controller, published=published)
-    tools = {str(number): offset_payload(offset) for number, offset in found.tools.items()}
+    tools = {str(number): json_value(offset) for number, offset in found.tools.items()}
     payload: dict[str, object] = {"selected_tool": found.selected, "tools": tools}
     payload["source"] = "published" if published else "controller"
     context.emit("tools", payload, lambda: show_tools(tools, found.selected))
@@ -95,7 +95,7 @@ def get(
     ] = None,
 ) -> None:
     """Show one tool; 0 is the flange."""
-    from robolink_cli.views.documents import offset_payload
+    from robolink.model import json_value
     from robolink_cli.views.tables import show_tools
 
     if (number is None) == (mode is None):
@@ -110,7 +110,7 @@ def get(
         offset, selected = controller.tools.read(number), controller.tools.selected()
         if number:
             note_change(controller, number, offset)
-    value = offset_payload(offset)
+    value = json_value(offset)
     payload: dict[str, object] = {
         "tool": number,
         "defined": value is not None,
@@ -122,15 +122,15 @@ def get(
 
 def _get_by_mode(context: CliContext, mode: str) -> None:
     """Show what the PLC's own reading block says about the tool in force."""
+    from robolink.model import json_value
     from robolink.protocols.mailbox import ReadMode
     from robolink_cli.access.capabilities import require_softmotion
-    from robolink_cli.views.documents import offset_payload
     from robolink_cli.views.tables import show_offset
 
     modes = {"set": ReadMode.SET, "active": ReadMode.ACTIVE, "last": ReadMode.LAST_COMMANDED}
     with open_controller(context, looks=True) as controller:
         offset = require_softmotion(controller).tools.read_mode(modes[mode])
-    value = offset_payload(offset)
+    value = json_value(offset)
     payload: dict[str, object] = {"mode": mode, "offset": value}
     context.emit("tool-mode", payload, lambda: show_offset(mode, value))
 
@@ -248,13 +248,11 @@ class _Setting:
         self, controller: "Controller", before: "ToolOffset | None", wanted: "ToolOffset"
     ) -> None:
         """Show a person what the tool holds, and what it is to hold."""
-        from robolink_cli.views.documents import offset_payload
         from robolink_cli.views.tables import show_change
 
         controller.tools.selected()  # read now: the last line of a failure names it
         if not self._context.json:
-            shown = offset_payload(before), offset_payload(wanted)
-            show_change(self._number, *shown, after_name=tr("new"))
+            show_change(self._number, before, wanted, after_name=tr("new"))
 
     def ask(self, controller: "Controller", *, agreed: bool, yes: bool) -> None:
         """Have a person agree who did not yet; back up before the first write."""

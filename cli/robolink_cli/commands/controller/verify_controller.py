@@ -8,6 +8,7 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.model import json_fields
 from robolink_cli.access.recording import recording
 from robolink_cli.console.render import say, table
 from robolink_cli.options.declaration import CliOption
@@ -139,12 +140,9 @@ def _write(path: Path, text: str) -> None:
 
 def _fact_payload(fact: "Fact") -> dict[str, object]:
     return {
-        "name": fact.name,
-        "finding": fact.finding,
-        "settled": fact.settled,
+        **json_fields(fact, "name", "finding", "settled"),
         "option": fact.option or None,
-        "value": fact.value,
-        "evidence": fact.evidence,
+        **json_fields(fact, "value", "evidence"),
     }
 
 

@@ -24,7 +24,7 @@ from robolink.accuracy import (
 from robolink.calibration import ACCURACY_ROWS, gauge_study
 from robolink.errors import ConfigError
 from robolink.messages import spoken, tr
-from robolink.model import Controller, EntryKind, require_engineer
+from robolink.model import Controller, EntryKind, json_fields, require_engineer
 from robolink.stations import StationKind, find_station
 from robolink.timing import wall_time
 from robolink_cli.commands.measure.solve.solving import load
@@ -214,13 +214,11 @@ def measure_row(context: CliContext, row: str, asked: Asked, *, yes: bool) -> No
 def row_payload(found: MeasuredRow) -> dict[str, object]:
     """Return a measured row for a document."""
     return {
-        "row": found.row,
-        "half_width": found.half_width,
+        **json_fields(found, "row", "half_width"),
         "unit": ACCURACY_ROWS[found.row].unit,
         "by": found.by,
         "station": found.station or None,
-        "count": found.count,
-        "records": list(found.records),
+        **json_fields(found, "count", "records"),
         **found.details,
     }
 

@@ -48,10 +48,9 @@ def _told(
     controller: "Controller", number: int, offset: "ToolOffset", left: int | None
 ) -> Mapping[str, object]:
     """Return what is known of one tool, plain JSON."""
-    from robolink.model import EntryKind
+    from robolink.model import EntryKind, json_value
     from robolink.transaction import changed_since
     from robolink_cli.commands.measure.choosing import due_in
-    from robolink_cli.views.documents import offset_payload
 
     last = next(controller.outcomes.recorded(tool=number, kinds=(EntryKind.DONE,)), None)
     since = changed_since(controller, number, offset)
@@ -60,7 +59,7 @@ def _told(
         due.append(tr("Tool {tool}: {said}", tool=number, said=due_in(left)))
     signature = None if last is None else last.signature
     return {
-        "offset": offset_payload(offset),
+        "offset": json_value(offset),
         "changed_at": last and last.at,
         "age_days": None if last is None else _days_since(last.at),
         "change": last and last.change,

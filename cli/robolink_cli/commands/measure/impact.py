@@ -58,8 +58,7 @@ def impact(
     """
     from robolink.calibration import impact_on
     from robolink.errors import UndefinedToolError
-    from robolink.model import says_it_is_simulated
-    from robolink_cli.views.documents import offset_payload
+    from robolink.model import json_value, says_it_is_simulated
     from robolink_cli.views.tables import show_change
 
     request = impact_request(points, path, names=("--points", "--pts"))
@@ -81,12 +80,12 @@ def impact(
         simulated = says_it_is_simulated(controller)
         found = impact_on(request.read(controller), old=before, new=after)
         draft.offer(tool, before=before, after=after, given=tuple(changes), impact=found)
-    shown = offset_payload(before), offset_payload(after)
-    payload = {"tool": tool, "before": shown[0], "after": shown[1], **impact_payload(found)}
+    values = {"before": json_value(before), "after": json_value(after)}
+    payload = {"tool": tool, **values, **impact_payload(found)}
     payload |= {"simulated": simulated, "report": draft.saved}
 
     def show() -> None:
-        show_change(tool, *shown, after_name=tr("new"))
+        show_change(tool, before, after, after_name=tr("new"))
         show_impact(tool, found)
         say(tr("Nothing was written."))
 

@@ -12,7 +12,7 @@ from robolink.calibration import VerifyResult
 from robolink.calibration_run import ChangeReport, Listener, Moment, Proposal, RecipeRun, preview
 from robolink.errors import CalibrationError, DeclinedError
 from robolink.messages import tr
-from robolink.model import AnsweredBy, Controller, ToolReceipt
+from robolink.model import AnsweredBy, Controller, ToolReceipt, json_fields
 from robolink.procedures import MeasurementContext
 from robolink.recipe import Answers, LoadedRecipe, require_answers
 from robolink.runner import Ask, Confirm, Notify, StepDone, TakenStep
@@ -383,9 +383,7 @@ class Recalibration:
             "prompts": [{"at": prompt.at, "text": prompt.text} for prompt in recipe.prompts],
             "outputs": [
                 {
-                    "at": output.at,
-                    "output": output.output,
-                    "on": output.on,
+                    **json_fields(output, "at", "output", "on"),
                     "requests": list(io_of(controller).preview_output(output.output, output.on)),
                 }
                 for output in recipe.outputs

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal, NamedTuple
 import click
 
 from robolink.messages import declared, tr
-from robolink.model import EntryKind
+from robolink.model import EntryKind, json_fields
 from robolink_cli.commands.record.journal_drift import drift
 from robolink_cli.commands.record.journal_lookup import (
     OfController,
@@ -196,13 +196,8 @@ def verify() -> int:
     opened = journal_to_read()
     with _progress(opened) as progress:
         found = opened.verify(progress)
-    payload = {
-        "entry_count": found.checked,
-        "problems": list(found.problems),
-        "last_number": found.last_number,
-        "last_hash": found.last_hash,
-        "keyed": False,
-    }
+    said_of = ("problems", "last_number", "last_hash")
+    payload = {"entry_count": found.checked, **json_fields(found, *said_of), "keyed": False}
     if json_is_on():
         emit_json("robolink/journal-verified/1", payload)
     else:

@@ -10,7 +10,7 @@ import click
 from robolink.errors import ConfigError
 from robolink.journal import Journal
 from robolink.messages import tr
-from robolink.model import EntryKind, Recorded
+from robolink.model import EntryKind, Recorded, json_fields
 from robolink.report import Report
 from robolink.transaction import id_of_change
 from robolink_cli.commands.record.journal_lookup import controller_meant, entries_of_change
@@ -22,7 +22,7 @@ from robolink_cli.options.impact import ImpactRequest, judge
 from robolink_cli.options.pose_source import point_numbers
 from robolink_cli.session.context import CliContext, optional_controller
 from robolink_cli.session.opening import open_controller
-from robolink_cli.views.documents import offset_payload, verification_payload
+from robolink_cli.views.documents import verification_payload
 
 _ENDINGS = (".html", ".htm")
 
@@ -160,9 +160,7 @@ def _tool_payload(report: Report) -> dict[str, object]:
         "method": report.method,
         "local_time": report.local_time or None,
         "machine": {name: value or None for name, value in asdict(report.facts).items()},
-        "gauges": [asdict(gauge) for gauge in report.gauges],
-        "before": offset_payload(report.before),
-        "after": offset_payload(report.after),
+        **json_fields(report, "gauges", "before", "after"),
         "measured": [name for name in report.determined if not fit or name not in fit.changed],
         "changed": list(fit.changed) if fit else [],
         "repeatable_to_mm": fit.repeatable_to_mm if fit else None,

@@ -17,7 +17,7 @@ from robolink_cli.prompts.questions import agree, on_terminal
 from robolink_cli.session.completing import complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 from robolink_cli.session.opening import open_controller
-from robolink_cli.views.documents import offset_payload, receipt_payload
+from robolink_cli.views.documents import receipt_payload
 from robolink_cli.views.tables import show_change
 
 
@@ -128,8 +128,7 @@ class Undoing:
         for remark in self._plan.remarks:
             say(f"  {remark}")
         for step in self._plan.steps:
-            shown = offset_payload(step.before), offset_payload(step.requested)
-            show_change(step.tool, *shown, after_name=tr("restored"))
+            show_change(step.tool, step.before, step.requested, after_name=tr("restored"))
 
     def run(self) -> dict[str, object]:
         """Carry it out and return the document; nothing is sent when nothing differs."""

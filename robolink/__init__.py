@@ -30,4 +30,12 @@ if TYPE_CHECKING:
     from robolink.runner import Operator as Operator
     from robolink.runner import Question as Question
 
-__getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)
+__getattr__, __dir__, __all__ = lazy_exports(
+    __name__,
+    {
+        "controllers": "connect",
+        "errors": "RobolinkError",
+        "model": "ANY Controller Pose Secret Spot SpotUnit TipSensor ToolOffset",
+        "runner": "Operator Question",
+    },
+)

@@ -1,44 +1,40 @@
 """Packages whose names are loaded when they are first used (PEP 562).
 
 A stop, a status and ``--help`` may not pay for what they do not use. A package that one of them
-passes, and whose names need more than they do, imports them under ``TYPE_CHECKING`` only, each as
-itself (``from home import name as name``): the list that the type checker and readers see is read
-by the running program, too. All others import what they hand out.
+passes, and whose names need more than they do, lists its names once for readers and the type
+checker, under ``TYPE_CHECKING``, and once for the running program; a test compares the two lists.
+All others import what they hand out.
 """
 
-import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Final
 
 _OURS: Final = {"TYPE_CHECKING", "lazy_exports", "old_names"}
-_IMPORT: Final = re.compile(r"^ +from (\S+) import (\([^)]*\)|.+)", re.MULTILINE)
-_HANDED_OUT: Final = re.compile(r"\b(\w+) as \1\b")
 
 
 def lazy_exports(
     package: str,
-    file: str,
+    homes: Mapping[str, str],
     otherwise: Callable[[str], object] | None = None,
 ) -> tuple[Callable[[str], object], Callable[[], list[str]], list[str]]:
     """Return ``__getattr__``, ``__dir__`` and ``__all__`` of a package.
 
     Args:
         package: Its ``__name__``.
-        file: Its ``__file__``, which says where each of its names is.
+        homes: Module of the package, without its leading name, to the names that it holds,
+            separated by blanks.
         otherwise: Asked for what none of them holds, such as :func:`old_names`.
     """
-    with open(file, encoding="utf-8") as text:
-        imports = _IMPORT.findall(text.read())
-    home = {name: module for module, names in imports for name in _HANDED_OUT.findall(names)}
+    home = {name: module for module, names in homes.items() for name in names.split()}
 
     def load(name: str) -> object:
         if name not in home:
             if otherwise is not None:
                 return otherwise(name)
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        value = getattr(import_module(home[name]), name)
+        value = getattr(import_module(f"{package}.{home[name]}"), name)
         setattr(sys.modules[package], name, value)  # the next use finds it at once
         return value
 

@@ -278,4 +278,119 @@ if TYPE_CHECKING:
     from robolink.calibration.touch.z_touch import solve_z_touch as solve_z_touch
     from robolink.calibration.touch.z_touch import touch_sigma_gain as touch_sigma_gain
 else:
-    __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)
+    __getattr__, __dir__, __all__ = lazy_exports(
+        __name__,
+        {
+            "beam_lines": "Beam Crossing Lean ShaftSeen find_beams",
+            "camera.board": "BoardDrawing LEAST_SPACING_MM solve_board",
+            "camera.board_fit": "solve_board_fit solve_board_round",
+            "camera.camera_affine": "CameraCalibration PixelSighting solve_camera_affine",
+            "camera.camera_model": (
+                "CameraLimits CameraModel Sighting USUAL_CAMERA require_same_camera"
+            ),
+            "camera.camera_round": "CameraRound as_round solve_camera_round",
+            "camera.known_movement": (
+                "CameraChangeRows MovementVerdict SeenMovement camera_changed "
+                "mm_camera_noise same_radius spot_changed tip_did_not_move"
+            ),
+            "camera.runout": (
+                "RunoutReport RunoutRow RunoutTable RunoutTableResult runout_report "
+                "solve_runout_table"
+            ),
+            "camera.up_camera": "solve_up_camera",
+            "core.accuracy": (
+                "ACCURACY_ROWS Accuracy AccuracyFacts AccuracyRow AssessedRow BudgetRow "
+                "DIVISORS ErrorSource RowFact UncertaintyBudget"
+            ),
+            "core.dispersion": "require_positive",
+            "core.frames": (
+                "flange_of flange_pose flange_poses in_base seen_from "
+                "tilted_flange_pose tilted_from tip_pose toward_zero"
+            ),
+            "core.least_squares": "Floats Robust linear_fit",
+            "core.pose_checks": "MIN_ROTATION_DEG angle_spread_deg planar_sigma_gain",
+            "core.pose_suggestion": (
+                "PoseLimits PosePlan precise_enough select_poses sigma_gain suggest_poses"
+            ),
+            "core.result": (
+                "CalibrationResult Drift DriftVerdict FitEvidence GUARD_FACTOR "
+                "LEAST_HALF_WIDTH PERSON_U_DRIFT_MM ResidualVectors RunOrder "
+                "VerifyResult judge_drift offset_sigma_mm worst_of"
+            ),
+            "core.rotations": (
+                "pose_arrays quaternion_rotations rotation_of rotations uvw_deg zyz_deg"
+            ),
+            "core.statistics": (
+                "NORMAL_95 chi_square_quantile f_quantile normal_quantile "
+                "shifted_half95 shifted_region95 student_t studentized_range_0999"
+            ),
+            "core.turn_claim": (
+                "CONTRADICTS_ACCURACY CONTRADICTS_REPEATABILITY DriftLimits REPEATED "
+                "SMALL_ANGLE TurnClaim TurnJudgement"
+            ),
+            "crossed_beams": (
+                "BeamsResult crossing_sigma_gain moved_beams solve_crossed_beams where_they_cross"
+            ),
+            "flange_plane": "FlangePlane TipHeight carrying height_of solvable_planes",
+            "pin.joint": "JointResult JointTouch ToolDifference solve_joint",
+            "pin.n_angle": "solve_n_angle",
+            "pin.needle_chain": "NeedleChain NeedleLimits StoredZ chain_of chain_sigma_mm",
+            "pin.needle_change": "NeedleChangeResult solve_needle_change",
+            "pin.one_touch": "Pin pin_touched solve_one_touch",
+            "pin.pivot": (
+                "PivotDesign PivotFit fit_pivot fit_pivot_robust pivot_design solve_pivot"
+            ),
+            "pin.six_point": (
+                "FAR_DEG GOOD_WAY_MM SixPointResult ToolAxis axis_displacement "
+                "between_deg require_unturned solve_six_point solve_tool_axis"
+            ),
+            "pin.two_pose": "solve_two_pose two_of",
+            "quality.control_chart": (
+                "ControlChart LEAST_BASELINE USUAL_LAMBDA USUAL_WIDTH control_chart"
+            ),
+            "quality.doubts": (
+                "BEYOND_TOLERANCE FARTHEST_MM HIGHEST_MM MOST_RESIDUAL_MM "
+                "PERSON_SIGMA_Z_MM PLANAR_TOLERANCE PROBE_SIGMA_Z_MM TOUCH_TOLERANCE "
+                "Tolerance beyond_tolerance doubt_sentence known_doubts order_in_words"
+            ),
+            "quality.gauge_study": "GaugeStudy gauge_study",
+            "quality.given_poses": (
+                "RobotReach ToolFit better_fit fits_alike require_near "
+                "require_stored_scale require_within_reach tool_fits"
+            ),
+            "quality.offset_change": (
+                "Correction Impact NEEDLE_LIMIT_MM PointImpact impact_on "
+                "require_shrinking update_guard writes_refused_unattended"
+            ),
+            "quality.pose_evidence": "with_approach_bias",
+            "quality.station": (
+                "SharedStation StationPart StationShift TipShift judge_shifts "
+                "shared_station with_station"
+            ),
+            "quality.verify_drift": "PLACING_TOLERANCE_MM verify_drift",
+            "statement.accuracy": "assessed usual_look_sigma_mm",
+            "statement.sentences": (
+                "RowInWords accurate_sentence basis_words largest_row_sentence "
+                "measured_axes proved_statements repeatable_sentence rows_in_words "
+                "seating_sentence stated_mm statement_line statement_sentences "
+                "turn_test_headline turn_test_sentences"
+            ),
+            "statement.turn_test": "LEAST_TURN_DEG held_to_claim turn_claim",
+            "statement.turn_test_again": "MOST_REPEATS held_together looks_together",
+            "touch.length": "LengthChange LengthDecision length_change length_not_observable",
+            "touch.plane_touch": "PlaneTouchResult TouchedPlane plane_columns solve_plane_touch",
+            "touch.sphere_touch": (
+                "SphereTouchResult solve_sphere_touch sphere_columns sphere_through"
+            ),
+            "touch.surface_fit": (
+                "SurfaceEvidence SurfaceStandoffs judge_surface_touches tip_is_told"
+            ),
+            "touch.touch_evidence": (
+                "Standoff StandoffSeries TouchEvidence WitnessedTouch height_limit_mm "
+                "height_shows_from_mm judge_touches least_jog_mm stand_upright"
+            ),
+            "touch.z_touch": (
+                "Touch USUAL_DECELERATION_MM_S2 ZTouchResult solve_z_touch touch_sigma_gain"
+            ),
+        },
+    )

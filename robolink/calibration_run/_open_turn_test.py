@@ -219,7 +219,7 @@ def finish_by_turn_test(
         >>> from robolink.calibration_run import finish_by_turn_test, open_turn_tests
         >>> from robolink.transaction import recover
         >>> from robolink_cli.prompts.operator import AssistedOperator
-        >>> from robolink_simulators.assist.port import InProcessEyes
+        >>> from robolink_simulators.control.assist import InProcessEyes
         >>> from robolink_simulators.epson import EpsonSimulator
         >>> from robolink_simulators.hosting.in_process.epson import register
         >>> simulator, written = EpsonSimulator(), []

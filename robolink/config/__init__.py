@@ -32,4 +32,16 @@ if TYPE_CHECKING:
     from robolink.config._reach import remember_reach as remember_reach
     from robolink.config._settings import CellSettings as CellSettings
 else:
-    __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__, old_names(__name__))
+    __getattr__, __dir__, __all__ = lazy_exports(
+        __name__,
+        {
+            "_cells": (
+                "Cell CellGlimpse USUAL_CHANGE_MM add_cell cell_names check_file "
+                "content_with_cell find_cell glimpse_of_cell load_cells settings_of_file"
+            ),
+            "_files": "ConfigFile Source config_files",
+            "_reach": "Expected Reach glance_at_cell proof_of_files reach_cell remember_reach",
+            "_settings": "CellSettings",
+        },
+        old_names(__name__),
+    )

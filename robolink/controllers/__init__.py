@@ -44,4 +44,28 @@ if TYPE_CHECKING:
     from robolink.controllers.tool_table import ToolTableCore as ToolTableCore
     from robolink.controllers.tool_writing import ToolWrite as ToolWrite
 else:
-    __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)
+    __getattr__, __dir__, __all__ = lazy_exports(
+        __name__,
+        {
+            "controller_core": "ControllerCore",
+            "driver_link": "DriverLink MarkedCommand advise_emergency_stop",
+            "epson.controller": "EpsonController open_epson",
+            "epson.tools": "PublishedTools",
+            "epson.values": "EpsonVariables typed_value variable_type",
+            "motion_group": "MotionGroupCore PolledGroup",
+            "plc_map.controller": "FlangeReader PlcMapController open_plc_map",
+            "preserving": "Preserver",
+            "registry": (
+                "CONTROLLERS_GROUP ConnectionTerms ControllerOpener axes_of_model "
+                "capabilities_of_kind connect connect_when_reachable"
+            ),
+            "resolving": "MarkerResolver",
+            "softmotion.controller": "SoftMotionController open_softmotion",
+            "softmotion.facts": "MailboxFacts",
+            "softmotion.jog": "Jog",
+            "softmotion.mailbox": "read_device_id",
+            "stopping": "stop_now stop_requests",
+            "tool_table": "ToolTableCore",
+            "tool_writing": "ToolWrite",
+        },
+    )

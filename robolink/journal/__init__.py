@@ -29,4 +29,19 @@ if TYPE_CHECKING:
     from robolink.journal._read_only_log import ReadOnlyLog as ReadOnlyLog
     from robolink.journal.store.entry_rows import ChainVerification as ChainVerification
 else:
-    __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__, old_names(__name__))
+    __getattr__, __dir__, __all__ = lazy_exports(
+        __name__,
+        {
+            "_connections": (
+                "GlancingLog NamesOnRecord close_files forget_memory memory_journal "
+                "names_on_record nothing_is_open open_journal open_log"
+            ),
+            "_journal": "Journal",
+            "_lease_view": "LEASE_S LeaseHolder signature_here this_process",
+            "_outcome_log": "JournalOutcomeLog",
+            "_places": "default_location may_exist",
+            "_read_only_log": "ReadOnlyLog",
+            "store.entry_rows": "ChainVerification",
+        },
+        old_names(__name__),
+    )

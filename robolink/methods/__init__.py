@@ -116,4 +116,54 @@ if TYPE_CHECKING:
     from robolink.methods.z_touch import measure_z_touch as measure_z_touch
     from robolink.methods.z_touch.procedure import verify_by_touching as verify_by_touching
 else:
-    __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)
+    __getattr__, __dir__, __all__ = lazy_exports(
+        __name__,
+        {
+            "beams": "BeamLine BeamsParameters BeamsSource measure_beams",
+            "beams.procedure": "trace_beams verify_by_crossing",
+            "board": "BoardParameters BoardSource measure_board verify_board",
+            "camera": "CameraParameters CameraSource measure_camera",
+            "camera_affine": (
+                "CameraAffineParameters CameraAffineSource LEAST_SPAN_MM measure_camera_affine"
+            ),
+            "given_poses": "PointsSource PosesFound taught_poses",
+            "method": (
+                "Angle AnyMethod Check DEGREES Former Help InputNumber Length LengthRule MM "
+                "MM_S Method MethodParameters NOTHING_STATED Needs NextStep Option Pair "
+                "PoseHelp Site StatedLimits ToolHistory Unit"
+            ),
+            "n_angle": (
+                "ManyTouches NAngleParameters NAngleSource measure_n_angle most_informative_order"
+            ),
+            "one_touch": "OneTouchParameters OneTouchSource measure_one_touch",
+            "one_touch.solvers": (
+                "Absolute Difference KEPT LastTouch difference_from_last find_last_touch"
+            ),
+            "parameter_checks": (
+                "ParameterField fields_of order_of_residuals parameter_problems source_of"
+            ),
+            "pivot": "PivotParameters PivotSource PivotTouches measure_pivot require_tilting",
+            "pivot.procedure": "verify_by_tilting",
+            "pivot.six_point": (
+                "AxisTeachPlan SixPointParameters SixPointSource SixPoints measure_six_point"
+            ),
+            "pivot.tilts": "OverPin Tilt informative_tilts proving_tilts",
+            "points": "PointsParameters",
+            "registry": "METHODS_GROUP all_methods find_method method_names register",
+            "runout_table": "AllRoundPlan RunoutTableParameters RunoutTableSource",
+            "runout_table_procedure": "measure_runout_table",
+            "shared_parameters": "LookParameters PinParameters UprightPinParameters",
+            "station_reference": "learn_station",
+            "surface_touch": "SurfaceParameters",
+            "surface_touch.plane": (
+                "PlaneTouchParameters PlaneTouchSource PlaneTouches measure_plane_touch"
+            ),
+            "surface_touch.sphere": (
+                "SphereTouchParameters SphereTouchSource SphereTouches measure_sphere_touch"
+            ),
+            "surface_touch.survey": "PlaneSurvey SphereSurvey",
+            "two_pose": "TwoPoseParameters TwoPoseSource TwoTouches measure_two_pose",
+            "z_touch": "ZTouchParameters ZTouchSource measure_z_touch",
+            "z_touch.procedure": "verify_by_touching",
+        },
+    )

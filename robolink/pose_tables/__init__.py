@@ -17,4 +17,12 @@ if TYPE_CHECKING:
     from robolink.pose_tables.values import ReadingChoices as ReadingChoices
     from robolink.pose_tables.values import TabledPose as TabledPose
 else:
-    __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)
+    __getattr__, __dir__, __all__ = lazy_exports(
+        __name__,
+        {
+            "formats.epson_points": "parse_pts read_pts",
+            "orientation": "RULES RotationRule",
+            "reader": "read_poses",
+            "values": "HowRead LengthUnit NOTHING_SAID PoseTable ReadingChoices TabledPose",
+        },
+    )

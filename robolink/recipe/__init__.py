@@ -36,4 +36,17 @@ if TYPE_CHECKING:
     from robolink.recipe._tables import Tool as Tool
     from robolink.recipe._tables import method_table as method_table
 else:
-    __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__, old_names(__name__))
+    __getattr__, __dir__, __all__ = lazy_exports(
+        __name__,
+        {
+            "_loading": "LoadedRecipe check_recipe load_recipe",
+            "_past": "RecipePast changes_left_of pasts_of",
+            "_recipe": "Basis HeightRule Recipe json_schema",
+            "_requirements": "Answers beyond require_answers",
+            "_tables": (
+                "Box FlangePose MethodTable Output Poses Prompt RefusalTable Speeds "
+                "StationTable Tolerances Tool method_table"
+            ),
+        },
+        old_names(__name__),
+    )

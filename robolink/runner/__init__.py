@@ -69,4 +69,26 @@ if TYPE_CHECKING:
     from robolink.runner._yes_no import ask_yes_no_or as ask_yes_no_or
     from robolink.runner._yes_no import yes_or_no as yes_or_no
 else:
-    __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)
+    __getattr__, __dir__, __all__ = lazy_exports(
+        __name__,
+        {
+            "_dry_run": (
+                "ArmAhead ForeseenStep considered first_clear foreseen_steps nothing_in_the_way"
+            ),
+            "_jog_steps": (
+                "RunSettings jog_target parse_decimal parse_steps refuse_decimal_comma way_in_words"
+            ),
+            "_place_question": "AGAIN MOST_REFUSED TakenAgainError inputs_of",
+            "_prompt_context": (
+                "AngleShown ChoiceRow FitRow FitSubject GuidedOperator JogRange "
+                "JogSubject MoveSubject OfferedChoice Operator POLL_S Question "
+                "TouchSubject awaited_line regard"
+            ),
+            "_runner": "EndingWatch Runner ask_for_pose",
+            "_steps": (
+                "Ask Confirm Consider FINEST_STEP Look Move NotYet Notify Procedure "
+                "SETTLING_S Seek SeenAt Step StepDone TakenStep TeachPrompt TouchedAt"
+            ),
+            "_yes_no": "BACK MORE ask_yes_no ask_yes_no_or yes_or_no",
+        },
+    )

@@ -31,4 +31,14 @@ if TYPE_CHECKING:
     from robolink.stations._station import station_entry as station_entry
     from robolink.stations._station import station_of as station_of
 else:
-    __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)
+    __getattr__, __dir__, __all__ = lazy_exports(
+        __name__,
+        {
+            "_lookup": "base_now find_station find_stations learnt_elsewhere require_base_of",
+            "_places": (
+                "BeamStation CameraStation TouchStation beam_station camera_station "
+                "pin_of sensor_of touch_station"
+            ),
+            "_station": "AGREEING_MM Found Gauge Station StationKind station_entry station_of",
+        },
+    )

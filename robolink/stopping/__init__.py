@@ -21,4 +21,11 @@ if TYPE_CHECKING:
     from robolink.stopping._notes import find_note as find_note
     from robolink.stopping._notes import leave_note as leave_note
 else:
-    __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)
+    __getattr__, __dir__, __all__ = lazy_exports(
+        __name__,
+        {
+            "_asking": "ControllerHolder HolderGoneError LastSeen far_end_of holders_of",
+            "_listener": "StopListener",
+            "_notes": "StopNote clear_note find_note leave_note",
+        },
+    )

@@ -28,4 +28,19 @@ if TYPE_CHECKING:
     from robolink.transport.dialogue import parse_dialogues as parse_dialogues
     from robolink.transport.dialogue import passage_line as passage_line
 else:
-    __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__, old_names(__name__))
+    __getattr__, __dir__, __all__ = lazy_exports(
+        __name__,
+        {
+            "_mailbox_link": "MailboxHead MailboxLink",
+            "_registry": (
+                "TRANSPORTS_GROUP TransportOpener open_mailbox_link open_modbus open_transport"
+            ),
+            "_url": "LinkUrl UrlOptions parse_url",
+            "byte_stream": "Direction SECRET_PLACEHOLDER TraceSink TracingTransport Transport",
+            "dialogue": (
+                "Dialogue DialogueLog Passage format_dialogue opening_line "
+                "parse_dialogues passage_line"
+            ),
+        },
+        old_names(__name__),
+    )

@@ -15,6 +15,7 @@ from robolink.errors import (
     LoginUnansweredError,
     NotReadyError,
     RemoteProtocolError,
+    RobolinkError,
     TransportBrokenError,
     TransportTimeoutError,
 )
@@ -46,7 +47,7 @@ def named(cell):
     """What an act raises: its class, whether it names this controller, and the request."""
 
     def names(act, *given, **options):
-        with pytest.raises(Exception) as caught:  # noqa: PT011 - the class is what is compared
+        with pytest.raises(RobolinkError) as caught:
             act(*given, **options)
         error = caught.value
         return type(error), error.controller == cell.url, error.request

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from robolink_cli.access import password
 from robolink_cli.commands.measure.solve import solving
-from robolink_simulators.assist import port
+from robolink_simulators.control import assist as port
 from robolink_simulators.hosting import replay
 
 from robolink.backup import _file as backup

@@ -15,9 +15,9 @@ from robolink_cli.prompts.lines import QUIET_S, Lines, open_lines
 from robolink_cli.prompts.present import present_desk
 
 if TYPE_CHECKING:
-    from robolink_simulators.assist.port import AssistClient, InProcessEyes
     from robolink_simulators.cell.habits import PersonManner
     from robolink_simulators.cell.places import Axis, XyzMm
+    from robolink_simulators.control.assist import AssistClient, InProcessEyes
 
     from robolink.timing import Clock
 
@@ -299,7 +299,7 @@ def operator_at(
     if assist_url is None:
         yield terminal()
         return
-    from robolink_simulators.assist.port import open_eyes
+    from robolink_simulators.control.assist import open_eyes
 
     with open_eyes(assist_url) as eyes:
         yield AssistedOperator.with_eyes(eyes, note, tool=tool, clock=clock)

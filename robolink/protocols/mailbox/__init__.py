@@ -73,4 +73,28 @@ if TYPE_CHECKING:
     from robolink.protocols.mailbox._layout import next_number as next_number
     from robolink.protocols.mailbox._layout import slot_start as slot_start
 else:
-    __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__, old_names(__name__))
+    __getattr__, __dir__, __all__ = lazy_exports(
+        __name__,
+        {
+            "_blocks": (
+                "Answer Command Finished Response Slot decode_command decode_device_id "
+                "decode_response decode_slot encode_command encode_device_id "
+                "encode_response encode_slot"
+            ),
+            "_codes": (
+                "Bits BufferMode Capability CommandState CoordinateSystem ErrorClass "
+                "ExportProfile GroupState OPCODES Opcode OpcodeFacts ReadMode "
+                "error_meaning opcodes_of"
+            ),
+            "_frames": "frames_match from_frame to_frame",
+            "_kinematics": "Kinematics find_kinematics find_kinematics_word kinematics_word",
+            "_layout": (
+                "BlockError BlockFault COMMAND COMMAND_WORDS DEVICE DEVICE_START "
+                "DEVICE_WORDS Field FoundProbe Four Layout PROBE RESPONSE "
+                "RESPONSE_WORDS SLOT SLOTS SLOT_WORDS Six VERSION WordOrder WordType "
+                "Words beats_for crc16 find_probe find_word_order heartbeat_word "
+                "next_number slot_start"
+            ),
+        },
+        old_names(__name__),
+    )

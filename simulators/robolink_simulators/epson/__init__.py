@@ -14,4 +14,11 @@ if TYPE_CHECKING:
     from robolink_simulators.epson.options import EpsonOptions as EpsonOptions
     from robolink_simulators.epson.options import SpelNumbers as SpelNumbers
 else:
-    __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)
+    __getattr__, __dir__, __all__ = lazy_exports(
+        __name__,
+        {
+            "condition": "Mode",
+            "device": "EpsonSimulator",
+            "options": "EpsonOptions SpelNumbers",
+        },
+    )

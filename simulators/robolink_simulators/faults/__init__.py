@@ -30,4 +30,16 @@ if TYPE_CHECKING:
     from robolink_simulators.faults.stream import Fault as Fault
     from robolink_simulators.faults.stream import FaultAction as FaultAction
 else:
-    __getattr__, __dir__, __all__ = lazy_exports(__name__, __file__)
+    __getattr__, __dir__, __all__ = lazy_exports(
+        __name__,
+        {
+            "counted": "CountedFaults Planned",
+            "disk": "DiskFault FaultyDisk",
+            "drawn": "FaultRates drawn_faults drawn_plc_faults",
+            "fieldbus": "PlcFault PlcFaultAction",
+            "links": "FaultNotPossibleError LinkKind links_of require_possible",
+            "plan": "Departure FaultPlan",
+            "plan_file": "FaultFile fault_as_keys faults_of_table read_fault_file",
+            "stream": "Fault FaultAction",
+        },
+    )

@@ -31,7 +31,7 @@ from robolink_cli.wizard.screens.ending import ended_of
 from robolink_cli.wizard.screens.told import told_before, told_question
 from robolink_cli.wizard.state import CheckSubject, Header, Mark, WizardState
 from robolink_cli.wizard.work import Desk, Work
-from robolink_simulators.assist.port import InProcessEyes
+from robolink_simulators.control.assist import InProcessEyes
 from wcwidth import wcswidth
 
 import robolink

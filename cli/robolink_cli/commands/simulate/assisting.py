@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from robolink_simulators.assist.port import AssistClient
-from robolink_simulators.control.acts.registry import texts_of
+from robolink_simulators.control.acts import texts_of
+from robolink_simulators.control.assist import AssistClient
 from robolink_simulators.control.client import ControlClient
 
 from robolink.errors import ConfigError

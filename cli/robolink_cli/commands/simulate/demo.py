@@ -8,9 +8,9 @@ from enum import StrEnum
 from typing import Annotated, Literal
 
 import click
-from robolink_simulators.assist.port import LEAST_THINKING_S, InProcessEyes
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.cell.world_parameters import WorldParameters
+from robolink_simulators.control.assist import LEAST_THINKING_S, InProcessEyes
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process.softmotion import simulator_named
 from robolink_simulators.hosting.streams.epson import serve_tcp

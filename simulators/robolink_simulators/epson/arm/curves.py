@@ -86,20 +86,14 @@ class FreeCurve(NamedTuple):
 
 
 class CurveFiles:
-    """The curve files of one robot, by name in any case.
-
-    Attributes:
-        changes: How often one was stored.
-    """
+    """The curve files of one robot, by name in any case."""
 
     def __init__(self) -> None:
-        self.changes = 0
         self._files: dict[str, FreeCurve] = {}
 
     def store(self, name: str, curve: FreeCurve) -> None:
         """Store a curve; one of the same name is replaced."""
         self._files[name.lower()] = curve
-        self.changes += 1
 
     def get(self, name: str) -> FreeCurve:
         """Return a curve.

@@ -21,7 +21,7 @@ from robolink_cli.console.render import json_is_on
 from robolink_cli.options.simulation import ServedLife
 
 if TYPE_CHECKING:
-    from robolink_simulators.assist.port import AssistHost
+    from robolink_simulators.control.assist import AssistHost
 
 
 Options = Mapping[str, Any]
@@ -96,7 +96,7 @@ class SimulatedKind:
         urls = self.place(stack, simulator, clock, **given)
         assist = None
         if person and not isinstance(simulator, PlcSimulator):
-            from robolink_simulators.assist.port import serve_assist
+            from robolink_simulators.control.assist import serve_assist
 
             assist = stack.enter_context(serve_assist(simulator, clock=clock))
         return ServedCell(ControlledCell(simulator, clock, urls), assist, self.about(simulator))

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any, Final
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.faults import LinkKind
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
-from robolink_simulators.softmotion.mailbox.option_text import options_from_text
-from robolink_simulators.softmotion.mailbox.parameters import parameters_from_text
+from robolink_simulators.softmotion.mailbox.option_text import (
+    options_from_text,
+    parameters_from_text,
+)
 from robolink_simulators.softmotion.program.structured_plc import plc_maker
 
 from robolink.errors import ConfigError

@@ -8,7 +8,7 @@ from typing import Any, Final, Literal
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Pose
-from robolink_simulators.control.acts.answers import Described
+from robolink_simulators.control.answers import Described
 from robolink_simulators.control.cell import ControlledCell
 
 Answer = dict[str, object]

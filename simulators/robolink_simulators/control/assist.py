@@ -31,10 +31,10 @@ from robolink_simulators.client_errors import (
     is_silent,
     nobody_listens,
 )
-from robolink_simulators.control.acts.declared import Answer, Given
-from robolink_simulators.control.acts.registry import MACHINE_REFUSALS, defect, machine_refusal
-from robolink_simulators.control.acts.registry import perform as perform_act
+from robolink_simulators.control.acts import MACHINE_REFUSALS, defect, machine_refusal
+from robolink_simulators.control.acts import perform as perform_act
 from robolink_simulators.control.cell import AnySimulator, ControlledCell, drawn_token, is_token
+from robolink_simulators.control.declared_acts import Answer, Given
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process import epson as in_process
 from robolink_simulators.hosting.in_process import softmotion as plc_in_process
@@ -138,7 +138,6 @@ class AssistHost(TcpHost):
     """A listening assist port; its URL holds the token."""
 
     def __init__(self, simulator: Assisted, port: int, clock: ScaledClock, token: str) -> None:
-        self._token = token
         self._assisting = _AssistDevice(simulator, clock, token)
         super().__init__(
             self._assisting,
@@ -147,16 +146,12 @@ class AssistHost(TcpHost):
             clock=clock,
             lock=simulator.lock,
         )
+        self.url = self.url.replace("://", f"://{token}@")
 
     @property
     def requests(self) -> int:
         """How many lines came, of whomever."""
         return self._assisting.requests
-
-    @property
-    def url(self) -> str:
-        """Where clients connect to, with what lets them in."""
-        return super().url.replace("://", f"://{self._token}@")
 
 
 def serve_assist(

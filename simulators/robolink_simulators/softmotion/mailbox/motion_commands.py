@@ -9,20 +9,21 @@ from robolink.protocols.mailbox import Answer, Command, ErrorClass, Opcode
 from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
 from robolink_simulators.softmotion.group.condition import SmcGroupState
+from robolink_simulators.softmotion.group.jog import COORDINATES, JogCommand
+from robolink_simulators.softmotion.group.movement import EdgeWatch, SmcBufferMode
+from robolink_simulators.softmotion.group.paths import Dynamics, Target
 from robolink_simulators.softmotion.kinematics.kinematics import CoordSystem
-from robolink_simulators.softmotion.mailbox.commands.jobs import Job, Jobs
-from robolink_simulators.softmotion.mailbox.commands.results import (
+from robolink_simulators.softmotion.mailbox.image import UserUnits
+from robolink_simulators.softmotion.mailbox.jobs import (
     CommandResult,
     Handler,
+    Job,
+    Jobs,
     Rejected,
     ok,
     require_finite,
     require_operand,
 )
-from robolink_simulators.softmotion.mailbox.image import UserUnits
-from robolink_simulators.softmotion.motion.jog import COORDINATES, JogCommand
-from robolink_simulators.softmotion.motion.movement import EdgeWatch, SmcBufferMode
-from robolink_simulators.softmotion.motion.paths import Dynamics, Target
 from robolink_simulators.softmotion.signals import SIGNALS
 
 MOST_MOVEMENTS: Final = 4

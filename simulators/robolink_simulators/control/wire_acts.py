@@ -7,7 +7,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.timing import NS_PER_S
 from robolink_simulators.cell.clock import ManualClock, SteeredClock
-from robolink_simulators.control.acts.answers import (
+from robolink_simulators.control.answers import (
     CellTruth,
     ClockShown,
     Counters,
@@ -17,8 +17,8 @@ from robolink_simulators.control.acts.answers import (
     MotionsTold,
     SnapshotNames,
 )
-from robolink_simulators.control.acts.declared import Answer, ControlAct, Given, Taken
 from robolink_simulators.control.cell import ControlledCell
+from robolink_simulators.control.declared_acts import Answer, ControlAct, Given, Taken
 from robolink_simulators.faults import (
     FaultAction,
     FaultNotPossibleError,

@@ -14,14 +14,15 @@ from robolink_simulators.cell.world_parameters import (
     parameter_names,
     parameters_from_text,
 )
-from robolink_simulators.control.acts.answers import (
+from robolink_simulators.control.answers import (
     FlangeTold,
     MarksSeen,
     TipTold,
     WaySeen,
     WorldTold,
 )
-from robolink_simulators.control.acts.declared import (
+from robolink_simulators.control.cell import ControlledCell
+from robolink_simulators.control.declared_acts import (
     NUMBER,
     WHOLE_TOOL,
     Answer,
@@ -30,7 +31,6 @@ from robolink_simulators.control.acts.declared import (
     Taken,
     shown_flange,
 )
-from robolink_simulators.control.cell import ControlledCell
 from robolink_simulators.epson.world import World
 from robolink_simulators.option_values import MOST_OF_AN_OPTION
 from robolink_simulators.plc import PlcSimulator

@@ -9,9 +9,9 @@ from itertools import chain
 from robolink.timing import NS_PER_S
 from robolink_simulators.cell.frames import ORIGIN, Frame
 from robolink_simulators.softmotion.function_blocks import BlockExecution
+from robolink_simulators.softmotion.group.paths import JointPath, LinePath, Path
+from robolink_simulators.softmotion.group.profile import Pace, SpeedProfile
 from robolink_simulators.softmotion.kinematics.kinematics import AxisValues, CoordRef, CoordSystem
-from robolink_simulators.softmotion.motion.paths import JointPath, LinePath, Path
-from robolink_simulators.softmotion.motion.profile import Pace, SpeedProfile
 
 
 class SmcBufferMode(IntEnum):

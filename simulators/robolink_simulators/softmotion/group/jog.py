@@ -17,14 +17,14 @@ from robolink_simulators.cell.frames import (
     turned,
 )
 from robolink_simulators.softmotion.function_blocks import BlockExecution
+from robolink_simulators.softmotion.group.axes import Axis
+from robolink_simulators.softmotion.group.paths import Dynamics, axes_for_tcp, require_inside
 from robolink_simulators.softmotion.kinematics.kinematics import (
     AxisValues,
     CoordinateTransforms,
     CoordSystem,
     KinematicsModel,
 )
-from robolink_simulators.softmotion.motion.axes import Axis
-from robolink_simulators.softmotion.motion.paths import Dynamics, axes_for_tcp, require_inside
 from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 COORDINATES = 6

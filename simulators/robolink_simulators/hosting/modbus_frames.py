@@ -3,6 +3,7 @@
 The driver encodes numbers itself, so that each proves the other.
 """
 
+import logging
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from pymodbus.pdu import DecodePDU, ExceptionResponse, ModbusPDU
 from pymodbus.pdu.bit_message import (
     ReadCoilsResponse,
     ReadDiscreteInputsResponse,
+    WriteMultipleCoilsResponse,
     WriteSingleCoilResponse,
 )
 from pymodbus.pdu.register_message import (
@@ -24,6 +26,9 @@ from pymodbus.pdu.register_message import (
 )
 
 from robolink.register_maps import Number, NumberType, RegisterTable
+
+# It writes to standard error when nobody listens; clients are told by their answers.
+logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 
 ILLEGAL_FUNCTION: Final = 1
 ILLEGAL_ADDRESS: Final = 2
@@ -46,10 +51,10 @@ _READ: Final = {
     3: RegisterTable.HOLDING,
     4: RegisterTable.INPUT,
 }
-_WRITE_COIL: Final = 5
 _WRITE: Final = {
-    _WRITE_COIL: RegisterTable.COIL,
+    5: RegisterTable.COIL,
     6: RegisterTable.HOLDING,
+    15: RegisterTable.COIL,
     16: RegisterTable.HOLDING,
 }
 
@@ -130,11 +135,11 @@ class Frames(ABC):
             return PlcRequest(number, unit, function, None)
         if function in _READ:
             return PlcRequest(number, unit, function, _READ[function], pdu.address, pdu.count)
-        values = pdu.bits[:1] if function == _WRITE_COIL else pdu.registers
+        table = _WRITE[function]
+        bits = pdu.bits[: 1 if function == 5 else pdu.count]
+        values = bits if table is RegisterTable.COIL else pdu.registers
         written = tuple(int(value) for value in values)
-        return PlcRequest(
-            number, unit, function, _WRITE[function], pdu.address, len(written), written
-        )
+        return PlcRequest(number, unit, function, table, pdu.address, len(written), written)
 
     def _packed(self, request: PlcRequest, pdu: ModbusPDU) -> bytes:
         payload = bytes([pdu.function_code]) + pdu.encode()
@@ -241,6 +246,8 @@ def _pdu(request: PlcRequest, found: Sequence[int]) -> ModbusPDU:
             return WriteSingleCoilResponse(address=address, bits=[bool(values[0])])
         case 6:
             return WriteSingleRegisterResponse(address=address, registers=values)
+        case 15:
+            return WriteMultipleCoilsResponse(address=address, count=len(values))
         case _:
             return WriteMultipleRegistersResponse(address=address, count=len(values))
 

@@ -21,6 +21,8 @@ from robolink_simulators.cell.frames import (
     transposed,
     turned,
 )
+from robolink_simulators.softmotion.group.axes import Axis
+from robolink_simulators.softmotion.group.profile import Pace
 from robolink_simulators.softmotion.kinematics.kinematics import (
     ANY_CONFIGURATION,
     AxisValues,
@@ -30,8 +32,6 @@ from robolink_simulators.softmotion.kinematics.kinematics import (
     CoordSystem,
     KinematicsModel,
 )
-from robolink_simulators.softmotion.motion.axes import Axis
-from robolink_simulators.softmotion.motion.profile import Pace
 from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 _STILL = 1e-9

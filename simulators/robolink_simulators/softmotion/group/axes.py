@@ -7,7 +7,7 @@ from typing import Final
 
 from robolink.model import AxisKind
 from robolink.timing import NS_PER_S
-from robolink_simulators.softmotion.motion.profile import Pace, SpeedProfile
+from robolink_simulators.softmotion.group.profile import Pace, SpeedProfile
 from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 _ROUNDING = 1e-9

@@ -3,11 +3,11 @@
 from collections.abc import Callable, Sequence
 
 from robolink_simulators.softmotion.function_blocks import BlockExecution
+from robolink_simulators.softmotion.group.axes import Axis
+from robolink_simulators.softmotion.group.jog import JogMotion
+from robolink_simulators.softmotion.group.movement import EdgeWatch, Movement, MovementQueue
+from robolink_simulators.softmotion.group.paths import require_inside
 from robolink_simulators.softmotion.kinematics.kinematics import AxisValues
-from robolink_simulators.softmotion.motion.axes import Axis
-from robolink_simulators.softmotion.motion.jog import JogMotion
-from robolink_simulators.softmotion.motion.movement import EdgeWatch, Movement, MovementQueue
-from robolink_simulators.softmotion.motion.paths import require_inside
 from robolink_simulators.softmotion.options import GroupOptions
 from robolink_simulators.softmotion.signals import DigitalInputs
 from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind, SmcError

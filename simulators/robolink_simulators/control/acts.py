@@ -5,8 +5,9 @@ from typing import Final, get_args
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_simulators.control.acts.answers import FlangeTold
-from robolink_simulators.control.acts.declared import (
+from robolink_simulators.control.answers import FlangeTold
+from robolink_simulators.control.cell import ControlledCell
+from robolink_simulators.control.declared_acts import (
     NUMBER,
     ON,
     Answer,
@@ -16,9 +17,8 @@ from robolink_simulators.control.acts.declared import (
     panel_act,
     shown_flange,
 )
-from robolink_simulators.control.acts.wire import KEEPING_ACTS, WIRE_ACTS
-from robolink_simulators.control.acts.world import WORLD_ACTS
-from robolink_simulators.control.cell import ControlledCell
+from robolink_simulators.control.wire_acts import KEEPING_ACTS, WIRE_ACTS
+from robolink_simulators.control.world_acts import WORLD_ACTS
 from robolink_simulators.epson.condition import SpelRefusal
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.panel import EpsonPanel

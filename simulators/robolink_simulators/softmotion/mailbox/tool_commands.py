@@ -22,8 +22,10 @@ from robolink_simulators.softmotion.catalogue import (
 )
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
 from robolink_simulators.softmotion.group.condition import ReadToolMode
+from robolink_simulators.softmotion.group.movement import ToolInForce
 from robolink_simulators.softmotion.kinematics.kinematics import CoordRef, KinematicsModel
-from robolink_simulators.softmotion.mailbox.commands.results import (
+from robolink_simulators.softmotion.mailbox.image import UserUnits
+from robolink_simulators.softmotion.mailbox.jobs import (
     CommandResult,
     Handler,
     Rejected,
@@ -33,9 +35,7 @@ from robolink_simulators.softmotion.mailbox.commands.results import (
     require_operand,
     require_slot,
 )
-from robolink_simulators.softmotion.mailbox.image import UserUnits
 from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
-from robolink_simulators.softmotion.motion.movement import ToolInForce
 from robolink_simulators.softmotion.smc_errors import BlockRefused
 
 _NO_TOOL: Final[Six] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)

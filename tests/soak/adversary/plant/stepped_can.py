@@ -5,11 +5,11 @@ from typing import Any, Final, cast
 
 import can
 import canopen
-
-from robolink.timing import NS_PER_S
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.hosting.fieldbus.canopen_node import LOOK_S, PERIOD_S, CanopenFace
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
+
+from robolink.timing import NS_PER_S
 
 _FRAME_NS: Final = 250_000
 """What a frame takes at 500 kbit/s with its gaps, and the stack behind it."""
@@ -118,7 +118,7 @@ class SteppedCanBus(can.BusABC):
                 (max(at_ns, self._waiting[-1][0] if self._waiting else 0), message)
             )
 
-    def send(self, msg: can.Message, timeout: float | None = None) -> None:  # noqa: ARG002 - python-can's own signature
+    def send(self, msg: can.Message, timeout: float | None = None) -> None:
         """Send a frame."""
         self._require_open()
         self._wire.take_from_client(msg)

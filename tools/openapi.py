@@ -1,6 +1,6 @@
 """The control API as an OpenAPI document, made from the declared acts.
 
-``python -m robolink_simulators.control.openapi`` prints it; the wheel holds it as
+``python -m tools.openapi`` prints it; the wheel holds it as
 ``robolink_simulators/control/openapi.json``, and every control port serves it.
 """
 
@@ -12,15 +12,15 @@ from inspect import cleandoc
 from types import NoneType, UnionType
 from typing import Annotated, Any, Final, Literal, Union, cast, get_args, get_origin, get_type_hints
 
-from robolink_simulators.control.acts.answers import LEFT_OUT, CellAbout, CellsAbout, Described
-from robolink_simulators.control.acts.declared import (
+from robolink_simulators.control.acts import ACTS
+from robolink_simulators.control.answers import LEFT_OUT, CellAbout, CellsAbout, Described
+from robolink_simulators.control.declared_acts import (
     LONGEST_TEXT,
     NONE,
     PRINTABLE,
     ControlAct,
     Taken,
 )
-from robolink_simulators.control.acts.registry import ACTS
 
 _PLAIN: Final = {bool: "boolean", int: "integer", float: "number", str: "string", NoneType: "null"}
 _SECTION: Final = re.compile(r"\n\n(?=\w+:\n)")

@@ -1,6 +1,6 @@
 """The tables of docs/fault-plans.md, made from the vocabulary itself.
 
-``python -m robolink_simulators.faults.page`` prints them.
+``python -m tools.fault_tables`` prints them.
 """
 
 import ast

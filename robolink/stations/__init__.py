@@ -34,7 +34,7 @@ else:
     __getattr__, __dir__, __all__ = lazy_exports(
         __name__,
         {
-            "_lookup": "base_now find_station find_stations learnt_elsewhere require_base_of",
+            "_lookup": "stations_on_record base_now find_station find_stations learnt_elsewhere require_base_of",
             "_places": (
                 "BeamStation CameraStation TouchStation beam_station camera_station "
                 "pin_of sensor_of touch_station"

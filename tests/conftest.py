@@ -19,7 +19,7 @@ for _library in ("OPENBLAS", "OMP", "MKL"):
 
 
 collect_ignore = ["integrator"]
-"""A project of its own, which ``tests/packaging/test_integrator.py`` runs against the wheel."""
+"""A project of its own, which ``tests/packaging/test_wheel.py`` runs against the wheel."""
 
 CANARIES = Watch()
 """Every password of the test that runs, and what it made robolink say."""

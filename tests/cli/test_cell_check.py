@@ -1,4 +1,4 @@
-"""cell check: what it finds, what it records, and that nothing on the controller changes."""
+"""cell check and cell tools: what they find, what they record, and for which robot."""
 
 import json
 from dataclasses import replace
@@ -8,12 +8,16 @@ import pytest
 from robolink_cli import main
 from robolink_simulators.cell.tip_switches import LightBeam
 
+import robolink
 from robolink.errors import DeclinedError
 from robolink.journal import open_journal
-from robolink.model import EntryKind, Marker, MarkerKind, NewEntry
-from tests.cli.test_journal_drift import entries
+from robolink.model import EntryKind, Identity, Marker, MarkerKind, NewEntry
+from robolink.stations import Found, StationKind, station_entry
+from tests.cli.test_journal_statements import entries
 from tests.drift._courses import course
 from tests.faults._requests import changes
+
+# cell check: what it finds, what it records, and that nothing on the controller changes.
 
 ROOT = Path(__file__).parents[2]
 PIN = '[cells.line3.stations.PIN-07]\nkind = "pin"\ncheck_every_days = 90\n'
@@ -223,3 +227,139 @@ def test_a_recipe_by_which_a_person_touches_measures_nothing(cells, simulator, w
     assert "a person to touch" in document["cells"][0]["error"]["what"]
     assert asked == []
     assert simulator.machine.arm.moves_started == 0
+
+
+# Two robots of one controller, each with a place of a station of the same name.
+
+URL = "epson+tcp://cell-5.plant:5000"
+BOTH = "epson:RC1/T6-1+C8-2"
+ROBOTS = ("epson:RC1/T6-1", "epson:RC1/C8-2")
+
+
+def learnt(robot, x_mm, name="PIN-07"):
+    log = open_journal().log(URL)
+    log.ask(
+        lambda: Identity(
+            BOTH, URL, "epson@192.168.0.1:5000", robot=robot, robots=ROBOTS if robot else ()
+        )
+    )
+    log.append(station_entry(Found(id=name, kind=StationKind.PIN, x_mm=x_mm, y_mm=0.0)))
+    log.close()
+
+
+@pytest.fixture
+def run_with_robots(capsys, monkeypatch, tmp_path):
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
+    for robot, x_mm in zip(ROBOTS, (100.0, 250.0), strict=True):
+        learnt(robot, x_mm)
+    learnt(ROBOTS[1], 300.0, "PIN-08")
+
+    def command(*words):
+        code = main.run(["-c", URL, "station", *words])
+        shown = capsys.readouterr()
+        return code, shown.out, shown.err
+
+    return command
+
+
+def places(run, *words):
+    document = json.loads(run("list", "--json", *words)[1])
+    return [(one["robot"], one["id"], one["x_mm"]) for one in document["stations"]]
+
+
+def test_each_robots_places_are_listed_as_its_own(run_with_robots):
+    first, second = ROBOTS
+    expected = [(first, "PIN-07", 100.0), (second, "PIN-08", 300.0), (second, "PIN-07", 250.0)]
+    assert sorted(places(run_with_robots)) == sorted(expected)
+    assert places(run_with_robots, "--robot", "T6-1") == [(first, "PIN-07", 100.0)]
+    assert [
+        line.split()[:2] for line in run_with_robots("list")[1].splitlines() if "PIN" in line
+    ] == [
+        ["C8-2", "PIN-08"],
+        ["C8-2", "PIN-07"],
+        ["T6-1", "PIN-07"],
+    ]
+
+
+def test_one_station_of_several_robots_is_shown_by_the_name_of_the_robot(run_with_robots):
+    code, _, err = run_with_robots("show", "PIN-07")
+    assert code == 2
+    assert "Several robots of this controller have a place of station PIN-07" in err
+    for robot, x_mm in zip(ROBOTS, (100.0, 250.0), strict=True):
+        shown = json.loads(run_with_robots("show", "PIN-07", "--robot", robot, "--json")[1])
+        assert (shown["robot"], shown["x_mm"]) == (robot, x_mm)
+    shown = json.loads(run_with_robots("show", "PIN-08", "--json")[1])
+    assert (shown["robot"], shown["x_mm"]) == (ROBOTS[1], 300.0)
+    code, _, err = run_with_robots("show", "PIN-07", "--robot", "G6-3")
+    assert (code, "No robot 'G6-3' is on record here." in err) == (2, True)
+
+
+def test_what_does_not_tell_its_robot_is_listed_under_the_controller(run_with_robots):
+    learnt("", 77.0)
+    assert (BOTH, "PIN-07", 77.0) in places(run_with_robots)
+    assert json.loads(run_with_robots("show", "PIN-08", "--json")[1])["x_mm"] == 300.0
+
+
+def test_the_beams_of_a_station_are_shown_as_a_cell_file_has_them(
+    run_with_robots, monkeypatch, tmp_path, capsys
+):
+    (tmp_path / "robolink.toml").write_text(f"""
+[cells.line3]
+url = "{URL}"
+stations.BEAMS-02 = {{ kind = "beams", z_mm = -106.0, beams = [
+    {{ input = 3, x_mm = 175.0, y_mm = 488.0, direction_deg = 2.0 }},
+    {{ input = 4, x_mm = 175.0, y_mm = 488.0, direction_deg = 91.0 }},
+] }}
+""")
+    monkeypatch.setenv("ROBOLINK_CONFIG", str(tmp_path / "robolink.toml"))
+    assert main.run(["-c", "line3", "cell", "station", "show", "BEAMS-02"]) == 0
+    shown = capsys.readouterr().out
+    for number, direction in ((3, 2), (4, 91)):
+        beam = f"input = {number}, x_mm = 175, y_mm = 488, direction_deg = {direction}"
+        assert f"  beams = {{ {beam} }}\n" in shown
+    assert "  off_when_broken = false\n" in shown
+
+
+# One page of all tools of a cell: value, last change, age, what is due.
+
+RECIPE = Path(__file__).parents[2] / "examples" / "recipes" / "needle-one-touch.toml"
+
+
+def test_each_tool_is_shown_with_its_last_change_and_its_age(run, simulator):
+    code, out, _ = run("cell", "tools")
+    assert code == 0
+    assert "never from here" in out
+    assert run("tool", "set", "2", "--x", "5", "--y", "6", "--z", "-70", "--yes")[0] == 0
+    code, out, _ = run("cell", "tools")
+    assert "today" in out
+    code, out, _ = run("--json", "cell", "tools")
+    assert code == 0
+    said = json.loads(out)
+    assert said["schema"] == "robolink/cell-tools/1"
+    assert said["selected_tool"] == 1
+    assert said["tools"]["1"]["changed_at"] is None
+    two = said["tools"]["2"]
+    assert two["offset"]["z_mm"] == -70.0
+    assert 0.0 <= two["age_days"] < 0.5
+    assert (two["as_recorded"], two["due"]) == (True, [])
+
+    simulator.machine.tools.set(2, simulator.machine.tools.get(1))
+    two = json.loads(run("--json", "cell", "tools")[1])["tools"]["2"]
+    assert two["as_recorded"] is False
+    assert "it was left with" in two["due"][0]
+
+
+def test_what_is_due_comes_from_the_recipes_and_the_record(run, simulator, tmp_path):
+    (tmp_path / "a.toml").write_text(RECIPE.read_text(encoding="utf-8"), encoding="utf-8")
+    touch = {
+        "station": "PIN-07", "x_mm": 1.0, "y_mm": 2.0, "z_mm": 3.0, "u_deg": 0.0,
+        "sigma_mm": 0.01, "changes": 16, "full_sigma_mm": 0.01, "touch_sigma_mm": 0.02,
+    }  # fmt: skip
+    value = list(simulator.machine.tools.get(1).components())
+    with robolink.connect(simulator.url) as controller:
+        details = {"touch": touch, "value": value}
+        controller.outcomes.append(NewEntry(EntryKind.DONE, change="c", tool=1, details=details))
+    one = json.loads(run("--json", "cell", "tools")[1])["tools"]["1"]
+    assert one["changes_left"] == 4
+    assert one["due"] == ["Tool 1: A full calibration is due after 4 more changes."]
+    assert "Tool 1: A full calibration is due after 4 more changes." in run("cell", "tools")[1]

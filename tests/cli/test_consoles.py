@@ -1,11 +1,30 @@
-"""Commands and their errors on consoles that lack most of the world's characters."""
+"""Words that a console lacks, and words that mean something to a spreadsheet or a controller."""
 
+import csv
+import io
 import json
 import os
+import stat
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from robolink_cli import main
+from robolink_cli.commands.record.journal_export import csv_lines
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.hosting.streams.epson import serve_tcp
+
+from robolink.errors import ConfigError, RobolinkError
+from robolink.files.durable import file_name, write_whole
+from robolink.files.named import save_named
+from robolink.journal import open_journal
+from robolink.model import EntryKind, NewEntry, Signature
+from robolink.protocols.epson_text import VariableType
+
+# Commands and their errors on consoles that lack most of the world's characters.
 
 LONG = pytest.mark.soak
 
@@ -105,3 +124,226 @@ def test_keys_that_the_console_does_not_know_are_a_slip_and_no_end(tmp_path, enc
     assert r"Typed too early, so it was not taken: 'x\\xff+1'" in shown
     assert done.returncode == 9
     assert "Traceback" not in shown
+
+
+# Words that mean something to a spreadsheet, a database, a controller, a file system.
+
+# ---- a spreadsheet
+
+FORMULAS = ("=cmd|' /C calc'!A0", "+1+1", "-2+3", "@SUM(A1)", "\t=1", "\r=1", " =1", "\uff1d1+1")
+HIDDEN = tuple(f"a{cut}{formula}" for cut in ";\t\n" for formula in ("=1+1", " +1", "@x"))
+
+
+def test_no_cell_of_an_export_is_calculated_wherever_it_is_cut(state_folder):
+    journal = open_journal()
+    entries = []
+    for text in FORMULAS + HIDDEN:
+        log = journal.log("epson+tcp://a:1", signature=Signature(operator=text, lot=text))
+        details = {"rms_mm": text, "note": text}
+        log.append(NewEntry(EntryKind.DECISION, verdict=text, details=details))
+    entries = list(log.recorded())
+    assert len(entries) == len(FORMULAS + HIDDEN)
+    data = b"".join(csv_lines(entries)).decode("utf-8-sig")
+    for delimiter in ",;\t":
+        for row in csv.reader(io.StringIO(data, newline=""), delimiter=delimiter):
+            for cell in row:
+                assert cell.strip()[:1] not in tuple("=+@\uff1d"), (delimiter, cell)
+
+
+def test_what_only_looks_a_little_like_a_formula_is_left_as_it_is(state_folder):
+    plain = "a=b, c@d; e-f + 3 = 5"
+    log = open_journal().log("epson+tcp://a:1", signature=Signature(operator=plain))
+    log.append(NewEntry(EntryKind.DECISION, details={"offset_mm": [-1.5, 2.5]}))
+    data = b"".join(csv_lines(log.recorded())).decode("utf-8-sig")
+    (row,) = csv.DictReader(io.StringIO(data, newline=""))
+    assert row["operator"] == plain
+    assert row["details"] == '{"offset_mm": [-1.5, 2.5]}'
+
+
+# ---- a database
+
+SQL = ("'; DROP TABLE entries; --", '" OR 1=1 --', "%", "_", "\\", "x' UNION SELECT 1 --")
+
+
+@pytest.mark.parametrize("text", SQL)
+def test_words_are_no_sql(state_folder, text):
+    journal = open_journal()
+    named = journal.log("epson+tcp://a:1", signature=Signature(operator=text, nozzle=text))
+    named.append(NewEntry(EntryKind.DECISION, verdict=text, change=text, details={text: text}))
+    other = journal.log("epson+tcp://b:1", signature=Signature(operator="Ann"))
+    other.append(NewEntry(EntryKind.DECISION, verdict="kept"))
+    (entry,) = named.recorded()
+    assert (entry.verdict, entry.signature.operator, entry.details) == (text, text, {text: text})
+    assert [found.verdict for found in other.recorded()] == ["kept"]
+    journal.verify()
+
+
+@pytest.mark.parametrize("text", SQL)
+def test_what_is_asked_for_is_no_sql(state_folder, capsys, text):
+    log = open_journal().log("epson+tcp://a:1", signature=Signature(operator="Ann"))
+    log.append(NewEntry(EntryKind.DECISION, verdict="kept", change="abcd" * 8))
+    for words in (["journal", "list", "--change", text], ["journal", "show", text]):
+        main.run(words)
+        assert "kept" not in capsys.readouterr().out
+    assert [entry.verdict for entry in log.recorded()] == ["kept"]
+
+
+# ---- a controller
+
+SPEL = ('x";Motor On;"', "x)+Reset", "x\r\n$Stop", "a b")
+MORE_SPEL = ("x;Go P1", "x,1", "x'", "$Execute", "é")
+
+
+@pytest.mark.parametrize(
+    "text", [*SPEL, *(pytest.param(text, marks=pytest.mark.soak) for text in MORE_SPEL)]
+)
+@pytest.mark.fault("F72")
+def test_f72_a_name_or_value_says_nothing_else_to_a_controller(run, simulator, text):
+    simulator.variables.declare("g_text$", VariableType.STRING, value="old")
+    before = len(simulator.log)
+    for words in (
+        ["var", "get", text],
+        ["var", "set", text, "1", "--type", "long"],
+        ["var", "set", "g_text$", text, "--type", "string"],
+        ["var", "set", "g_text$", "1", "--type", text],
+        ["tool", "set", text, "--x", "1"],
+        ["tool", "set", "1", "--x", text],
+        ["io", "get", text],
+        ["io", "set", text, "on"],
+        ["where", text],
+    ):
+        run(*words)
+    asked = [line for _, direction, line in list(simulator.log)[before:] if line.startswith("$")]
+    known = ("Login", "Logout", "Execute", "Get")
+    sent = "\n".join(asked)
+    if text != "a b":  # a text that may be stored as it is
+        assert text not in sent
+        assert "SetVariable" not in sent
+    assert "Motor On" not in sent
+    assert "Go P1" not in sent
+    assert all(line[1:].startswith((*known, "SetVariable,g_text$")) for line in asked), sent
+
+
+# ---- a file system
+
+NAMES = st.text(max_size=300) | st.sampled_from(
+    ("../../etc/passwd", "..", ".", "", "/", "a/b", "a\\b", "CON", "nul.txt", "~", "a\0b", "-rf")
+)
+
+
+@settings(max_examples=30, deadline=None, derandomize=True)
+@given(NAMES)
+def test_no_identity_leads_out_of_its_folder(identity):
+    require_in_its_folder(identity)
+
+
+@pytest.mark.soak
+@settings(max_examples=2000, deadline=None)
+@given(NAMES)
+def test_no_identity_of_many_leads_out_of_its_folder(identity):
+    require_in_its_folder(identity)
+
+
+def require_in_its_folder(identity):
+    try:
+        name = file_name(identity)
+    except UnicodeEncodeError:
+        return  # half a character, which no URL has
+    path = Path("/state/backups") / name
+    assert os.path.normpath(path) == str(path)
+    assert path.parent == Path("/state/backups")
+    assert len(name) < 100
+    assert name.isascii()
+    assert not name.startswith(("-", "."))
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links and modes of POSIX")
+def test_what_is_written_never_goes_through_a_link(tmp_path):
+    victim, link, dangling = tmp_path / "victim", tmp_path / "link", tmp_path / "dangling"
+    victim.write_text("mine")
+    link.symlink_to(victim)
+    dangling.symlink_to(tmp_path / "nowhere")
+    for path in (link, dangling):
+        with pytest.raises(ConfigError):
+            save_named(path, b"theirs")
+        with pytest.raises(FileExistsError):
+            write_whole(path, b"theirs", replace=False)
+    save_named(link, b"theirs", replace=True)
+    save_named(dangling, b"theirs", replace=True)
+    assert victim.read_text() == "mine"
+    assert not (tmp_path / "nowhere").exists()
+    assert not link.is_symlink()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links and modes of POSIX")
+@pytest.mark.parametrize("words", [["plc", "export"], ["spel", "export"]])
+def test_an_export_does_not_go_through_links_that_wait_in_its_folder(tmp_path, words, capsys):
+    victim, folder = tmp_path / "victim", tmp_path / "out"
+    assert main.run([*words, str(folder)]) == 0
+    names = sorted(path.name for path in folder.iterdir())
+    victim.write_text("mine")
+    for name in names:
+        (folder / name).unlink()
+        (folder / name).symlink_to(victim)
+    assert main.run([*words, str(folder)]) == 2
+    assert main.run([*words, str(folder), "--force"]) == 0
+    assert victim.read_text() == "mine"
+    assert not any((folder / name).is_symlink() for name in names)
+    capsys.readouterr()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links and modes of POSIX")
+def test_nobody_else_can_read_what_is_kept_even_without_a_umask(state_folder, tmp_path, capsys):
+    simulator = EpsonSimulator(seed=4, state_path=tmp_path / "flash.json")
+    before = os.umask(0)
+    try:
+        with serve_tcp(simulator) as host:
+            for words in (["tool", "set", "1", "--x", "12.5"], ["tool", "list"], ["stop"]):
+                assert main.run(["-c", host.url, *words]) == 0
+    finally:
+        os.umask(before)
+    capsys.readouterr()
+    kept = [state_folder, *state_folder.rglob("*")]
+    assert {path.name for path in kept} >= {"journal.db", "backups"}
+    open_to_others = [path for path in kept if stat.S_IMODE(path.stat().st_mode) & 0o077]
+    # What lies in a folder that is its owner's alone is out of reach of others.
+    assert not [path for path in open_to_others if path.is_dir() or path.suffix == ".db"]
+
+
+# ---- a terminal
+
+EVIL = "ok\x1b[2J\x1b]0;x\x07\x9b31m"
+
+
+@pytest.mark.parametrize(
+    ("words", "content"),
+    [
+        (["recalibrate", "{file}", "--yes"], f'name = "{EVIL}"\n'),
+        (["recalibrate", "{file}", "--yes"], '"ok\\u001b[2J" = 1\n'),
+        (["restore", "{file}", "--yes"], '{"schema": "ok\\u001b[2J"}'),
+        (["solve", "{file}"], '{"method": "ok\\u001b[2J"}'),
+        (["plc", "check-map", "{file}"], '"ok\\u001b[2J" = 1\n'),
+        (["plc", "check-map", "--from-csv", "{file}"], f"name,address\nTool1_X{EVIL},1\n"),
+    ],
+)
+def test_no_word_of_a_file_or_of_its_name_is_obeyed(run, tmp_path, words, content):
+    file = tmp_path / f"{EVIL.replace('/', '')}.x"
+    file.write_text(content)
+    _, out, err = run(*(word.replace("{file}", str(file)) for word in words))
+    assert "\\x1b[2J" in out + err
+    for obeyed in "\x1b\x07\x9b":
+        assert obeyed not in out + err
+
+
+def test_no_word_of_a_journal_is_obeyed(run, simulator, state_folder):
+    log = open_journal().log(simulator.url, signature=Signature(operator=EVIL, nozzle=EVIL))
+    log.append(NewEntry(EntryKind.DECISION, verdict=EVIL, tool=1, change="abcd" * 8))
+    for words in (["journal", "list"], ["journal", "show", "1"], ["journal", "drift", "1"]):
+        _, out, err = run(*words)
+        for obeyed in "\x1b\x07\x9b":
+            assert obeyed not in out + err
+
+
+def test_an_error_names_a_controller_that_has_a_hostile_name_in_escapes():
+    error = RobolinkError("no answer", controller=EVIL)
+    assert "\x1b" not in str(error)

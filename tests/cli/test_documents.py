@@ -13,7 +13,7 @@ import pytest
 from robolink_cli import main
 
 from tests._documents import DOCUMENTS, FILE, PUBLISHED, key_of, wrong_in
-from tests.cli.test_names_of_before import OF_ITS_OWN, command_at
+from tests.cli.test_command_names import OF_ITS_OWN, command_at
 from tests.cli.test_refusals_of_every_command import leaves
 
 ROOT = Path(__file__).parents[2]

@@ -1,16 +1,22 @@
-"""Every help page fits into 80 columns, in whole sentences, in each language alike."""
+"""Options as they are declared, and every help page in 80 columns and in each language."""
 
 import re
+from pathlib import Path
+from typing import Annotated, Literal, NamedTuple
 
 import click
 import pytest
+from click.testing import CliRunner
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from robolink_cli import main
 from robolink_cli.console.help_pages import WideHelpFormatter
 from robolink_cli.console.tables import columns
+from robolink_cli.options.declaration import CliArgument, CliOption, add_declared, declared_options
 
 from robolink import messages
+
+# Every help page fits into 80 columns, in whole sentences, in each language alike.
 
 COPIED = ["fish", "powershell"]
 """Lines of ``completion`` that begin so are copied as they stand, and are not broken."""
@@ -74,3 +80,108 @@ def test_a_page_without_wide_characters_is_click_s_own(width, indent, rows):
             formatter.write_usage("p", said, prefix=name[:9])
         written.append(formatter.getvalue())
     assert written[0] == written[1]
+
+
+# The options of a command, declared in the signature of its function.
+
+
+class Offset(NamedTuple):
+    x_mm: Annotated[float | None, CliOption(help="Sideways.")] = None
+    u_deg: Annotated[float, click.FloatRange(0, 360), CliOption("--turn")] = 90.0
+
+
+def shared(command):
+    return click.option("--json", is_flag=True, expose_value=False)(command)
+
+
+def command_of(function):
+    return click.command()(add_declared(function, shared))
+
+
+def called(function, *line):
+    ended = CliRunner().invoke(command_of(function), line, standalone_mode=False)
+    assert ended.exception is None
+    return ended.return_value
+
+
+def refused(function, *line):
+    return CliRunner().invoke(command_of(function), line).output
+
+
+def lift(
+    *,
+    tool: Annotated[int, CliArgument()],
+    files: Annotated[tuple[Path, ...], CliOption("--file")] = (),
+    height_mm: Annotated[float, CliOption(help="How high.")] = 5.0,
+    mode: Annotated[Literal["set", "active"] | None, CliOption()] = None,
+    offset: Offset,
+    yes: Annotated[bool, CliOption(late=True)] = False,
+    _plain: Annotated[bool, CliOption("--plain", late=True, expose_value=False)] = False,
+):
+    return tool, files, height_mm, mode, offset, yes, _plain
+
+
+def test_what_is_left_out_is_what_the_signature_says():
+    assert called(lift, "3") == (3, (), 5.0, None, Offset(None, 90.0), False, False)
+
+
+def test_what_is_typed_arrives_in_the_types_of_the_signature():
+    line = [
+        "3",
+        "--file",
+        "a",
+        "--file",
+        "b",
+        "--height",
+        "2.5",
+        "--mode",
+        "active",
+        "--x",
+        "-1",
+        "--turn",
+        "7",
+        "--yes",
+        "--plain",
+    ]
+    offset = Offset(-1.0, 7.0)
+    assert called(lift, *line) == (3, (Path("a"), Path("b")), 2.5, "active", offset, True, False)
+
+
+def test_a_value_that_is_none_of_its_type_is_refused():
+    assert "'1_0' is not a decimal number" in refused(lift, "3", "--height", "1_0")
+    assert "'last' is not one of 'set', 'active'" in refused(lift, "3", "--mode", "last")
+    assert "361.0 is not in the range 0<=x<=360" in refused(lift, "3", "--turn", "361")
+    assert "Missing argument 'TOOL'" in refused(lift)
+
+
+def test_an_option_without_a_default_must_be_given():
+    def needs(
+        *,
+        url: Annotated[str, CliOption()],
+        seeds: Annotated[tuple[int, ...], CliArgument()] = (),
+    ):
+        return url, seeds
+
+    assert called(needs, "--url", "a", "1", "2") == ("a", (1, 2))
+    assert "Missing option '--url'" in refused(needs)
+
+
+def test_the_page_shows_units_and_defaults_in_the_order_of_the_signature():
+    page = refused(lift, "--help")
+    assert "--height MM  " in page
+    assert "How high.  [default: 5.0]" in page
+    assert "--file FILE" in page
+    names = ["--file", "--height", "--mode", "--x MM", "--turn DEG", "--json", "--yes", "--plain"]
+    places = [page.index(f"  {name}") for name in names]
+    assert places == sorted(places)
+
+
+def test_another_command_can_take_all_that_a_function_declares():
+    @click.command()
+    @declared_options(lift)
+    def beside(**given):
+        return given
+
+    given = CliRunner().invoke(beside, ["3"], standalone_mode=False).return_value
+    names = {"tool", "files", "height_mm", "mode", "x_mm", "u_deg", "yes"}
+    assert given.keys() == names

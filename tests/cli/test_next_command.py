@@ -1,9 +1,12 @@
-"""A "Next" line never names the command that was refused just now."""
+""" "Next" lines and notes: never what was refused just now, right when followed to the letter."""
 
 import inspect
 import json
 import re
+import shlex
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from robolink_cli import main
@@ -12,11 +15,23 @@ from robolink_cli.console.exit_codes import next_of
 from robolink_cli.console.language import speaking_for
 from robolink_cli.wizard.screens.end import stopped_lines
 from robolink_cli.wizard.state import WizardState
+from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.hosting.in_process import epson, softmotion
+from robolink_simulators.hosting.in_process.epson import register, unregister
+from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
+import robolink
 from robolink import errors
+from robolink.controllers import EpsonController
+from robolink.errors import ControllerFaultError
+from robolink.journal import open_journal
 from robolink.messages import tr
+from robolink.model import MarkerKind
 from robolink.standing import UNTOUCHED
+from robolink.stopping import far_end_of, find_note, leave_note
 from tests.cli.wizard._people import HEADER
+
+# A "Next" line never names the command that was refused just now.
 
 URL = "epson+sim://next-command?seed=1"
 
@@ -124,3 +139,132 @@ def test_the_last_screen_of_a_refused_recover_names_what_comes_before_it():
     assert not [line for line in refused if line.startswith("Next:")]
     left = stopped_lines(state, errors.DeclinedError("No."))
     assert left[-1] == "Next: robolink -c line3 recover"
+
+
+# After an emergency stop or an error: the printed "Next" lines, followed to the letter.
+
+STOPS: dict[str, dict[str, Callable[[Any], object]]] = {
+    "epson": {
+        "emergency stop": lambda panel: panel.press_estop(),
+        "guard": lambda panel: panel.open_guard(),
+        "error": lambda panel: panel.raise_error(4001),
+    },
+    "plc": {
+        "emergency stop": lambda panel: panel.press_estop(),
+        "drive": lambda panel: panel.fail_axis(),
+        "permit": lambda panel: panel.withdraw_permit(),
+    },
+}
+CAUSE_GONE: dict[str, Callable[[Any], object]] = {
+    "epson": lambda panel: (panel.release_estop(), panel.close_guard()),
+    "plc": lambda panel: (panel.release_estop(), panel.give_permit()),
+}
+SIMULATORS: dict[str, Callable[[], Any]] = {
+    "epson": lambda: EpsonSimulator(seed=4, serial="SIM00001"),
+    "plc": lambda: SoftMotionSimulator(seed=4),
+}
+PLACES: dict[str, Any] = {"epson": epson, "plc": softmotion}
+CASES = [(kind, stop) for kind, stops in STOPS.items() for stop in stops]
+
+
+@pytest.fixture(params=CASES, ids=" ".join)
+def stopped(request, tmp_path, state_folder):
+    """A controller that stopped in a procedure with another tool selected; yields what is run."""
+    kind, stop = request.param
+    name = f"way-back-{kind}-{stop}".replace(" ", "-")
+    simulator: Any = SIMULATORS[kind]()
+    place = PLACES[kind]
+    place.register(name, simulator)
+    url = simulator.url
+    try:
+        with robolink.connect(url) as controller:
+            controller.motors(True)
+            controller.tools.select(1)
+        with (
+            pytest.raises(ControllerFaultError),
+            robolink.connect(url) as controller,
+            controller.preserved("calibrate tool 1"),
+        ):
+            controller.tools.select(0)
+            controller.begin(MarkerKind.MOVE, "a movement", {"target": [1, 2, 3, 4]})
+            STOPS[kind][stop](simulator.panel)
+            raise ControllerFaultError("The movement was ended by the controller.")
+        yield url, lambda: CAUSE_GONE[kind](simulator.panel)
+    finally:
+        place.unregister(name)
+
+
+def next_line_of(said):
+    """Return the commands of the last "Next" lines, in their order, as they would be typed."""
+    found = re.findall(r": (robolink -c .*)", said)
+    return [shlex.split(part)[1:] for part in found[-1].split(", then ")] if found else []
+
+
+def test_following_next_ends_settled(stopped, capsys):
+    url, cause_gone = stopped
+    cause_gone()
+    assert main.run(["-c", url, "status"]) == 0
+    ways, typed = next_line_of(capsys.readouterr().err), []
+    while ways:
+        words = ways.pop(0)
+        assert words not in typed, "a cycle, or a command that was just refused"
+        typed.append(words)
+        code = main.run([*words, "--yes"])
+        shown = capsys.readouterr()
+        assert code == 0, (words, shown.err)
+        ways = next_line_of(shown.out + shown.err) or ways
+        if "recover" in words:
+            assert not ways
+    assert open_journal().open_markers() == ()
+    assert typed
+
+
+# A stop that comes while a command calms the controller: told, and noted until it is released.
+
+NAME = "stopped-meanwhile"
+NOTED_URL = f"epson+sim://{NAME}"
+
+
+@pytest.fixture
+def stopped_in(monkeypatch):
+    """Let somebody at another terminal stop the controller just before a call of it."""
+    simulator = EpsonSimulator(seed=4)
+    register(NAME, simulator)
+
+    def install(name):
+        call = getattr(EpsonController, name)
+
+        def stopped(controller, *given):
+            controller.stop()
+            leave_note(far_end_of(NOTED_URL), NOTED_URL, "mei", confirmed=True)
+            return call(controller, *given)
+
+        monkeypatch.setattr(EpsonController, name, stopped)
+        return simulator
+
+    yield install
+    unregister(NAME)
+
+
+def test_a_reset_does_not_release_the_stop_that_came_in_the_middle_of_it(stopped_in, capsys):
+    simulator = stopped_in("reset_fault")
+    assert main.run(["-c", NOTED_URL, "reset", "--yes"]) == 10
+    assert "$Reset" not in [text for _, _, text in simulator.log]  # it was asked for before
+    assert "stop" in capsys.readouterr().err
+    assert find_note(far_end_of(NOTED_URL)) is not None
+    assert main.run(["-c", NOTED_URL, "jog", "z+1", "--yes"]) == 10
+
+
+def test_motors_that_are_switched_off_under_a_stop_are_off_and_the_stop_is_told(stopped_in):
+    simulator = stopped_in("motors")
+    simulator.machine.switch_motors(True)
+    assert main.run(["-c", NOTED_URL, "motors", "off"]) == 10
+    assert not simulator.machine.motors_on
+    assert find_note(far_end_of(NOTED_URL)) is not None
+
+
+def test_a_reset_after_the_stop_releases_it(stopped_in):
+    stopped_in("motors")
+    assert main.run(["-c", NOTED_URL, "motors", "off"]) == 10
+    assert main.run(["-c", NOTED_URL, "reset", "--yes"]) == 0
+    assert find_note(far_end_of(NOTED_URL)) is None

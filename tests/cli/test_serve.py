@@ -1,7 +1,8 @@
-"""expert serve: as a process that is killed, and who may call."""
+"""expert serve and orders: who may call, what is killed, and what is delivered again."""
 
 import json
 import os
+import signal
 import socket
 import subprocess
 import sys
@@ -10,18 +11,27 @@ from contextlib import ExitStack
 
 import pytest
 from click.testing import CliRunner
+from robolink_cli import main
 from robolink_cli.commands.simulate import service
 from robolink_cli.main import cli
+from robolink_simulators.cell.clock import ManualClock
+from robolink_simulators.hosting.in_process.softmotion import register, unregister
+from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
+from robolink_simulators.softmotion.mailbox.options import MailboxOptions
 
 from robolink import ambient
 from robolink.errors import ConfigError, JournalError
 from robolink.journal import memory_journal, open_journal
-from robolink.model import EntryKind, new_operation
+from robolink.model import EntryKind, ToolOffset, new_operation
 from robolink.protocols.spel_callback import CallbackLine, CallbackWord, encode_line
 from robolink.serving import CallbackConversation, CallbackLimits, CallbackServer
 from robolink.serving._server import MOST_PROGRAMS
 from tests._documents import wrong_in
+from tests.contract._permit_machine import PermitMachine
 from tests.faults._callback_cell import Bend, CallbackCell
+
+# expert serve: as a process that is killed, and who may call.
 
 SERVED = ("--spel", "127.0.0.1:0", "--sigma-mm", "0.01", "--json")
 
@@ -312,3 +322,140 @@ def test_whoever_watches_reads_why_a_program_was_refused_and_what_to_do(monkeypa
             "remedy": "Move the file away.",
             "peer": "10.0.0.7",
         }
+
+
+# expert serve --plc: the program of a PLC calls, and the machine goes on with a proved tool.
+
+SERVED_PLC = ("serve", "--plc", "n-angle", "--tool", "1", "--sigma-mm", "0.01", "--json")
+
+
+class MachineClock(ManualClock):
+    """Time in which the machine goes on whenever somebody waits; it produces before each call."""
+
+    parts = 12
+
+    def __init__(self, simulator):
+        super().__init__()
+        self.machine = PermitMachine(simulator)
+        self.calls: list[str] = []
+        self.produced = 0
+
+    def sleep(self, seconds):
+        super().sleep(seconds)
+        self.produced += 1
+        if self.produced < self.parts:
+            return
+        self.machine.look()
+        if self.machine.state in ("produces", "gave up"):
+            self.calls.append(self.machine.state)
+            self.machine.bump_mm = 0.0
+            self.machine.begin()
+            self.produced = 0
+            if len(self.calls) == 2:
+                os.kill(os.getpid(), signal.SIGTERM)
+
+
+def test_calls_are_answered_one_after_the_other_until_somebody_ends_it(capsys):
+    options = PlcOptions(mailbox=MailboxOptions(profile="tools"))
+    simulator = SoftMotionSimulator(seed=7, options=options)
+    clock = MachineClock(simulator)
+    url = register("serve-plc", simulator, clock=clock)
+    clock.machine.bump_mm = 0.15
+    try:
+        assert main.run(["-c", url, *SERVED_PLC, "--permit-is-contact"]) == 0
+    finally:
+        unregister("serve-plc")
+    told = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    assert [one["event"] for one in told] == ["listening", "refused", "kept"]
+    assert clock.calls == ["produces"] * 2
+    assert told[1]["code"] == "point_moved"
+    assert told[2]["tool"] == 1
+    assert clock.machine.error_mm < 0.02
+    assert not clock.machine.panel.tool_changed
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("serve",),
+        ("serve", "--plc", "n-angle", "--spel", "127.0.0.1:0"),
+        SERVED_PLC,
+        ("serve", "--plc", "n-angle", "--permit-is-contact"),
+        (*SERVED_PLC, "--permit-is-contact", "--touches", "3"),
+    ],
+    ids=["neither", "both", "no-witness", "no-tool", "few-touches"],
+)
+def test_what_would_prove_nothing_is_refused_before_the_plc_is_asked(words):
+    assert main.run(["-c", "softmotion+modbus-tcp://127.0.0.1:1", *words]) == 2
+
+
+def test_a_controller_without_a_mailbox_is_refused():
+    words = [*SERVED_PLC, "--permit-is-contact"]
+    assert main.run(["-c", "epson+sim://no-mailbox", *words]) == 2
+
+
+# --order: what is delivered again, and what is refused then.
+
+SET = ("tool", "set", "1", "--x", "12.5", "--order", "A-17", "--yes")
+NEW = ToolOffset(12.5, -3.5, -20.0)
+
+
+@pytest.mark.fault("F79")
+def test_f79_an_order_delivered_again_reports_the_first_result_and_writes_nothing(run, simulator):
+    code, out, err = run(*SET, "--json")
+    assert code == 0, err
+    first = json.loads(out)
+    assert (first["order"], first["already_done"]) == ("A-17", False)
+    written, entries = simulator.machine.flash_writes, open_journal().count()
+    code, out, _ = run(*SET, "--json")
+    assert (code, json.loads(out)) == (0, {**first, "already_done": True})
+    assert first["read_back"]["x_mm"] == 12.5
+    assert "nothing was moved or written now" in run(*SET)[1]
+    assert (simulator.machine.flash_writes, open_journal().count()) == (written, entries)
+
+
+@pytest.mark.fault("F79")
+@pytest.mark.parametrize(
+    ("between", "code", "said"),
+    [
+        (("undo", "--yes"), 2, "What order A-17 did was taken back"),
+        (("tool", "set", "1", "--x", "13", "--yes"), 5, "it holds X 13.000"),
+    ],
+)
+def test_f79_an_order_that_does_not_stand_any_more_is_refused_by_name(
+    run, simulator, between, code, said
+):
+    assert run(*SET)[0] == 0
+    assert run(*between)[0] == 0
+    held, written = simulator.machine.tools.get(1), simulator.machine.flash_writes
+    refused, _, err = run(*SET)
+    assert refused == code
+    assert said in " ".join(err.split())
+    assert "Give a new order" in " ".join(err.split())
+    assert (simulator.machine.tools.get(1), simulator.machine.flash_writes) == (held, written)
+    assert run("tool", "set", "1", "--x", "12.5", "--order", "A-18", "--yes")[0] == 0
+    assert simulator.machine.tools.get(1) == NEW
+
+
+@pytest.mark.fault("F79")
+def test_f79_one_order_for_two_jobs_is_refused(run, simulator):
+    assert run(*SET)[0] == 0
+    code, _, err = run("tool", "set", "1", "--x", "12.6", "--order", "A-17", "--yes")
+    assert (code, "for another job" in err) == (2, True)
+    assert simulator.machine.tools.get(1) == NEW
+
+
+@pytest.mark.fault("F79")
+@pytest.mark.parametrize("order", ["", "x" * 65, "Zw\xf6lf", "a\nb"])
+def test_f79_an_order_is_some_printable_characters(run, simulator, order):
+    code, _, err = run("tool", "set", "1", "--x", "12.5", "--order", order, "--yes")
+    assert (code, "not the id of an order" in err) == (2, True)
+    assert simulator.machine.flash_writes == 0
+
+
+@pytest.mark.fault("F79")
+def test_f79_a_dry_run_carries_out_no_order(run, simulator):
+    for words in ((*SET[:-1],), ("calibrate", "two-pose", "--tool", "1", "--order", "A-17")):
+        code, _, err = run(*words, "--dry-run")
+        assert (code, "A dry run carries out no order" in err) == (2, True)
+    assert not list(open_journal().entries(kinds=(EntryKind.ORDER,)))

@@ -7,7 +7,10 @@ from pathlib import Path
 import pytest
 from robolink_cli import main
 from robolink_cli.commands.shipped.docs import page_lines
+from robolink_cli.commands.shipped.recipe import PURPOSES, first_comment, models
 from robolink_cli.console.tables import columns
+
+from tests.contract._terminal import Terminal
 
 ROOT = Path(__file__).parents[2]
 RECIPES = sorted(path.stem for path in (ROOT / "examples" / "recipes").glob("*.toml"))
@@ -114,3 +117,35 @@ def test_a_copy_writes_over_nothing(run, tmp_path):
     assert "schema" in out
     assert run("recipe", "new", "scara-pin", "own.toml", "--force")[0] == 0
     assert json.loads(run("recipe", "check", "own.toml", "--json")[1])["ok"]
+
+
+# recipe list: what each recipe is for, in the language of the person, no word cut.
+
+
+def test_each_recipe_says_what_its_file_says():
+    assert {name: first_comment(path) for name, path in models().items()} == PURPOSES
+
+
+def test_a_person_reads_it_in_their_language_and_a_program_in_english(capsys):
+    assert main.run(["--lang", "zh", "recipe", "list"]) == 0
+    assert "水平多关节机器人、基准销和一个人。" in capsys.readouterr().out
+    assert main.run(["--lang", "zh", "--json", "recipe", "list"]) == 0
+    entries = json.loads(capsys.readouterr().out)["recipes"]
+    assert {one["name"]: one["purpose"] for one in entries} == PURPOSES
+
+
+def test_on_a_narrow_terminal_no_word_is_cut():
+    import fcntl
+    import struct
+    import termios
+
+    terminal = Terminal("recipe", "list")
+    try:
+        fcntl.ioctl(terminal.descriptor, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 60, 0, 0))
+        assert terminal.end() == 0
+    finally:
+        terminal.close()
+    lines = terminal.shown.splitlines()
+    assert max(map(len, lines)) <= 60
+    words = {word for text in PURPOSES.values() for word in text.split()}
+    assert words <= set(" ".join(lines).split())

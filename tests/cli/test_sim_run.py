@@ -1,4 +1,4 @@
-"""sim run: what its file may say, what is refused, and that all kinds are served at once."""
+"""sim run and demo: what is refused, and that all kinds are served at once."""
 
 import json
 import os
@@ -12,6 +12,8 @@ from pathlib import Path
 import pytest
 from robolink_cli import main
 from robolink_cli.commands.simulate.cells_file import KINDS, DeclaredKeys, read_cells
+from robolink_cli.commands.simulate.demo import AcceptedChange, DemoOperator, require_refused
+from robolink_cli.commands.simulate.demo import _on_plc as on_plc
 from robolink_cli.commands.simulate.sim import sim
 from robolink_cli.commands.simulate.sim_run import SCHEMA, _tell_end, made
 from robolink_simulators.control.client import ControlClient
@@ -22,6 +24,8 @@ from robolink.controllers import PlcMapController
 from robolink.errors import ConfigError
 from robolink.testing import confirm_whole_map
 from tests._documents import wrong_in
+
+# sim run: what its file may say, what is refused, and that all kinds are served at once.
 
 MAP = Path(__file__).parents[2] / "examples/plc-maps/commit-bit.toml"
 HEAD = 'schema = "robolink/sim-cells/1"\n'
@@ -350,3 +354,42 @@ def test_a_cell_of_a_file_is_made_when_it_is_first_used(file):
         with robolink.connect(str(document["url"])) as controller:
             controller.status()
         assert vars(simulator)["machine"].model.name == document["robot"]
+
+
+# ``robolink demo --operator``: a careful person gets a new tool, a careless one a refusal.
+
+STORED = {"x_mm": 12.0, "y_mm": -3.5, "z_mm": -20.0}
+
+
+def test_a_careful_person_is_believed_and_a_believed_one_is_no_refusal():
+    change = on_plc(2, DemoOperator.CAREFUL)
+    assert isinstance(change, AcceptedChange)
+    assert change.error_mm < 0.05
+    with pytest.raises(RuntimeError, match="was believed, on Kin_Scara3_Z"):
+        require_refused([change])
+
+
+@pytest.mark.soak
+def test_who_stands_there_is_said_in_the_document(capsys):
+    assert main.run(["demo", "--json", "--speed", "100", "--operator", "careful"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["operator"] == "careful"
+    assert [one["refused"] for one in document["controllers"]] == [None, None]
+
+
+@pytest.mark.parametrize("seed", [1, pytest.param(3, marks=pytest.mark.soak)])
+def test_a_careless_person_is_refused_and_the_old_tool_stays_in_force(capsys, seed):
+    words = ("demo", "--speed", "100", "--operator", "careless", "--seed", str(seed))
+    assert main.run([*words, "--json"]) == 0
+    shown = capsys.readouterr()
+    document = json.loads(shown.out)
+    assert document["operator"] == "careless"
+    assert [one["kind"] for one in document["controllers"]] == ["epson", "softmotion"]
+    for one in document["controllers"]:
+        assert one["refused"]["code"] == "not_touched"
+        assert "recovered" not in one
+        assert {name: one["in_force"][name] for name in STORED} == pytest.approx(STORED)
+        assert abs(one["truth"]["x_mm"] - STORED["x_mm"]) > 0.1
+    assert "only presses Enter" in shown.err
+    assert shown.err.count("Refused: ") == 2
+    assert shown.err.count("still holds X 12.000 Y -3.500 Z -20.000") == 2

@@ -529,7 +529,7 @@ def test_no_method_is_left_untried():
         "orientation_convert",
     }
     here = {"find_beams", "joint", "board_fit", "uncertainty_budget"}
-    # tests/calibration/test_touch_evidence.py and test_evidence_vectors.py
+    # tests/calibration/test_touch_evidence.py and test_vectors.py
     touching = {"touch_evidence", "verify_evidence"}
     lasting = {"length_change", "station_shift", "needle_chain", "station_chain"}
     assert set(METHODS) == set(MORE) | shared | here | touching | lasting

@@ -28,8 +28,8 @@ from robolink_simulators.hosting.in_process.epson import register, unregister
 from robolink_simulators.hosting.streams.epson import serve_tcp
 
 from tests.contract.test_pages_typed import without_typed_parts
-from tests.unit.test_epson_point_files import block as point
-from tests.unit.test_epson_point_files import pts
+from tests.unit.test_spel_points import block as point
+from tests.unit.test_spel_points import pts
 
 pytestmark = pytest.mark.simulator_only
 
@@ -80,7 +80,7 @@ NOT_RUN = {
     ),
     "fault-plans.md 1": Elsewhere(
         "it serves until Ctrl-C",
-        "tests/cli/test_sim_faults_option.py",
+        "tests/cli/test_sim_options.py",
         ('"sim", "epson", "--tcp"', '"--faults"', '"TLSet 2, XY"'),
     ),
     "journal.md 1": Elsewhere(

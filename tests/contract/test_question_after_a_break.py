@@ -20,7 +20,7 @@ from robolink.transaction import recover
 from tests.certificate.live import BEAM_NOISE, row_of, wrong_by
 from tests.contract._sensor_cell import TOOL, sensor_cell
 from tests.contract.test_proof_after_a_break import Later
-from tests.packaging.test_documented_commands import problem
+from tests.packaging.test_documented_examples import problem
 
 pytestmark = [pytest.mark.simulator_only, pytest.mark.timeout(60)]
 

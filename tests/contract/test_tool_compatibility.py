@@ -17,7 +17,7 @@ from robolink.controllers.softmotion.kinematics import (
 )
 from robolink.errors import ConfigError, RejectedError
 from robolink.protocols.mailbox import ErrorClass, Kinematics, find_kinematics
-from tests.unit import test_custom_kinematics as own
+from tests.unit import test_sim_kinematics as own
 
 BESIDE = ToolOffset(12.0, -3.5, -20.0)
 ALONG = ToolOffset(0.0, 0.0, -21.5, 30.0)

@@ -1,7 +1,8 @@
-"""What stands out in the course of a cell's tools, and what does not."""
+"""What stands out in the course of a cell's tools, how soon, and how rarely for nothing."""
 
 from collections import Counter
 from dataclasses import replace
+from statistics import median
 
 import pytest
 
@@ -11,7 +12,9 @@ from robolink.drift.findings import mounted_trend
 from robolink.drift.history import LEVEL, slope_of
 from robolink.errors import ConfigError
 from robolink.model import EntryKind, Recorded, Signature, ToolOffset, plain_offset
-from tests.drift._courses import course, found
+from tests.drift._courses import course, found, steady
+
+# What stands out in the course of a cell's tools, and what does not.
 
 SEEDS = range(8)
 
@@ -233,3 +236,57 @@ def test_a_slope_is_told_from_the_level_on_that_was_chosen_on_both_sides():
         ]
         trend = mounted_trend(changes)
         assert (trend and set(trend.moved_mm)) == told
+
+
+# How often a steady cell is suspected, and how soon a change is seen; for docs/accuracy.md.
+
+RUNS, BEFORE, UNTIL = 300, 25, 55
+
+
+def first_seen(name, **kwargs):
+    """Return in how many courses a code came up, and after how many changes at the median."""
+    tools = kwargs.get("tools", 1)
+    seen, delays = Counter[str](), dict[str, list[int]]()
+    for run in range(RUNS):
+        changes, codes = course(f"{name}{run}", UNTIL, **kwargs), dict[str, int]()
+        for count in range(BEFORE + 1, UNTIL + 1):
+            for code in found(changes[: count * tools]):
+                codes.setdefault(code, count - BEFORE)
+        seen.update(codes.keys())
+        for code, delay in codes.items():
+            delays.setdefault(code, []).append(delay)
+    shown = {code: (seen[code] / RUNS, median(delays[code])) for code in seen}
+    print(f"\n{name}: share of courses, median delay in changes: {shown}")  # noqa: T201
+    return shown
+
+
+def moved(mm):
+    return lambda index, tool: (mm * (index >= BEFORE and tool == 1), 0.0, 0.0)
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(1200)
+@pytest.mark.parametrize("each_nozzle", [1, 5])
+def test_false_alarms_of_a_steady_cell(each_nozzle):
+    shown = first_seen(f"steady, {each_nozzle} measurements a nozzle", each_nozzle=each_nozzle)
+    assert shown.get("unusual_change", (0,))[0] < 0.15
+    for code in shown.keys() - {"unusual_change"}:
+        assert shown[code][0] < 0.08, code
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(1200)
+@pytest.mark.parametrize("sigmas", [1, 2, 3, 5])
+def test_a_mount_that_slips(sigmas):
+    shown = first_seen(f"mount slips by {sigmas} sigma", shift=moved(sigmas * 0.0206))
+    if sigmas >= 3:
+        assert shown["mount_shifted"][0] > 0.9
+
+
+@pytest.mark.soak
+@pytest.mark.timeout(1200)
+@pytest.mark.parametrize("sigmas", [3, 5])
+def test_a_pin_that_moves(sigmas):
+    pin = lambda index: sigmas * 0.005 * (index >= BEFORE)  # noqa: E731
+    shown = first_seen(f"pin moves by {sigmas} sigma", pin=pin, shift=steady)
+    assert shown["pin_moved"][0] > 0.9

@@ -27,7 +27,7 @@ from robolink.standing import Effect
 from robolink.transport import parse_url
 from tests.fuzz._mutating import edited_bytes, fuzzed
 from tests.unit.conftest import Client
-from tests.unit.test_spel_statements_page import before, rows
+from tests.unit.test_spel_statements import before, rows
 
 REQUESTS = (
     b"$Login,secret\r\n",

@@ -1,13 +1,21 @@
-"""The house: rooms that can be taken in at a look, and one thing under one name."""
+"""The house: rooms and names that a newcomer can take in, ways that do not grow unnoticed."""
 
 import ast
+import importlib
 import re
 from collections import defaultdict
 from pathlib import Path
 
 import pytest
 
-from tools import house
+from tests.packaging._way_to_the_wire import (
+    follow_a_tool_write,
+    follow_into_the_simulator,
+    follow_typed_poses,
+)
+from tools import api, house
+
+# The house: rooms that can be taken in at a look, and one thing under one name.
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("robolink", "cli/robolink_cli", "simulators/robolink_simulators")
@@ -115,3 +123,154 @@ class Thing:
 '''
     one = house.count_module(module)
     assert (one.code, sorted(one.lengths)) == (9, [1, 10])
+
+
+# What is public: one place to import each name from, shown by ``dir`` and on docs/api.md.
+
+PLAIN = (int, float, str, bool)
+"""Two constants with one value are not one thing."""
+
+
+@pytest.fixture(scope="module")
+def public():
+    return api.public()
+
+
+def test_each_name_is_listed_once_in_order_and_shown(public):
+    assert len(public) > 40
+    for package, names in public.items():
+        assert [*names] == sorted(set(names)), package
+        assert {*names} <= {*dir(importlib.import_module(package))}, package
+
+
+def test_each_name_has_one_place_to_import_it_from(public):
+    places = defaultdict(list)
+    for package, names in public.items():
+        for name, thing in names.items():
+            if package != "robolink" and not isinstance(thing, PLAIN):
+                places[name, id(thing)].append(package)
+    assert {name: found for (name, _), found in places.items() if len(found) > 1} == {}
+
+
+def test_what_the_front_door_offers_comes_from_one_package_beneath(public):
+    for name, thing in public["robolink"].items():
+        found = [package for package, names in public.items() if names.get(name) is thing]
+        assert len(found) == 2, (name, found)
+
+
+def inits():
+    """Yield each package with what its ``__init__`` says."""
+    for top in ("robolink", "simulators/robolink_simulators"):
+        for path in sorted((ROOT / top).rglob("__init__.py")):
+            parts = path.parent.relative_to((ROOT / top).parent).parts
+            yield ".".join(parts), path.read_text(encoding="utf-8")
+
+
+LAZY = {package: source for package, source in inits() if "lazy_exports(" in source}
+
+
+@pytest.mark.parametrize("package", LAZY)
+def test_the_list_for_readers_is_the_list_of_the_program(package):
+    tree = ast.parse(LAZY[package])
+    (block,) = (node for node in tree.body if isinstance(node, ast.If))
+    module = importlib.import_module(package)
+    homes = {
+        alias.name: node.module
+        for node in block.body
+        if isinstance(node, ast.ImportFrom)
+        for alias in node.names
+    }
+    assert sorted(homes) == module.__all__
+    for name, home in homes.items():
+        assert getattr(module, name) is getattr(importlib.import_module(str(home)), name)
+    with pytest.raises(AttributeError, match="no attribute 'nothing_of_the_kind'"):
+        module.nothing_of_the_kind  # noqa: B018 - the look-up is the test
+
+
+def test_no_other_package_hands_out_what_it_does_not_list():
+    """``from x import a as a`` is how the type checker alone is told."""
+    for package, source in inits():
+        if package in LAZY:
+            continue
+        handed = [
+            alias.name
+            for node in ast.walk(ast.parse(source))
+            if isinstance(node, ast.ImportFrom)
+            for alias in node.names
+            if alias.asname == alias.name
+        ]
+        assert handed == [], package
+
+
+def test_the_page_names_what_is_public():
+    assert api.PAGE.read_text(encoding="utf-8") == api.page(), ".venv/bin/python -m tools.api"
+
+
+# The ways of a tool write to the wire, and of poses to the solver, grow no longer unnoticed.
+#
+# docs/decisions/0023-how-short-the-way-of-a-tool-write-is.md says what the figures mean.
+
+MOST_FILES = {"set_tool": 84, "change_tools": 42}
+MOST_CALLS = 13
+MOST_FILES_OPEN = 9
+MOST_FILES_TO_SOLVE = 8
+MOST_FILES_OPEN_FROM_THE_POSES = 5
+MOST_FILES_OPEN_FROM_THE_COMMAND = 9
+
+
+@pytest.fixture
+def way(epson_tcp, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    return follow_a_tool_write(epson_tcp.url)
+
+
+@pytest.fixture(scope="module")
+def told():
+    return house.told(house.PAGE.read_text(encoding="utf-8"))[1]
+
+
+def test_a_tool_write_passes_through_no_more_files_than_are_known(way, told):
+    files = sorted(way.of_the_library("run"))
+    assert len(files) <= told["`tool set` to its bytes"], files
+    opened = {file for file, _ in way.stack[-MOST_CALLS + 1 :]}
+    for name, most in MOST_FILES.items():
+        files = sorted(way.entered[name])
+        assert opened <= set(files)
+        assert len(files) <= most, f"{len(files)} files from {name}() on: {files}"
+
+
+def test_what_is_open_when_the_request_leaves_can_be_read_from_top_to_bottom(way):
+    functions = [function for _, function in way.stack]
+    calls = way.stack[functions.index("set_tool") :]
+    assert len(calls) <= MOST_CALLS, calls
+    assert len({file for file, _ in calls}) <= MOST_FILES_OPEN, calls
+    page = Path(__file__).parents[2] / "docs" / "architecture.md"
+    told = page.read_text(encoding="utf-8")
+    assert [file for file, _ in calls if f"`{file}`" not in told] == []
+
+
+def test_typed_poses_pass_through_no_more_files_than_are_known(epson_tcp, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    way = follow_typed_poses(epson_tcp.url)
+    files, opened = sorted(way.entered["solve"]), {file for file, _ in way.stack}
+    assert "robolink/calibration/pin/two_pose.py" in opened
+    assert len(files) <= MOST_FILES_TO_SOLVE, files
+    assert len(opened) <= MOST_FILES_OPEN_FROM_THE_POSES, way.stack
+    assert len({file for file, _ in way.command}) <= MOST_FILES_OPEN_FROM_THE_COMMAND, way.command
+    page = Path(__file__).parents[2] / "docs" / "architecture.md"
+    told = page.read_text(encoding="utf-8")
+    assert [file for file in sorted({*files, *opened}) if f"`{file}`" not in told] == []
+
+
+def test_a_request_passes_through_no_more_files_of_the_simulator_than_are_known(told):
+    entered = sorted(follow_into_the_simulator().entered["receive"])
+    assert "simulators/robolink_simulators/epson/memory/tools.py" in entered
+    assert len(entered) <= told["a request to the simulator's `TLSet`"], entered
+
+
+@pytest.mark.soak
+def test_a_recipe_passes_through_no_more_files_than_are_known(told, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path))
+    way = "a recipe to its first movement"
+    assert house.walks()[way] <= told[way]

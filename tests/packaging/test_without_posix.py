@@ -1,21 +1,24 @@
-"""A chosen part of the suite in a Python that lacks what Windows lacks.
+"""Where Windows lacks what others have: a chosen part of the suite, and the suite of Windows."""
 
-Source: docs/reference/rules.md 10.
-
-What the library, the simulators and the command line use where it exists is taken away before
-anything of theirs is imported: modules cannot be imported, names are gone. pyserial chooses
-its own half by the operating system, so ``ports`` and ``doctor`` cannot be run this way.
-"""
-
+import ast
 import os
 import re
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parents[2]
+from tests.windows._windows_python import ROOT, TAKEN_ALONG
+
+# A chosen part of the suite in a Python that lacks what Windows lacks.
+#
+# Source: docs/reference/rules.md 10.
+#
+# What the library, the simulators and the command line use where it exists is taken away before
+# anything of theirs is imported: modules cannot be imported, names are gone. pyserial chooses
+# its own half by the operating system, so ``ports`` and ``doctor`` cannot be run this way.
 
 PROGRAM = '''
 import os, select, signal, socket, sys
@@ -50,10 +53,9 @@ for module, names in NAMES.items():
 CHOSEN = (
     "tests/unit/test_recipe_files.py",
     "tests/unit/test_interrupts.py",
-    "tests/unit/test_transport_registry.py",
+    "tests/unit/test_urls.py",
     "tests/unit/test_transport_tcp_failures.py",
     "tests/unit/test_transport_trace.py",
-    "tests/unit/test_url.py",
     "tests/unit/test_config_files.py",
     "tests/contract/test_transport_contract.py",
     "tests/contract/test_epson_login.py",
@@ -125,3 +127,29 @@ def test_transport_safety_record_driver_and_command_line_work_without_posix():
     assert done.returncode == 0, done.stdout[-5000:] + done.stderr
     (passed,) = re.findall(r"(\d+) passed", done.stdout)
     assert int(passed) > 200
+
+
+# The tests that run under Windows' Python have beside them what every test reads.
+
+
+def of_tests(module):
+    """Yield the modules of the tests that a module imports, and those that these import."""
+    tree = ast.parse(Path(module.__file__).read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
+        name = node.module if isinstance(node, ast.ImportFrom) else None
+        if name and name.startswith("tests."):
+            found = import_module(name)
+            yield found
+            yield from of_tests(found)
+
+
+def test_what_the_tests_read_while_they_are_collected_is_taken_along():
+    conftest = import_module("tests.conftest")
+    read = {
+        value.relative_to(ROOT).as_posix()
+        for module in (conftest, *of_tests(conftest))
+        for value in vars(module).values()
+        if isinstance(value, Path) and value.is_file() and ROOT / "tests" not in value.parents
+    }
+    assert "docs/documents.schema.json" in read
+    assert read <= set(TAKEN_ALONG)

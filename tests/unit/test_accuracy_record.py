@@ -1,8 +1,12 @@
-"""What the journal tells of the rows of a cell, and what of it does not count."""
+"""What the record tells of accuracy: the rows of a cell, their bounds, how well a stored Z is
+known.
+"""
 
 import math
+import random
 from dataclasses import replace
 from datetime import timedelta
+from typing import Any
 
 import pytest
 
@@ -10,19 +14,27 @@ from robolink.accuracy import (
     CellRecord,
     LooksAlike,
     MeasuredRow,
+    artefact_test,
     facts_at,
     learnt_rows,
     measured_entry,
     measured_row,
     measured_tips,
+    paired_half_width,
     pooled_look,
     rows_at,
+    scatter_of_repeats,
     turned_pairs,
+    upper_half_width,
 )
-from robolink.calibration import RowFact
-from robolink.errors import JournalError
-from robolink.model import EntryKind, Recorded, Signature
+from robolink.calibration import RowFact, gauge_study
+from robolink.errors import CalibrationError, JournalError
+from robolink.methods.one_touch.solvers import find_stored_z
+from robolink.model import EntryKind, NewEntry, Recorded, Signature, ToolOffset, plain_offset
+from robolink.testing import MemoryController
 from robolink.timing import wall_time
+
+# What the journal tells of the rows of a cell, and what of it does not count.
 
 ALIKE = LooksAlike("PIN-07", "n-angle")
 
@@ -224,3 +236,225 @@ def test_pairs_are_the_last_two_of_each_nozzle():
     tips = measured_tips([seen(1, "A", 9), seen(4, "A", 1), seen(3, "B", 1), seen(6, "A", 2)])
     ((first, last),) = turned_pairs(tips)
     assert (first.number, last.number) == (4, 6)
+
+
+# Rows from records: too large in 95 %, whatever the scatter, and never 0.
+
+RUNS = 400
+
+
+def scatter(values, **options):
+    bound = scatter_of_repeats(values, **{"anew_from": 0.5, **options})
+    assert bound is not None
+    return bound
+
+
+def upper(values):
+    bound_mm = gauge_study(values).reproducibility_upper95_mm
+    assert bound_mm is not None
+    return bound_mm
+
+
+def share(holds):
+    return sum(holds) / len(holds)
+
+
+@pytest.mark.parametrize("count", [5, 20])
+def test_repeated_learning_bounds_its_scatter_in_95_percent(count):
+    rng = random.Random(count)
+    held = []
+    for _ in range(RUNS):
+        places = [(rng.gauss(0, 0.01), rng.gauss(0, 0.01)) for _ in range(count)]
+        bound = scatter(places)
+        held.append(bound.half_width >= 0.01 * math.sqrt(3))
+    assert 0.91 < share(held) < 0.99
+
+
+def test_a_step_on_purpose_is_no_scatter_and_a_bump_is():
+    steady = [(0.001 * (n % 2), 0.0) for n in range(6)]
+    anew = [(5 + 0.001 * (n % 2), 0.0) for n in range(6)]
+    without = scatter(steady)
+    assert scatter(steady + anew).half_width < without.half_width
+    bumped = steady + [(x + 0.3, y) for x, y in steady]
+    assert scatter(bumped).half_width > 0.1
+
+
+def test_four_records_or_four_that_follow_each_other_tell_nothing():
+    assert scatter_of_repeats([(0.0,)] * 4, anew_from=0.5) is None
+    apart = [(float(n),) for n in range(20)]
+    assert scatter_of_repeats(apart, anew_from=0.5) is None
+
+
+def test_what_never_scatters_has_the_last_digit_left():
+    bound = scatter([(1.0, 2.0)] * 9, floor=0.0003)
+    assert bound.half_width > 0.0003
+
+
+@pytest.mark.parametrize("toward_deg", [0, 30, 135])
+def test_the_region_of_an_artefact_test_holds_the_bias_in_any_direction(toward_deg):
+    rng, bias, held = random.Random(toward_deg), 0.05, []
+    dx, dy = (bias * f(math.radians(toward_deg)) for f in (math.cos, math.sin))
+    for _ in range(RUNS):
+        seen = [(12 + dx + rng.gauss(0, 0.02), -4 + dy + rng.gauss(0, 0.02)) for _ in range(5)]
+        half_width = artefact_test(seen, (12, -4)).half_width_mm
+        held.append(2.4477 * half_width / math.sqrt(3) >= bias)
+    assert share(held) > 0.97
+
+
+def test_what_is_not_known_of_the_gauge_tip_is_in_the_row():
+    seen = [(12.0, -4.0)] * 5
+    assert artefact_test(seen, (12.0, -4.0), known_u_mm=0.01).half_width_mm == pytest.approx(
+        0.01 * math.sqrt(3)
+    )
+
+
+@pytest.mark.parametrize("count", [0, 1, 4])
+def test_fewer_than_five_are_refused(count):
+    seen = [(1.0, 2.0)] * count
+    for refused in (
+        lambda: artefact_test(seen, (1.0, 2.0)),
+        lambda: paired_half_width(seen, seen),
+    ):
+        with pytest.raises(CalibrationError) as error:
+            refused()
+        assert error.value.code == "too_few_records"
+
+
+def test_persons_who_do_not_differ_have_a_bound_that_is_not_0():
+    rng = random.Random(1)
+    values = [[[n + rng.gauss(0, 0.01) for _ in range(3)] for _ in range(3)] for n in range(10)]
+    assert upper(values) > gauge_study(values).reproducibility_mm
+    assert upper(values) > 0.001
+
+
+def test_the_bound_of_a_study_holds_what_persons_differ_by():
+    rng, held = random.Random(2), []
+    for _ in range(RUNS):
+        persons = [rng.gauss(0, 0.02) for _ in range(3)]
+        values = [[[n + p + rng.gauss(0, 0.01) for _ in (1, 2)] for p in persons] for n in range(5)]
+        held.append(upper(values) >= 0.02)
+    assert share(held) > 0.92
+
+
+def test_more_records_cost_less():
+    assert upper_half_width(0.01, 4) > upper_half_width(0.01, 20) > 0.01 * math.sqrt(3)
+
+
+# Whether the record says how well a stored Z is known: only a measurement of it does.
+
+OLD = ToolOffset(12.0, -4.0, -20.0)
+MEASURED = replace(OLD, z_mm=-20.4)
+
+
+@pytest.fixture
+def log(request):
+    with MemoryController(identity=request.node.name) as controller:
+        yield Log(controller)
+
+
+class Log:
+    """Puts calibrations and writes on record, the oldest first."""
+
+    def __init__(self, controller):
+        self.controller, self._count = controller, 0
+
+    def calibrated(self, before, value, *, measured, z_from, half=0.02, tip=None, **more: Any):
+        self._count += 1
+        change = f"c{self._count}"
+        of_measurement = more.pop("of_measurement", {})
+        self.controller.outcomes.append(
+            NewEntry(
+                EntryKind.CALIBRATION, change=change, tool=1,
+                details={"measured": measured, "half_width95": [half] * len(measured)}
+                | of_measurement,
+            ),
+            NewEntry(
+                EntryKind.DONE, change=change, tool=1,
+                details={"before": plain_offset(before), "value": plain_offset(value),
+                         "tip": plain_offset(tip or value), "method": "m", "z_from": z_from}
+                | more,
+            ),
+        )  # fmt: skip
+
+    def typed(self, before, value):
+        details = {"before": plain_offset(before), "value": plain_offset(value)}
+        self.controller.outcomes.append(NewEntry(EntryKind.DONE, tool=1, details=details))
+
+    def half_of(self, value):
+        return find_stored_z(self.controller, 1, value).half95_mm
+
+
+Z = ["z_mm"]
+XY = ["x_mm", "y_mm"]
+ASIDE = replace(MEASURED, x_mm=12.3)
+
+
+def test_z_that_was_measured_has_the_interval_of_then(log):
+    assert log.half_of(MEASURED) is None
+    log.calibrated(OLD, MEASURED, measured=Z, z_from="measured")
+    assert log.half_of(MEASURED) == 0.02
+    # A value that is not that one has nothing to do with it.
+    assert log.half_of(OLD) is None
+
+
+@pytest.mark.parametrize(
+    ("more", "half"),
+    [
+        ({"z_from": "kept"}, None),  # of another needle, for all that is known
+        ({"z_from": "kept", "nozzle": "N-1"}, 0.02),  # the same needle
+        ({"z_from": "kept", "nozzle": "N-2"}, None),
+        ({"z_from": "measured", "length_checked": {"u_mm": 0.01}}, (0.02**2 + 0.0196**2) ** 0.5),
+    ],
+)
+def test_z_that_was_kept_is_known_where_the_needle_or_the_heights_are_the_same(log, more, half):
+    log.calibrated(OLD, MEASURED, measured=Z, z_from="measured", nozzle="N-1")
+    log.calibrated(MEASURED, ASIDE, measured=XY, **more)
+    assert log.half_of(ASIDE) == (None if half is None else pytest.approx(half, rel=1e-3))
+
+
+@pytest.mark.parametrize("aside_mm", [-0.3, 0.3])
+def test_a_z_that_was_kept_has_to_be_the_one_that_was_measured(log, aside_mm):
+    log.calibrated(OLD, MEASURED, measured=Z, z_from="measured", nozzle="N-1")
+    shifted = replace(ASIDE, z_mm=MEASURED.z_mm + aside_mm)
+    log.calibrated(shifted, shifted, measured=XY, z_from="kept", nozzle="N-1")
+    assert log.half_of(shifted) is None
+
+
+def test_x_and_y_that_were_typed_leave_z_as_known_as_it_was(log):
+    log.calibrated(OLD, MEASURED, measured=Z, z_from="measured")
+    log.typed(MEASURED, ASIDE)
+    assert log.half_of(ASIDE) == 0.02
+
+
+def test_a_z_that_was_typed_or_is_no_tip_is_not_known(log):
+    log.calibrated(OLD, MEASURED, measured=Z, z_from="measured")
+    other = replace(MEASURED, z_mm=-21.0)
+    log.typed(MEASURED, other)
+    assert log.half_of(other) is None
+    # A value by difference stands aside of where the tip was found.
+    log.calibrated(other, OLD, measured=Z, z_from="measured", tip=MEASURED)
+    assert log.half_of(OLD) is None
+    # Without an interval there is none to go back to.
+    log.calibrated(
+        OLD, MEASURED, measured=Z, z_from="measured", of_measurement={"half_width95": []}
+    )
+    assert log.half_of(MEASURED) is None
+
+
+def test_changes_by_one_touch_go_back_to_where_they_began(log):
+    log.calibrated(OLD, MEASURED, measured=Z, z_from="measured")
+    stored = {"value_mm": -20.4, "half95_mm": 0.02, "entry": 1}
+    longer = replace(MEASURED, z_mm=-20.6)
+    log.calibrated(
+        MEASURED, longer, measured=[*XY, *Z], z_from="measured", half=0.05,
+        of_measurement={"stored_z": stored},
+    )  # fmt: skip
+    found = find_stored_z(log.controller, 1, longer)
+    assert (found.half95_mm, found.entry) == (0.02, 1)
+    # One whose Z was never measured says nothing, whatever follows.
+    again = replace(longer, z_mm=-20.5)
+    log.calibrated(
+        longer, again, measured=XY, z_from="kept",
+        of_measurement={"changed": ["z_mm"], "stored_z": stored | {"half95_mm": None}},
+    )  # fmt: skip
+    assert log.half_of(again) is None

@@ -1,7 +1,8 @@
-"""Tables of poses: columns, units, separators and encodings; what is asked, what is refused."""
+"""Tables of poses: columns, units, separators and encodings; and twenty as people have them."""
 
 import json
 from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,9 +10,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from robolink.calibration import rotation_of
 from robolink.errors import AmbiguousPosesError, CalibrationError, ConfigError
 from robolink.model import Hand, Pose
 from robolink.pose_tables import RULES, ReadingChoices, read_poses
+
+# Tables of poses: columns, units, separators and encodings; what is asked, what is refused.
 
 FLAT = (Pose(287.5, 103.25, -50.0, 90.0), Pose(-12.25, 87.5, -50.0, -45.0))
 TILTED = (444.235, -60.394, 247.269, 40.0, 12.0, -172.0)
@@ -378,3 +382,46 @@ def test_rubbish_gives_poses_or_a_sentence(tmp_path_factory, text):
     path.write_bytes(text.encode("utf-8", "surrogatepass"))
     with suppress(ConfigError, CalibrationError):  # anything else is a defect
         assert read_poses(path).entries
+
+
+# Twenty tables as people have them, unedited, with the poses that they stand for.
+#
+# They are not part of the source archive; the tests skip where the folder is absent.
+
+DATA = Path(__file__).parents[2].parent / "shared" / "data" / "pose_tables"
+LIST = DATA / "expected.json"
+EXPECTED = json.loads(LIST.read_text(encoding="utf-8"))["files"] if LIST.is_file() else {}
+
+
+@pytest.mark.skipif(
+    not LIST.is_file(), reason="the tables lie beside the repository and are not there"
+)
+@pytest.mark.parametrize("name", EXPECTED)
+def test_a_table_holds_the_poses_that_it_stands_for(name):
+    wanted = EXPECTED[name]
+    found = read_poses(DATA / name, ReadingChoices(**wanted["options"]))
+    assert len(found.entries) == len(wanted["poses"])
+    for entry, one in zip(found.entries, wanted["poses"], strict=True):
+        pose = entry.pose
+        place = (pose.x_mm, pose.y_mm, pose.z_mm)
+        assert place == pytest.approx((one["x"], one["y"], one["z"]), abs=1e-6)
+        assert np.allclose(rotation_of(pose).ravel(), one["r"], rtol=0, atol=1e-6)
+        known = {
+            "name": entry.name,
+            "number": entry.number,
+            "hand": pose.hand,
+            "local": pose.local,
+            "tool": pose.tool,
+        }
+        for key in known.keys() & one.keys():
+            assert known[key] == one[key]
+
+
+@pytest.mark.skipif(
+    not LIST.is_file(), reason="the tables lie beside the repository and are not there"
+)
+@pytest.mark.parametrize("name", [name for name in EXPECTED if EXPECTED[name]["options"]])
+def test_without_what_it_does_not_say_a_table_is_refused_with_that_question(name):
+    with pytest.raises(AmbiguousPosesError) as caught:
+        read_poses(DATA / name)
+    assert set(caught.value.asks) == set(EXPECTED[name]["options"])

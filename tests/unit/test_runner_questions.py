@@ -1,9 +1,10 @@
-"""What a person may answer, how a jog step may be typed, and that no question is for ever."""
+"""Questions of a procedure: what a person may answer or type, when they come, what ends them."""
 
 import os
 import re
 import sys
 from itertools import count, cycle
+from typing import cast
 
 import pytest
 from robolink_cli.prompts.operator import MOST_STEPS, AssistedOperator, TerminalOperator
@@ -11,18 +12,36 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process.epson import register, unregister
 
 import robolink
-from robolink.errors import CalibrationError, ConfigError, DeclinedError
-from robolink.model import WorkBox
+from robolink.calibration import CalibrationResult
+from robolink.calibration_run import (
+    AcceptanceCriteria,
+    ChangePlan,
+    Listener,
+    Moment,
+    NozzleChange,
+    Proposal,
+    ToolPlan,
+)
+from robolink.errors import CalibrationError, ConfigError, DeclinedError, LimitError
+from robolink.methods import PointsSource
+from robolink.model import ControllerStatus, Path, Pose, ToolOffset, WorkBox
 from robolink.runner import (
     MOST_REFUSED,
     Ask,
+    EndingWatch,
+    Operator,
     Question,
     Runner,
     RunSettings,
     ask_for_pose,
+    jog_target,
     parse_steps,
     yes_or_no,
 )
+from robolink.runner._jog_steps import typed_pose
+from robolink.testing import MemoryController, MemoryMachine
+
+# What a person may answer, how a jog step may be typed, and that no question is for ever.
 
 _names = count()
 
@@ -245,3 +264,176 @@ def test_whoever_keeps_answering_too_early_is_refused(controller):
 
 def test_a_jog_for_its_own_sake_needs_no_time(controller):
     runner_with(controller, Hasty(controller.clock, 0.0)).run(ask_for_pose("Jog."))
+
+
+# What ends a procedure while a person is asked.
+
+ON = ControllerStatus(remote=True, ready=True)
+
+
+@pytest.mark.parametrize("how", ["unpowered", "disabled"])
+def test_drives_that_lost_their_power_end_it_and_those_without_any_do_not(how):
+    off = ControllerStatus(remote=True, **{how: True})
+    watch = EndingWatch()
+    assert watch.obstacle(off) == "", "a person moves the machine in another way"
+    assert watch.obstacle(ON) == ""
+    assert watch.obstacle(off) == "The motors went off."
+
+
+def test_what_says_why_is_said_first():
+    watch = EndingWatch()
+    assert watch.obstacle(ON) == ""
+    pressed = ControllerStatus(emergency_stop=True, unpowered=True)
+    assert watch.obstacle(pressed) == "The emergency stop was pressed."
+
+
+# Jog steps and poses as a person types them: what is refused before anything moves.
+
+HERE = Pose(300.0, 100.0, -60.0, 30.0, tool=0)
+SETTINGS = RunSettings(WorkBox(), max_jog_mm=5.0, max_jog_deg=10.0)
+
+
+@pytest.mark.parametrize(
+    ("steps", "path", "coordinates"),
+    [
+        ("x+5 y-5, z+0.1", Path.STRAIGHT, (305.0, 95.0, -59.9, 30.0)),
+        ("u-10", Path.JOINT, (300.0, 100.0, -60.0, 20.0)),
+        ("x+1 u+8", Path.JOINT, (301.0, 100.0, -60.0, 38.0)),
+    ],
+)
+def test_where_steps_lead_and_that_a_turn_is_no_straight_move(steps, path, coordinates):
+    target, way = jog_target(HERE, steps, SETTINGS)
+    assert way is path
+    assert target.coordinates()[:4] == pytest.approx(coordinates)
+
+
+@pytest.mark.parametrize("steps", ["x+5.1", "x-5.1", "z-6", "u+10.5", "u-11", "x+1 y-7"])
+def test_a_step_too_long_is_refused_either_way(steps):
+    with pytest.raises(LimitError):
+        jog_target(HERE, steps, SETTINGS)
+
+
+@pytest.mark.parametrize("axis", "xyzu")
+@pytest.mark.parametrize("sign", "+-")
+def test_a_decimal_comma_is_refused_at_each_axis_and_said_how_to_write_it(axis, sign):
+    """Taken for two steps it would move by the first digit alone."""
+    with pytest.raises(ConfigError) as refused:
+        parse_steps(f"{axis}{sign}0,5")
+    assert f"{axis}{sign}0.5" in refused.value.what
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["300.2 100 -60 30", "300 100 -60 31.5", "300 100 -60 30 1.5 0", "301.1 100 -60 30"],
+    ids=["outside the box", "turned too far", "leans too far", "too far away"],
+)
+def test_a_typed_pose_is_about_where_the_frame_is_and_in_its_box(text):
+    settings = RunSettings(WorkBox(x_max_mm=300.1))
+    assert typed_pose("300.05 100 -60 30", HERE, settings).x_mm == 300.05
+    with pytest.raises(LimitError):
+        typed_pose(text, HERE, settings)
+
+
+# What a recipe asks and switches between the phases of a change comes at its place, once.
+
+OLD = ToolOffset(12, -3.5, -20)
+TOUCHES = [Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)]
+
+
+class Noting(Listener):
+    """Keeps each moment with what the tool holds then; may refuse at one."""
+
+    def __init__(self, machine, *, refuses=None):
+        self.machine, self.refuses, self.seen = machine, refuses, []
+
+    def moment(self, moment, context, tool=None):
+        self.seen.append((moment, tool, self.machine.read(1) == OLD))
+        if moment is self.refuses:
+            raise DeclinedError("no")
+
+
+def run(machine, listener, *, write=True):
+    tool = ToolPlan(1, source=PointsSource(lambda: TOUCHES), verify=False)
+    plan = ChangePlan((tool,), ask_before_write=False)
+    with MemoryController(machine) as controller:
+        return NozzleChange(controller, plan, operator=cast(Operator, None), listener=listener).run(
+            write=write
+        )
+
+
+def test_each_moment_comes_once_and_the_one_before_the_write_before_it():
+    machine = MemoryMachine({1: OLD})
+    listener = Noting(machine)
+    run(machine, listener)
+    assert listener.seen == [
+        (Moment.START, None, True),
+        (Moment.BEFORE_MEASURE, 1, True),
+        (Moment.AFTER_MEASURE, 1, True),
+        (Moment.BEFORE_WRITE, None, True),
+        (Moment.END, None, False),
+    ]
+
+
+def test_what_is_not_written_has_no_moment_before_it():
+    machine = MemoryMachine({1: OLD})
+    listener = Noting(machine)
+    run(machine, listener, write=False)
+    assert Moment.BEFORE_WRITE not in [moment for moment, _, _ in listener.seen]
+    assert machine.read(1) == OLD
+
+
+@pytest.mark.parametrize("refuses", [Moment.START, Moment.BEFORE_MEASURE, Moment.BEFORE_WRITE])
+def test_who_refuses_at_a_moment_before_the_write_keeps_the_old_value(refuses):
+    machine = MemoryMachine({1: OLD})
+    with pytest.raises(DeclinedError):
+        run(machine, Noting(machine, refuses=refuses))
+    assert machine.read(1) == OLD
+
+
+# What of a proposal counts as its change: the lengths that were measured.
+
+BEFORE = ToolOffset(12.0, -3.5, -20.0)
+XY, XYZ = ("x_mm", "y_mm"), ("x_mm", "y_mm", "z_mm")
+
+
+def proposal(offset, measured, z_from="kept"):
+    result = CalibrationResult(
+        method="pivot",
+        offset=offset,
+        measured=measured,
+        kept=tuple(name for name in XYZ if name not in measured),
+        reference_point_mm=(),
+        sigma_gain=1.0,
+        warnings=(),
+        inputs=(),
+    )
+    return Proposal(1, BEFORE, result, z_from=z_from)
+
+
+@pytest.mark.parametrize(
+    ("measured", "z_from", "change_mm"),
+    [
+        (("z_mm",), "kept", 3.0),
+        (XYZ, "kept", 3.0),
+        (XY, "measured", 3.0),
+        (XY, "typed", 0.0),
+        (XYZ, "typed", 0.0),
+    ],
+)
+def test_a_jump_of_z_alone_is_implausible_where_z_was_measured(measured, z_from, change_mm):
+    longer = proposal(ToolOffset(12.0, -3.5, -23.0), measured, z_from)
+    assert longer.change_mm == pytest.approx(change_mm)
+    if not change_mm:
+        AcceptanceCriteria().judge_change(longer)
+        return
+    with pytest.raises(CalibrationError, match="would move 3") as refused:
+        AcceptanceCriteria().judge_change(longer)
+    assert refused.value.code == "implausible_change"
+
+
+def test_the_lengths_count_together_and_only_the_plane_has_to_shrink():
+    both = proposal(ToolOffset(12.6, -4.3, -21.0), XYZ)
+    assert both.change_mm == pytest.approx(2**0.5)
+    AcceptanceCriteria().judge_change(both, earlier_mm=[1.1])
+    with pytest.raises(CalibrationError, match="The correction grew"):
+        AcceptanceCriteria().judge_change(both, earlier_mm=[0.9])

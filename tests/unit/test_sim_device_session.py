@@ -1,9 +1,16 @@
-"""Who is logged in, for how long, and what a log shows of it."""
+"""Sessions with a simulated EPSON controller: who is logged in, its variables, its options."""
+
+from dataclasses import fields
 
 import pytest
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
+from robolink_simulators.epson.options import option_names, options_from_text
 
+from robolink.errors import ConfigError
 from robolink.model import Secret
+from robolink.protocols.epson_text import VariableType
+
+# Who is logged in, for how long, and what a log shows of it.
 
 CANARY = "k4nar1e"
 
@@ -224,3 +231,146 @@ def test_bytes_nobody_asked_for_can_be_pushed(login):
     client = login(simulator)
     simulator.push(b"#GetStatus,00000000000,0000\r\n")
     assert client.heard() == "#GetStatus,00000000000,0000"
+
+
+# Global Preserve variables over the wire.
+
+
+@pytest.fixture
+def simulator():
+    return EpsonSimulator()
+
+
+@pytest.fixture
+def client(simulator, login):
+    return login(simulator)
+
+
+@pytest.mark.parametrize(
+    ("kind", "written", "read"),
+    [
+        (VariableType.BOOLEAN, "True", "-1"),
+        (VariableType.BYTE, "-128", "-128"),
+        (VariableType.INTEGER, "32767", "32767"),
+        (VariableType.LONG, "-2147483648", "-2147483648"),
+        (VariableType.REAL, "1.23456789", "1.23457"),
+        (VariableType.DOUBLE, "1.23456789", "1.23456789"),
+    ],
+)
+def test_a_variable_keeps_what_its_type_can_hold(client, kind, written, read):
+    assert client.ask(f"$SetVariable,g_{kind},{written},{kind}") == "#SetVariable,0"
+    assert client.ask(f"$GetVariable,G_{kind}") == f"#GetVariable,{read}"
+    assert client.ask(f"$GetVariable,g_{kind},{kind}") == f"#GetVariable,{read}"
+
+
+@pytest.mark.parametrize(
+    ("rest", "code"),
+    [
+        ("g_Byte,128", 12),
+        ("g_Byte,1.5", 12),
+        ("g_Boolean,maybe", 12),
+        ("g_Real,nan", 12),
+        ("g_Real,1e999", 12),
+        ("g_Long,99999999999999999999", 12),
+        ("g_Nothing,1", 15),
+        ("g_Byte,1,Long", 14),
+        ("g_Byte_table(16,0),1,Byte", 15),
+        ("g_Byte_table,1,Byte", 15),
+    ],
+)
+def test_a_value_that_does_not_fit_is_refused(client, rest, code):
+    assert client.ask(f"$SetVariable,{rest}") == f"!SetVariable,{code}"
+
+
+def test_elements_are_read_along_the_last_subscript(client):
+    for j in range(3):
+        client.ask(f"$SetVariable,g_Byte_table(3,{j}),{10 + j},Byte")
+    assert client.ask("$GetVariable,g_Byte_table(3,0),Byte,3") == "#GetVariable,10,11,12"
+
+
+@pytest.mark.parametrize(
+    ("rest", "code"),
+    [
+        ("g_Byte_table(3,0)", 14),
+        ("g_Byte_table(3,0),Byte", 14),
+        ("g_Byte_table(3,0),Byte,0", 14),
+        ("g_Byte_table(3,0),Byte,101", 14),
+        ("g_Byte_table(3,0),Byte,x", 14),
+        ("names$(0),String,1", 14),
+        ("g_Byte_table(3,4),Byte,3", 15),
+        ("g_Byte_table(3),Byte,1", 15),
+        ("g_Byte,Long", 14),
+        ("g_Nothing", 15),
+        ("1bad", 15),
+    ],
+)
+def test_a_query_that_fits_no_variable_is_refused(simulator, client, rest, code):
+    simulator.variables.declare("names$", VariableType.STRING, 3)
+    assert client.ask(f"$GetVariable,{rest}") == f"!GetVariable,{code}"
+
+
+def test_a_text_keeps_its_blanks_and_its_255_characters(simulator, client):
+    simulator.variables.declare("note$", VariableType.STRING)
+    assert client.ask("$SetVariable,note$, a b ,String") == "#SetVariable,0"
+    assert client.ask("$GetVariable,note$") == "#GetVariable, a b "
+    assert client.ask("$SetVariable,note$," + "x" * 256) == "!SetVariable,12"
+
+
+def test_an_array_is_declared_without_a_value(simulator):
+    with pytest.raises(ConfigError, match="no single value"):
+        simulator.variables.declare("table", VariableType.LONG, 3, value=1)
+
+
+# Options of the simulator, written as text.
+
+
+def test_nothing_given_is_the_defaults():
+    assert options_from_text({}) == EpsonOptions()
+
+
+@pytest.mark.parametrize("field", fields(EpsonOptions), ids=lambda field: field.name)
+def test_every_option_can_be_written_as_text(field):
+    if field.name == "numbers":
+        assert options_from_text({"numbers.aborted": "77"}).numbers.aborted == 77
+    else:
+        text = str(field.default)
+        assert field.name in option_names()
+        assert options_from_text({field.name: text}) == EpsonOptions()
+
+
+def test_values_take_the_type_of_their_option():
+    options = options_from_text(
+        {
+            "terminator": "lf",
+            "status_flags": "10",
+            "monitoring_only": "yes",
+            "remote_timeout_s": "2.5",
+            "execute_failure_code": "20",
+        }
+    )
+    assert (options.terminator, options.status_flags) == ("lf", 10)
+    assert options.monitoring_only is True
+    assert (options.remote_timeout_s, options.execute_failure_code) == (2.5, 20)
+
+
+def test_an_unknown_option_lists_the_known_ones():
+    with pytest.raises(ConfigError, match=r"no option 'colour'.*terminator.*tool_undefined"):
+        options_from_text({"colour": "red"})
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("terminator", "tab"),
+        ("status_flags", "12"),
+        ("monitoring_only", "perhaps"),
+        ("remote_timeout_s", "soon"),
+        ("remote_timeout_s", "nan"),
+        ("remote_timeout_s", "-1"),
+        ("execute_failure_code", "2.5"),
+        ("numbers.aborted", "x"),
+    ],
+)
+def test_a_value_that_does_not_fit_is_named(name, text):
+    with pytest.raises(ConfigError, match=f"{name} cannot be '{text}'"):
+        options_from_text({name: text})

@@ -1,28 +1,45 @@
-"""Which commands the simulated mailbox program carries out, and which it refuses."""
+"""Which commands the simulated mailbox program carries out, and with which options."""
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from robolink_simulators.faults import PlcFault, PlcFaultAction
 from robolink_simulators.softmotion.mailbox import MailboxOptions, PlcOptions, SoftMotionSimulator
+from robolink_simulators.softmotion.mailbox.image import Bank, arranged, places_of
+from robolink_simulators.softmotion.mailbox.option_text import (
+    option_names,
+    options_from_text,
+    parameters_from_text,
+)
 
+from robolink.errors import ConfigError
 from robolink.protocols.mailbox import (
+    COMMAND,
+    PROBE,
+    RESPONSE,
     Bits,
     Capability,
+    Command,
     CommandState,
     ErrorClass,
     GroupState,
     Kinematics,
     Opcode,
+    Response,
+    WordOrder,
     encode_command,
+    encode_response,
 )
 from tests.unit._mailbox_client import FACTORS, LINE, MCS, another, linked, owning
 
-pytestmark = pytest.mark.usefixtures("mailbox_program")
+# Which commands the simulated mailbox program carries out, and which it refuses.
 
 
 def moves_started(simulator):
     return simulator.plc.group.movements_started
 
 
+@pytest.mark.usefixtures("mailbox_program")
 def test_the_machine_stands_ready_at_first(mailbox_program):
     now = linked(SoftMotionSimulator()).now()
     assert (now.group_state, now.tool_slot, now.boot_id) == (GroupState.STANDBY, 1, 1)
@@ -32,6 +49,7 @@ def test_the_machine_stands_ready_at_first(mailbox_program):
     assert (now.position_kinematics, now.axis_count) == (Kinematics.SCARA3_Z, 4)
 
 
+@pytest.mark.usefixtures("mailbox_program")
 def test_the_heartbeat_counts_the_cycles_of_the_motion_task():
     client = linked(SoftMotionSimulator())
     before = client.now().plc_heartbeat
@@ -39,6 +57,7 @@ def test_the_heartbeat_counts_the_cycles_of_the_motion_task():
     assert (client.now().plc_heartbeat - before) & 0xFFFF in (1000, 1001)
 
 
+@pytest.mark.usefixtures("mailbox_program")
 def test_a_command_is_looked_at_in_the_next_cycle_of_the_program():
     options = PlcOptions(mailbox=MailboxOptions(program_cycle_us=20_000))
     client = linked(SoftMotionSimulator(options=options))
@@ -50,6 +69,7 @@ def test_a_command_is_looked_at_in_the_next_cycle_of_the_program():
     assert client.now().ack_head == before + 1
 
 
+@pytest.mark.usefixtures("mailbox_program")
 @pytest.mark.fault("F27")
 def test_the_same_command_again_is_acknowledged_and_not_carried_out():
     client, _ = owning()
@@ -63,6 +83,7 @@ def test_the_same_command_again_is_acknowledged_and_not_carried_out():
     assert client.slot(3).counter == 1
 
 
+@pytest.mark.usefixtures("mailbox_program")
 @pytest.mark.fault("F27")
 @pytest.mark.parametrize("between", ["the owner's next", "another client's"])
 def test_a_command_of_before_is_not_carried_out_again_behind_another(between):
@@ -84,6 +105,7 @@ def test_a_command_of_before_is_not_carried_out_again_behind_another(between):
     assert client.done(Opcode.WRITE_TOOL, 4, name="next").state == CommandState.DONE
 
 
+@pytest.mark.usefixtures("mailbox_program")
 def test_the_numbers_of_an_owner_go_on_behind_the_highest():
     client, _ = owning()
     client.sequence = 0xFFFE - 0x7FFF
@@ -93,6 +115,7 @@ def test_the_numbers_of_an_owner_go_on_behind_the_highest():
     assert client.now().ack_head == 2
 
 
+@pytest.mark.usefixtures("mailbox_program")
 @pytest.mark.fault("F28")
 def test_a_block_with_two_ends_is_not_looked_at():
     client, _ = owning()
@@ -105,6 +128,7 @@ def test_a_block_with_two_ends_is_not_looked_at():
     assert now.rejected == 0
 
 
+@pytest.mark.usefixtures("mailbox_program")
 def test_a_damaged_block_is_counted_once_and_not_acknowledged():
     client, _ = owning()
     words = list(encode_command(client.command(Opcode.READ_TOOL)))
@@ -120,6 +144,7 @@ def test_a_damaged_block_is_counted_once_and_not_acknowledged():
     assert client.now().rejected == 2
 
 
+@pytest.mark.usefixtures("mailbox_program")
 def test_zeroed_inputs_are_no_command():
     client, simulator = owning()
     simulator.panel.zero_inputs()
@@ -128,6 +153,7 @@ def test_zeroed_inputs_are_no_command():
     assert (now.ack_head, now.rejected) == (client.sequence, 0)
 
 
+@pytest.mark.usefixtures("mailbox_program")
 @pytest.mark.fault("F28", "F32")
 def test_a_block_that_arrives_in_two_parts_is_carried_out_when_it_is_whole():
     client, simulator = owning()
@@ -141,6 +167,7 @@ def test_a_block_that_arrives_in_two_parts_is_carried_out_when_it_is_whole():
     assert (now.ack_head, now.tool_slot, now.rejected) == (command.sequence, 0, 0)
 
 
+@pytest.mark.usefixtures("mailbox_program")
 @pytest.mark.parametrize(
     ("fields", "error_class"),
     [
@@ -166,11 +193,13 @@ def test_what_every_command_can_be_refused_for(fields, error_class):
     assert now.tool_slot == 1
 
 
+@pytest.mark.usefixtures("mailbox_program")
 def test_another_minor_version_is_served():
     client, _ = owning()
     assert client.done(Opcode.SELECT_TOOL, 0, version=0x0107).tool_slot == 0
 
 
+@pytest.mark.usefixtures("mailbox_program")
 def test_the_profile_tools_has_no_motion():
     options = PlcOptions(mailbox=MailboxOptions(profile="tools"))
     client, simulator = owning(options=options)
@@ -182,6 +211,7 @@ def test_the_profile_tools_has_no_motion():
     assert client.now().group_state == GroupState.STANDBY
 
 
+@pytest.mark.usefixtures("mailbox_program")
 def test_a_command_that_comes_too_early_is_told_among_the_ends():
     client, _ = owning()
     client.move(z=-20.0)
@@ -197,6 +227,7 @@ def test_a_command_that_comes_too_early_is_told_among_the_ends():
     assert (now.ack_head, now.state) == (halt.sequence, CommandState.DONE)
 
 
+@pytest.mark.usefixtures("mailbox_program")
 def test_a_stop_comes_in_at_any_time_and_ends_what_was_in_work():
     client, _ = owning()
     client.move(z=-20.0)
@@ -208,6 +239,7 @@ def test_a_stop_comes_in_at_any_time_and_ends_what_was_in_work():
     assert (interrupt.ack_head, CommandState.ABORTED, ErrorClass.NONE) in ends
 
 
+@pytest.mark.usefixtures("mailbox_program")
 def test_without_the_permit_nothing_is_changed_and_everything_can_be_read():
     client, simulator = owning()
     sequence = client.move(z=-20.0).ack_head
@@ -223,6 +255,7 @@ def test_without_the_permit_nothing_is_changed_and_everything_can_be_read():
     client.done(Opcode.SELECT_TOOL, 0)
 
 
+@pytest.mark.usefixtures("mailbox_program")
 @pytest.mark.parametrize(
     ("opcode", "operands", "fields"),
     [
@@ -249,6 +282,7 @@ def test_an_operand_out_of_range_is_refused(opcode, operands, fields):
     assert moves_started(simulator) == 0
 
 
+@pytest.mark.usefixtures("mailbox_program")
 def test_inputs_are_read_and_outputs_switched():
     client, simulator = owning()
     assert client.done(Opcode.READ_INPUT, 4).answer.input_value == 0
@@ -258,6 +292,7 @@ def test_inputs_are_read_and_outputs_switched():
     assert simulator.plc.group.outputs.read(7)
 
 
+@pytest.mark.usefixtures("mailbox_program")
 def test_the_answer_words_hold_the_set_tool_when_no_answer_stands_there():
     client, _ = owning()
     client.done(Opcode.WRITE_OUTPUT, 7, 1)
@@ -267,3 +302,89 @@ def test_the_answer_words_hold_the_set_tool_when_no_answer_stands_there():
     other.link.clock.sleep(0.05)
     assert client.now().ack_owner == other.owner
     assert client.now().answer.pose == (0.0,) * 6
+
+
+# Options of a simulated PLC as text, and how a PLC may lay its words.
+
+ORDERS = [
+    WordOrder.LOW_FIRST,
+    WordOrder.HIGH_FIRST,
+    WordOrder.PAIRS_SWAPPED,
+    WordOrder.HALVES_SWAPPED,
+]
+
+
+def test_options_reach_the_part_that_they_are_about():
+    options = options_from_text(
+        {
+            "profile": "tools",
+            "unit_um": "25400",
+            "latch": "edge",
+            "numbers.unreachable": "10123",
+            "snapshot_latched": "no",
+        }
+    )
+    assert (options.mailbox.profile, options.mailbox.unit_um) == ("tools", 25400.0)
+    assert (options.group.latch, options.group.numbers.unreachable) == ("edge", 10123)
+    assert options.mailbox.snapshot_latched is False
+    assert len(set(option_names())) == len(option_names())
+
+
+@pytest.mark.parametrize(
+    ("pairs", "words"),
+    [
+        ({"colour": "red"}, "no option 'colour'"),
+        ({"profile": "some"}, "full, tools"),
+        ({"unit_um": "0"}, "above 0"),
+        ({"program_cycle_us": "0"}, "above 0"),
+        ({"cycle_us": "9000000"}, "above 0"),
+        ({"watchdog_ms": "-1"}, "0 or more"),
+        ({"response": "4000"}, "4096 registers"),
+        ({"slots": "100"}, "response and slots overlap"),
+        ({"registers": "holding"}, "command and response overlap"),
+    ],
+)
+def test_a_wrong_option_is_named(pairs, words):
+    with pytest.raises(ConfigError) as caught:
+        options_from_text(pairs)
+    assert words in f"{caught.value} {caught.value.remedy}"
+
+
+def test_a_parameter_is_a_number():
+    assert parameters_from_text({"dArmLength1": "250.5"}) == {"dArmLength1": 250.5}
+    with pytest.raises(ConfigError, match="dArmLength1 cannot be 'long'"):
+        parameters_from_text({"dArmLength1": "long"})
+
+
+def test_the_blocks_stand_where_the_options_say():
+    pairs = {"registers": "holding", "response": "100", "slots": "1000"}
+    command, response, slots = places_of(options_from_text(pairs).mailbox)
+    assert (command.start, command.end, command.written) == (0, 64, True)
+    assert (response.bank, response.start, response.first) == (Bank.HOLDING, 100, 0)
+    assert (slots.bank, slots.start, slots.first) == (Bank.HOLDING, 1000, 112)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@given(x=st.floats(-1e6, 1e6), raw=st.integers(-(2**31), 2**31 - 1))
+@settings(max_examples=25, deadline=None)
+def test_another_word_order_twice_is_none_and_the_checksum_stays_right(order, x, raw):
+    block = encode_response(Response(tcp=(x, 2.0, 3.0, 4.0, 5.0, 6.0), raw_error=raw))
+    moved = arranged(RESPONSE, block, order)
+    assert RESPONSE.intact(moved)
+    assert arranged(RESPONSE, moved, order) == block
+    assert moved[:4] == block[:4]
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_a_damaged_block_stays_damaged(order):
+    words = list(encode_command(Command(1, Opcode.HALT)))
+    words[9] ^= 1
+    assert not COMMAND.intact(arranged(COMMAND, words, order))
+
+
+def test_high_first_turns_every_value_of_several_words():
+    block = encode_response(Response(ack_owner=0x12345678, unit_um=1000.0))
+    moved = arranged(RESPONSE, block, WordOrder.HIGH_FIRST)
+    assert moved[RESPONSE.at("probe")] == block[RESPONSE.at("probe")][::-1]
+    assert moved[RESPONSE.at("ack_owner")] == (0x1234, 0x5678)
+    assert RESPONSE.unpack(block)["probe"] == PROBE

@@ -1,10 +1,12 @@
-"""Jogging of a simulated axis group; numbers are those of docs/reference/softmotion.md 5."""
+"""Jogging and single axes of a simulated axis group (docs/reference/softmotion.md 5)."""
 
 from dataclasses import dataclass
 from itertools import pairwise
 from math import atan2, degrees, hypot
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from robolink_simulators.cell.frames import (
     NO_TURN,
     X_AXIS,
@@ -17,6 +19,7 @@ from robolink_simulators.cell.frames import (
 )
 from robolink_simulators.softmotion import (
     AxisGroup,
+    AxisState,
     CoordRef,
     CoordSystem,
     Dynamics,
@@ -24,6 +27,7 @@ from robolink_simulators.softmotion import (
     JogCommand,
     SmcGroupState,
 )
+from robolink_simulators.softmotion.group.profile import Pace, SpeedProfile
 from robolink_simulators.softmotion.kinematics.kinematics import ANY_CONFIGURATION
 
 from robolink.model import AxisKind, OrientationSpace
@@ -35,8 +39,12 @@ from tests.unit._softmotion_machine import (
     moved,
     passing,
     settled,
+    shifted,
     standing,
+    state_of,
 )
+
+# Jogging of a simulated axis group; numbers are those of docs/reference/softmotion.md 5.
 
 SLOW = Dynamics(20.0, 200.0, 200.0, 1000.0)
 TENTH = Dynamics(0.1, 0.1, 0.1, 0.1)
@@ -237,3 +245,148 @@ def test_nothing_is_jogged_without_enabling():
     group = standing()
     group.disable()
     assert kind(group.jog(FORWARD_X)) is ErrorKind.WRONG_STATE
+
+
+# Axes of a group that move alone; numbers are those of docs/reference/softmotion.md 5.
+
+
+def test_a_single_axis_may_move_in_standby_and_ends_a_group_movement_in_error():
+    """Behaviour 14."""
+    group = standing()
+    single = group.move_axis(2, 40.0)
+    assert state_of(group) is SmcGroupState.STANDBY
+    assert group.axes[2].state is AxisState.DISCRETE_MOTION
+    settled(group)
+    assert single.outputs.done
+    assert group.values[2] == 40.0
+    assert state_of(group) is SmcGroupState.STANDBY
+    move = moved(group, x_mm=-20)
+    passing(group, 0.1)
+    assert kind(group.move_axis(2, 0.0)) is ErrorKind.INTERRUPTED_BY_SINGLE_AXIS
+    assert state_of(group) is SmcGroupState.ERROR_STOP
+    error = group.status().error
+    assert error.symbol == "SMC_AXIS_GROUP_INTERRUPTED_BY_SINGLE_AXIS"
+    assert error.number == 0
+    assert move.outputs.aborted
+
+
+def test_a_group_movement_while_an_axis_moves_alone_is_a_group_error():
+    group = standing()
+    single = group.move_axis(2, 40.0)
+    passing(group, 0.01)
+    move = group.move_linear_absolute(shifted(group, x_mm=-20), LINE)
+    assert kind(move) is ErrorKind.INTERRUPTED_BY_SINGLE_AXIS
+    assert state_of(group) is SmcGroupState.ERROR_STOP
+    assert single.outputs.aborted
+    settled(group)
+    assert group.values[2] < 40.0
+
+
+def test_a_disabled_group_lets_its_axes_move_alone():
+    group = standing()
+    group.disable()
+    single = group.move_axis(0, 50.0)
+    settled(group)
+    assert single.outputs.done
+    assert state_of(group) is SmcGroupState.DISABLED
+
+
+@pytest.mark.parametrize(
+    ("prepare", "expected"),
+    [
+        (lambda group: group.power(on=False), ErrorKind.NO_POWER),
+        (lambda group: group.stop(), ErrorKind.WRONG_STATE),
+        (lambda group: group.fail_axis(0), ErrorKind.WRONG_STATE),
+        (lambda group: None, ErrorKind.AXIS_LIMIT),
+    ],
+)
+def test_a_single_axis_refuses_what_it_cannot_do(prepare, expected):
+    group = standing()
+    prepare(group)
+    assert kind(group.move_axis(0, 1000.0)) is expected
+
+
+def test_what_stops_an_axis_aborts_its_single_movement():
+    group = standing()
+    single = group.move_axis(2, 40.0)
+    group.power(on=False)
+    assert single.outputs.aborted
+    group.disable()
+    group.power(on=True)
+    failing, going = group.move_axis(2, 40.0), group.move_axis(0, 20.0)
+    group.fail_axis(2)
+    assert failing.outputs.aborted
+    settled(group)
+    assert going.outputs.done
+
+
+@pytest.mark.parametrize("number", [-1, 4])
+def test_there_is_no_other_axis_than_those_of_the_group(number):
+    assert kind(standing().move_axis(number, 0.0)) is ErrorKind.PARAMETER
+
+
+def test_a_second_single_movement_of_an_axis_aborts_the_first():
+    group = standing()
+    first, second = group.move_axis(2, 40.0), group.move_axis(2, -40.0)
+    assert first.outputs.aborted
+    settled(group)
+    assert second.outputs.done
+    assert group.values[2] == -40.0
+
+
+rates = st.floats(1e-3, 1e3)
+paces = st.builds(Pace, rates, rates, rates)
+
+
+def samples(profile, count=60):
+    return [profile.share_at(profile.duration_s * step / count) for step in range(count + 1)]
+
+
+@settings(max_examples=80, deadline=None)
+@given(paces, st.floats(0, 0.99))
+def test_a_profile_goes_from_its_start_to_the_end_within_its_limits(pace, start):
+    profile = SpeedProfile.fastest(start, pace)
+    shares = samples(profile)
+    assert shares[0] == pytest.approx(start)
+    assert profile.share_at(profile.duration_s) == 1
+    assert all(b >= a - 1e-9 for a, b in pairwise(shares))
+    step_s = profile.duration_s / 60
+    assert all(b - a <= pace.rate_per_s * step_s * (1 + 1e-6) + 1e-9 for a, b in pairwise(shares))
+    assert profile.rate_at(profile.falls_after_s) <= pace.rate_per_s * (1 + 1e-9)
+
+
+@settings(max_examples=80, deadline=None)
+@given(paces, st.floats(0.001, 0.999), rates)
+def test_a_braked_profile_keeps_its_past_and_comes_to_rest_on_the_path(pace, part, fall):
+    profile = SpeedProfile.fastest(0.0, pace)
+    at_s = profile.duration_s * part
+    braked = profile.braked(at_s, fall)
+    assert braked.share_at(at_s / 2) == pytest.approx(profile.share_at(at_s / 2), abs=1e-9)
+    assert braked.share_at(at_s) == pytest.approx(profile.share_at(at_s), abs=1e-9)
+    assert braked.rate_at(at_s) == pytest.approx(profile.rate_at(at_s), rel=1e-6, abs=1e-9)
+    assert profile.share_at(at_s) - 1e-9 <= braked.end <= 1
+    just_before_s = braked.duration_s * (1 - 1e-9)
+    assert braked.share_at(just_before_s) == pytest.approx(braked.end, abs=1e-6)
+    assert braked.rate_at(braked.duration_s) == 0
+
+
+def test_braking_twice_keeps_the_harder_end():
+    profile = SpeedProfile.fastest(0.0, Pace(1.0, 10.0, 10.0)).braked(0.5, 5.0)
+    again = profile.braked(0.55, 10.0)
+    assert again.end < profile.end
+    assert again.duration_s < profile.duration_s
+
+
+def test_braking_after_the_end_changes_nothing():
+    profile = SpeedProfile.fastest(0.0, Pace(1.0, 10.0, 10.0))
+    assert profile.braked(profile.duration_s, 1.0) is profile
+
+
+def test_braking_before_anything_moves_stays_where_it_is():
+    braked = SpeedProfile.fastest(0.25, Pace(1.0, 10.0, 10.0)).braked(0.0, 1.0)
+    assert (braked.end, braked.duration_s) == (0.25, 0)
+
+
+def test_without_a_way_to_go_it_has_arrived():
+    profile = SpeedProfile.fastest(0.0, None)
+    assert (profile.end, profile.duration_s, profile.share_at(0)) == (1.0, 0, 1.0)

@@ -1,16 +1,43 @@
-"""Typed statements: what is written, and what is refused before it is."""
+"""Typed statements of SPEL+: what is written, what is refused, their shapes, and the page that
+lists them.
+"""
 
 import math
+import re
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from robolink_simulators.epson import EpsonOptions, EpsonSimulator
+from robolink_simulators.epson.condition import SpelRefusal
+from robolink_simulators.epson.spel.expressions.functions import PLAIN_FUNCTIONS
+from robolink_simulators.epson.spel.expressions.machine_functions import (
+    MACHINE_FUNCTIONS,
+    OF_POINT_NUMBERS,
+    POINT_FUNCTIONS,
+)
+from robolink_simulators.epson.spel.expressions.state_functions import STATE_FUNCTIONS
+from robolink_simulators.epson.spel.parser import (
+    UNSIMULATED,
+    UNSIMULATED_FAMILIES,
+    UNSIMULATED_FUNCTIONS,
+    WINDOW_ONLY,
+    _read,
+    filler,
+    marked,
+    parse,
+)
+from robolink_simulators.epson.spel.programs.text_statements import FUNCTIONS_OF_ARRAYS
+from robolink_simulators.epson.spel.tasks.task_functions import TASK_FUNCTIONS
 
 from robolink.errors import ConfigError, LocalProtocolError
 from robolink.model import Hand, Pose, ToolOffset
 from robolink.protocols import Role, spel
 from robolink.protocols.epson_text import EpsonTextCodec, Request
+
+# Typed statements: what is written, and what is refused before it is.
 
 TOOL = ToolOffset(12.0, -3.25, -0.0001, 45.0)
 POSE = Pose(350.0, -100.0, -20.0004, 90.0)
@@ -133,3 +160,140 @@ def test_two_bytes_carry_the_number_of_a_bit(query):
     for bit in (-1, 65536):
         with pytest.raises(LocalProtocolError):
             query(bit)
+
+
+# docs/spel-programs.md says what is so: each of its rows is sent, and the answer compared.
+
+PAGE = Path(__file__).parents[2] / "docs" / "spel-programs.md"
+_ROW = re.compile(r"^\| `(?P<statement>[^|]+)` \| (?P<who>[^|]+) \| (?P<answer>[^|]+) \|$")
+_LONGEST_S = 120
+
+
+def part():
+    page = PAGE.read_text(encoding="utf-8")
+    return page.partition("\n## Statements that the simulator answers\n")[2]
+
+
+def rows():
+    answered = part().partition("### Not carried out")[0]
+    found = map(_ROW.match, answered.splitlines())
+    return [(row["statement"], row["answer"]) for row in found if row]
+
+
+def before():
+    (block,) = re.findall(r"```\n(.*?)```", part(), re.DOTALL)
+    return block.strip().splitlines()
+
+
+def answer(client, statement):
+    """Send a statement and wait for its end; return what was printed, 0, or the error number."""
+    said = client.ask(f'$Execute,"{statement}"')
+    waited = 0
+    while not said and waited < _LONGEST_S:
+        said = client.wait(1.0)
+        waited += 1
+    if said == "#Execute,0":
+        return "0"
+    if said == "!Execute,99":
+        return str(client.code())
+    assert said.startswith('#Execute,"'), said
+    return "`" + said.removeprefix('#Execute,"').removesuffix('"').removesuffix("\r\n") + "`"
+
+
+@pytest.fixture
+def client(login):
+    client = login(EpsonSimulator(serial="SIM00001", options=EpsonOptions(remote_timeout_s=0)))
+    for line in before():
+        assert answer(client, line) == "0"
+    return client
+
+
+@pytest.mark.parametrize(("statement", "expected"), rows(), ids=lambda value: value[:40])
+def test_a_statement_is_answered_as_the_page_says(client, statement, expected):
+    said = answer(client, statement)
+    pattern = re.escape(expected).replace(re.escape("..."), ".*")
+    assert re.fullmatch(pattern, said, re.DOTALL), said
+
+
+def test_the_page_has_all_its_rows():
+    assert len(rows()) > 120
+
+
+def test_if_runs_where_the_option_says_so(login):
+    client = login(EpsonSimulator(options=EpsonOptions(single_line_if="runs")))
+    assert answer(client, "If Error On Then Reset") == "0"
+    assert answer(client, "If Sw(1)=Off Then Print 1; Print 2 Else Print 3") == "`1\r\n2`"
+    assert answer(client, "If Sw(1)=On Then Print 1 Else Print 3") == "`3`"
+
+
+def test_an_assigned_variable_is_read_over_the_wire_and_back(login):
+    client = login(EpsonSimulator())
+    assert answer(client, "g_Long = 2 * 3") == "0"
+    assert client.ask("$GetVariable,g_Long,Long") == "#GetVariable,6"
+    assert answer(client, "Print g_Long + 1") == "`7`"
+    refusing = login(EpsonSimulator(options=EpsonOptions(variable_assignment="refused")))
+    assert answer(refusing, "g_Long = 1") == "2353"
+
+
+def refused_words():
+    """Return the statements and the functions that a program may hold and that are refused."""
+    known = {"pdef", *PLAIN_FUNCTIONS, *MACHINE_FUNCTIONS, *POINT_FUNCTIONS, *STATE_FUNCTIONS}
+    known |= {*TASK_FUNCTIONS, *FUNCTIONS_OF_ARRAYS, *OF_POINT_NUMBERS}
+    return UNSIMULATED - WINDOW_ONLY, UNSIMULATED_FUNCTIONS - known
+
+
+def test_what_is_refused_is_listed_by_name():
+    section = PAGE.read_text(encoding="utf-8").partition("## Not carried out")[2]
+    _, statements, functions = re.split(r"^Statements:$|^Functions:$", section, flags=re.MULTILINE)
+    functions, families = functions.split("begin so")
+    listed = [set(re.findall(r"`([^`]+)`", part)) for part in (statements, functions, families)]
+    families = {f"{word}..." for word in UNSIMULATED_FAMILIES}
+    assert listed == [*refused_words(), families]
+
+
+# Lines that differ in their numbers alone: what is filled is what would have been read.
+
+LINES = [
+    "Go XY(172.331, -477.810, -96.529, 0.000) /R /0",
+    "Move XY(172.331, 477.810, 0.5, 30.000) /L /1 Till Sw(3) = On",
+    "TLSet 1, XY(12.328, -3.056, -20.000, 0.000)",
+    "Print XY(1.25, 2.50, 3, 4.0) -TLZ(10.5) +X50.5 :Z(1.5)",
+    "Wait 0.25; Print 2.5 * -1.5e3, .5, 5., 0.987654321",
+    "P1 = XY(1.5, 1.5, 2.5, 3.5); Print CX(P1) / 1.5",
+    'Print "1.5", 1.5',
+    "Print 1.5 ' 2.5",
+    "Box 1, 0.5, 10.25, -5.5, 5.5, -100.5, 0.5",
+    "Arc XY(1.5, 2.5, 3.5, 4.5), XY(5.5, 6.5, 7.5, 8.5) CP",
+    "Go P1 !D50.5; On 3!",
+]
+
+
+def ended(read, line):
+    try:
+        return read(line)
+    except SpelRefusal as refusal:
+        return str(refusal)
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_a_filled_line_is_the_line_that_was_read(line):
+    assert ended(parse, line) == ended(_read, line)
+    # And with other numbers, when its shape is known.
+    other = line.replace("5", "7")
+    assert ended(parse, other) == ended(_read, other)
+
+
+def test_a_line_that_is_wrong_is_refused_by_its_own_text():
+    for line in ("Go XY(1.5, 2.5", "Go XY(1.5, 2.5, 3.5, 4.5) 6.25"):
+        with pytest.raises(SpelRefusal) as told:
+            parse(line)
+        assert str(told.value) == ended(_read, line)
+        assert "987654321" not in str(told.value)
+
+
+def test_a_mark_that_does_not_come_back_just_once_fills_nothing():
+    shape, numbers = marked("Print 1.5, 2.5")
+    tree = _read(shape)
+    assert filler(tree, len(numbers)) is not None
+    assert filler(tree, 3) is None
+    assert filler((*tree, *tree), 2) is None

@@ -1,13 +1,21 @@
-"""A tool change is done as a whole, or never was; what became of it is on record."""
+"""A tool change is done as a whole, or never was: what is read before it, and Ctrl-C at each
+point.
+"""
+
+import signal
+from itertools import count
 
 import pytest
+from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.faults import Fault, FaultAction
 
+from robolink.controllers import EpsonController
 from robolink.errors import (
     ControllerFaultError,
     JournalError,
     LeaseLostError,
     NotAllowedError,
+    NotReadyError,
     OutcomeUnknownError,
     ReadBackError,
     ToolChangedError,
@@ -17,6 +25,8 @@ from robolink.errors import (
 from robolink.model import ANY, EntryKind, MarkerKind, PersonRole, ToolOffset, read_offset
 from robolink.transaction import ToolChange, Wanted, change_tools, recover
 from tests.unit._transaction_cell import NEW, OLD, OTHER, UNDEFINED, tool_cell, wanted
+
+# A tool change is done as a whole, or never was; what became of it is on record.
 
 ONE_WRITE = ["intent", "write", "read back", "done"]
 
@@ -240,3 +250,193 @@ def test_an_end_that_cannot_be_recorded_leaves_the_change_open(cell, controller,
     # Not kept, so taken back.
     assert cell.tools == OLD
     assert cell.journal.open_markers() == ()
+
+
+# Ctrl-C at each point of a tool change: all of it is kept, or all of it is taken back.
+
+
+def verified(controller, kept):
+    with ToolChange(controller, wanted(1, 2), verify=True) as change:
+        change.write()
+        controller.status()
+        try:
+            change.keep("verified")
+        finally:
+            kept.append(change.kept)
+
+
+def unverified(controller, kept):
+    change_tools(controller, wanted(1, 2))
+
+
+class Interrupted:
+    """Presses Ctrl-C at the ``at``-th instant: at an exchange or after a durable transaction."""
+
+    def __init__(self, cell, log, at):
+        self.instants = 0
+        self.at = at
+        cell.simulator.on_request = cell.simulator.on_reply = self.pass_by
+        for name in ("begin", "clear", "append"):
+            setattr(log, name, self.passing(getattr(log, name)))
+
+    def passing(self, act):
+        def done(*given):
+            act(*given)
+            self.pass_by()
+
+        return done
+
+    def pass_by(self, *_seen):
+        self.instants += 1
+        if self.instants == self.at:
+            signal.raise_signal(signal.SIGINT)
+
+
+@pytest.mark.parametrize("program", [unverified, verified])
+def test_ctrl_c_leaves_all_or_nothing_of_a_change(program):
+    for at in count(1):
+        kept: list[bool] = []
+        with tool_cell() as cell:
+            log = cell.log()
+            with cell.connected(log) as controller:
+                interrupted = Interrupted(cell, log, at)
+                try:
+                    program(controller, kept)
+                except KeyboardInterrupt:
+                    pass
+                else:
+                    break
+                finally:
+                    interrupted.at = 0
+            assert cell.tools in (OLD, NEW), at
+            assert (cell.tools == NEW) is (kept == [True] or "done" in cell.story()), at
+            assert cell.journal.open_markers() == (), at
+            # One write there and one back, at most.
+            assert cell.writes in (0, 2, 4), at
+    assert cell.tools == NEW
+    assert at > 30
+
+
+def test_ctrl_c_while_an_output_is_switched_leaves_nothing_in_doubt():
+    for at in count(1):
+        with tool_cell() as cell:
+            log = cell.log()
+            with cell.connected(log) as controller:
+                assert isinstance(controller, EpsonController)
+                interrupted = Interrupted(cell, log, at)
+                try:
+                    controller.io.set_output(8, True)
+                except KeyboardInterrupt:
+                    pass
+                else:
+                    break
+                finally:
+                    interrupted.at = 0
+            assert cell.journal.open_markers() == (), at
+    assert cell.simulator.machine.outputs.get(8)
+    assert at > 10
+
+
+# What an EPSON controller is asked before a tool is written, and what that may miss.
+
+
+@pytest.fixture
+def controller_as_asked(cell):
+    with cell.connected() as controller:
+        yield controller
+
+
+def asked(cell):
+    """Return the exchanges that changed nothing but the login, in short."""
+    texts = [
+        text.strip('"').rpartition('"')[2] for _, way, text in cell.simulator.log if way == ">"
+    ]
+    return [text for text in texts if text.startswith(("$Get", "Print TL", "TL"))]
+
+
+WRITTEN = ["TLSet 1, XY(12.250, -3.250, -20.000, 0.000)", "Print TLSet(1)"]
+ONE_BY_ONE = ["Print TLDef(1)", "Print TLSet(1)"]
+
+
+def test_a_write_of_what_was_expected_takes_three_exchanges(cell, controller_as_asked):
+    controller_as_asked.tools.write(2, NEW[2], expected=OLD[2])  # asks which robot it is, once
+    cell.simulator.log.clear()
+    controller_as_asked.tools.write(1, NEW[1], expected=OLD[1])
+    assert asked(cell) == ["TLSet", *WRITTEN]
+
+
+def test_the_first_write_of_a_session_looks_at_the_state_before_it_sends_anything(
+    cell, controller_as_asked
+):
+    controller_as_asked.tools.write(1, NEW[1], expected=OLD[1])
+    assert asked(cell)[0] == "$GetStatus"
+
+
+def test_a_state_that_changed_since_is_named_although_it_was_not_looked_at(
+    cell, controller_as_asked
+):
+    controller_as_asked.tools.write(2, NEW[2], expected=OLD[2])
+    cell.simulator.panel.open_guard()
+    written = cell.simulator.machine.flash_writes
+    cell.simulator.log.clear()
+    for _ in range(2):
+        with pytest.raises(NotReadyError, match="guard"):
+            controller_as_asked.tools.write(1, NEW[1], expected=OLD[1])
+    assert asked(cell) == ["TLSet", "$GetStatus", "$GetStatus", "$GetStatus"]
+    assert cell.simulator.machine.flash_writes == written
+
+
+@pytest.mark.parametrize("layout", ["padded", "four"])
+def test_the_list_is_believed_however_wide_its_columns_are(layout):
+    with tool_cell(EpsonOptions(tool_listing=layout)) as cell, cell.connected() as controller:
+        controller.tools.write(2, NEW[2], expected=OLD[2])
+        cell.simulator.log.clear()
+        controller.tools.write(1, NEW[1], expected=OLD[1])
+        assert asked(cell) == ["TLSet", *WRITTEN]
+
+
+@pytest.mark.parametrize(
+    "listing", ["Tool 1: 12, -4, -20, 0", "1: 12.000 -3.500 -20.000 0.000", "Werkzeug?"]
+)
+def test_a_list_that_does_not_confirm_what_was_expected_is_not_believed(
+    cell, controller_as_asked, monkeypatch, listing
+):
+    controller_as_asked.tools.write(2, NEW[2], expected=OLD[2])
+    monkeypatch.setattr(controller_as_asked.tools, "_listing", lambda: listing)
+    cell.simulator.log.clear()
+    controller_as_asked.tools.write(1, NEW[1], expected=OLD[1])
+    assert asked(cell) == [*ONE_BY_ONE, *WRITTEN]
+
+
+def test_what_is_stored_already_is_asked_for_by_itself_before_the_write_is_left_out(
+    cell, controller_as_asked
+):
+    controller_as_asked.tools.write(2, NEW[2], expected=OLD[2])
+    cell.simulator.log.clear()
+    assert controller_as_asked.tools.write(1, OLD[1], expected=OLD[1]).skipped
+    assert asked(cell) == ["TLSet", *ONE_BY_ONE]
+
+
+def test_a_tool_that_was_cleared_here_is_asked_for_again(cell, controller_as_asked):
+    controller_as_asked.tools.clear(1, expected=controller_as_asked.tools.read(1), then_select=0)
+    assert controller_as_asked.tools.read(1) is None
+    controller_as_asked.tools.write(1, OTHER, expected=None)
+    assert controller_as_asked.tools.read(1) == OTHER
+
+
+def test_a_tool_of_zeros_is_told_from_an_undefined_one(cell, controller_as_asked):
+    zeros = type(OTHER)()
+    controller_as_asked.tools.write(1, zeros, expected=OLD[1])
+    assert controller_as_asked.tools.read(1) == zeros
+    assert controller_as_asked.tools.read(3) is None
+
+
+def test_a_tool_that_somebody_cleared_is_undefined_even_where_asking_for_it_is_an_error():
+    options = EpsonOptions(tlset_of_undefined="error")
+    with tool_cell(options) as cell, cell.connected() as controller:
+        before = controller.tools.read(1)
+        cell.simulator.machine.tools.clear(1, in_force="selects_zero")
+        with pytest.raises(ToolChangedError, match="Tool 1 holds undefined"):
+            controller.tools.write(1, NEW[1], expected=before)
+        assert cell.writes == 1, "only that of the person who cleared it"
+        assert not controller.status().fault

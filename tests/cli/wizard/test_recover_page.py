@@ -1,8 +1,4 @@
-"""After a process that was killed between write and proof: the page of a recovery, on a terminal.
-
-The measurement is a process of its own, killed with SIGKILL in the first movement of its proof; the
-recovery is the real command on a pseudo terminal, with a hand at its keys.
-"""
+"""The page of a recovery, and the words in which it says what was begun."""
 
 import os
 import signal
@@ -22,9 +18,14 @@ from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.hosting.streams.epson import serve_tcp
 
 from robolink.journal import open_journal
+from robolink.model import Marker, MarkerKind, begun_in_words
 from tests.cli.wizard._screen import ScreenHand
 
-pytestmark = [pytest.mark.simulator_only, pytest.mark.soak, pytest.mark.timeout(300)]
+# After a process that was killed between write and proof: the page of a recovery, on a terminal.
+#
+# The measurement is a process of its own, killed with SIGKILL in the first movement of its proof;
+# the
+# recovery is the real command on a pseudo terminal, with a hand at its keys.
 
 FULL = ("n-angle", "--station", "PIN-07", "--count", "3")
 METHODS = {"n-angle": FULL, "one-touch": ("one-touch", "--station", "PIN-07"), "z-touch": ()}
@@ -109,6 +110,9 @@ def chosen_and_tested(hand):
         hand.see("moving|Please wait|Everything is settled|DONE|STOPPED")
 
 
+@pytest.mark.simulator_only
+@pytest.mark.soak
+@pytest.mark.timeout(300)
 @pytest.mark.parametrize("method", METHODS)
 def test_the_new_needle_is_chosen_tested_and_kept(method, tmp_path, monkeypatch):
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
@@ -140,3 +144,28 @@ def test_the_new_needle_is_chosen_tested_and_kept(method, tmp_path, monkeypatch)
         assert written == [], "the value is there already"
         assert simulator.machine.tools.selected == 1
     assert open_journal().open_markers() == ()
+
+
+# The page of a recovery says in words what was begun; requests of the wire are for records.
+
+TARGET = [164.588, 497.136, -93.572, 90.0, 0.0, 0.0]
+WIRE = "Go XY(164.588, 497.136, -93.572, 90.000) /R /0"
+
+
+@pytest.mark.parametrize(
+    ("kind", "details", "words"),
+    [
+        (
+            MarkerKind.MOVE,
+            {"target": TARGET},
+            "a movement to X 164.588 Y 497.136 Z -93.572 U 90.000",
+        ),
+        (MarkerKind.MOVE, {"duration_s": 0.4}, "a movement"),
+        (MarkerKind.SET, {"tool": 3, "requested": TARGET}, "writing tool 3"),
+        (MarkerKind.SET, {"tool": 3, "requested": None}, "clearing tool 3"),
+        (MarkerKind.SET, {"select": 0, "before": 1}, "selecting tool 0"),
+        (MarkerKind.CHANGE, {"tools": {}}, WIRE),
+    ],
+)
+def test_a_movement_is_told_by_where_it_was_to_go(kind, details, words):
+    assert begun_in_words(Marker("1", kind, WIRE, "2026-11-23T14:02:00Z", details)) == words

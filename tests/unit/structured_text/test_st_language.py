@@ -1,4 +1,4 @@
-"""The subset of Structured Text: what it means, what is refused, and where."""
+"""The subset of Structured Text: what it means, what is refused, and what two compilers say."""
 
 import json
 
@@ -9,8 +9,11 @@ from robolink_simulators.structured_text import (
     StructuredTextError,
     TextDialect,
 )
+from robolink_simulators.structured_text.parse import INSTRUCTION_WORDS, RESERVED_WORDS
 
-from tests.unit.structured_text._bench import program, result
+from tests.unit.structured_text._bench import JUDGES, needs_judges, program, result
+
+# The subset of Structured Text: what it means, what is refused, and where.
 
 PAIR = "TYPE PAIR : STRUCT a : UINT; b : LREAL; END_STRUCT; END_TYPE"
 ADDER = """
@@ -237,3 +240,171 @@ def test_members_do_not_begin_with_values_in_the_common_subset():
     """
     with pytest.raises(StructuredTextError, match="glue only"):
         StructuredProgram([SourceText("main.st", text)], "Main")
+
+
+# Names that CODESYS, TwinCAT or IEC 61131-3 keep (docs/reference/structured_text.md 1.1).
+
+COMMON, CODESYS = TextDialect.COMMON, TextDialect.CODESYS
+DECLARED = {
+    "variable": "PROGRAM Main\nVAR\n  ok : INT;\n  {name} : WORD;\nEND_VAR\nok := 1;\nEND_PROGRAM",
+    "member": "TYPE Pair : STRUCT\n  ok : INT;\n\n  {name} : WORD;\nEND_STRUCT;\nEND_TYPE\n",
+    "type": "TYPE Ok : ARRAY [0..1] OF INT; END_TYPE\n\n\nTYPE {name} : Ok; END_TYPE\n",
+    "block": "\n\n\nFUNCTION_BLOCK {name}\nVAR\n  ok : INT;\nEND_VAR\nok := 1;\nEND_FUNCTION_BLOCK",
+}
+LINE = 4
+
+
+def refusal_of(text, dialect):
+    with pytest.raises(StructuredTextError) as refusal:
+        StructuredProgram([SourceText("mine.st", text, dialect)], "Main")
+    return refusal.value
+
+
+@pytest.mark.parametrize("dialect", list(TextDialect))
+@pytest.mark.parametrize("where", DECLARED)
+@pytest.mark.parametrize("name", ["bit", "BIT", "Real", "ltime", "adr", "Limit", "int_to_word"])
+def test_no_name_is_a_keyword_or_a_type_of_codesys(name, where, dialect):
+    error = refusal_of(DECLARED[where].format(name=name), dialect)
+    assert f"{name} is a keyword or data type of CODESYS" in str(error)
+    assert (error.place.file, error.place.line) == ("mine.st", LINE)
+
+
+@pytest.mark.parametrize("name", ["to_word", "a__b", "DWORD_TO_DINT", "atan2", "xsizeof", "class"])
+def test_conversions_operators_and_two_underscores_are_no_names(name):
+    for dialect in TextDialect:
+        error = refusal_of(DECLARED["variable"].format(name=name), dialect)
+        assert name.lower() in str(error).lower()
+        assert error.place.line == LINE
+
+
+@pytest.mark.parametrize("name", ["en", "Ton", "len", "priority", "Single", "ends_"])
+def test_what_the_standard_alone_reserves_is_refused_in_the_common_subset(name):
+    text = DECLARED["variable"].format(name=name)
+    assert f"not every compiler takes the name {name}" in str(refusal_of(text, COMMON))
+    StructuredProgram([SourceText("mine.st", text, CODESYS)], "Main")
+
+
+@pytest.mark.parametrize("name", ["bits", "beat", "to_do", "words_to_lreal", "bit_", "inbit", "r"])
+def test_a_name_that_only_looks_like_one_is_taken(name):
+    text = DECLARED["variable"].format(name=name)
+    StructuredProgram([SourceText("mine.st", text, CODESYS)], "Main")
+
+
+def test_every_word_of_the_list_is_one_word_in_capital_letters():
+    assert len(RESERVED_WORDS) > 200
+    for word in RESERVED_WORDS:
+        assert word == word.upper()
+        assert word.replace("_", "").isalnum()
+
+
+def test_the_common_subset_takes_no_word_of_the_list_in_whatever_case():
+    words = RESERVED_WORDS - INSTRUCTION_WORDS
+    for word in sorted(words):
+        text = DECLARED["variable"].format(name=word.swapcase())
+        assert refusal_of(text, COMMON).place.line == LINE
+
+
+LIST = SourceText("Kept.st", "VAR_GLOBAL RETAIN\n  n : UINT;\nEND_VAR\n", CODESYS)
+TYPE = SourceText("types.st", "\nTYPE KEPT : STRUCT\n  n : UINT;\nEND_STRUCT;\nEND_TYPE\n", CODESYS)
+
+
+@pytest.mark.parametrize(("texts", "line"), [((LIST, TYPE), 2), ((TYPE, LIST), 1)])
+def test_a_type_and_a_list_of_global_variables_are_not_of_one_name(texts, line):
+    with pytest.raises(StructuredTextError, match=r"(?i)kept appears twice") as refusal:
+        StructuredProgram(texts, "Main")
+    assert (refusal.value.place.file, refusal.value.place.line) == (texts[1].name, line)
+
+
+# The interpreter gives the answers of two foreign compilers, and refuses where they differ.
+
+
+def as_value(of, written):
+    if of == "LREAL":
+        return float.fromhex(written)
+    return bool(written) if of == "BOOL" else written
+
+
+def answer(case):
+    declared = [f"r : {case['result']};"]
+    declared += [f"{name} : {of.replace('ARRAY', 'ARRAY ')};" for name, (of, *_) in variables(case)]
+    made = program(case.get("body") or f"r := {case['expr']};", "\n".join(declared))
+    for name, (of, *first) in variables(case):
+        if first:
+            made.put(name, as_value(of, *first))
+    made.cycle(0)
+    return made.value("r")
+
+
+def variables(case):
+    return case["vars"].items()
+
+
+@needs_judges
+def test_every_case_has_the_answer_of_both_or_is_refused():
+    cases = json.loads((JUDGES / "semantics.json").read_text())["cases"]
+    wrong, refused = [], 0
+    for case in cases:
+        try:
+            got = answer(case)
+        except StructuredTextError:
+            got = None
+            refused += 1
+        wanted = as_value(case["result"], case["value"]) if "value" in case else None
+        if (type(got), got) != (type(wanted), wanted):
+            wrong.append((case, got))
+    assert wrong == []
+    assert (len(cases), refused) == (259, 14)
+
+
+def replayed(rows):
+    source = SourceText("core.st", (JUDGES / "example" / "core.st").read_text())
+    made = StructuredProgram([source], "Main")
+    wrong = []
+    for row, (ms, permit, inbox, outbox) in enumerate(rows):
+        made.put("permit", bool(permit))
+        made.put("inbox", [int(inbox[at : at + 4], 16) for at in range(0, 64, 4)])
+        made.cycle(ms * 1000)
+        if "".join(f"{word:04x}" for word in made.value("outbox")) != outbox:
+            wrong.append(row)
+    return wrong
+
+
+def core_rows():
+    return json.loads((JUDGES / "example" / "core_trace.json").read_text())["rows"]
+
+
+@needs_judges
+def test_the_worked_example_gives_the_recorded_words():
+    assert replayed(core_rows()[:150]) == []
+
+
+@needs_judges
+@pytest.mark.soak
+def test_the_worked_example_gives_every_recorded_word():
+    assert len(core_rows()) == 1000
+    assert replayed(core_rows()) == []
+
+
+def timers(text):
+    return StructuredProgram([SourceText("timers.st", text)], "Main")
+
+
+@needs_judges
+def test_timers_and_counters_run_as_recorded_and_those_that_differ_are_refused():
+    text = (JUDGES / "example" / "timers.st").read_text()
+    with pytest.raises(StructuredTextError, match=r"timers\.st, line 13, .* F_TRIG"):
+        timers(text)
+    agreed = [line for line in text.splitlines() if "fFall" not in line and "fDown" not in line]
+    made = timers("\n".join(agreed))
+    trace = json.loads((JUDGES / "example" / "timers_trace.json").read_text())
+    for ms, inp, clear, outputs, _ in trace["rows"]:
+        made.put("inp", bool(inp))
+        made.put("clear", bool(clear))
+        made.cycle(ms * 1000)
+        got = [*map(int, made.value("outs")), made.value("cntUp"), 0]
+        named = zip(trace["outputs"], got, outputs, strict=True)
+        assert [row for row in named if row[1] != row[2] and not differs(row[0])] == [], ms
+
+
+def differs(name):
+    return name.startswith(("f_trig", "ctd"))

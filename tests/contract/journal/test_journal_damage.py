@@ -1,0 +1,186 @@
+"""A journal that was killed at a statement, or in which one bit is another."""
+
+import os
+import random
+import sqlite3
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from robolink.errors import JournalError
+from robolink.journal import ChainVerification
+from robolink.model import EntryKind, NewEntry
+from tests.contract.journal._acts import marker
+from tests.contract.journal._killed import STEPS
+
+# SIGKILL before each statement and each commit: what was acknowledged is there, all else whole.
+
+ROOT = Path(__file__).parents[3]
+ENDED = ["intent", "write", "read back", "done"]
+
+# Open markers and entries after so many steps.
+STATES: tuple[tuple[list[str], list[str]], ...] = (
+    ([], []),
+    ([], []),
+    (["a"], ["intent"]),
+    ([], ENDED),
+    ([], [*ENDED, "verify"]),
+    (["b"], [*ENDED, "verify", "intent"]),
+)
+
+
+def killed(location, how):
+    """Return how many steps were acknowledged, for each place to be killed at."""
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.contract.journal._killed", location, how],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=50 if hasattr(os, "fork") else 900,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return [int(line) for line in done.stdout.split()]
+
+
+def state(journal, number):
+    log = journal.log(f"cell-{number}")
+    kinds = [str(entry.kind) for entry in log.recorded()]
+    return [known.operation for known in log.open_markers()], kinds[::-1]
+
+
+def test_each_step_is_whole_or_was_never_begun(location, journal):
+    runs = killed(location, "again")
+    assert len(runs) > 20
+    assert runs == sorted(runs)
+    assert runs[-1] == len(STEPS)
+    for number, acknowledged in enumerate(runs, start=1):
+        found = state(journal, number)
+        # A step whose commit was under way may be done without having been acknowledged.
+        assert found in STATES[acknowledged : acknowledged + 2], number
+    assert journal.verify().problems == ()
+
+
+def test_a_journal_whose_making_was_cut_short_is_made_by_the_next(tmp_path, open_anew):
+    path = str(tmp_path / "journal.db")
+    runs = killed(path, "anew")
+    assert len(runs) > 15
+    for number in range(1, len(runs) + 1):
+        journal = open_anew(f"{path}-{number}")
+        journal.log("cell").append(NewEntry(EntryKind.RAW))
+        assert journal.verify() == ChainVerification(1, ())
+
+
+# One bit of the file is another, wherever it is: refused, or told, or without a meaning (F62).
+
+SAMPLE = {"few": 20, "many": 2000}
+MANY = pytest.param("many", marks=[pytest.mark.soak, pytest.mark.timeout(600)])
+
+
+@pytest.mark.fault("F62")
+@pytest.mark.parametrize("sample", ["few", MANY])
+def test_f62_no_bent_bit_is_taken_for_the_record_or_costs_it(tmp_path, open_anew, sample):
+    path = tmp_path / "journal.db"
+    journal = open_anew(str(path))
+    log = journal.log("cell")
+    log.append(*[NewEntry(EntryKind.RAW, tool=2, verdict=f"entry {n}") for n in range(30)])
+    log.begin(marker("left open"))
+    log.close()
+    right = list(journal.entries())
+    journal.close()
+    with sqlite3.connect(path) as connection:
+        connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    connection.close()
+    whole, drawn = path.read_bytes(), random.Random(62)
+    written = [place for place, byte in enumerate(whole) if byte]
+    ends = {"refused": 0, "told": 0, "without a meaning": 0}
+    for _ in range(SAMPLE[sample]):
+        bent = bytearray(whole)
+        place = drawn.choice(written)
+        bent[place] ^= 1 << drawn.randrange(8)
+        path.write_bytes(bent)
+        ends[self_judged(path, open_anew, right)] += 1
+        for beside in path.parent.glob(f"{path.name}-*"):
+            beside.unlink()
+    assert ends["refused"] + ends["told"] >= 3, ends
+    print(ends)  # noqa: T201 - for pytest -s
+
+
+@pytest.mark.fault("F62")
+@pytest.mark.parametrize(("was", "bent"), [("left open", "left o0en"), ("12.25", "12.75")])
+def test_f62_a_bent_marker_is_not_acted_on(tmp_path, open_anew, was, bent):
+    """Recovery writes the old value that a marker names."""
+    path = tmp_path / "journal.db"
+    journal = open_anew(str(path))
+    begun = marker("left open")
+    journal.log("cell").begin(replace(begun, details={"before": [12.25, -3.5, -20.0]}))
+    journal.close()
+    connection = sqlite3.connect(path)
+    with connection:
+        for column in ("operation", "details"):
+            connection.execute(
+                f"UPDATE markers SET {column} = replace({column}, ?, ?)", (was, bent)
+            )
+    connection.close()
+    with pytest.raises(JournalError, match="cannot be read"):
+        open_anew(str(path)).log("cell").open_markers()
+
+
+@pytest.mark.fault("F62")
+def test_f62_a_marker_under_another_name_blocks_who_does_not_know_it(tmp_path, open_anew):
+    """Nobody would find it: the controller that it holds back has another name."""
+    path = tmp_path / "journal.db"
+    journal = open_anew(str(path))
+    journal.log("cell").begin(marker("left open"))
+    journal.close()
+    with sqlite3.connect(path) as connection:
+        connection.execute("UPDATE markers SET controller = 'cemm'")
+    connection.close()
+    with pytest.raises(JournalError, match="of cemm cannot be read"):
+        open_anew(str(path)).log("cell").begin(marker("another"))
+
+
+@pytest.mark.fault("F62")
+def test_f62_a_name_in_the_file_that_is_no_text_any_more_is_damage(tmp_path, open_anew):
+    """SQLite complains of it by that name, which Python cannot read."""
+    path = tmp_path / "journal.db"
+    journal = open_anew(str(path))
+    journal.log("cell").append(NewEntry(EntryKind.RAW, tool=2, verdict="kept"))
+    journal.close()
+    with sqlite3.connect(path) as connection:
+        connection.execute("PRAGMA wal_checkpoint(TRUNCATE)")
+    connection.close()
+    path.write_bytes(path.read_bytes().replace(b"CREATE TABLE", b"CREATE TAB\xc5E"))
+    with pytest.raises(JournalError, match="is damaged"):
+        open_anew(str(path)).log("cell").begin(marker("another"))
+
+
+def self_judged(path, open_anew, right):
+    """Begin to change something with a bent file; say what became of it."""
+    journal = None
+    try:
+        journal = open_anew(str(path))
+        journal.log("cell").begin(marker("another"))
+    except JournalError:
+        assert len(path.read_bytes()) >= 4096, "it was made anew over what was there"
+        return "refused"
+    finally:
+        if journal is not None:
+            journal.close()
+    again = open_anew(str(path))
+    try:
+        problems = again.verify().problems
+        found = list(again.entries())[1:]
+        names = {known.operation for known in again.log("cell").open_markers()}
+    except JournalError:
+        return "told"
+    finally:
+        again.close()
+    if problems:
+        return "told"
+    assert found == right
+    assert names == {"left open", "another"}
+    return "without a meaning"

@@ -1,0 +1,385 @@
+"""What a script meets: names, arguments that are mistaken, representations, the tree of errors."""
+
+import contextlib
+import importlib
+import inspect
+import pickle
+import re
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from dataclasses import dataclass, field, replace
+from typing import Any, ClassVar, cast
+
+import numpy as np
+import pytest
+from robolink_simulators.faults import Fault, FaultAction, FaultPlan
+
+import robolink
+from robolink import ANY, Pose, ToolOffset, calibration, drift, errors, journal
+from robolink.deprecation import GONE_IN, OLD_NAMES, deprecated
+from robolink.errors import ConfigError, ToolIndexError
+from robolink.journal import open_journal
+from robolink.methods import TwoPoseSource, measure_two_pose
+from robolink.model import EntryKind, NewEntry, WorkBox
+from robolink.model._movement import MotionProfile
+from robolink.procedures import InputSource, ManualPinSource, TouchPlan
+from robolink.runner import foreseen_steps
+from robolink.testing import MemoryController, PaperCell
+from robolink.version import VERSION
+
+# A public name that was given up works for one more version, and says what it is now.
+
+ROWS = [(package, name, new) for package, row in OLD_NAMES.items() for name, new in row.items()]
+IDS = [f"{package}.{name}" for package, name, _ in ROWS]
+
+
+def told(act):
+    """Return the warnings of an act, and what it gave."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        given = act()
+    return caught, given
+
+
+def tried(act, *args, **kwargs):
+    """Call what may fail on what it is given; the warning comes first."""
+    with contextlib.suppress(AttributeError):
+        act(*args, **kwargs)
+
+
+def imported(package, name):
+    names: dict[str, object] = {}
+    exec(compile(f"from {package} import {name} as it", __file__, "exec"), names)
+    return names["it"]
+
+
+def the_new(path):
+    home, _, name = path.rpartition(".")
+    return getattr(importlib.import_module(home), name)
+
+
+@pytest.mark.parametrize(("package", "name", "new"), ROWS, ids=IDS)
+def test_an_old_name_is_the_same_thing_and_warns_once_where_it_is_used(package, name, new):
+    for act in (
+        lambda: imported(package, name),
+        lambda: getattr(importlib.import_module(package), name),
+    ):
+        caught, given = told(act)
+        assert given is the_new(new)
+        (one,) = caught
+        assert one.category is DeprecationWarning
+        assert one.filename == __file__
+        assert f"{package}.{name} is now {new}." in str(one.message)
+
+
+def test_what_a_package_hands_out_does_not_name_the_old():
+    for package, row in OLD_NAMES.items():
+        module = importlib.import_module(package)
+        assert not {*row} & {*dir(module), *getattr(module, "__all__", ())}
+
+
+def test_what_never_was_is_no_old_name():
+    for package in OLD_NAMES:
+        with pytest.raises(AttributeError, match=f"module '{package}' has no attribute 'nothing'"):
+            importlib.import_module(package).nothing  # noqa: B018 - the look-up is the test
+
+
+def test_a_pickle_that_names_the_old_place_is_read():
+    caught, found = told(lambda: pickle.loads(b"crobolink.config\nProblem\n."))
+    assert found is the_new("robolink.files.toml.Problem")
+    assert len(caught) == 1
+
+
+def test_the_old_names_end_with_the_version_that_the_warning_says():
+    now, gone = (tuple(map(int, text.split("."))) for text in (VERSION, GONE_IN))
+    assert now < gone, "empty OLD_NAMES, and say in which version the next ones go"
+
+
+class Tolerance:
+    """A class with a method that was given up."""
+
+    limit_mm = 0.2
+
+    def exceeded(self, by_mm):
+        return by_mm > self.limit_mm
+
+    @deprecated("Tolerance.exceeded")
+    def doubts(self, by_mm):
+        """Return whether it is."""
+        return self.exceeded(by_mm)
+
+    @property
+    @deprecated("Tolerance.limit_mm")
+    def most_mm(self):
+        return self.limit_mm
+
+
+def test_an_old_method_does_what_it_did_and_warns_where_it_is_called():
+    tolerance = Tolerance()
+    for act, given, message in (
+        (lambda: tolerance.doubts(0.3), True, "Tolerance.doubts is now Tolerance.exceeded."),
+        (lambda: tolerance.most_mm, 0.2, "Tolerance.most_mm is now Tolerance.limit_mm."),
+    ):
+        caught, found = told(act)
+        assert found == given
+        (one,) = caught
+        assert (one.category, one.filename) == (DeprecationWarning, __file__)
+        assert str(one.message).startswith(message)
+    assert Tolerance.doubts.__doc__ == "Return whether it is."
+
+
+def test_a_look_at_a_journal_under_its_old_name_is_the_same_and_warns():
+    here = journal.signature_here("1.0")
+    caught, old = told(lambda: journal.GlancingLog("epson://192.0.2.1:5000", signature=here))
+    new = journal.open_log("epson://192.0.2.1:5000", durable=True, signature=here, glance=True)
+    assert type(old) is type(new)
+    assert old.signature == here
+    assert [one.category for one in caught] == [DeprecationWarning]
+
+
+@pytest.mark.parametrize("given", [(), (8,)], ids=["by name", "last"])
+def test_a_sentence_with_a_sign_of_its_own_warns_and_has_it(given):
+    sentence: Callable[..., str] = calibration.seating_sentence
+    caught, found = told(
+        lambda: sentence(0.1, *given, "~") if given else sentence(0.1, 8, sign="~")
+    )
+    assert found == sentence(0.1, 8).replace("+-", "~") != sentence(0.1, 8)
+    assert [(one.category, one.filename) for one in caught] == [(DeprecationWarning, __file__)]
+
+
+def test_sentences_that_are_yielded_have_the_sign_too():
+    at, tip_mm = "2026-11-22T08:00:00Z", {"x": 12.3, "y": -3.9}
+    change = drift.MeasuredChange(7, at, "c-1", 1, "", "", tip_mm, None, 0.05, 0.024, 0.064)
+    sentences: Callable[..., Iterator[str]] = drift.last_statements
+    caught, found = told(lambda: list(sentences([change], sign="~")))
+    assert found == [one.replace("+-", "~") for one in drift.last_statements([change])]
+    assert "~0.024" in found[0]
+    assert len(caught) == 1
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "accurate_sentence",
+        "largest_row_sentence",
+        "proved_statements",
+        "repeatable_sentence",
+        "seating_sentence",
+        "statement_sentences",
+    ],
+)
+def test_every_sentence_that_took_a_sign_takes_it_and_nothing_else(name):
+    sentence = getattr(calibration, name)
+    assert "sign" not in inspect.signature(sentence).parameters
+    nothing = [None] * len(inspect.signature(sentence).parameters)
+    caught, _ = told(lambda: tried(sentence, *nothing, sign="~"))
+    assert [str(one.message).partition(" is now")[0] for one in caught] == [f"sign of {name}"]
+    with pytest.raises(TypeError, match="positional argument"):
+        sentence(*nothing, "~", "more")
+
+
+def a_source_with_old_hooks():
+    @dataclass(frozen=True)
+    class Once(ManualPinSource):
+        sentence: ClassVar[str] = "A pin is touched."
+        adds_touch: ClassVar[bool] = False
+        touch: TouchPlan = field(default_factory=TouchPlan)
+
+        def _steps(self, stored, *, live):
+            return measure_two_pose(self._touching(live=live), stored=stored)
+
+        def _further_steps(self, here, taken, again, stored):
+            return TwoPoseSource(self.touch).further_steps(here, taken, again, stored)
+
+    return Once()  # type: ignore[abstract]  # made of the old name
+
+
+def test_a_source_of_touches_with_hooks_by_their_old_names_measures_and_shows_as_before():
+    caught, source = told(a_source_with_old_hooks)
+    assert [str(one.message).partition(". ")[0] for one in caught] == [
+        f"a_source_with_old_hooks.<locals>.Once.{old} is now {new}"
+        for old, new in (("_steps", "steps"), ("_further_steps", "further_steps"))
+    ]
+    assert {one.filename for one in caught} == {__file__}
+    stored = ToolOffset(12, -4, -20)
+    cell = PaperCell(Pose(300, 100, 20, 0), ToolOffset(12.3, -3.9, -20), (310, 95, -40))
+    caught, found = told(lambda: cell.run(source.steps(stored)))
+    assert {str(one.message).partition(" is now ")[2].partition(".")[0] for one in caught} == {
+        "touch"
+    }
+    again = cell.run(source.further_steps(cell.here, found.inputs, 1, stored))
+    for result in (found, again):
+        assert result.offset.x_mm == pytest.approx(12.3)
+    shown = told(lambda: foreseen_steps(source.procedure(stored, cell.here), cell.here))[1]
+    whole = foreseen_steps(TwoPoseSource().procedure(stored, cell.here), cell.here)
+    assert [one.step for one in shown] == [one.step for one in whole]
+
+
+def test_a_source_of_an_input_with_its_hook_by_the_old_name_measures_and_shows_as_before():
+    @dataclass(frozen=True)
+    class Plan:
+        until_mm: float | None = 0.1
+        retake: bool = True
+
+    def made():
+        @dataclass(frozen=True)
+        class Switched(InputSource[Plan]):
+            plan: Plan = Plan()
+
+            def _steps(self, stored, here, plan):
+                return stored, here, plan
+
+            def proof(self, context, tool, result, *, tip, tolerance_mm):
+                raise NotImplementedError
+
+        return Switched()  # type: ignore[abstract]  # made of the old name
+
+    caught, source = told(made)
+    assert [str(one.message).partition(". ")[0].rpartition(".")[2] for one in caught] == [
+        "_steps is now steps"
+    ]
+    assert source.steps(1, 2) == (1, 2, Plan())
+    assert source.procedure(1, 2) == (1, 2, Plan(None, retake=False))
+
+
+# What a script gives by mistake is named for what it is, and nothing is sent.
+
+
+@pytest.fixture
+def controller(tmp_path, monkeypatch):
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path))
+    with robolink.connect("epson+sim://arguments") as controller:
+        yield controller
+
+
+def test_numbers_of_numpy_are_numbers(controller):
+    given: list[Any] = [np.float32(1.5), np.float64(2.25), np.int32(3), np.int64(30)]
+    offset = ToolOffset(*given)
+    assert offset == ToolOffset(1.5, 2.25, 3.0, 30.0)
+    assert {type(value) for value in offset.components()} <= {int, float, np.float64}
+    receipt = controller.tools.write(1, offset, expected=ANY)
+    assert receipt.read_back == offset
+
+
+@pytest.mark.parametrize("value", [np.float32("nan"), np.float64("inf"), "1", None, 1j])
+def test_what_is_no_number_is_refused(value):
+    with pytest.raises(ConfigError, match="x_mm is not a number"):
+        ToolOffset(value)
+
+
+@pytest.mark.parametrize("tool", ["1", 1.0, True, None])
+def test_a_tool_is_named_by_its_number(controller, tool):
+    for act in (
+        controller.tools.read,
+        controller.tools.select,
+        lambda it: controller.tools.clear(it, expected=ANY),
+        lambda it: controller.tools.write(it, ToolOffset(), expected=ANY),
+    ):
+        with pytest.raises(ToolIndexError, match="by its number") as caught:
+            act(tool)
+        assert type(tool).__name__ in caught.value.what
+
+
+def test_an_offset_is_a_tool_offset(controller):
+    before = controller.tools.read(1)
+    with pytest.raises(ConfigError, match="An offset is a ToolOffset, not tuple"):
+        controller.tools.write(1, (1, 2, 3, 0, 0, 0), expected=ANY)
+    with pytest.raises(ConfigError, match="ToolOffset, None or ANY, not"):
+        controller.tools.write(1, ToolOffset(1, 2, 3), expected=(1, 2, 3))
+    assert controller.tools.read(1) == before
+
+
+@pytest.mark.parametrize(
+    "target", [(1, 2, 3, 4), replace(Pose(1, 2, 3, 4), x_mm=cast("Any", "1")), None]
+)
+def test_a_target_is_a_pose(controller, target):
+    box = WorkBox(-500, 500, -500, 500, -500, 500)
+    with pytest.raises(ConfigError, match="A target is a Pose of numbers"):
+        controller.groups[0].move_to(target, MotionProfile(), box=box)
+
+
+@pytest.mark.parametrize("url", [5, None, b"epson+tcp://192.168.0.1"])
+def test_what_is_neither_url_nor_controller_is_refused(url):
+    with pytest.raises(ConfigError, match="neither a URL nor a controller"):
+        robolink.connect(url)
+
+
+def test_the_action_of_a_fault_may_be_a_word_and_nothing_else():
+    plan = FaultPlan(seed=1)
+    plan.add(Fault(cast("Any", "drop_reply")))
+    assert plan.pending[0].action is FaultAction.DROP_REPLY
+    with pytest.raises(ConfigError, match="no fault 'drop_replies'"):
+        Fault(cast("Any", "drop_replies"))
+
+
+# What a prompt shows of a controller: which one, and its state as it was read last.
+
+
+@pytest.mark.parametrize(
+    ("url", "kind"),
+    [
+        ("epson+sim://shown", "Epson"),
+        ("softmotion+sim://shown", "SoftMotion"),
+    ],
+)
+def test_a_controller_says_which_it_is_and_in_what_state(url, kind):
+    with robolink.connect(url) as controller:
+        identity, sent = controller.identity, controller.exchanges
+        assert repr(controller.tools) == f"<{kind}ToolTable of {identity}>"
+        assert repr(controller.groups[0]) == f"<{kind}Group of {identity}>"
+        assert repr(controller) == f"<{kind}Controller {identity}: state not read>"
+        assert controller.exchanges == sent
+        state = controller.status().state.value
+        assert repr(controller) == f"<{kind}Controller {identity}: {state} when read last>"
+        controller.stop()
+        assert repr(controller) == f"<{kind}Controller {identity}: held by a stop>"
+        controller.release_stop()
+        assert repr(controller).endswith("when read last>")
+    assert repr(controller) == f"<{kind}Controller {identity}: closed>"
+
+
+def test_one_of_another_package_says_so_too():
+    with MemoryController() as controller:
+        assert repr(controller).startswith("<MemoryController memory")
+    assert repr(controller).endswith(": closed>")
+
+
+def test_a_journal_says_where_it_is_and_its_log_of_whom(tmp_path):
+    url = "epson+tcp://192.0.2.1:5000"
+    with closing(open_journal(str(tmp_path / "journal.db"))) as journal:
+        assert repr(journal) == f"<Journal {journal.location}>"
+        log = journal.log(url)
+        assert repr(log) == f"<JournalOutcomeLog of {url} in {journal.location}>"
+        log.append(NewEntry(EntryKind.RAW, verdict="seen"))
+    with closing(open_journal(str(tmp_path / "journal.db"), read_only=True)) as journal:
+        assert repr(journal).endswith(", read only>")
+
+
+# The tree of errors that is drawn at the top of the module is the one that is there.
+
+
+def drawn():
+    """Return each drawn class with its parent."""
+    path: list[str] = []
+    found: dict[str, str | None] = {}
+    for line in str(errors.__doc__).splitlines():
+        match = re.match(r"    ((?:│   |    )*)(?:[├└]── )?([A-Z]\w*Error(?: · \w+Error)*)\b", line)
+        if match is None:
+            continue
+        names = match[2].split(" · ")
+        depth = len(match[1]) // 4 + ("──" in line.partition(names[0])[0])
+        for name in names:
+            found[name] = path[depth - 1] if depth else None
+        path = [*path[:depth], names[-1]]
+    return found
+
+
+def test_every_class_is_drawn_under_its_parent():
+    there: dict[str, str | None] = {
+        name: kind.__bases__[0].__name__
+        for name, kind in vars(errors).items()
+        if isinstance(kind, type) and issubclass(kind, errors.RobolinkError)
+    }
+    there["RobolinkError"] = None
+    assert drawn() == there

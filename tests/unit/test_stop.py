@@ -1,0 +1,425 @@
+"""A stop: what its latch lets through, the note that it leaves, what counts as rest on EPSON."""
+
+import json
+import threading
+from typing import Any
+
+import pytest
+from robolink_simulators.cell.clock import ManualClock
+
+from robolink.checkpoints import Checkpoint, checkpoint, observed
+from robolink.controllers.epson.line import EpsonConversation, text_line
+from robolink.controllers.epson.rest import REST_S, bring_to_rest
+from robolink.controllers.epson.session import command_class_of
+from robolink.controllers.softmotion.commands import command_class_of as class_of_command
+from robolink.errors import (
+    BusyError,
+    NotReadyError,
+    NotReadyReason,
+    OutcomeUnknownError,
+    RejectedError,
+    RemoteProtocolError,
+    StoppedError,
+    TransportTimeoutError,
+)
+from robolink.files.durable import file_name, state_folder
+from robolink.journal._lease_view import LeaseHolder, LeaseView
+from robolink.protocols.epson_text import COMMANDS, Reply, Request
+from robolink.protocols.mailbox import Command, Opcode
+from robolink.stop_latch import CommandClass, StopLatch
+from robolink.stopping import clear_note, find_note, leave_note
+from robolink.timing import NS_PER_S
+
+# What a stop lets through, and to whom.
+
+LOOK, CALM, RESET, RESTORE, WRITE, ACT = CommandClass
+HELD_BACK = (RESTORE, WRITE, ACT)
+
+
+@pytest.fixture
+def latch():
+    return StopLatch("robot")
+
+
+def admitted(latch):
+    """Return what passes in this thread."""
+    passed = set()
+    for kind in CommandClass:
+        try:
+            latch.admit(kind, "request")
+        except StoppedError:
+            continue
+        else:
+            passed.add(kind)
+    return passed
+
+
+def test_open_it_lets_everything_pass(latch):
+    assert admitted(latch) == set(CommandClass)
+    latch.close()
+    latch.release()
+    assert admitted(latch) == set(CommandClass)
+
+
+def test_closed_it_lets_pass_what_looks_and_what_calms(latch):
+    latch.close()
+    assert admitted(latch) == {LOOK, CALM}
+
+
+def test_who_restores_may_restore_and_nothing_else(latch):
+    latch.close()
+    with latch.restoring():
+        assert admitted(latch) == {LOOK, CALM, RESTORE}
+        latch.require_open("restoring")
+    assert admitted(latch) == {LOOK, CALM}
+
+
+def test_a_permission_is_that_of_one_thread(latch):
+    latch.close()
+    elsewhere = []
+    with latch.putting_back(1):
+        assert admitted(latch) == {LOOK, CALM, RESTORE, WRITE}
+        thread = threading.Thread(target=lambda: elsewhere.append(admitted(latch)))
+        thread.start()
+        thread.join()
+    assert elsewhere == [{LOOK, CALM}]
+
+
+def test_each_tool_is_put_back_once(latch):
+    latch.close()
+    with latch.putting_back(1):
+        pass
+    with pytest.raises(StoppedError, match="Tool 1, put back once more"), latch.putting_back(1):
+        raise AssertionError("a second time")
+    with latch.putting_back(2):
+        pass
+    latch.release()
+    latch.close()
+    with latch.putting_back(1):
+        pass
+
+
+def test_a_roll_back_in_which_the_stop_falls_is_the_one(latch):
+    with latch.putting_back(1):
+        latch.close()
+        assert WRITE in admitted(latch)
+    with pytest.raises(StoppedError), latch.putting_back(1):
+        raise AssertionError("a second time")
+
+
+def test_under_a_stop_nothing_begins_and_nothing_ends_well(latch):
+    with pytest.raises(StoppedError, match="ended by a stop"), latch.watching("jog"):
+        latch.close()
+    with pytest.raises(StoppedError, match="ended by a stop"), latch.watching("jog"):
+        raise AssertionError("it began")
+
+
+def test_a_reset_that_a_person_asks_for_under_a_stop_is_let_through(latch):
+    latch.close()
+    with latch.calming("reset"):
+        assert admitted(latch) == {LOOK, CALM, RESET}
+    assert admitted(latch) == {LOOK, CALM}
+
+
+@pytest.mark.parametrize("stopped_before", [False, True])
+def test_a_reset_of_before_a_stop_is_not_sent_after_it_and_does_not_end_well(latch, stopped_before):
+    if stopped_before:
+        latch.close()
+    with pytest.raises(StoppedError, match="reset: ended by a stop"), latch.calming("reset"):
+        latch.close()
+        assert admitted(latch) == {LOOK, CALM}
+
+
+def test_what_the_controller_says_under_a_stop_is_the_stop_and_doubt_stays_doubt(latch):
+    held = NotReadyError("held", reason=NotReadyReason.PAUSED)
+    with pytest.raises(NotReadyError), latch.watching("jog"):
+        raise held
+    with pytest.raises(StoppedError) as caught, latch.watching("jog"):
+        latch.close()
+        raise held
+    assert caught.value.__context__ is held
+    latch.release()
+    with pytest.raises(OutcomeUnknownError), latch.watching("jog"):
+        latch.close()
+        raise OutcomeUnknownError("lost")
+
+
+def test_closing_a_link_waits_for_the_stop_that_uses_it(latch):
+    begun, ending, closed = threading.Event(), threading.Event(), threading.Event()
+
+    def stop():
+        with latch.stopping():
+            begun.set()
+            ending.wait(10)
+
+    def close():
+        latch.await_stops(10)
+        closed.set()
+
+    threads = [threading.Thread(target=stop), threading.Thread(target=close)]
+    threads[0].start()
+    assert begun.wait(10)
+    threads[1].start()
+    assert not closed.wait(0.02)
+    ending.set()
+    assert closed.wait(10)
+    for thread in threads:
+        thread.join()
+
+
+@pytest.mark.parametrize(
+    ("statement", "expected"),
+    [
+        ("Print RealPos", LOOK),
+        ("Where", LOOK),
+        ("TLSet", LOOK),
+        ("Base", LOOK),
+        ("Base XY(1, 0, 0, 0)", ACT),
+        ("Tool 0", RESTORE),
+        ("Power Low", RESTORE),
+        ("Speed 5, 5, 5", RESTORE),
+        ("SpeedS 20.5", RESTORE),
+        ("TLSet 1, XY(1.000, 2.000, 3.000, 0.000)", WRITE),
+        ("TLClr 1", WRITE),
+        ("Go XY(1.000, 2.000, 3.000, 0.000) /R /0", ACT),
+        ("Move XY(1.000, 2.000, 3.000, 0.000) Till Sw(1) = On", ACT),
+        ("Print 1; Go P1", ACT),
+        ("Tool 1; Go P1", ACT),
+        ("Tool 1 Go P1", ACT),
+        ("tool 1", ACT),
+        ("Motor On", ACT),
+        ("", ACT),
+    ],
+)
+def test_a_statement_is_what_its_text_says(statement, expected):
+    assert command_class_of(Request("Execute", (statement,))) is expected
+
+
+def test_every_request_that_is_not_known_to_look_or_calm_acts():
+    looking = {c.name for c in COMMANDS if command_class_of(Request(c.name)) is LOOK}
+    calming = {c.name for c in COMMANDS if command_class_of(Request(c.name)) is CALM}
+    assert all(name.startswith("Get") or name in ("Login", "Logout") for name in looking)
+    assert calming == {"Stop", "Abort", "Pause", "SetMotorsOff", "ResetAlm"}
+    assert command_class_of(Request("Reset")) is RESET
+    assert command_class_of(Request("Start", ("0",))) is ACT
+    assert command_class_of(Request("SetIO", ("1", "1"))) is ACT
+    assert command_class_of(Request("Unheard")) is ACT
+
+
+def test_what_moves_a_plc_is_held_back_and_what_ends_it_is_not():
+    acting = {
+        code for code in Opcode if class_of_command(Command(0, code, operands=(1, 0, 0, 0))) is ACT
+    }
+    assert acting == {
+        *(Opcode.ENABLE, Opcode.CONTINUE, Opcode.JOG, Opcode.MOVE_DIRECT, Opcode.MOVE_LINEAR),
+        *(Opcode.SET_KINEMATICS, Opcode.WRITE_OUTPUT, Opcode.MOVE_UNTIL_INPUT),
+    }
+    assert class_of_command(Command(0, Opcode.JOG)) is CALM  # both masks 0: its end
+    assert class_of_command(Command(0, Opcode.STOP)) is CALM
+    assert class_of_command(Command(0, Opcode.STOP, operands=(1, 0, 0, 0))) is RESET  # its release
+    assert class_of_command(Command(0, Opcode.RESET)) is RESET
+
+
+def test_checkpoints_are_seen_while_somebody_looks_and_cost_nothing_else():
+    seen = []
+    checkpoint(Checkpoint.STEP, "before")
+    with observed(lambda point, what: seen.append((point, what))):
+        checkpoint(Checkpoint.STEP, "meanwhile")
+        with observed(lambda _point, _what: None):
+            checkpoint(Checkpoint.STEP, "somebody else looks")
+        checkpoint(Checkpoint.LOCK)
+    checkpoint(Checkpoint.STEP, "after")
+    assert seen == [(Checkpoint.STEP, "meanwhile"), (Checkpoint.LOCK, "")]
+
+
+# The note that a stop leaves: in doubt it stands, and it hangs on its own controller.
+
+URL = "epson+tcp://192.168.0.1:5000"
+HERE = {"192.168.0.1:5000"}
+
+
+def path_of(key):
+    return state_folder("stops") / file_name(key)
+
+
+@pytest.mark.usefixtures("robolink_state")
+def test_a_note_that_cannot_be_read_is_a_note_all_the_same():
+    path_of(next(iter(HERE))).mkdir(parents=True)
+    found = find_note(HERE)
+    assert found is not None
+    assert not found.confirmed
+    assert "cannot be read" in found.sentence
+
+
+@pytest.mark.usefixtures("robolink_state")
+@pytest.mark.parametrize("confirmed", ["no", 1, None, False])
+def test_rest_is_believed_only_where_the_note_says_so(confirmed):
+    leave_note(HERE, URL, "mei", confirmed=True)
+    path = path_of(next(iter(HERE)))
+    kept = json.loads(path.read_bytes())
+    path.write_text(json.dumps({**kept, "confirmed": confirmed}))
+    found = find_note(HERE)
+    assert found is not None
+    assert not found.confirmed
+    assert "did not see it come to rest" in found.sentence
+
+
+@pytest.mark.usefixtures("robolink_state")
+def test_a_note_of_another_controller_hides_none_of_this_one_and_stays():
+    """They were met at one address, one after the other."""
+    leave_note(HERE, URL, "mei", confirmed=True, controller="SN-1")
+    leave_note({"cable"}, URL, "jan", confirmed=True, controller="SN-2")
+    both = {*HERE, "cable"}
+    for name, who in (("SN-1", "mei"), ("SN-2", "jan")):
+        found = find_note(both, name)
+        assert found is not None
+        assert found.who == who
+    leave_note(HERE, URL, "ada", confirmed=True, controller="SN-2")
+    clear_note({"elsewhere"}, "SN-1")
+    assert find_note({"elsewhere"}, "SN-1") is None
+    found = find_note(HERE)
+    assert found is not None
+    assert found.who == "ada", "a later stop at the same address"
+
+
+@pytest.mark.usefixtures("robolink_state")
+@pytest.mark.parametrize("record", ['{"nobody": 1}', "[]", "", "{", '"x"', "[" * 100_000])
+def test_a_record_of_a_holder_that_is_damaged_names_nobody(record):
+    assert LeaseView(holder=record).who() == LeaseHolder()
+
+
+# What counts as rest on an EPSON controller, and what a stop takes for its answer.
+#
+# Against one that answers as it is told.
+
+READY, RUNNING = "00100000001", "00100000010"
+
+
+class Robot:
+    """Moves until it was aborted so many times; refuses a Stop meanwhile, or not."""
+
+    def __init__(self, *, aborts=1, shown=RUNNING, stop_refusal=21, abort_refusal=0):
+        self.clock = ManualClock()
+        self.asked = []
+        self._aborts, self._shown = aborts, shown
+        self._stop_refusal, self._abort_refusal = stop_refusal, abort_refusal
+
+    @property
+    def moving(self):
+        return self.asked.count("Abort") < self._aborts
+
+    def ask(self, name):
+        self.asked.append(name)
+        if name == "Abort" and self._abort_refusal:
+            raise RejectedError("no Abort", code=self._abort_refusal)
+        if name == "Stop" and self.moving and self._stop_refusal:
+            if self._stop_refusal < 0:
+                raise BusyError("an Execute of ours is unanswered")
+            raise RejectedError("not now", code=self._stop_refusal)
+        if name == "GetStatus":
+            return Reply(name, (self._shown if self.moving else READY, "0000"))
+        return Reply(name, ("0",))
+
+    def stop(self):
+        return bring_to_rest(self.ask, self.clock, controller="robot")
+
+
+def test_the_first_frame_is_the_abort_and_one_of_each_is_enough():
+    robot = Robot()
+    flags, code = robot.stop()
+    assert robot.asked == ["Abort", "Stop", "GetStatus"]
+    assert (flags.running, code) == (False, 0)
+
+
+@pytest.mark.parametrize("stop_refusal", [21, -1], ids=["refused", "held back here"])
+@pytest.mark.parametrize("shown", [RUNNING, READY])
+def test_ready_flags_are_no_rest_while_an_execute_keeps_the_stop_out(shown, stop_refusal):
+    robot = Robot(aborts=3, shown=shown, stop_refusal=stop_refusal)
+    robot.stop()
+    assert not robot.moving
+    assert robot.asked.count("Abort") == 3
+
+
+def test_a_stop_that_was_accepted_is_no_rest_while_the_flag_is_on():
+    robot = Robot(aborts=2, stop_refusal=0)
+    robot.stop()
+    assert not robot.moving
+    assert robot.asked.count("Stop") == 1
+
+
+@pytest.mark.parametrize("shown", [RUNNING, READY])
+@pytest.mark.fault("F76")
+def test_no_rest_in_time_is_unknown(shown):
+    robot = Robot(aborts=1000, shown=shown)
+    with pytest.raises(OutcomeUnknownError, match="did not come to rest within 5 s"):
+        robot.stop()
+    assert (REST_S - 0.5) * NS_PER_S < robot.clock.now_ns() < (REST_S + 0.5) * NS_PER_S
+    assert robot.asked.count("Abort") >= 5
+
+
+def test_firmware_without_abort_is_stopped_by_stop():
+    robot = Robot(aborts=0, abort_refusal=11)
+    robot.stop()
+    assert robot.asked == ["Abort", "Stop", "GetStatus"]
+
+
+def test_a_stop_that_is_not_allowed_is_an_error_at_once():
+    robot = Robot(stop_refusal=20, aborts=5)
+    with pytest.raises(RejectedError):
+        robot.stop()
+
+
+class Wire:
+    """Says one thing whatever is sent, and then nothing."""
+
+    identity = place = "robot"
+
+    def __init__(self, *pieces):
+        self.clock = ManualClock()
+        self.sent = []
+        self._pieces = list(pieces)
+
+    def send(self, data, *, deadline, secret=False):
+        self.sent.append(data)
+
+    def receive(self, *, deadline):
+        if not self._pieces:
+            raise TransportTimeoutError("Nothing came.", remedy="Look at it.")
+        return self._pieces.pop(0)
+
+
+def over(wire: Any) -> EpsonConversation:
+    return EpsonConversation(text_line(wire), timeout_s=1.0)
+
+
+LATE = b"#Execute,0\r\n"
+
+
+@pytest.mark.fault("F01")
+@pytest.mark.parametrize("answer", [b"#Abort,0\r\n", b"#ABORT,0\r\n"])
+def test_a_stop_passes_over_what_it_did_not_ask_for(answer):
+    wire = Wire(LATE * 15 + answer)
+    reply = over(wire).exchange("Abort")
+    assert (reply.name.lower(), reply.fields) == ("abort", ("0",))
+    assert wire.sent == [b"$Abort\r\n"]
+
+
+def test_who_only_ever_answers_something_else_is_no_controller():
+    wire = Wire(LATE * 8, LATE * 8, LATE + b"#Abort,0\r\n")
+    conversation = over(wire)
+    with pytest.raises(RemoteProtocolError, match="a question nobody asked"):
+        conversation.exchange("Abort")
+    # The next request has its own count, and what came late is none of its answers.
+    assert conversation.exchange("Abort").fields == ("0",)
+
+
+def test_a_refusal_without_a_name_is_the_answer_to_a_stop():
+    with pytest.raises(RejectedError, match="refused Stop with code 20") as refused:
+        over(Wire(b"!,20\r\n")).exchange("Stop")
+    assert (refused.value.code, refused.value.request) == (20, "Stop")
+
+
+def test_half_an_answer_to_a_stop_is_told_from_none():
+    wire = Wire(b"#Abo")
+    with pytest.raises(TransportTimeoutError, match="answered 4 bytes, then nothing: Abort"):
+        over(wire).exchange("Abort")

@@ -113,6 +113,7 @@ OLD_NAMES: Final[Mapping[str, Mapping[str, str]]] = {
         "structured_text_types": "robolink.protocols.mailbox.exports.structured_text_types",
     },
     "robolink.protocols.spel_callback": {"NEED_DATA": "robolink.protocols.NEED_DATA"},
+    "robolink.procedures": {"CalibratedCameraSource": "robolink.procedures.LookSource"},
     "robolink.recipe": {"RecipeRun": "robolink.calibration_run.RecipeRun"},
     "robolink.register_maps": {"Problem": "robolink.files.toml.Problem"},
     "robolink.transaction": {"Jump": "robolink.model.Jump"},

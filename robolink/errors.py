@@ -47,6 +47,7 @@ boundary only, always ``from`` the original.
 """
 
 from enum import StrEnum
+from types import TracebackType
 from typing import TYPE_CHECKING
 
 __all__ = [
@@ -128,6 +129,11 @@ class RobolinkError(Exception):
     def __str__(self) -> str:
         return f"{self.what} {self.remedy}".rstrip()
 
+    def concern(self, controller: str, request: str = "") -> None:
+        """Name the controller and the request, where neither was named nearer to the cause."""
+        self.controller = self.controller or controller
+        self.request = self.request or request
+
     @property
     def controller_state(self) -> "Standing":
         """What stands on the controller now, of what was done to it in the block that this ended.
@@ -144,6 +150,34 @@ class RobolinkError(Exception):
     @controller_state.setter
     def controller_state(self, standing: "Standing") -> None:
         self._standing = standing
+
+
+class Concerning:
+    """Lets each error that leaves the block name the controller and the request.
+
+    What a driver raises inside says what happened; this says of whom, once, at its border. No
+    generator: every procedure passes here.
+
+    Args:
+        controller: Identity of the controller.
+        request: What it was asked.
+    """
+
+    __slots__ = ("_controller", "_request")
+
+    def __init__(self, controller: str, request: str = "") -> None:
+        self._controller, self._request = controller, request
+
+    def __enter__(self) -> None: ...
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if isinstance(error, RobolinkError):
+            error.concern(self._controller, self._request)
 
 
 class ConfigError(RobolinkError, ValueError):
@@ -186,10 +220,8 @@ class NotComparedError(ConfigError):
         tool: int,
         components: tuple[str, ...],
         remedy: str = "",
-        controller: str = "",
-        request: str = "",
     ) -> None:
-        super().__init__(what, remedy=remedy, controller=controller, request=request)
+        super().__init__(what, remedy=remedy)
         self.tool = tool
         self.components = components
 

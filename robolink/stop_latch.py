@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from enum import Enum, auto
 
 from robolink import ambient
-from robolink.errors import ControllerError, StoppedError, UnclearAnswerError
+from robolink.errors import Concerning, ControllerError, StoppedError, UnclearAnswerError
 from robolink.messages import tr
 
 __all__ = [
@@ -115,12 +115,8 @@ class StopLatch:
             return
         if kind is CommandClass.WRITE and self._permit("writing"):
             return
-        raise StoppedError(
-            tr("{request} was not sent: the controller was stopped.", request=request),
-            remedy=_remedy(),
-            controller=self._controller,
-            request=request,
-        )
+        said = tr("{request} was not sent: the controller was stopped.", request=request)
+        raise self._stopped(said, request)
 
     def require_open(self, request: str) -> None:
         """Refuse to begin, or to go on with, an operation of several exchanges.
@@ -131,12 +127,7 @@ class StopLatch:
             StoppedError: A stop is in force.
         """
         if self._closed and not self.restores:
-            raise StoppedError(
-                tr("{request}: ended by a stop.", request=request),
-                remedy=_remedy(),
-                controller=self._controller,
-                request=request,
-            )
+            raise self._stopped(tr("{request}: ended by a stop.", request=request), request)
 
     @contextmanager
     def watching(self, request: str) -> Iterator[None]:
@@ -157,12 +148,13 @@ class StopLatch:
             StoppedError: A stop is in force at its end, be that a success or a "no" of the
                 controller, which the stop explains.
         """
-        try:
-            yield
-        except (ControllerError, UnclearAnswerError):
+        with Concerning(self._controller, request):
+            try:
+                yield
+            except (ControllerError, UnclearAnswerError):
+                self.require_open(request)
+                raise
             self.require_open(request)
-            raise
-        self.require_open(request)
 
     @contextmanager
     def calming(self, request: str) -> Iterator[None]:
@@ -221,9 +213,9 @@ class StopLatch:
     def _permit(self, name: str) -> bool:
         return bool(self._permits.__dict__.get(name))
 
-
-def _remedy() -> str:
-    return tr(
-        "The robot will not move by itself. When the cell is clear, release the stop and "
-        "start again."
-    )
+    def _stopped(self, said: str, request: str) -> StoppedError:
+        remedy = tr(
+            "The robot will not move by itself. When the cell is clear, release the stop and "
+            "start again."
+        )
+        return StoppedError(said, remedy=remedy, controller=self._controller, request=request)

@@ -130,8 +130,8 @@ def counts() -> dict[str, tuple[int, ...]]:
 
 def walks() -> dict[str, int]:
     """Return how many files each act passes through, on a simulated controller."""
-    from robolink_simulators.assist.port import serve_assist
     from robolink_simulators.cell.clock import ScaledClock
+    from robolink_simulators.control.assist import serve_assist
     from robolink_simulators.epson.device import EpsonSimulator
     from robolink_simulators.epson.options import EpsonOptions
     from robolink_simulators.hosting.streams.epson import serve_tcp

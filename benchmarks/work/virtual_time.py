@@ -12,7 +12,7 @@ from time import perf_counter
 from typing import Final
 
 from robolink_cli.prompts.operator import AssistedOperator
-from robolink_simulators.assist.port import InProcessEyes
+from robolink_simulators.control.assist import InProcessEyes
 from robolink_simulators.hosting.in_process.epson import simulator_named, unregister
 
 import robolink

@@ -108,7 +108,7 @@ RENAMED: Final = {
     "spel": (f"{COMPANIONS}.spel:spel", "expert spel"),
     "station": (f"{MEASURE}.station:station", "cell station"),
     "take-ownership": (
-        f"{CONTROLLER}.take_ownership:take_ownership",
+        f"{CONTROLLER}.operate:take_ownership",
         "robot take-ownership",
     ),
     "var": (f"{CONTROLLER}.var:var", "robot variable"),

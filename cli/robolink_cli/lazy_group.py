@@ -65,7 +65,7 @@ class LazyGroup(click.Group):
         else:
             return super().get_command(ctx, cmd_name)
         module, name = target.split(":")
-        return in_language(cast(click.Command, getattr(import_module(module), name)))
+        return in_language(cast("click.Command", getattr(import_module(module), name)))
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

@@ -14,6 +14,7 @@ from robolink.interrupts import Interrupted, one_ending
 from robolink.messages import declared, spoken
 from robolink.ways import speaking
 from robolink_cli.command_map import RENAMED, SECTIONS, SHORT_NAMES
+from robolink_cli.console.closed_window import closing_in_order
 from robolink_cli.console.help_pages import in_language
 from robolink_cli.console.language import speaking_for
 from robolink_cli.console.output import (
@@ -25,10 +26,9 @@ from robolink_cli.console.output import (
     watched_output,
 )
 from robolink_cli.console.render import dumps, json_is_on, note, print_document, say
-from robolink_cli.console.ways import SHELL_WAYS
-from robolink_cli.console.window_closing import closing_in_order
+from robolink_cli.console.shell_words import SHELL_WAYS
 from robolink_cli.lazy_group import FrontPage
-from robolink_cli.options.shared import TYPED, shared_options
+from robolink_cli.options.shared import TYPED, all_shared
 
 if TYPE_CHECKING:
     from robolink_cli.stopping.request import StopRequest
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 @click.version_option(__version__, prog_name="robolink", message="%(prog)s %(version)s")
-@shared_options
+@all_shared
 @click.pass_context
 def cli(context: click.Context) -> object:
     """Root of the commands."""

@@ -11,7 +11,7 @@ from datetime import UTC, datetime
 from typing import Final
 
 from robolink.accuracy._row_measurements import RowBound, scatter_of_repeats
-from robolink.calibration import RowFact
+from robolink.calibration import CameraModel, RowFact
 from robolink.messages import tr
 from robolink.model import Recorded
 from robolink.stations import Station, StationKind, find_stations
@@ -44,10 +44,11 @@ def learnt_rows(entries: Iterable[Recorded], station: str) -> dict[str, RowFact]
     rows: dict[str, RowFact] = {}
     kind = found[-1].kind
     if kind is StationKind.CAMERA:
-        seen = [one for one in map(_CameraSeen.of, found) if one is not None]
-        _add(rows, "camera_turn_deg", _turns(seen), seen)
-        _add(rows, "camera_scale_percent", _scales(seen), seen)
-        _add(rows, "place_mm", _camera_places(seen), seen)
+        learnt = [(one, camera) for one in found if (camera := _camera(one)) is not None]
+        stations, seen = [one for one, _ in learnt], [camera for _, camera in learnt]
+        _add(rows, "camera_turn_deg", _turns(seen), stations)
+        _add(rows, "camera_scale_percent", _scales(seen), stations)
+        _add(rows, "place_mm", _camera_places(seen), stations)
     else:
         places = [(one, place) for one in found if (place := _place(one)) is not None]
         bound = scatter_of_repeats(
@@ -77,7 +78,7 @@ def _add(
     rows: dict[str, RowFact],
     key: str,
     bound: RowBound | None,
-    found: "Sequence[Station | _CameraSeen]",
+    found: Sequence[Station],
 ) -> None:
     if bound is None:
         return
@@ -133,72 +134,29 @@ def _finite(*values: object) -> tuple[float, ...] | None:
     return tuple(numbers) if len(numbers) == len(values) else None
 
 
-class _CameraSeen:
-    """A camera as one calibration found it.
+def _camera(station: Station) -> CameraModel | None:
+    """Return a camera as one calibration found it, ``None`` where an entry does not say all of it.
 
-    Args:
-        entry: Number of the entry.
-        found_at: When, ISO 8601 UTC.
-        matrix: Its mm per pixel, row by row.
-        origin: Base point at pixel (0, 0).
-        middle: Base point that it knows best, or to which tips are brought; ``None`` for neither.
+    The place that it knows best is the one to which tips are brought, where nothing else says it.
     """
-
-    def __init__(
-        self,
-        entry: int | None,
-        found_at: str,
-        matrix: tuple[float, ...],
-        origin: tuple[float, ...],
-        *,
-        middle: tuple[float, ...] | None,
-    ) -> None:
-        self.entry, self.found_at = entry, found_at
-        self.matrix, self.origin, self.middle = matrix, origin, middle
-
-    @classmethod
-    def of(cls, station: Station) -> "_CameraSeen | None":
-        """Return what an entry says, ``None`` where it does not say all of it."""
-        rows, origin = station.details.get("mm_per_px"), station.details.get("origin_mm")
-        if not isinstance(rows, list) or not isinstance(origin, list):
-            return None
-        flat = [value for row in rows if isinstance(row, list) for value in row]
-        matrix, place = _finite(*flat), _finite(*origin)
-        if matrix is None or place is None or len(matrix) != 4 or len(place) != 2:
-            return None
-        a, b, c, d = matrix
-        if not a * d - b * c:
-            return None
-        centre = station.details.get("centre_mm")
-        known = _finite(*centre) if isinstance(centre, list) and len(centre) == 2 else None
-        middle = known or _finite(station.x_mm, station.y_mm)
-        return cls(station.entry, station.found_at, matrix, place, middle=middle)
-
-    @property
-    def area(self) -> float:
-        """Area of a pixel, negative where the image is mirrored."""
-        a, b, c, d = self.matrix
-        return a * d - b * c
-
-    @property
-    def turn_deg(self) -> float:
-        """Direction of the image's first axis in the base."""
-        a, _, c, _ = self.matrix
-        return math.degrees(math.atan2(c, a))
-
-    def base_mm(self, px: float, py: float) -> tuple[float, float]:
-        """Return where a pixel looks."""
-        a, b, c, d = self.matrix
-        return a * px + b * py + self.origin[0], c * px + d * py + self.origin[1]
-
-    def pixel(self, x_mm: float, y_mm: float) -> tuple[float, float]:
-        """Return the pixel that looks at a place."""
-        a, b, c, d = self.matrix
-        dx, dy = x_mm - self.origin[0], y_mm - self.origin[1]
-        return (d * dx - b * dy) / self.area, (a * dy - c * dx) / self.area
+    rows, origin = station.details.get("mm_per_px"), station.details.get("origin_mm")
+    if not isinstance(rows, list) or not isinstance(origin, list):
+        return None
+    flat = [value for row in rows if isinstance(row, list) for value in row]
+    matrix, place = _finite(*flat), _finite(*origin)
+    if matrix is None or place is None or len(matrix) != 4 or len(place) != 2:
+        return None
+    a, b, c, d = matrix
+    centre = station.details.get("centre_mm")
+    known = _finite(*centre) if isinstance(centre, list) and len(centre) == 2 else None
+    middle = known or _finite(station.x_mm, station.y_mm)
+    camera = CameraModel(
+        ((a, b), (c, d)), (place[0], place[1]), None if middle is None else (middle[0], middle[1])
+    )
+    return camera if camera.determinant else None
 
 
-def _turns(seen: "Sequence[_CameraSeen]") -> RowBound | None:
+def _turns(seen: Sequence[CameraModel]) -> RowBound | None:
     turns: list[tuple[float]] = []
     for one in seen:
         turn = one.turn_deg
@@ -208,17 +166,16 @@ def _turns(seen: "Sequence[_CameraSeen]") -> RowBound | None:
     return scatter_of_repeats(turns, anew_from=_TURNED_ANEW_DEG, floor=_LAST_DIGIT)
 
 
-def _scales(seen: "Sequence[_CameraSeen]") -> RowBound | None:
-    scales = [(100 * math.log(abs(one.area)) / 2,) for one in seen]
+def _scales(seen: Sequence[CameraModel]) -> RowBound | None:
+    scales = [(100 * math.log(abs(one.determinant)) / 2,) for one in seen]
     return scatter_of_repeats(scales, anew_from=_FOCUSED_ANEW_PERCENT, floor=_LAST_DIGIT)
 
 
-def _camera_places(seen: "Sequence[_CameraSeen]") -> RowBound | None:
+def _camera_places(seen: Sequence[CameraModel]) -> RowBound | None:
     """Return how the place scatters at which one pixel looks: where the newest sees its middle."""
-    if not seen or seen[-1].middle is None:
+    if not seen or seen[-1].centre_mm is None:
         return None
-    x_mm, y_mm = seen[-1].middle
-    pixel = seen[-1].pixel(x_mm, y_mm)
+    pixel = seen[-1].pixel(*seen[-1].centre_mm)
     places = [one.base_mm(*pixel) for one in seen]
     return scatter_of_repeats(places, anew_from=PLACED_ANEW_MM, floor=_LAST_DIGIT_MM)
 

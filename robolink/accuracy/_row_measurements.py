@@ -9,7 +9,7 @@ from typing import Final
 from robolink.calibration import ACCURACY_ROWS, RowFact, chi_square_quantile, student_t
 from robolink.errors import CalibrationError
 from robolink.messages import declared, spoken, tr
-from robolink.model import EntryKind, NewEntry, Recorded
+from robolink.model import EntryKind, NewEntry, Recorded, json_fields
 from robolink.timing import local_label
 
 _HOW: Final = {
@@ -78,10 +78,7 @@ def measured_entry(found: MeasuredRow) -> NewEntry:
             "row": found.row,
             "half_width": found.half_width,
             "unit": row.unit,
-            "by": found.by,
-            "station": found.station,
-            "count": found.count,
-            "records": list(found.records),
+            **json_fields(found, "by", "station", "count", "records"),
             **found.details,
         },
     )

@@ -6,7 +6,14 @@ from typing import Final, Protocol
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.model import ControllerFacts, OutcomeLog, ToolOffset, ToolTable, angle_difference_deg
+from robolink.model import (
+    COMPONENTS,
+    ControllerFacts,
+    OutcomeLog,
+    ToolOffset,
+    ToolTable,
+    angle_difference_deg,
+)
 from robolink.timing import wall_label
 from robolink.version import VERSION
 from robolink.ways import Way, way
@@ -14,9 +21,6 @@ from robolink.ways import Way, way
 TOOLS: Final = range(1, 16)
 """The tools that a controller can define (docs/reference/epson.md 3.1); a backup names every
 one."""
-
-COMPONENTS: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
-"""The components of an offset, as files and documents name them."""
 
 
 class ToolHolder(Protocol):

@@ -9,12 +9,10 @@ itself, before the first write to it.
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Final, NoReturn
 
 from robolink.backup._comparison import (
-    COMPONENTS,
     TOOLS,
     Backup,
     ToolHolder,
@@ -25,7 +23,15 @@ from robolink.errors import ConfigError
 from robolink.files.durable import file_name, make_folder, state_folder
 from robolink.files.named import read_named, save_named
 from robolink.messages import tr
-from robolink.model import ControllerFacts, EntryKind, NewEntry, ToolOffset
+from robolink.model import (
+    COMPONENTS,
+    ControllerFacts,
+    EntryKind,
+    NewEntry,
+    ToolOffset,
+    json_fields,
+    json_value,
+)
 
 
 class JsonReader:
@@ -179,13 +185,13 @@ def load(path: Path) -> Backup:
 
 def backup_to_text(backup: Backup) -> str:
     """Return the file's text, in ASCII."""
-    tools = {str(tool): _plain(backup.state.tools[tool]) for tool in TOOLS}
+    tools = {str(tool): json_value(backup.state.tools[tool]) for tool in TOOLS}
     members = {
         "schema": json.dumps(SCHEMA),
         "saved_at": json.dumps(backup.saved_at),
         "robolink_version": json.dumps(backup.robolink_version),
         "controller": json.dumps(backup.controller),
-        "facts": _block(asdict(backup.facts)),
+        "facts": _block(json_fields(backup.facts)),
         "selected_tool": json.dumps(backup.state.selected),
         "tools": _block(tools),
     }
@@ -269,12 +275,6 @@ def _offset(read: JsonReader, value: object, path: str) -> ToolOffset | None:
         return None
     members = read.members(value, path, COMPONENTS)
     return ToolOffset(*(read.number(members[name], f"{path}.{name}") for name in COMPONENTS))
-
-
-def _plain(offset: ToolOffset | None) -> dict[str, float] | None:
-    if offset is None:
-        return None
-    return dict(zip(COMPONENTS, offset.components(), strict=True))
 
 
 def _block(members: Mapping[str, object]) -> str:

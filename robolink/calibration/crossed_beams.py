@@ -33,7 +33,7 @@ from robolink.calibration.core.least_squares import Floats, LinearFit, linear_fi
 from robolink.calibration.core.pose_checks import (
     MIN_ROTATION_DEG,
     angle_spread_deg,
-    keep_unmeasured,
+    components,
 )
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.rotations import rotation_of
@@ -87,9 +87,6 @@ def _through_mm(crossing: Crossing, offset: ToolOffset) -> tuple[float, float]:
     dx, dy, _ = (rotation_of(crossing.entry) @ np.array(offset.components()[:3])).tolist()
     x_mm, y_mm = crossing.middle_mm
     return x_mm + dx, y_mm + dy
-
-
-_KEPT = ("z_mm", "u_deg", "v_deg", "w_deg")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -201,9 +198,7 @@ def solve_crossed_beams(
     lags = fit.x[2 : 2 + sum(two_ways)].tolist()
     result = BeamsResult(
         method="beams",
-        offset=keep_unmeasured(stored, x_mm=float(fit.x[0]), y_mm=float(fit.x[1])),
-        measured=("x_mm", "y_mm"),
-        kept=_KEPT,
+        **components(stored, x_mm=float(fit.x[0]), y_mm=float(fit.x[1])),
         reference_point_mm=where_they_cross(beams),
         sigma_gain=_gain(fit),
         warnings=warnings,
@@ -211,7 +206,6 @@ def solve_crossed_beams(
         residuals_mm=_vectors(fit.residuals[: len(crossings)], crossings, beams),
         condition_number=fit.condition_number,
         rank=fit.rank,
-        unobservable=_KEPT,
         sources=()
         if beams_may_have_moved
         else (ErrorSource.of_lengths("place_mm", 2, turning="in_base"),),

@@ -31,14 +31,13 @@ from robolink.methods import find_last_touch, find_method
 from robolink.model import (
     AnsweredBy,
     Controller,
-    EntryKind,
     Pose,
     ToolOffset,
     answer_entry,
 )
 from robolink.procedures import MeasurementContext
 from robolink.runner import Ask, StepDone, TouchSubject
-from robolink.stations import AGREEING_MM, Station, StationKind, find_stations
+from robolink.stations import AGREEING_MM, Station, StationKind, stations_on_record
 from robolink.ways import Way, way
 
 _UNKNOWN_SIGMA_MM: Final = 0.05
@@ -368,8 +367,7 @@ def _undecided(tool: int, told: LengthChange) -> CalibrationError:
 
 
 def _of_station(controller: Controller, pin: str) -> KnownHeight | None:
-    entries = controller.outcomes.recorded(kinds=(EntryKind.STATION,))
-    station = find_stations(None, entries).get(pin)
+    station = stations_on_record(controller).get(pin)
     if station is None or not shows_height(station):
         return None
     x_mm, y_mm, z_mm = station.x_mm, station.y_mm, station.z_mm

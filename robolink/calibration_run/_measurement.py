@@ -13,17 +13,17 @@ from typing import Final
 from robolink.accuracy import CellRecord, LooksAlike, facts_at
 from robolink.calibration import AccuracyFacts, CalibrationResult, ErrorSource, assessed, turn_claim
 from robolink.calibration_run._length import told_by_first_touch
-from robolink.calibration_run._plan import ToolPlan
+from robolink.calibration_run._plan import ToolPlan, journey
 from robolink.calibration_run._proposal import Listener, Moment, Proposal
 from robolink.calibration_run._records import calibration_entry, decision_entry, refusal_entry
 from robolink.calibration_run._repeatability import seating_of
 from robolink.errors import CalibrationError, ConfigError, RobolinkError
 from robolink.messages import joined, tr
 from robolink.methods import find_method
-from robolink.model import Controller, EntryKind, NewEntry, Pose, ToolOffset, says_it_is_simulated
-from robolink.procedures import MeasurementContext, TouchesFurther, approach_path, touches_of
+from robolink.model import Controller, NewEntry, Pose, ToolOffset, says_it_is_simulated
+from robolink.procedures import MeasurementContext, TouchesFurther, touches_of
 from robolink.runner import AGAIN, BACK, MORE, Ask, Look, Seek, StepDone, TouchedAt
-from robolink.stations import find_stations
+from robolink.stations import stations_on_record
 from robolink.ways import Way, way
 
 
@@ -188,10 +188,7 @@ class Measuring:
             return
         controller = self._context.controller
         controller.tools.select(0)
-        here = controller.groups[0].pose()
-        there = Pose(*pose.coordinates(), tool=0, local=here.local)
-        target = replace(there, hand=here.hand, posture=here.posture)
-        self._context.run(approach_path(target, here=here, purpose=purpose))
+        self._context.run(journey(pose, purpose, controller.groups[0].pose()))
 
     def _attempt(
         self, plan: ToolPlan, measure: Callable[[ToolOffset | None], CalibrationResult]
@@ -241,8 +238,7 @@ class Measuring:
         """
         if not name:
             return {}
-        entries = self._context.controller.outcomes.recorded(kinds=(EntryKind.STATION,))
-        known = find_stations(None, entries).get(name)
+        known = stations_on_record(self._context.controller).get(name)
         if known is None or not known.learnt:
             return {}
         return {"station_record": {"station": name, "entry": known.entry, "at": known.found_at}}

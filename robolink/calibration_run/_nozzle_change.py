@@ -11,7 +11,6 @@ from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import replace
 
 from robolink.calibration import VerifyResult
-from robolink.calibration_run._acceptance import AcceptanceCriteria
 from robolink.calibration_run._length import settle_lengths
 from robolink.calibration_run._measurement import (
     MOST_FURTHER,
@@ -41,8 +40,13 @@ from robolink.calibration_run._proposal import (
 )
 from robolink.calibration_run._records import decision_entry, refusal_entry
 from robolink.calibration_run._station_check import check_stations, found_with, stations_found
-from robolink.calibration_run._turn_test import Attended, conclude_turn_test, relearning_commands
-from robolink.errors import CalibrationError, DeclinedError, StoppedError, VerifyError
+from robolink.calibration_run._turn_test import (
+    Attended,
+    conclude_turn_test,
+    relearning_commands,
+    touches_counting,
+)
+from robolink.errors import CalibrationError, DeclinedError, StoppedError
 from robolink.messages import tr
 from robolink.methods import find_method
 from robolink.model import (
@@ -51,7 +55,7 @@ from robolink.model import (
     answer_entry,
     new_operation,
 )
-from robolink.procedures import TOUCH_CODES, KeepsProof, MeasurementContext
+from robolink.procedures import KeepsProof, MeasurementContext
 from robolink.runner import Operator, regard
 from robolink.timing import NS_PER_S
 from robolink.transaction import Order, ToolChange, Wanted, plain_result
@@ -384,10 +388,18 @@ class NozzleChange:
             return None
         tool, criteria = receipt.tool, plan.criteria
 
+        def refused(error: CalibrationError) -> None:
+            self._controller.outcomes.append(refusal_entry(tool, criteria, error))
+
         def turned() -> VerifyResult:
             with (
                 context.telling(lambda done: self._listener.step(tool, done), tool=tool),
-                self._touches_counting(tool, criteria),
+                touches_counting(
+                    self._controller,
+                    lambda error: self._controller.outcomes.append(
+                        refusal_entry(tool, criteria, error)
+                    ),
+                ),
             ):
                 return source.verify(
                     context,
@@ -416,22 +428,6 @@ class NozzleChange:
             attended=attended,
             tell=lambda proof: self._listener.verified(tool, proof),
         )
-
-    @contextmanager
-    def _touches_counting(self, tool: int, criteria: AcceptanceCriteria) -> Iterator[None]:
-        """Let touches of a proof that were not made end it as a failed proof, on record."""
-        try:
-            yield
-        except CalibrationError as error:
-            if error.code not in TOUCH_CODES:
-                raise
-            self._controller.outcomes.append(refusal_entry(tool, criteria, error))
-            raise VerifyError(
-                tr("The new tip was not tested. {cause}", cause=error.what),
-                remedy=error.remedy,
-                code=error.code,
-                controller=self._controller.identity,
-            ) from error
 
     def _tell(self, sentence: str) -> None:
         self._operator.tell(sentence)

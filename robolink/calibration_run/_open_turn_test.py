@@ -16,21 +16,24 @@ from robolink.calibration import VerifyResult
 from robolink.calibration_run._plan import Limits, ToolPlan
 from robolink.calibration_run._proposal import Proposal
 from robolink.calibration_run._records import tests_on_record
-from robolink.calibration_run._turn_test import Attended, conclude_turn_test, relearning_commands
+from robolink.calibration_run._turn_test import (
+    Attended,
+    conclude_turn_test,
+    relearning_commands,
+    touches_counting,
+)
 from robolink.errors import (
-    CalibrationError,
     ConfigError,
     LeaseLostError,
     OutcomeUnknownError,
     RemoteProtocolError,
     RobolinkError,
     TransportError,
-    VerifyError,
 )
 from robolink.messages import joined, tr
 from robolink.methods import find_method
 from robolink.model import Controller, Finding, Marker, MarkerKind, Verdict
-from robolink.procedures import TOUCH_CODES, KeepsProof, KeptProof, MeasurementContext
+from robolink.procedures import KeepsProof, KeptProof, MeasurementContext
 from robolink.runner import Operator, RunSettings
 from robolink.transaction import Settler
 
@@ -216,7 +219,7 @@ def finish_by_turn_test(
         >>> from robolink.calibration_run import finish_by_turn_test, open_turn_tests
         >>> from robolink.transaction import recover
         >>> from robolink_cli.prompts.operator import AssistedOperator
-        >>> from robolink_simulators.assist.port import InProcessEyes
+        >>> from robolink_simulators.control.assist import InProcessEyes
         >>> from robolink_simulators.epson import EpsonSimulator
         >>> from robolink_simulators.hosting.in_process.epson import register
         >>> simulator, written = EpsonSimulator(), []
@@ -315,8 +318,11 @@ def _prove(
     )
 
     def turned() -> VerifyResult:
-        with context.telling(lambda _done: None, tool=test.tool):
-            return _touches_counting(controller, test, context)
+        with (
+            context.telling(lambda _done: None, tool=test.tool),
+            touches_counting(controller),
+        ):
+            return test.prove_after_a_break(context)
 
     person = context.runner(tool=test.tool)
     proof = turned()
@@ -332,23 +338,6 @@ def _prove(
         earlier=tests_on_record(controller.outcomes, test.tool, proof),
         tell=lambda result: tell(test.tool, result),
     )
-
-
-def _touches_counting(
-    controller: Controller, test: KeptProof, context: MeasurementContext
-) -> VerifyResult:
-    """Make a test; touches that were not made end it as a failed one."""
-    try:
-        return test.prove_after_a_break(context)
-    except CalibrationError as error:
-        if error.code not in TOUCH_CODES:
-            raise
-        raise VerifyError(
-            tr("The new tip was not tested. {cause}", cause=error.what),
-            remedy=error.remedy,
-            code=error.code,
-            controller=controller.identity,
-        ) from error
 
 
 @contextmanager

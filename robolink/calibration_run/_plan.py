@@ -29,8 +29,9 @@ from robolink.procedures import (
     TipSource,
     TouchesPin,
     TouchPlan,
+    approach_path,
 )
-from robolink.runner import RunSettings, inputs_of
+from robolink.runner import Procedure, RunSettings, inputs_of
 from robolink.stations import Gauge, Station
 
 
@@ -143,6 +144,20 @@ class ToolPlan:
     def moving(self) -> MovingSource | None:
         """The source, where it moves the robot."""
         return self.source if isinstance(self.source, MovingSource) else None
+
+
+def journey(target: Pose | None, purpose: str, here: Pose) -> Procedure[None]:
+    """Return the way of the flange to a pose of a plan, up, over and down; none where it has none.
+
+    Args:
+        target: That pose.
+        purpose: What the way is for.
+        here: Where the flange is; the arm keeps its hand.
+    """
+    if target is not None:
+        there = Pose(*target.coordinates(), tool=0, local=here.local)
+        goal = replace(there, hand=here.hand, posture=here.posture)
+        yield from approach_path(goal, here=here, purpose=purpose)
 
 
 Proposals = Sequence[tuple[ToolPlan, Proposal]]

@@ -7,6 +7,7 @@ from functools import partial
 from robolink.calibration import flange_of
 from robolink.calibration_run._plan import (
     ChangePlan,
+    journey,
     require_clearance,
     require_inputs,
     require_measurable,
@@ -23,7 +24,7 @@ from robolink.model import (
     Pose,
     ToolOffset,
 )
-from robolink.procedures import MovingSource, approach_path
+from robolink.procedures import MovingSource
 from robolink.runner import (
     ArmAhead,
     Ask,
@@ -166,25 +167,17 @@ def _procedures(
 
     The pose is where it ends, of one that does so wherever it begins.
     """
-    yield plan.safe, partial(_journey, plan.safe, tr("Moving to the safe pose."))
+    yield plan.safe, partial(journey, plan.safe, tr("Moving to the safe pose."))
     for one in plan.tools:
         tool, source = one.tool, one.moving
         if source is None:
             continue
         stored = controller.tools.read(tool)
         there = tr("Moving to where tool {tool} is measured.", tool=tool)
-        yield one.approach, partial(_journey, one.approach, there)
+        yield one.approach, partial(journey, one.approach, there)
         yield None, partial(_measurement, source, stored)
         away = tr("Moving away from where tool {tool} is measured.", tool=tool)
-        yield one.retreat, partial(_journey, one.retreat, away)
-
-
-def _journey(target: Pose | None, purpose: str, here: Pose) -> Procedure[object]:
-    if target is not None:
-        there = Pose(*target.coordinates(), tool=0, local=here.local)
-        goal = replace(there, hand=here.hand, posture=here.posture)
-        yield from approach_path(goal, here=here, purpose=purpose)
-    return None
+        yield one.retreat, partial(journey, one.retreat, away)
 
 
 def _measurement(source: MovingSource, stored: ToolOffset | None, here: Pose) -> Procedure[object]:

@@ -18,7 +18,6 @@ from robolink.messages import joined, tr
 from robolink.model import (
     AnsweredBy,
     Controller,
-    EntryKind,
     LookingController,
     PersonRole,
     TipSensor,
@@ -26,7 +25,7 @@ from robolink.model import (
 )
 from robolink.recipe import Answers, beyond
 from robolink.runner import Operator
-from robolink.stations import Station, find_stations, require_base_of
+from robolink.stations import Station, find_stations, require_base_of, stations_on_record
 from robolink.transaction import ChangedSince, Order, changed_since, earlier_corrections
 from robolink.ways import Way, way
 
@@ -359,8 +358,7 @@ def _located(
     loaded: "LoadedRecipe", controller: Controller, cell: Cell | None
 ) -> tuple["LoadedRecipe", Station, Station | None]:
     """Return the recipe with the place of its station, the station, and what is known of that."""
-    entries = controller.outcomes.recorded(kinds=(EntryKind.STATION,))
-    stations = find_stations(cell, entries)
+    stations = stations_on_record(controller, cell)
     recipe, station = located(loaded.recipe, stations)
     return replace(loaded, recipe=recipe), station, stations.get(loaded.recipe.station.id)
 

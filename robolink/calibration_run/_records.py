@@ -28,6 +28,8 @@ from robolink.model import (
     OutcomeLog,
     Pose,
     ToolOffset,
+    json_fields,
+    json_value,
     plain_offset,
 )
 from robolink.procedures import jog_mm
@@ -68,7 +70,7 @@ def calibration_entry(
         **({"simulated": True} if simulated else {}),
         "gauges": [] if gauge is None else [asdict(gauge)],
         **_result(result),
-        "seating": proposal.seating.as_json() if proposal.seating else None,
+        "seating": json_value(proposal.seating),
         **proposal.record,
     }
     return NewEntry(
@@ -141,14 +143,10 @@ def verification_entry(
     """
     verdict = tr("passed") if result.passed else tr("failed")
     details: dict[str, object] = {
-        "passed": result.passed,
-        "max_drift_mm": result.max_drift_mm,
-        "tolerance_mm": result.tolerance_mm,
-        "drifts": _drifts(result),
-        "warnings": list(result.warnings),
+        **json_fields(result, "passed", "max_drift_mm", "tolerance_mm", "drifts", "warnings"),
         "verdict": result.codes[0] if result.codes else result.verdict.value,
-        "judgement": result.judgement.as_json() if result.judgement else None,
-        **({"tests": [_drifts(one) for one in tests]} if len(tests) > 1 else {}),
+        "judgement": json_value(result.judgement),
+        **({"tests": [json_value(one.drifts) for one in tests]} if len(tests) > 1 else {}),
         **touches_made(result.inputs),
     }
     return NewEntry(
@@ -158,10 +156,6 @@ def verification_entry(
         verdict=tr("{verdict}: {drift:.3f} mm", verdict=verdict, drift=result.max_drift_mm),
         details=details,
     )
-
-
-def _drifts(result: VerifyResult) -> list[dict[str, object]]:
-    return [asdict(drift) for drift in result.drifts]
 
 
 def tests_on_record(outcomes: OutcomeLog, tool: int, proof: VerifyResult) -> list[VerifyResult]:
@@ -195,42 +189,24 @@ def decision_entry(verdict: str, **details: object) -> NewEntry:
 
 def _result(result: CalibrationResult) -> dict[str, object]:
     return {
-        "method": result.method,
-        "measured": list(result.measured),
-        "kept": list(result.kept),
-        **({"changed": list(result.changed)} if result.changed else {}),
+        **json_fields(result, "method", "measured", "kept"),
+        **(json_fields(result, "changed") if result.changed else {}),
         "reference_point_mm": list(result.reference_point_mm),
         "poses": [_pose(pose) for pose in result.inputs],
         **_seen(result.inputs),
         **touches_made(result.inputs),
-        "residuals_mm": [list(residual) for residual in result.residuals_mm],
-        "rejected": list(result.rejected),
-        "rms_mm": result.rms_mm,
-        "max_residual_mm": result.max_residual_mm,
-        "covariance": [list(row) for row in result.covariance],
-        "half_width95": list(result.half_width95),
-        "sigma_mm": result.sigma_mm,
-        "sigma_stated": result.sigma_stated,
-        "dof": result.dof,
-        "sigma_gain": result.sigma_gain,
-        "condition_number": result.condition_number,
-        "warnings": list(result.warnings),
-        "information": list(result.notes),
-        "interval_from": result.interval_from,
-        "region95_radius_mm": result.region95_radius_mm,
-        "budget": result.budget.as_json() if result.budget else None,
-        "evidence": result.evidence.as_json() if result.evidence else None,
-        "repeatable_to_mm": result.repeatable_to_mm,
-        "accurate_to_mm": result.accurate_to_mm,
+        **json_fields(result, "residuals_mm", "rejected", "rms_mm", "max_residual_mm"),
+        **json_fields(result, "covariance", "half_width95", "sigma_mm", "sigma_stated", "dof"),
+        **json_fields(result, "sigma_gain", "condition_number", "warnings", information="notes"),
+        **json_fields(result, "interval_from", "region95_radius_mm", "budget", "evidence"),
+        **json_fields(result, "repeatable_to_mm", "accurate_to_mm"),
         "accuracy": result.accuracy.as_json(result.measured) if result.accuracy else None,
         **result.details(),
     }
 
 
 def _pose(pose: Pose) -> dict[str, object]:
-    values = {field.name: getattr(pose, field.name) for field in fields(Pose)}
-    if pose.posture is not None:
-        values["posture"] = asdict(pose.posture)
+    values = json_fields(pose, *(field.name for field in fields(Pose)))
     return {name: value for name, value in values.items() if value is not None}
 
 
@@ -445,9 +421,7 @@ def touch_details(station: str, proposal: Proposal) -> dict[str, object]:
         "y_mm": y_mm + value[1] - tip[1],
         "z_mm": height_mm,
         "u_deg": touch.u_deg,
-        "sigma_mm": chain.sigma_mm,
-        "changes": chain.changes,
-        "full_sigma_mm": chain.full_sigma_mm,
+        **json_fields(chain, "sigma_mm", "changes", "full_sigma_mm"),
         "touch_sigma_mm": _touch_sigma_mm(result),
         # Tilted touches have Z from the fit, and their heights say nothing about it.
         **({} if "z_mm" in result.found else _scatter(heights, touched_by(result.inputs))),

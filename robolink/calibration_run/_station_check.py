@@ -14,7 +14,7 @@ from robolink.messages import tr
 from robolink.methods import KEPT
 from robolink.model import Controller, EntryKind, NewEntry
 from robolink.procedures import FindsStation
-from robolink.stations import Station, base_now, find_stations, station_entry
+from robolink.stations import Station, base_now, find_stations, station_entry, stations_on_record
 from robolink.ways import Way, way
 
 
@@ -31,7 +31,7 @@ def check_stations(controller: Controller, proposals: Proposals) -> Proposals:
     """
     if not any(plan.pin for plan, _ in proposals):
         return proposals
-    known = find_stations(None, controller.outcomes.recorded(kinds=(EntryKind.STATION,)))
+    known = stations_on_record(controller)
     seating = seating_of(controller)
     judged = list(proposals)
     for name in dict.fromkeys(plan.pin for plan, _ in proposals if plan.pin):
@@ -52,7 +52,7 @@ def check_stations(controller: Controller, proposals: Proposals) -> Proposals:
 
 def stations_found(controller: Controller, proposals: Proposals) -> Iterator[NewEntry]:
     """Yield what calibrations that were kept say about where pins are, and how cameras see."""
-    known = find_stations(None, controller.outcomes.recorded(kinds=(EntryKind.STATION,)))
+    known = stations_on_record(controller)
     base: tuple[float, ...] | None = None
     asked = False
     for plan, proposal in proposals:

@@ -9,7 +9,8 @@ only presses ENTER gets it. The steps that would tell what has happened end with
 making the test again; that counts all looks together, and is bounded.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final
@@ -28,10 +29,11 @@ from robolink.calibration import (
 from robolink.calibration_run._acceptance import require_proved
 from robolink.calibration_run._plan import ToolPlan
 from robolink.calibration_run._records import decision_entry, verification_entry
-from robolink.errors import ConfigError, VerifyError
+from robolink.errors import CalibrationError, ConfigError, VerifyError
 from robolink.messages import joined, tr
 from robolink.methods import find_method
 from robolink.model import Controller, EntryKind, require_engineer
+from robolink.procedures import TOUCH_CODES
 from robolink.runner import ChoiceRow, OfferedChoice
 
 Choosing = Callable[[str, OfferedChoice], int]
@@ -352,6 +354,33 @@ def _record(
             tool=tool,
             accurate_to_mm=accurate_mm,
         )
+
+
+@contextmanager
+def touches_counting(
+    controller: Controller, tell: Callable[[CalibrationError], None] = lambda _error: None
+) -> Iterator[None]:
+    """Let touches of a turn test that were not made end it as a failed one.
+
+    Args:
+        controller: The controller.
+        tell: Told of them first.
+
+    Raises:
+        VerifyError: They were not made.
+    """
+    try:
+        yield
+    except CalibrationError as error:
+        if error.code not in TOUCH_CODES:
+            raise
+        tell(error)
+        raise VerifyError(
+            tr("The new tip was not tested. {cause}", cause=error.what),
+            remedy=error.remedy,
+            code=error.code,
+            controller=controller.identity,
+        ) from error
 
 
 def told_of_contradiction(proof: VerifyResult, judgement: TurnJudgement) -> str:

@@ -11,7 +11,7 @@ from functools import cached_property
 from types import TracebackType
 from typing import Final, Self
 
-from robolink.controllers.driver_link import DriverLink, advise_emergency_stop
+from robolink.controllers.driver_link import DriverLink, DriverPart, advise_emergency_stop
 from robolink.controllers.preserving import Preserver
 from robolink.controllers.resolving import MarkerResolver
 from robolink.errors import RobolinkError
@@ -37,7 +37,7 @@ _STOPS_S: Final = 5.0
 """Longest wait, at the end, for stops that are under way in other threads."""
 
 
-class ControllerCore(ABC):
+class ControllerCore(DriverPart, ABC):
     """Implements :class:`robolink.model.Controller` with what a kind of controller says.
 
     Attributes:
@@ -86,7 +86,7 @@ class ControllerCore(ABC):
         capabilities: Capabilities,
         tools: ToolTable,
     ) -> None:
-        self._driver = link
+        super().__init__(link)
         self.identity = link.identity
         self.clock = link.clock
         self.latch = link.latch
@@ -222,7 +222,8 @@ class ControllerCore(ABC):
         Raises:
             OutcomeUnknownError: Names it.
         """
-        self._driver.markers.require_settled(request)
+        with self._driver.asked(request):
+            self._driver.markers.require_settled(request)
 
     def begin(
         self,
@@ -233,7 +234,8 @@ class ControllerCore(ABC):
         operation: str = "",
     ) -> Marker:
         """Store the durable marker of a procedure; see the model."""
-        return self._driver.markers.begin(kind, request, details, operation=operation)
+        with self._driver.asked(request):
+            return self._driver.markers.begin(kind, request, details, operation=operation)
 
     def finish(self, marker: Marker, *entries: NewEntry) -> None:
         """Forget the marker of a procedure, and journal how it ended."""

@@ -27,12 +27,14 @@ import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
-from functools import cached_property
-from typing import Final, Generic, TypeVar
+from functools import cached_property, wraps
+from types import FunctionType
+from typing import Any, Final, Generic, TypeVar
 
 from robolink import ambient
 from robolink.controllers.markers import MarkerStore, ProcedureLock
 from robolink.errors import (
+    Concerning,
     ConfigError,
     ControllerFaultError,
     RejectedError,
@@ -249,6 +251,10 @@ class DriverLink:
             controller=self.identity,
         )
 
+    def asked(self, request: str) -> AbstractContextManager[None]:
+        """Let each error that leaves the block name this controller and ``request``."""
+        return Concerning(self.identity, request)
+
     def carry_out(self, command: MarkedCommand[T]) -> T:
         """Send something that is marked, and return what is read then.
 
@@ -289,6 +295,42 @@ class DriverLink:
             unclear.remedy = command.told_by(found) or unclear.remedy
             raise unclear
         return found
+
+
+class DriverPart:
+    """A part of a driver that others call: each error that leaves it names the controller.
+
+    That is seen to here for every public method of every kind, so nothing inside a driver that
+    raises an error has to be told which controller it works for.
+
+    Args:
+        link: The controller.
+    """
+
+    def __init__(self, link: DriverLink) -> None:
+        self._driver = link
+
+    def __init_subclass__(cls, **options: object) -> None:
+        super().__init_subclass__(**options)
+        for name, member in tuple(vars(cls).items()):
+            if isinstance(member, FunctionType) and not name.startswith("_"):
+                setattr(cls, name, _naming_controller(member))
+
+    def __repr__(self) -> str:
+        """Say whose it is."""
+        return f"<{type(self).__name__} of {self._driver.identity}>"
+
+
+def _naming_controller(method: Callable[..., T]) -> Callable[..., T]:
+    @wraps(method)
+    def named(self: DriverPart, *args: Any, **options: Any) -> T:  # noqa: ANN401 - as the method
+        try:
+            return method(self, *args, **options)
+        except RobolinkError as error:
+            error.concern(self._driver.identity)
+            raise
+
+    return named
 
 
 def advise_emergency_stop(error: RobolinkError) -> RobolinkError:

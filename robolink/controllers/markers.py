@@ -12,6 +12,7 @@ from typing import Final
 from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.errors import (
     BusyError,
+    Concerning,
     JournalError,
     LeaseLostError,
     OutcomeUnknownError,
@@ -56,12 +57,13 @@ class ProcedureLock:
             BusyError: Another thread holds it.
             StoppedError: A stop is in force, or came meanwhile.
         """
-        if calming:
-            with self._latch.calming(request), self._locked(request):
-                yield
-        else:
-            with self._locked(request), self._latch.watching(request):
-                yield
+        with Concerning(self._identity, request):
+            if calming:
+                with self._latch.calming(request), self._locked(request):
+                    yield
+            else:
+                with self._locked(request), self._latch.watching(request):
+                    yield
 
     @contextmanager
     def _locked(self, request: str) -> Iterator[None]:
@@ -70,8 +72,6 @@ class ProcedureLock:
             raise BusyError(
                 tr("{request} has to wait: another operation is under way.", request=request),
                 remedy=tr("Wait for it to end; stopping is possible at any time."),
-                controller=self._identity,
-                request=request,
             )
         try:
             yield
@@ -261,8 +261,6 @@ class MarkerStore:
                     request=request,
                 ),
                 remedy=tr("Wait until the movement has ended, or stop it."),
-                controller=self._identity,
-                request=request,
             )
 
     def _refuse_unsettled(self, request: str, *, besides: Collection[str]) -> None:
@@ -281,8 +279,6 @@ class MarkerStore:
                     when=local_label(marker.begun_at),
                 ),
                 remedy=tr("Next: 'robolink recover'. The robot stays blocked until then."),
-                controller=self._identity,
-                request=request,
             )
 
     def _overtaken(self, request: str) -> LeaseLostError:
@@ -297,8 +293,6 @@ class MarkerStore:
                 request=request,
             ),
             remedy=tr("Nothing was sent. Read the tools again, then start again."),
-            controller=self._identity,
-            request=request,
         )
 
     def _recorded(self, keep: Callable[[], object]) -> bool:

@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Final
 
-from robolink.controllers.driver_link import DriverLink
+from robolink.controllers.driver_link import DriverLink, DriverPart
 from robolink.errors import (
     ControllerError,
     MotionTimeoutError,
@@ -37,7 +37,7 @@ from robolink.model import (
 from robolink.timing import Deadline
 
 
-class MotionGroupCore(ABC):
+class MotionGroupCore(DriverPart, ABC):
     """Implements :class:`robolink.model.MotionGroup`, but for what a kind of controller says.
 
     What only some kinds can do, a movement until an input switches, is refused here by name.
@@ -45,13 +45,6 @@ class MotionGroupCore(ABC):
     Args:
         link: The controller.
     """
-
-    def __init__(self, link: DriverLink) -> None:
-        self._driver = link
-
-    def __repr__(self) -> str:
-        """Say whose it is."""
-        return f"<{type(self).__name__} of {self._driver.identity}>"
 
     @property
     @abstractmethod
@@ -146,11 +139,11 @@ class MotionGroupCore(ABC):
         Raises:
             NotReadyError: The target is meant for another tool; nothing may be sent.
         """
-        self._require_tool(target, selected, request)
+        self._require_tool(target, selected)
         details = {"target": list(target.coordinates())}
         return self._driver.markers.begin(MarkerKind.MOVE, request, details)
 
-    def _require_tool(self, target: Pose, found: int | None, request: str) -> None:
+    def _require_tool(self, target: Pose, found: int | None) -> None:
         """Refuse a target that is meant for another tool than the one in force.
 
         Raises:
@@ -165,12 +158,10 @@ class MotionGroupCore(ABC):
                 ),
                 reason=NotReadyReason.WRONG_TOOL,
                 remedy=tr("Nothing was moved. Select the right tool first."),
-                controller=self._driver.identity,
-                request=request,
             )
 
 
-def not_ended_in_time(controller: str, request: str, timeout_s: float) -> MotionTimeoutError:
+def not_ended_in_time(request: str, timeout_s: float) -> MotionTimeoutError:
     """Return the error for a movement that took too long and was aborted."""
     return MotionTimeoutError(
         tr(
@@ -179,8 +170,6 @@ def not_ended_in_time(controller: str, request: str, timeout_s: float) -> Motion
             timeout_s=timeout_s,
         ),
         remedy=tr("Read where the robot is ('robolink robot where') before you go on."),
-        controller=controller,
-        request=request,
     )
 
 
@@ -275,7 +264,6 @@ class PolledGroup(MotionGroupCore):
                         seconds=_REST_S,
                     ),
                     remedy=tr("It may still be moving."),
-                    controller=self._driver.identity,
                     request="stop",
                 )
             self._driver.clock.sleep(_POLL_S)
@@ -317,7 +305,7 @@ class PolledMotion:
                 raise
             if not arrived:
                 self.abort()
-                raise not_ended_in_time(self._link.identity, request, timeout_s)
+                raise not_ended_in_time(request, timeout_s)
             self._settle()
         return MotionOutcome.STOPPED if self._aborted else MotionOutcome.ARRIVED
 

@@ -1,6 +1,6 @@
 """Settling what was begun and not proved finished: tools, written or selected, and movements."""
 
-from robolink.controllers.driver_link import DriverLink
+from robolink.controllers.driver_link import DriverLink, DriverPart
 from robolink.controllers.preserving import Preserver
 from robolink.errors import ConfigError
 from robolink.messages import tr
@@ -88,7 +88,7 @@ def _entry(marker: Marker, tool: int, verdict: Verdict, now: ToolOffset | None) 
     return NewEntry(kind, operation=marker.operation, tool=tool, verdict=verdict, details=details)
 
 
-class MarkerResolver:
+class MarkerResolver(DriverPart):
     """Settles what an earlier process left open: by reading, and with a person's word.
 
     Nothing is sent again. A value that was being written is read; a robot that was told to move is
@@ -117,7 +117,7 @@ class MarkerResolver:
     """
 
     def __init__(self, link: DriverLink, tools: ToolTable, preserver: Preserver) -> None:
-        self._link = link
+        super().__init__(link)
         self._tools = tools
         self._preserver = preserver
 
@@ -156,7 +156,7 @@ class MarkerResolver:
             self.fence()  # what is selected is read anew behind it
             self._preserver.restore(finding.marker)
         else:
-            self._link.markers.clear(finding.marker, *finding.entries)
+            self._driver.markers.clear(finding.marker, *finding.entries)
 
     def _require_rest(self) -> None:
         """Refuse to judge a movement while the machine moves."""

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 from robolink import ambient
 from robolink.errors import (
+    Concerning,
     ConnectError,
     RejectedError,
     RemoteProtocolError,
@@ -23,6 +24,7 @@ from robolink.transport import LinkUrl, parse_url
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from robolink.controllers.epson.line import EpsonConversation
     from robolink.controllers.softmotion.wire import MailboxWire
     from robolink.model import Controller, ControllerStatus, Secret
     from robolink.timing import Clock
@@ -121,27 +123,44 @@ class _Means(NamedTuple):
 
 
 def _stop_epson(link: LinkUrl, means: _Means) -> "ControllerStatus":
-    from robolink.controllers.epson.line import open_line
-    from robolink.controllers.epson.rest import StopLine
+    from robolink.controllers.epson.line import EpsonConversation, open_line
+    from robolink.controllers.epson.rest import bring_to_rest
 
     traces = () if means.trace is None else (means.trace,)
     opened = open_line(link, timeout_s=means.timeout_s, clock=means.clock, traces=traces)
-    line = StopLine(opened, timeout_s=means.timeout_s)
+    talk = EpsonConversation(opened, timeout_s=means.timeout_s)
     try:
-        line.login(means.password)
-        flags, code = line.stop()
-        from robolink.controllers.epson.answers import status_from_flags
+        with Concerning(talk.identity):
+            talk.login(means.password)
+            now = bring_to_rest(talk.exchange, talk.clock, controller=talk.identity)
+            from robolink.controllers.epson.answers import may_log_out, status_from_flags
 
-        if means.met is not None and (name := line.who()):
-            means.met(name)
-        line.leave(flags)
-        return status_from_flags(flags, code)
+            status = status_from_flags(*now)
+            if means.met is not None:
+                _tell_who(talk, means.met)
+            if may_log_out(status):
+                with suppress(RobolinkError):  # it stands: nothing that fails here matters
+                    talk.exchange("Logout")
+            return status
     finally:
-        line.close()
+        talk.close()
+
+
+def _tell_who(talk: "EpsonConversation", met: "Callable[[str], None]") -> None:
+    """Say which controller stands now, where this firmware tells it without an Execute."""
+    from robolink.controllers.epson.link import name_from
+
+    try:
+        number = talk.exchange("GetContNo").fields
+        robots = talk.exchange("GetRobotSerial", "0").fields
+    except RobolinkError:
+        return
+    if name := name_from([text.strip() for text in number], [text.strip() for text in robots]):
+        met(name)
 
 
 def _stop_group(link: LinkUrl, means: _Means) -> "ControllerStatus":
-    from robolink.controllers.softmotion.commands import CommandSender, bring_group_to_rest
+    from robolink.controllers.softmotion.commands import CommandSender
     from robolink.controllers.softmotion.snapshots import Snapshots
     from robolink.controllers.softmotion.wire import MailboxWire
     from robolink.transport import open_mailbox_link
@@ -149,9 +168,8 @@ def _stop_group(link: LinkUrl, means: _Means) -> "ControllerStatus":
     mailbox = open_mailbox_link(link, timeout_s=means.timeout_s, clock=means.clock)
     wire = MailboxWire(mailbox, owner=means.owner, timeout_s=means.timeout_s)
     try:
-        snapshots = Snapshots(wire)
-        commands = CommandSender(wire, snapshots)
-        now = bring_group_to_rest(commands, snapshots, wire.clock, controller=wire.identity)
+        with Concerning(wire.identity):
+            now = CommandSender(wire, Snapshots(wire)).bring_to_rest()
         from robolink.controllers.softmotion.condition import status_of
 
         if means.met is not None:

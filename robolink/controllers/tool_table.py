@@ -15,7 +15,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from typing import ClassVar
 
-from robolink.controllers.driver_link import DriverLink, MarkedCommand
+from robolink.controllers.driver_link import DriverPart, MarkedCommand
 from robolink.controllers.markers import MarkerStore
 from robolink.errors import (
     ConfigError,
@@ -42,7 +42,7 @@ from robolink.model import (
 from robolink.ways import Way, way
 
 
-class ToolTableCore(ABC):
+class ToolTableCore(DriverPart, ABC):
     """Implements :class:`robolink.model.ToolTable` with what a kind of controller says.
 
     Attributes:
@@ -54,13 +54,6 @@ class ToolTableCore(ABC):
     """
 
     machine_selects: ClassVar[bool] = False
-
-    def __init__(self, link: DriverLink) -> None:
-        self._driver = link
-
-    def __repr__(self) -> str:
-        """Say whose it is."""
-        return f"<{type(self).__name__} of {self._driver.identity}>"
 
     # What a kind says.
 
@@ -214,7 +207,8 @@ class ToolTableCore(ABC):
         requests = self._requests(tool, requested)
         if self.same(self._stored(tool), requested):
             return ()
-        self._require_possible(tool, requested)
+        with self._driver.asked(self._request(tool, requested)):
+            self._require_possible(tool, requested)
         return requests
 
     def preview_clear(self, tool: int, *, then_select: int | None = None) -> tuple[str, ...]:
@@ -258,8 +252,6 @@ class ToolTableCore(ABC):
                         controller=self._driver.identity,
                     ),
                     remedy=tr("Select tool {tool} at the machine.", tool=tool),
-                    controller=self._driver.identity,
-                    request=request,
                 )
             offset = self._require_defined(tool)
             self._require_values_of_a_tool(tool, offset)
@@ -282,7 +274,6 @@ class ToolTableCore(ABC):
                         found=found,
                     ),
                     remedy=tr("Do not move the robot; look at the controller's Tool setting."),
-                    request=request,
                 )
             self._prove_selected(offset, request)
 
@@ -340,7 +331,6 @@ class ToolTableCore(ABC):
                     values=describe_offset(offset),
                 ),
                 remedy=joined(" ", filter(None, (tr("Nothing was sent."), put_right(offset)))),
-                controller=self._driver.identity,
             )
 
     def _require_known(self, tool: int, *, lowest: int = 0) -> None:

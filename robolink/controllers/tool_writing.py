@@ -109,18 +109,12 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
             if self._same(self.before, self.requested):
                 return self._receipt(self.before, skipped=True)
             if expected is not ANY and not self._same(self.before, expected):
-                raise tool_changed(
-                    self.tool,
-                    self.before,
-                    expected,
-                    controller=self._link.identity,
-                    request=self.request,
-                )
+                raise tool_changed(self.tool, self.before, expected)
             self._link.change_guard.require(self.tool, self.before, self.requested)
             self._require_clearer()
             found = self._link.carry_out(self)
             if not self._same(found, self.requested):
-                raise self._read_back_differs(found)
+                raise self._differs(found)
             return self._receipt(found)
 
     def _require_clearer(self) -> None:
@@ -188,7 +182,7 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
             unconditional=self._unconditional,
         )
 
-    def _read_back_differs(self, found: ToolOffset | None) -> ReadBackError:
+    def _differs(self, found: ToolOffset | None) -> ReadBackError:
         return ReadBackError(
             tr(
                 "Tool {tool} was written as {requested}, but reads back as {found}.",
@@ -200,5 +194,4 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
                 "Do not run the cell with it. Before the write it held {before}.",
                 before=describe_offset(self.before),
             ),
-            request=self.request,
         )

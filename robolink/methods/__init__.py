@@ -91,7 +91,7 @@ if TYPE_CHECKING:
     from robolink.methods.runout_table import AllRoundPlan as AllRoundPlan
     from robolink.methods.runout_table import RunoutTableParameters as RunoutTableParameters
     from robolink.methods.runout_table import RunoutTableSource as RunoutTableSource
-    from robolink.methods.runout_table_procedure import measure_runout_table as measure_runout_table
+    from robolink.methods.runout_table import measure_runout_table as measure_runout_table
     from robolink.methods.shared_parameters import LookParameters as LookParameters
     from robolink.methods.shared_parameters import PinParameters as PinParameters
     from robolink.methods.shared_parameters import UprightPinParameters as UprightPinParameters
@@ -128,9 +128,9 @@ else:
             ),
             "given_poses": "PointsSource PosesFound taught_poses",
             "method": (
-                "Angle AnyMethod Check DEGREES Former Help InputNumber Length LengthRule MM "
-                "MM_S Method MethodParameters NOTHING_STATED Needs NextStep Option Pair "
-                "PoseHelp Site StatedLimits ToolHistory Unit"
+                "Angle AnyMethod Check DEGREES Former Help InputNumber Length "
+                "LengthRule MM MM_S Method MethodParameters NOTHING_STATED Needs "
+                "NextStep Option Pair PoseHelp Site StatedLimits ToolHistory Unit"
             ),
             "n_angle": (
                 "ManyTouches NAngleParameters NAngleSource measure_n_angle most_informative_order"
@@ -150,8 +150,9 @@ else:
             "pivot.tilts": "OverPin Tilt informative_tilts proving_tilts",
             "points": "PointsParameters",
             "registry": "METHODS_GROUP all_methods find_method method_names register",
-            "runout_table": "AllRoundPlan RunoutTableParameters RunoutTableSource",
-            "runout_table_procedure": "measure_runout_table",
+            "runout_table": (
+                "AllRoundPlan RunoutTableParameters RunoutTableSource measure_runout_table"
+            ),
             "shared_parameters": "LookParameters PinParameters UprightPinParameters",
             "station_reference": "learn_station",
             "surface_touch": "SurfaceParameters",

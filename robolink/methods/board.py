@@ -11,17 +11,14 @@ from annotated_types import Ge, Len
 from robolink.calibration import (
     LEAST_SPACING_MM,
     BoardDrawing,
-    CalibrationResult,
     Sighting,
     VerifyResult,
-    height_of,
     seen_from,
-    solvable_planes,
     solve_board,
 )
 from robolink.files.toml import Problem
 from robolink.messages import declared, tr
-from robolink.methods.camera import LookTest
+from robolink.methods.camera import LookTest, RoundSource
 from robolink.methods.method import (
     MM,
     Check,
@@ -45,18 +42,16 @@ from robolink.procedures import (
     NO_ERROR,
     NO_OFFSET,
     TWO_ANGLES_DEG,
-    CalibratedCameraSource,
     CameraDrive,
-    CameraSamples,
     LookPlan,
-    MeasurementContext,
     Place,
+    ProofBasis,
     camera_error_of,
+    look_again,
     nearest_first,
     proof_angles,
-    seen_drift,
 )
-from robolink.runner import Procedure, SeenAt
+from robolink.runner import Procedure
 from robolink.sensing import sensor_name
 from robolink.stations import CameraStation, StationKind
 
@@ -192,60 +187,7 @@ def measure_board(
         >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3), round(found.offset.u_deg, 3)
         (2.0, -1.0, 8.0)
     """
-    board.require_apart()
-    solvable_planes([here], height_of(stored))
-    tool, centred = stored or NO_OFFSET, False
-    drive = CameraDrive(station, plan, here)
-    angles_deg = yield from drive.angles_in_reach(
-        here, lambda angles: _places(board, stored or NO_OFFSET, angles)
-    )
-    if plan.centre_first:
-        found = _places(board, tool, angles_deg[:1])[:2]
-        pair = BoardDrawing(board.fiducials_mm[:2])
-
-        def expected(looks: Sequence[SeenAt]) -> ToolOffset:
-            sightings = [station.sighting(look) for look in looks]
-            return _board_tool(station, sightings, (1, 2), pair, tool).offset
-
-        tool = yield from drive.centred(found, here, expected)
-        here, centred = drive.pose(found[-1]), True
-    places = _places(board, tool, angles_deg)
-
-    def solve(looks: Sequence[SeenAt]) -> "CameraRound":
-        sightings = [station.sighting(look) for look in looks]
-        marks = [place.mark for place in places]
-        return _board_tool(station, sightings, marks, board, stored, sigma_mm)
-
-    looks = CameraSamples(drive, solve, here, before_camera=centred)
-    return (yield from looks.at(places, retake=retake))
-
-
-def _board_tool(
-    station: CameraStation,
-    sightings: Sequence[Sighting],
-    marks: Sequence[int],
-    board: BoardDrawing,
-    stored: ToolOffset | None,
-    sigma_mm: float | None = None,
-) -> "CameraRound":
-    from robolink.calibration import as_round, solve_board_round
-
-    if len(sightings) == 2 and board.is_pair:
-        (first, second), spacing_mm = sightings, math.dist(*board.fiducials_mm)
-        return as_round(
-            solve_board(
-                first,
-                second,
-                stored=stored,
-                spacing_mm=spacing_mm,
-                sigma_mm=sigma_mm,
-                camera=station.model,
-            )
-        )
-    drawing = [board.fiducials_mm[mark - 1] for mark in marks]
-    return solve_board_round(
-        sightings, drawing, stored=stored, sigma_mm=sigma_mm, camera=station.model
-    )
+    return BoardSource("", station, board, plan, sigma_mm, retake).procedure(stored, here)
 
 
 def verify_board(
@@ -293,13 +235,11 @@ def verify_board(
     """
     drive = CameraDrive(station, plan, here)
     places = _places(board, aside, nearest_first(angles_deg, here))
-    seen = yield from drive.looks(places, here)
-    yield from drive.lifted(places[-1])
-    drifts = [
-        seen_drift(station, look, place, camera_error_mm)
-        for look, place in zip(seen, places, strict=True)
-    ]
-    return VerifyResult(tuple(drifts), tolerance_mm)
+    return (
+        yield from look_again(
+            drive, places, here, tolerance_mm=tolerance_mm, camera_error_mm=camera_error_mm
+        )
+    )
 
 
 def _places(board: BoardDrawing, tool: ToolOffset, angles_deg: Sequence[float]) -> list[Place]:
@@ -342,7 +282,7 @@ _TWO_ANGLES = LookPlan(turns_deg=TWO_ANGLES_DEG)
 
 
 @dataclass(frozen=True, slots=True)
-class BoardSource(CalibratedCameraSource):
+class BoardSource(RoundSource):
     """Measures X, Y and U of a held board by its fiducials.
 
     Attributes:
@@ -371,39 +311,52 @@ class BoardSource(CalibratedCameraSource):
         """What to do when a measurement makes the board jump."""
         return tr("Check that the board is held as drawn, and which marks the camera found.")
 
-    def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
+    def procedure(self, stored: ToolOffset | None, here: Pose) -> "Procedure[CameraRound]":
         """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`."""
-        return measure_board(
-            self.station,
-            self.plan,
-            self.board,
-            here=here,
-            stored=stored,
-            sigma_mm=self.sigma_mm,
-            retake=self.retake,
+        self.board.require_apart()
+        return (yield from RoundSource.procedure(self, stored, here))
+
+    def places(self, tool: ToolOffset, angles_deg: Sequence[float]) -> list[Place]:
+        """Return every fiducial at every angle."""
+        return _places(self.board, tool, angles_deg)
+
+    def expected(self, seen: Sequence[Sighting], stored: ToolOffset | None) -> ToolOffset:
+        """Return where the board is by its first two fiducials."""
+        pair = replace(self, board=BoardDrawing(self.board.fiducials_mm[:2]), sigma_mm=None)
+        return pair.solved(seen, (1, 2), stored or NO_OFFSET).offset
+
+    def solved(
+        self, seen: Sequence[Sighting], marks: Sequence[int], stored: ToolOffset | None
+    ) -> "CameraRound":
+        """Solve the looks at the fiducials; two of a pair as EPSON's CalcBoardTool does."""
+        from robolink.calibration import as_round, solve_board_round  # numpy
+
+        board, camera = self.board, self.station.model
+        if len(seen) == 2 and board.is_pair:
+            return as_round(
+                solve_board(
+                    *seen,
+                    stored=stored,
+                    spacing_mm=math.dist(*board.fiducials_mm),
+                    sigma_mm=self.sigma_mm,
+                    camera=camera,
+                )
+            )
+        drawing = [board.fiducials_mm[mark - 1] for mark in marks]
+        return solve_board_round(
+            seen, drawing, stored=stored, sigma_mm=self.sigma_mm, camera=camera
         )
 
-    def proof(
-        self,
-        context: MeasurementContext,  # noqa: ARG002 - nothing of it is read
-        tool: int,
-        result: CalibrationResult,
-        *,
-        tip: ToolOffset,
-        tolerance_mm: float,
-    ) -> BoardTest:
-        """Return the proof at other angles; see :class:`~robolink.procedures.KeepsProof`."""
+    def proof_of(self, basis: ProofBasis) -> BoardTest:
+        """Return the proof at other angles; see :class:`~robolink.procedures.ProvesAgain`."""
         return BoardTest(
-            tool=tool,
-            written=result.offset,
-            tip=tip,
-            tolerance_mm=tolerance_mm,
+            **basis.common,
             sensor=self.sensor,
             station=self.station,
             plan=self.plan,
             # The tool's own U turned with the board, so the joint stands where it stood.
-            angles_deg=proof_angles(result, tool),
-            camera_error_mm=camera_error_of(result),
+            angles_deg=proof_angles(basis.result, basis.tool),
+            camera_error_mm=camera_error_of(basis.result),
             board=self.board,
         )
 

@@ -1,11 +1,11 @@
 """camera: a calibrated, up-looking camera sees the tip."""
 
-from collections.abc import Callable, Sequence
+from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar, TypeVar, cast
+from typing import TYPE_CHECKING, ClassVar, cast
 
 from robolink.calibration import (
-    CalibrationResult,
     Sighting,
     VerifyResult,
     height_of,
@@ -24,13 +24,14 @@ from robolink.methods.shared_parameters import (
 from robolink.model import Pose, TipSensor, ToolOffset
 from robolink.procedures import (
     NO_OFFSET,
-    CalibratedCameraSource,
     CameraDrive,
     CameraSamples,
     LookPlan,
+    LookSource,
     MeasurementContext,
     Place,
     PlacedProof,
+    ProofBasis,
     calibrated_camera,
     camera_error_of,
     proof_angles,
@@ -59,9 +60,6 @@ class CameraParameters(LookParameters):
             "look at three angles or more, or limit the interval and state the "
             "standard deviation"
         )
-
-
-ResultT = TypeVar("ResultT", bound=CalibrationResult)
 
 
 def measure_camera(
@@ -100,59 +98,7 @@ def measure_camera(
         >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3)
         (12.4, -3.8)
     """
-    from robolink.calibration import solve_camera_round
-
-    def solve(sightings: Sequence[Sighting]) -> "CameraRound":
-        return solve_camera_round(sightings, stored=stored, sigma_mm=sigma_mm, camera=station.model)
-
-    return (yield from look_round(station, plan, solve, here=here, stored=stored, retake=retake))
-
-
-def look_round(
-    station: CameraStation,
-    plan: LookPlan,
-    solver: Callable[[Sequence[Sighting]], ResultT],
-    *,
-    here: Pose,
-    stored: ToolOffset | None,
-    retake: bool,
-) -> Procedure[ResultT]:
-    """Bring a tip before a calibrated camera at every angle of a plan, and solve what is seen.
-
-    Args:
-        station: Where the camera is, and what its pixels mean.
-        plan: At which angles it is looked at.
-        solver: Makes the result of what was seen.
-        here: Where the flange is; its U is where the angles count from.
-        stored: The offset stored now; the tip is expected there.
-        retake: Offer to take the look again that fits worst.
-
-    Raises:
-        CalibrationError: ``tilted_pose`` before anything moves; ``tip_not_seen``,
-            ``several_tips_seen``, ``camera_not_calibrated``, and those of the solver.
-        LimitError: The arm cannot bring the tip before the camera so; nothing was moved.
-    """
-    solvable_planes([here], height_of(stored))
-    tip, centred = stored or NO_OFFSET, False
-    drive = CameraDrive(station, plan, here)
-    angles_deg = yield from drive.angles_in_reach(
-        here, lambda angles: [Place(u_deg, stored or NO_OFFSET) for u_deg in angles]
-    )
-    if plan.centre_first:
-        found = Place(angles_deg[0], tip)
-
-        def expected(looks: Sequence[SeenAt]) -> ToolOffset:
-            return solve_up_camera(station.sighting(looks[0]), stored=stored).offset
-
-        tip = yield from drive.centred([found], here, expected)
-        here, centred = drive.pose(found), True
-    places = [Place(u_deg, tip) for u_deg in angles_deg]
-
-    def solve(looks: Sequence[SeenAt]) -> ResultT:
-        return solver([station.sighting(look) for look in looks])
-
-    looks = CameraSamples(drive, solve, here, before_camera=centred)
-    return (yield from looks.at(places, retake=retake))
+    return CameraSource("", station, plan, sigma_mm, retake).procedure(stored, here)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -213,13 +159,81 @@ class LookTest(PlacedProof):
             radius_px=self.radius_px,
         )
 
-    def steps_after_a_break(self, here: Pose) -> Procedure[VerifyResult]:
-        """Return the same steps: they begin straight up."""
-        return self.steps(here)
+
+class RoundSource(LookSource):
+    """Measures by bringing marks before a calibrated camera at every angle of a plan.
+
+    Attributes:
+        plan: How they are brought before it.
+        sigma_mm: Standard deviation of one coordinate of one look, where it is known.
+        retake: Offer to take the look again that fits worst.
+    """
+
+    __slots__ = ()
+
+    plan: LookPlan
+    sigma_mm: float | None
+    retake: bool
+
+    def procedure(self, stored: ToolOffset | None, here: Pose) -> "Procedure[CameraRound]":
+        """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`.
+
+        Raises:
+            CalibrationError: ``tilted_pose`` before anything moves; ``camera_not_calibrated``;
+                and as :meth:`CameraDrive.looks`, :meth:`CameraDrive.centred` and :meth:`solved`.
+            LimitError: The arm cannot bring the marks before the camera so; nothing was moved.
+        """
+        solvable_planes([here], height_of(stored))
+        station, tool, centred = self.station, stored or NO_OFFSET, False
+        drive = CameraDrive(station, self.plan, here)
+        angles_deg = yield from drive.angles_in_reach(
+            here, lambda angles: self.places(stored or NO_OFFSET, angles)
+        )
+        if self.plan.centre_first:
+            found = self.places(tool, angles_deg[:1])[:2]
+
+            def expected(looks: Sequence[SeenAt]) -> ToolOffset:
+                return self.expected([station.sighting(look) for look in looks], stored)
+
+            tool = yield from drive.centred(found, here, expected)
+            here, centred = drive.pose(found[-1]), True
+        places = self.places(tool, angles_deg)
+        marks = [place.mark for place in places]
+
+        def solve(looks: Sequence[SeenAt]) -> "CameraRound":
+            return self.solved([station.sighting(look) for look in looks], marks, stored)
+
+        looks = CameraSamples(drive, solve, here, before_camera=centred)
+        return (yield from looks.at(places, retake=self.retake))
+
+    @abstractmethod
+    def places(self, tool: ToolOffset, angles_deg: Sequence[float]) -> list[Place]:
+        """Return every mark at every angle, as something to be looked at.
+
+        Args:
+            tool: Where they are expected.
+            angles_deg: U of the frame.
+        """
+
+    @abstractmethod
+    def expected(self, seen: Sequence[Sighting], stored: ToolOffset | None) -> ToolOffset:
+        """Return where the marks are by looks at the first two places, or at the only one."""
+
+    @abstractmethod
+    def solved(
+        self, seen: Sequence[Sighting], marks: Sequence[int], stored: ToolOffset | None
+    ) -> "CameraRound":
+        """Return the result of all looks.
+
+        Args:
+            seen: What was seen.
+            marks: The mark of each.
+            stored: The offset stored now.
+        """
 
 
 @dataclass(frozen=True, slots=True)
-class CameraSource(CalibratedCameraSource):
+class CameraSource(RoundSource):
     """Measures X and Y of a tip by looking at it at several angles of U.
 
     Attributes:
@@ -249,38 +263,37 @@ class CameraSource(CalibratedCameraSource):
             "moved?"
         )
 
-    def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
-        """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`."""
-        return measure_camera(
-            self.station,
-            self.plan,
-            here=here,
-            stored=stored,
-            sigma_mm=self.sigma_mm,
-            retake=self.retake,
+    def places(self, tool: ToolOffset, angles_deg: Sequence[float]) -> list[Place]:
+        """Return the tip at every angle."""
+        return [Place(u_deg, tool) for u_deg in angles_deg]
+
+    def expected(self, seen: Sequence[Sighting], stored: ToolOffset | None) -> ToolOffset:
+        """Return where the tip is by one look."""
+        return solve_up_camera(seen[0], stored=stored).offset
+
+    def solved(
+        self,
+        seen: Sequence[Sighting],
+        marks: Sequence[int],  # noqa: ARG002 - there is one
+        stored: ToolOffset | None,
+    ) -> "CameraRound":
+        """Solve the looks at the tip."""
+        from robolink.calibration import solve_camera_round  # numpy
+
+        return solve_camera_round(
+            seen, stored=stored, sigma_mm=self.sigma_mm, camera=self.station.model
         )
 
-    def proof(
-        self,
-        context: MeasurementContext,  # noqa: ARG002 - nothing of it is read
-        tool: int,
-        result: CalibrationResult,
-        *,
-        tip: ToolOffset,
-        tolerance_mm: float,
-    ) -> LookTest:
-        """Return the proof at other angles; see :class:`~robolink.procedures.KeepsProof`."""
+    def proof_of(self, basis: ProofBasis) -> LookTest:
+        """Return the proof at other angles; see :class:`~robolink.procedures.ProvesAgain`."""
         return LookTest(
-            tool=tool,
-            written=result.offset,
-            tip=tip,
-            tolerance_mm=tolerance_mm,
+            **basis.common,
             sensor=self.sensor,
             station=self.station,
             plan=self.plan,
-            angles_deg=proof_angles(result, tool),
-            camera_error_mm=camera_error_of(result),
-            radius_px=radius_of(result),
+            angles_deg=proof_angles(basis.result, basis.tool),
+            camera_error_mm=camera_error_of(basis.result),
+            radius_px=radius_of(basis.result),
         )
 
 

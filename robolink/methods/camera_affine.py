@@ -1,6 +1,7 @@
 """camera-affine: an up-looking camera whose place and scale are unknown, found with the tip."""
 
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Annotated, Final
 
@@ -37,14 +38,14 @@ from robolink.methods.shared_parameters import (
     LookParameters,
     camera_at,
 )
-from robolink.model import Pose, TipSensor, ToolOffset
+from robolink.model import Pose, TipSensor, ToolOffset, json_fields
 from robolink.procedures import (
     NO_OFFSET,
     CameraDrive,
     CameraSamples,
-    MeasurementContext,
+    LookSource,
     Place,
-    ProvesAgain,
+    ProofBasis,
     pixel_camera,
     proof_angles,
     radius_of,
@@ -257,7 +258,7 @@ def _require_pattern(plan: CameraAffineParameters) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class CameraAffineSource(ProvesAgain):
+class CameraAffineSource(LookSource):
     """Measures X and Y of a tip, and the camera that sees it, in one pattern of looks.
 
     Attributes:
@@ -269,8 +270,6 @@ class CameraAffineSource(ProvesAgain):
         name: Name of the station, under which the camera is kept on record; empty for not.
     """
 
-    sensor: str | TipSensor
-    station: CameraStation
     plan: CameraAffineParameters = field(default_factory=CameraAffineParameters)
     sigma_mm: float | None = None
     name: str = ""
@@ -301,39 +300,20 @@ class CameraAffineSource(ProvesAgain):
         return Found(
             id=self.name,
             kind=StationKind.CAMERA,
-            x_mm=self.station.x_mm,
-            y_mm=self.station.y_mm,
-            z_mm=self.station.z_mm,
+            **json_fields(self.station, "x_mm", "y_mm", "z_mm"),
             sigma_mm=offset_sigma_mm(result),
             how=tr("{method} with tool {tool}", method=result.method, tool=tool),
             tool=tool,
             details={
                 "seen_by": sensor_name(self.sensor),
-                "mm_per_px": [list(row) for row in model.mm_per_px],
-                "origin_mm": list(model.origin_mm),
-                "centre_mm": None if model.centre_mm is None else list(model.centre_mm),
-                "place_sigma_mm": model.place_sigma_mm,
-                "scale_sigma": model.scale_sigma,
+                **json_fields(model, "mm_per_px", "origin_mm", "centre_mm"),
+                **json_fields(model, "place_sigma_mm", "scale_sigma"),
             },
         )
 
-    def require_ready(self) -> None:
-        """Find out whether the camera is there.
-
-        See :class:`~robolink.procedures.RequiresSensor`.
-        """
-        with pixel_camera(self.sensor):
-            pass
-
-    def measure(
-        self,
-        context: MeasurementContext,
-        tool: int,  # noqa: ARG002 - the flange is what moves
-        stored: ToolOffset | None,
-    ) -> CalibrationResult:
-        """Look and solve; see :class:`~robolink.procedures.MovingSource`."""
-        with pixel_camera(self.sensor) as camera:
-            return context.measure(lambda here: self.procedure(stored, here), camera=camera)
+    def opened(self) -> AbstractContextManager[TipSensor]:
+        """Open the camera, which answers in pixels; see :func:`pixel_camera`."""
+        return pixel_camera(self.sensor)
 
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
         """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`."""
@@ -345,16 +325,8 @@ class CameraAffineSource(ProvesAgain):
             sigma_mm=self.sigma_mm,
         )
 
-    def proof(
-        self,
-        context: MeasurementContext,  # noqa: ARG002 - nothing of it is read
-        tool: int,
-        result: CalibrationResult,
-        *,
-        tip: ToolOffset,
-        tolerance_mm: float,
-    ) -> "LookTest":
-        """Return the proof at other angles; see :class:`~robolink.procedures.KeepsProof`.
+    def proof_of(self, basis: ProofBasis) -> "LookTest":
+        """Return the proof at other angles; see :meth:`~robolink.procedures.ProvesAgain.proof_of`.
 
         Raises:
             TypeError: The result is not that of a camera that was found.
@@ -362,18 +334,15 @@ class CameraAffineSource(ProvesAgain):
         from robolink.calibration import CameraCalibration
         from robolink.methods.camera import LookTest  # numpy
 
-        if not isinstance(result, CameraCalibration):
-            raise TypeError(f"no camera was found by {result.method}")
+        if not isinstance(basis.result, CameraCalibration):
+            raise TypeError(f"no camera was found by {basis.result.method}")
         return LookTest(
-            tool=tool,
-            written=result.offset,
-            tip=tip,
-            tolerance_mm=tolerance_mm,
+            **basis.common,
             sensor=self.sensor,
-            station=replace(self.station, model=result.camera),
+            station=replace(self.station, model=basis.result.camera),
             plan=self.plan.look,
-            angles_deg=proof_angles(result, tool),
-            radius_px=radius_of(result),
+            angles_deg=proof_angles(basis.result, basis.tool),
+            radius_px=radius_of(basis.result),
         )
 
 

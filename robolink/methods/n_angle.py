@@ -47,6 +47,7 @@ from robolink.procedures import (
     touch_again,
     turned_touches,
 )
+from robolink.procedures.samples import TouchNames
 from robolink.runner import Procedure, TouchedAt, first_clear
 from robolink.stations import StationKind
 
@@ -164,7 +165,7 @@ FALSE_ALARM: Final = 0.001
 
 
 @dataclass(slots=True)
-class _NAngleSampler:
+class _NAngleSampler(TouchNames):
     """Touches at angles of U; implements ``SequentialSampler``. Each ends lifted off the pin.
 
     Attributes:
@@ -181,9 +182,6 @@ class _NAngleSampler:
     @property
     def known(self) -> str:
         return tr("X and Y")
-
-    def counted(self, count: int) -> str:
-        return tr("{count} touches", count=count)
 
     def take(self, place: float) -> Procedure[Pose]:
         self.last = yield from touch_again(
@@ -227,9 +225,6 @@ class _NAngleSampler:
 
     def named(self, pose: Pose) -> str:
         return tr("U {u:.1f}", u=pose.u_deg)
-
-    def which(self, number: int, pose: Pose) -> str:
-        return tr("Touch {number} at {where}", number=number, where=self.named(pose))
 
 
 def _came_from_mm(touch: Pose) -> tuple[float, float] | None:

@@ -1,12 +1,12 @@
 """runout-table: a calibrated camera sees how the tip wobbles, angle by angle."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar, cast
 
 from annotated_types import MaxLen, MinLen
 
-from robolink.calibration import CalibrationResult
+from robolink.calibration import Sighting
 from robolink.files.toml import Problem
 from robolink.messages import declared, tr
 from robolink.methods.camera import CameraSource
@@ -18,12 +18,13 @@ from robolink.methods.shared_parameters import (
     camera_at,
 )
 from robolink.model import Pose, ToolOffset
-from robolink.procedures import LookPlan, MeasurementContext
+from robolink.procedures import LookPlan, ProofBasis
 from robolink.runner import Procedure
 from robolink.sensing import sensor_name
-from robolink.stations import StationKind
+from robolink.stations import CameraStation, StationKind
 
 if TYPE_CHECKING:
+    from robolink.calibration import RunoutTableResult
     from robolink.methods.camera import LookTest
     from robolink.procedures import KeptProof, TipSource
 
@@ -53,6 +54,8 @@ class AllRoundPlan(LookPlan):
 class RunoutTableParameters(LookParameters):
     """How a calibrated camera looks at a tip all round."""
 
+    plan_kind: ClassVar[type[LookPlan]] = AllRoundPlan
+
     turns_deg: Annotated[
         tuple[Angle, ...],
         MinLen(_LEAST_LOOKS),
@@ -66,16 +69,6 @@ class RunoutTableParameters(LookParameters):
             )
         ),
     ] = tuple(30.0 * step for step in range(12))
-
-    @property
-    def look(self) -> LookPlan:
-        """The same for a procedure."""
-        return AllRoundPlan(
-            turns_deg=self.turns_deg,
-            pictures=self.pictures,
-            lift_mm=self.lift_mm,
-            beside_mm=self.beside_mm,
-        )
 
     def problems(self, check: Check) -> Iterator[Problem]:
         """Check that the looks go all round."""
@@ -104,38 +97,69 @@ class RunoutTableSource(CameraSource):
             count=len(self.plan.turns_deg),
         )
 
-    def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
-        """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`."""
-        from robolink.methods.runout_table_procedure import measure_runout_table  # numpy
+    def solved(
+        self,
+        seen: Sequence[Sighting],
+        marks: Sequence[int],  # noqa: ARG002 - there is one
+        stored: ToolOffset | None,
+    ) -> "RunoutTableResult":
+        """Solve the looks at the tip."""
+        from robolink.calibration import solve_runout_table  # numpy
 
-        return measure_runout_table(
-            self.station,
-            self.plan,
-            here=here,
-            stored=stored,
-            sigma_mm=self.sigma_mm,
-            retake=self.retake,
+        return solve_runout_table(
+            seen, stored=stored, sigma_mm=self.sigma_mm, camera=self.station.model
         )
 
-    def proof(
-        self,
-        context: MeasurementContext,
-        tool: int,
-        result: CalibrationResult,
-        *,
-        tip: ToolOffset,
-        tolerance_mm: float,
-    ) -> "LookTest":
+    def proof_of(self, basis: ProofBasis) -> "LookTest":
         """Return the proof at other angles, where the tip has to be where the table says."""
         from robolink.calibration import RunoutTableResult  # numpy
         from robolink.methods.runout_table_procedure import WobbleTest
 
         # "slots" makes the class anew, so the short form of super() would not find it.
-        looks = CameraSource.proof(self, context, tool, result, tip=tip, tolerance_mm=tolerance_mm)
-        if not isinstance(result, RunoutTableResult):
+        looks = CameraSource.proof_of(self, basis)
+        if not isinstance(basis.result, RunoutTableResult):
             return looks
         plain = {field.name: getattr(looks, field.name) for field in fields(looks)}
-        return WobbleTest(**plain, table=result.table)
+        return WobbleTest(**plain, table=basis.result.table)
+
+
+def measure_runout_table(
+    station: CameraStation,
+    plan: LookPlan,
+    *,
+    here: Pose,
+    stored: ToolOffset | None,
+    sigma_mm: float | None = None,
+    retake: bool = False,
+) -> "Procedure[RunoutTableResult]":
+    """Measure X and Y of a tip and how it wobbles, with a calibrated camera. Runs in Tool 0.
+
+    Args:
+        station: Where the camera is, and what its pixels mean.
+        plan: At which angles it is looked at: all round, in steps of 60 degrees at most.
+        here: Where the flange is; its U is where the angles count from.
+        stored: The offset stored now; the tip is expected there.
+        sigma_mm: Standard deviation of one coordinate of one look, where it is known.
+        retake: Offer to take the look again that fits worst.
+
+    Raises:
+        CalibrationError: As :func:`measure_camera`, and those of :func:`solve_runout_table`.
+
+    Example:
+        >>> from robolink.methods import RunoutTableParameters, measure_runout_table
+        >>> from robolink.model import Pose, ToolOffset
+        >>> from robolink.stations import CameraStation
+        >>> from robolink.testing import PaperCell
+        >>> camera, here = CameraStation(x_mm=300, y_mm=80, z_mm=-30), Pose(300, 100, 20, 0)
+        >>> plan = RunoutTableParameters(turns_deg=tuple(range(0, 360, 45))).look
+        >>> stored = ToolOffset(12, -3.5, -20)
+        >>> course = measure_runout_table(camera, plan, here=here, stored=stored)
+        >>> found = PaperCell(here, ToolOffset(12.1, -3.2, -20)).run(course)
+        >>> round(found.offset.x_mm, 3), round(found.offset.y_mm, 3), len(found.inputs)
+        (12.1, -3.2, 8)
+    """
+    source = RunoutTableSource("", station, plan, sigma_mm, retake)
+    return cast("Procedure[RunoutTableResult]", source.procedure(stored, here))
 
 
 def _source(parameters: RunoutTableParameters, site: Site) -> "TipSource":

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from annotated_types import Ge, Le, MaxLen, MinLen
 
@@ -24,7 +24,7 @@ from robolink.methods.method import (
     Rows,
 )
 from robolink.model import InputEdge
-from robolink.procedures import HALF_ROUND_DEG, LEAST_BESIDE_MM, LookPlan, TouchPlan
+from robolink.procedures import HALF_ROUND_DEG, LEAST_BESIDE_MM, LookPlan, SamplingPolicy, TouchPlan
 from robolink.ways import Way, way
 
 if TYPE_CHECKING:
@@ -111,6 +111,40 @@ class UprightPinParameters(PinParameters):
         return self.if_length_changed
 
 
+class SampledParameters(MethodParameters):
+    """How an input is switched again and again, until that is enough.
+
+    What derives from it has the fields ``until_mm`` and ``retake``, each with a help of its own.
+    """
+
+    until_mm: float | None
+    retake: bool
+
+    @property
+    def sampling(self) -> SamplingPolicy:
+        """When it ends, and whether a sample is offered to be taken again."""
+        return SamplingPolicy(self.until_mm, retake=self.retake)
+
+    def problems(self, check: Check) -> Iterator[Problem]:
+        """Check that an early end and a retake can do something."""
+        if "retake" in check.given and self.retake and self.no_residual():
+            yield Problem(
+                "retake", tr("means nothing: nothing is repeated, so nothing can fit badly")
+            )
+        if self.until_mm is None or check.sigma_stated is None:
+            return
+        if not self.may_end_early(sigma_stated=check.sigma_stated):
+            yield Problem("until_mm", self.nothing_to_leave_out(check))
+
+    def may_end_early(self, *, sigma_stated: bool) -> bool:
+        """Tell whether the tip can be known well enough before the last sample."""
+        raise NotImplementedError
+
+    def nothing_to_leave_out(self, check: Check) -> str:
+        """Return why it cannot end early, and what to give."""
+        raise NotImplementedError
+
+
 def clearance_below_lift(clearance_mm: float, lift_mm: float, check: Check) -> Iterator[Problem]:
     """Check that something is left to come down."""
     if clearance_mm >= lift_mm:
@@ -169,6 +203,8 @@ UNMEASURED_Z = declared('cannot be "measured" by a camera; write "typed" or "kep
 class LookParameters(MethodParameters):
     """How marks are brought before a camera and looked at."""
 
+    plan_kind: ClassVar[type[LookPlan]] = LookPlan
+
     sensor: Annotated[
         str | None,
         MinLen(1),
@@ -223,7 +259,7 @@ class LookParameters(MethodParameters):
     @property
     def look(self) -> LookPlan:
         """The same for a procedure."""
-        return LookPlan(
+        return self.plan_kind(
             turns_deg=self.turns_deg,
             pictures=self.pictures,
             lift_mm=self.lift_mm,

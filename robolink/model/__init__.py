@@ -48,6 +48,9 @@ if TYPE_CHECKING:
     from robolink.model._journal_entries import finding_named_now as finding_named_now
     from robolink.model._journal_entries import method_name_now as method_name_now
     from robolink.model._journal_entries import with_method_name_now as with_method_name_now
+    from robolink.model._json_values import from_json as from_json
+    from robolink.model._json_values import json_fields as json_fields
+    from robolink.model._json_values import json_value as json_value
     from robolink.model._kinematics import AxisKind as AxisKind
     from robolink.model._kinematics import AxisPositions as AxisPositions
     from robolink.model._kinematics import CsTool as CsTool
@@ -100,6 +103,7 @@ if TYPE_CHECKING:
     from robolink.model._tip_sensor import SpotUnit as SpotUnit
     from robolink.model._tip_sensor import TipSensor as TipSensor
     from robolink.model._tools import ANY as ANY
+    from robolink.model._tools import COMPONENTS as COMPONENTS
     from robolink.model._tools import Expect as Expect
     from robolink.model._tools import Expected as Expected
     from robolink.model._tools import Jump as Jump
@@ -135,6 +139,7 @@ else:
                 "Signature answer_entry answered_by_in_words finding_named_now "
                 "method_name_now with_method_name_now"
             ),
+            "_json_values": "from_json json_fields json_value",
             "_kinematics": (
                 "AxisKind AxisPositions CsTool Direction3 FlangeFrame "
                 "ISMKinematicsWithOrientationImage "
@@ -155,7 +160,7 @@ else:
             "_status": "ControllerState ControllerStatus",
             "_tip_sensor": "ControllerSensor LookingController Spot SpotUnit TIP TipSensor",
             "_tools": (
-                "ANY Expect Expected Jump KinematicToolTable ToolOffset ToolReceipt "
+                "ANY COMPONENTS Expect Expected Jump KinematicToolTable ToolOffset ToolReceipt "
                 "ToolTable describe_offset of_no_tool plain_offset put_right "
                 "read_for_verdict read_offset "
                 "tool_changed"

@@ -21,7 +21,8 @@ _LOOKS: Final = 3
 
 _NUMBERS: Final = frozenset({float, int})
 
-_COMPONENTS: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
+COMPONENTS: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
+"""The components of an offset, and of a pose, as files and documents name them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +47,7 @@ class ToolOffset:
         values = self.components()
         if _NUMBERS.issuperset(map(type, values)) and all(map(math.isfinite, values)):
             return  # nearly always; what is another kind of number is looked at one by one
-        for name, value in zip(_COMPONENTS, values, strict=True):
+        for name, value in zip(COMPONENTS, values, strict=True):
             if isinstance(value, Real) and not isinstance(value, (int, float)):
                 # A number of numpy, say; what is kept and sent is Python's own.
                 object.__setattr__(self, name, float(value))

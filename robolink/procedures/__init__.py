@@ -5,7 +5,7 @@ A procedure is a generator of steps (:mod:`robolink.runner`); a source runs proc
 
 from typing import TYPE_CHECKING
 
-from robolink.lazy_exports import lazy_exports
+from robolink.lazy_exports import lazy_exports, old_names
 
 if TYPE_CHECKING:
     from robolink.procedures.approach import NO_OFFSET as NO_OFFSET
@@ -22,12 +22,14 @@ if TYPE_CHECKING:
     from robolink.procedures.camera_drive import Place as Place
     from robolink.procedures.camera_looks import NO_ERROR as NO_ERROR
     from robolink.procedures.camera_looks import CameraSamples as CameraSamples
+    from robolink.procedures.camera_looks import look_again as look_again
     from robolink.procedures.camera_looks import nearest_first as nearest_first
     from robolink.procedures.camera_looks import seen_drift as seen_drift
     from robolink.procedures.camera_looks import verify_by_looking as verify_by_looking
     from robolink.procedures.kept_proof import KeepsProof as KeepsProof
     from robolink.procedures.kept_proof import KeptProof as KeptProof
     from robolink.procedures.kept_proof import PlacedProof as PlacedProof
+    from robolink.procedures.kept_proof import ProofBasis as ProofBasis
     from robolink.procedures.kept_proof import ProvesAgain as ProvesAgain
     from robolink.procedures.pin_proof import MOST_MORE as MOST_MORE
     from robolink.procedures.pin_proof import DriftProof as DriftProof
@@ -58,9 +60,9 @@ if TYPE_CHECKING:
     from robolink.procedures.source import StopsAbovePin as StopsAbovePin
     from robolink.procedures.source import TipSource as TipSource
     from robolink.procedures.source import TouchesFurther as TouchesFurther
-    from robolink.procedures.source_bases import CalibratedCameraSource as CalibratedCameraSource
     from robolink.procedures.source_bases import InputSource as InputSource
     from robolink.procedures.source_bases import LazySource as LazySource
+    from robolink.procedures.source_bases import LookSource as LookSource
     from robolink.procedures.source_bases import ManualPinSource as ManualPinSource
     from robolink.procedures.source_bases import PinSource as PinSource
     from robolink.procedures.source_bases import TouchesPin as TouchesPin
@@ -92,8 +94,10 @@ else:
             "camera_drive": (
                 "CameraDrive HALF_ROUND_DEG LEAST_BESIDE_MM LookPlan Place TWO_ANGLES_DEG"
             ),
-            "camera_looks": "CameraSamples NO_ERROR nearest_first seen_drift verify_by_looking",
-            "kept_proof": "KeepsProof KeptProof PlacedProof ProvesAgain",
+            "camera_looks": (
+                "CameraSamples NO_ERROR look_again nearest_first seen_drift verify_by_looking"
+            ),
+            "kept_proof": "KeepsProof KeptProof PlacedProof ProofBasis ProvesAgain",
             "pin_proof": (
                 "DriftProof MOST_MORE TurnTest contact_pose drift_uncertainty_mm verify_by_turning"
             ),
@@ -108,15 +112,17 @@ else:
                 "RequiresSensor StopsAbovePin TipSource TouchesFurther"
             ),
             "source_bases": (
-                "CalibratedCameraSource InputSource LazySource ManualPinSource PinSource "
-                "TouchSource TouchesPin angles_between calibrated_camera camera_error_of "
-                "middles_of_gaps pixel_camera proof_angles radius_of touches_of"
+                "InputSource LazySource LookSource ManualPinSource PinSource "
+                "TouchSource TouchesPin angles_between calibrated_camera "
+                "camera_error_of middles_of_gaps pixel_camera proof_angles radius_of "
+                "touches_of"
             ),
             "surface_touches": "SurfaceTouches",
             "tilt_proof": "SurfaceProof",
             "witnessed_touches": (
-                "TOUCH_CODES TouchPlan heights_agree jog_mm plain_pose require_one_height "
-                "require_touches"
+                "TOUCH_CODES TouchPlan heights_agree jog_mm plain_pose "
+                "require_one_height require_touches"
             ),
         },
+        old_names(__name__),
     )

@@ -151,10 +151,34 @@ def verify_by_looking(
     drive = CameraDrive(station, plan, here)
     drive.watch.expect_radius(TIP, radius_px)
     places = [Place(u_deg, aside) for u_deg in nearest_first(angles_deg, here)]
+    return (
+        yield from look_again(
+            drive, places, here, tolerance_mm=tolerance_mm, camera_error_mm=camera_error_mm
+        )
+    )
+
+
+def look_again(
+    drive: CameraDrive,
+    places: Sequence[Place],
+    here: Pose,
+    *,
+    tolerance_mm: float,
+    camera_error_mm: tuple[float, float] = NO_ERROR,
+) -> Procedure[VerifyResult]:
+    """Look at marks and return how far each is from where the controller puts it; ends lifted.
+
+    Args:
+        drive: Brings them before the camera.
+        places: The marks, with where they should be.
+        here: Where the frame of the new tool is.
+        tolerance_mm: Largest drift that passes.
+        camera_error_mm: What the camera is off by, as the measurement found it.
+    """
     seen = yield from drive.looks(places, here)
     yield from drive.lifted(places[-1])
     drifts = [
-        seen_drift(station, look, place, camera_error_mm)
+        seen_drift(drive.station, look, place, camera_error_mm)
         for look, place in zip(seen, places, strict=True)
     ]
     return VerifyResult(tuple(drifts), tolerance_mm)

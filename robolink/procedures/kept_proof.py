@@ -2,9 +2,9 @@
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar, Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
-from robolink.calibration import CalibrationResult, TurnClaim, VerifyResult
+from robolink.calibration import CalibrationResult, TurnClaim, VerifyResult, tip_pose
 from robolink.model import Pose, ToolOffset
 from robolink.procedures.source import MeasurementContext
 from robolink.runner import Move, Procedure, Seek, foreseen_steps
@@ -96,13 +96,13 @@ class PlacedProof(KeptProof):
             here: Where the frame of the new tool is.
         """
 
-    @abstractmethod
     def steps_after_a_break(self, here: Pose) -> Procedure[VerifyResult]:
-        """Return the steps from wherever the robot stands now.
+        """Return the steps from wherever the robot stands now; the same where they go up first.
 
         Args:
             here: Where the frame of the new tool is.
         """
+        return self.steps(here)
 
 
 @runtime_checkable
@@ -143,8 +143,46 @@ class KeepsProof(Protocol):
         """
 
 
-class ProvesAgain(ABC):
-    """A source that proves by a :class:`KeptProof`, at once and after a break alike."""
+@dataclass(frozen=True, slots=True)
+class ProofBasis:
+    """What a source is told of a tip whose proof it makes.
+
+    Attributes:
+        context: What to work with; nothing moves.
+        tool: The tool that is written.
+        result: What was measured, with the offset that is written.
+        tip: Where the tip was found.
+        tolerance_mm: Largest drift that passes.
+    """
+
+    context: MeasurementContext
+    tool: int
+    result: CalibrationResult
+    tip: ToolOffset
+    tolerance_mm: float
+
+    @property
+    def common(self) -> dict[str, Any]:
+        """The fields of a :class:`KeptProof` that have no default."""
+        return {
+            "tool": self.tool,
+            "written": self.result.offset,
+            "tip": self.tip,
+            "tolerance_mm": self.tolerance_mm,
+        }
+
+    @property
+    def measured_deg(self) -> list[float]:
+        """U of the new tool in each pose of the measurement."""
+        written = self.result.offset
+        return [tip_pose(pose, written, tool=self.tool).u_deg for pose in self.result.inputs]
+
+
+class ProvesAgain(ABC):  # noqa: B024 - what derives from it has abstract hooks
+    """A source that proves by a :class:`KeptProof`, at once and after a break alike.
+
+    What derives from it overrides :meth:`proof_of`, or :meth:`proof` itself.
+    """
 
     __slots__ = ()
 
@@ -162,7 +200,6 @@ class ProvesAgain(ABC):
         proof = self.proof(context, tool, result, tip=tip, tolerance_mm=tolerance_mm)
         return proof.prove(context)
 
-    @abstractmethod
     def proof(
         self,
         context: MeasurementContext,
@@ -173,6 +210,15 @@ class ProvesAgain(ABC):
         tolerance_mm: float,
     ) -> KeptProof:
         """Return the proof of what was measured; see :class:`KeepsProof`."""
+        return self.proof_of(ProofBasis(context, tool, result, tip, tolerance_mm))
+
+    def proof_of(self, basis: ProofBasis) -> KeptProof:
+        """Return the proof of what was measured.
+
+        Args:
+            basis: What was measured, and what for.
+        """
+        raise NotImplementedError
 
 
 def movements(steps: Procedure[VerifyResult], here: Pose) -> int:

@@ -16,7 +16,6 @@ from robolink.procedures.approach import offset_z
 from robolink.procedures.witnessed_touches import (
     TouchPlan,
     WitnessedTouches,
-    fresh_seed,
     heights_agree,
     plain_pose,
     require_touches,
@@ -142,9 +141,8 @@ class PinTouches(WitnessedTouches):
         from robolink.calibration import Standoff, StandoffSeries  # numpy
 
         if self._drawing is None:
-            seed = self._plan.seed
             self._drawing = StandoffSeries(
-                fresh_seed() if seed is None else seed,
+                self._drawn_from(),
                 self._low_mm,
                 sideways=self._plan.contact is None,
                 planar=self._planar,
@@ -211,10 +209,6 @@ class PinTouches(WitnessedTouches):
                     ),
                 )
         return None
-
-    @property
-    def _seed(self) -> int | None:
-        return self._drawing.seed if self._drawing else None
 
     def _not_jogged(self, away_mm: float) -> str:
         return tr(

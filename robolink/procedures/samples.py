@@ -1,7 +1,7 @@
 """What a method takes at each place, what was taken so far, and how one of it is taken again."""
 
 from collections.abc import Sequence
-from typing import Generic, Protocol, TypeVar, runtime_checkable
+from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
 from robolink.calibration import CalibrationResult
 from robolink.messages import tr
@@ -74,6 +74,24 @@ class SequentialSampler(
 
     def named(self, taken: TakenT) -> str:
         """Return where it was taken, for a person: "U 120.0"."""
+
+
+class TouchNames:
+    """What samplers of touches say alike."""
+
+    __slots__ = ()
+
+    def counted(self, count: int) -> str:
+        """Return how many were taken."""
+        return tr("{count} touches", count=count)
+
+    def which(self, number: int, touch: Any) -> str:  # noqa: ANN401 - what the sampler takes
+        """Return which one it is."""
+        return tr("Touch {number} at {where}", number=number, where=self.named(touch))
+
+    def named(self, touch: Any) -> str:  # noqa: ANN401
+        """Return where one was taken."""
+        raise NotImplementedError
 
 
 class Samples(Generic[PlaceT, TakenT, ResultT]):

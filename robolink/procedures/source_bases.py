@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from statistics import median
@@ -13,7 +13,7 @@ from robolink.deprecation import deprecated, old_hook
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import Pose, SpotUnit, TipSensor, ToolOffset
-from robolink.procedures.kept_proof import KeepsProof, KeptProof, ProvesAgain
+from robolink.procedures.kept_proof import KeepsProof, KeptProof, ProofBasis, ProvesAgain
 from robolink.procedures.pin_proof import TurnTest, contact_pose, drift_uncertainty_mm
 from robolink.procedures.source import MeasurementContext, MovingSource, TouchesFurther
 from robolink.procedures.witnessed_touches import TouchPlan
@@ -168,7 +168,16 @@ class InputSource(ProvesAgain, Generic[PlanT]):
         stored: ToolOffset | None,
     ) -> CalibrationResult:
         """Drive and solve; see :class:`~robolink.procedures.MovingSource`."""
-        return context.measure(lambda here: self.steps(stored, here))
+        source = self.told_by(context)
+        return context.measure(lambda here: source.steps(stored, here))
+
+    def told_by(self, context: MeasurementContext) -> Self:  # noqa: ARG002 - for overriding
+        """Return the source with what only the controller tells of its movements; it is asked now.
+
+        Args:
+            context: What to work with.
+        """
+        return self
 
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
         """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`.
@@ -324,26 +333,15 @@ class ManualPinSource(PinSource):
 
     __slots__ = ()
 
-    def proof(
-        self,
-        context: MeasurementContext,  # noqa: ARG002 - nothing of it is read
-        tool: int,
-        result: CalibrationResult,
-        *,
-        tip: ToolOffset,
-        tolerance_mm: float,
-    ) -> TurnTest:
-        """Return the turn test; see :class:`~robolink.procedures.KeepsProof`."""
-        angles = [tip_pose(pose, result.offset, tool=tool).u_deg for pose in result.inputs]
+    def proof_of(self, basis: ProofBasis) -> TurnTest:
+        """Return the turn test; see :meth:`~robolink.procedures.ProvesAgain.proof_of`."""
+        angles = basis.measured_deg
         return TurnTest(
-            tool=tool,
+            **basis.common,
             touch=self.touch,
-            contact=contact_pose(result, tool=tool),
+            contact=contact_pose(basis.result, tool=basis.tool),
             angles_deg=(middles_of_gaps(angles)[0], angles[0]),
-            tolerance_mm=tolerance_mm,
-            u_mm=drift_uncertainty_mm(result),
-            written=result.offset,
-            tip=tip,
+            u_mm=drift_uncertainty_mm(basis.result),
         )
 
 
@@ -428,8 +426,8 @@ def pixel_camera(sensor: str | TipSensor) -> Iterator[TipSensor]:
 
 
 @dataclass(frozen=True, slots=True)
-class CalibratedCameraSource(ProvesAgain):
-    """Measures by looks of a camera whose place and pixels are known.
+class LookSource(ProvesAgain):
+    """Measures by looks of a camera.
 
     Attributes:
         sensor: URL or name of the camera (:func:`robolink.sensing.open_sensor`), or the camera.
@@ -439,9 +437,13 @@ class CalibratedCameraSource(ProvesAgain):
     sensor: str | TipSensor
     station: CameraStation
 
+    def opened(self) -> AbstractContextManager[TipSensor]:
+        """Open the camera; it has to be a calibrated one, see :func:`calibrated_camera`."""
+        return calibrated_camera(self.sensor, self.station)
+
     def require_ready(self) -> None:
         """Find out whether the camera is there; see :class:`RequiresSensor`."""
-        with calibrated_camera(self.sensor, self.station):
+        with self.opened():
             pass
 
     def measure(
@@ -451,7 +453,7 @@ class CalibratedCameraSource(ProvesAgain):
         stored: ToolOffset | None,
     ) -> CalibrationResult:
         """Look and solve; see :class:`~robolink.procedures.MovingSource`."""
-        with calibrated_camera(self.sensor, self.station) as camera:
+        with self.opened() as camera:
             return context.measure(lambda here: self.procedure(stored, here), camera=camera)
 
     @abstractmethod

@@ -16,9 +16,7 @@ from robolink.messages import tr
 from robolink.model import Path, Pose
 from robolink.procedures.approach import offset_z
 from robolink.procedures.witnessed_touches import (
-    TouchPlan,
     WitnessedTouches,
-    fresh_seed,
     plain_pose,
     you_touch,
 )
@@ -49,16 +47,7 @@ class SurfaceTouches(WitnessedTouches):
         (-20.0, -8.0, 1)
     """
 
-    def __init__(
-        self,
-        plan: TouchPlan,
-        *,
-        total: int | None = None,
-        limit_mm: float | None = None,
-        retakes: bool = False,
-    ) -> None:
-        super().__init__(plan, total=total, limit_mm=limit_mm, retakes=retakes)
-        self._drawing: SurfaceStandoffs | None = None
+    _drawing: "SurfaceStandoffs | None" = None
 
     @property
     def taken(self) -> tuple[TouchedAt, ...]:
@@ -161,10 +150,7 @@ class SurfaceTouches(WitnessedTouches):
         from robolink.calibration import SurfaceStandoffs  # numpy
 
         if self._drawing is None:
-            seed = self._plan.seed
-            self._drawing = SurfaceStandoffs(
-                fresh_seed() if seed is None else seed, self._plan.clearance_mm
-            )
+            self._drawing = SurfaceStandoffs(self._drawn_from(), self._plan.clearance_mm)
         return self._drawing.next(self._distances_mm(), columns, further_mm=further_mm)
 
     def _distances_mm(self) -> list[float]:
@@ -172,10 +158,6 @@ class SurfaceTouches(WitnessedTouches):
 
     def _subject(self, arrival: Pose | None) -> TouchSubject:
         return replace(super()._subject(arrival), surface=True)
-
-    @property
-    def _seed(self) -> int | None:
-        return self._drawing.seed if self._drawing else None
 
     def _not_jogged(self, away_mm: float) -> str:
         return tr(

@@ -219,6 +219,7 @@ class WitnessedTouches(ABC):
         self._numbers: dict[Hashable, int] = {}
         self._number = 0
         self._earlier: tuple[AngleShown, ...] = ()
+        self._seed: int | None = None
 
     def shown(self, instruction: str, *, key: Hashable = None) -> Procedure[TouchedAt]:
         """Let the person bring the tip into contact from wherever it is, and lift off.
@@ -351,14 +352,14 @@ class WitnessedTouches(ABC):
             ),
         )
 
+    def _drawn_from(self) -> int:
+        """Return from what the standoffs are drawn; the touches on record say it."""
+        self._seed = fresh_seed() if self._plan.seed is None else self._plan.seed
+        return self._seed
+
     @abstractmethod
     def off(self, touch: Pose) -> Move:
         """Return the step that takes the tip out of contact."""
-
-    @property
-    @abstractmethod
-    def _seed(self) -> int | None:
-        """From which the standoffs are drawn, ``None`` before any was."""
 
     @abstractmethod
     def _not_jogged(self, away_mm: float) -> str:

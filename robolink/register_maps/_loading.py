@@ -25,11 +25,11 @@ from robolink.register_maps._map import (
     describe_place,
     span_of,
 )
-from robolink.register_maps._tables import CommitBitKeys, LevelKeys, MapFile
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
 
+    from robolink.register_maps._tables import MapFile
 
 MAP_FILE: Final = FileKind(
     named=lambda path: tr("The PLC map {path}", path=path),
@@ -63,7 +63,6 @@ def check_map(path: Path) -> tuple[Problem, ...]:
 def _checked(path: Path) -> tuple[RegisterMap | None, list[Problem]]:
     from pydantic import ValidationError
 
-    from robolink.register_maps._loading import problems_together
     from robolink.register_maps._tables import MapFile, Resolving
 
     content = MAP_FILE.read(path)
@@ -159,7 +158,7 @@ class _Claim:
         return (self.bit, self.on) == (other.bit, other.on)
 
 
-def problems_together(file: MapFile, found: RegisterMap) -> list[Problem]:
+def problems_together(file: "MapFile", found: RegisterMap) -> list[Problem]:
     """Return what is wrong with the places of a map as a whole."""
     return [
         *_twice(file),
@@ -169,13 +168,13 @@ def problems_together(file: MapFile, found: RegisterMap) -> list[Problem]:
             for problem in _slot(*slot, found)
         ),
         *_unreadable("flange", found.flange),
-        *_signals(file, found),
+        *_signals(found),
         *_probe(found),
-        *_places(file, found),
+        *_places(found),
     ]
 
 
-def _twice(file: MapFile) -> Iterator[Problem]:
+def _twice(file: "MapFile") -> Iterator[Problem]:
     numbered = (
         ("tools", [t.number for t in file.tools]),
         ("inputs", [i.number for i in file.inputs]),
@@ -217,8 +216,8 @@ def _unreadable(where: str, components: Mapping[str, Number]) -> Iterator[Proble
         )
 
 
-def _signals(file: MapFile, found: RegisterMap) -> Iterator[Problem]:
-    for where, signal in _all_signals(file, found):
+def _signals(found: RegisterMap) -> Iterator[Problem]:
+    for where, signal in _all_signals(found):
         if signal.table.holds_bits and (signal.bit is not None or {signal.on, signal.off} - {0, 1}):
             yield Problem(where, tr("is a single bit: take bit out, and let on be 0 or 1"))
         elif signal.bit is not None and signal.on > 1:
@@ -256,8 +255,8 @@ def _probe(found: RegisterMap) -> Iterator[Problem]:
         )
 
 
-def _places(file: MapFile, found: RegisterMap) -> Iterator[Problem]:
-    claims = list(_claims(file, found))
+def _places(found: RegisterMap) -> Iterator[Problem]:
+    claims = list(_claims(found))
     for claim in claims:
         if claim.addresses.stop - 1 > LAST_ADDRESS:
             yield Problem(claim.where, tr("ends beyond address {last}", last=LAST_ADDRESS))
@@ -274,7 +273,7 @@ def _places(file: MapFile, found: RegisterMap) -> Iterator[Problem]:
             )
 
 
-def _claims(file: MapFile, found: RegisterMap) -> Iterator[_Claim]:
+def _claims(found: RegisterMap) -> Iterator[_Claim]:
     for position, slot in enumerate(found.slots.values(), start=1):
         for name, number in slot.components.items():
             yield _of_number(f"tools#{position}.{name}", number)
@@ -284,7 +283,7 @@ def _claims(file: MapFile, found: RegisterMap) -> Iterator[_Claim]:
         yield _of_number("probe", found.probe.number)
     if found.device_id is not None:
         yield _Claim("device_id", found.device_id.table, found.device_id.registers)
-    for where, signal in _all_signals(file, found):
+    for where, signal in _all_signals(found):
         ours = signal is found.commit.request or (where.endswith(".defined") and signal.writable)
         yield _Claim(
             where,
@@ -312,10 +311,10 @@ def _of_word(where: str, word: Word, *, shared: bool) -> _Claim:
     return _Claim(where, word.table, range(word.address, word.address + 1), shared=shared)
 
 
-def _all_signals(file: MapFile, found: RegisterMap) -> Iterator[tuple[str, Signal]]:
+def _all_signals(found: RegisterMap) -> Iterator[tuple[str, Signal]]:
     commit = found.commit
-    bit = isinstance(file.commit, CommitBitKeys)
-    if bit or isinstance(file.commit, LevelKeys):
+    if commit.kind is not CommitKind.NONE:
+        bit = commit.kind is CommitKind.COMMIT_BIT
         named = (
             ("commit.trigger" if bit else "commit.request", commit.request),
             ("commit.done" if bit else "commit.acknowledge", commit.answer),

@@ -4,11 +4,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
 from robolink.calibration import (
-    Accuracy,
     CalibrationResult,
     Drift,
     TurnJudgement,
-    UncertaintyBudget,
     VerifyResult,
     doubt_sentence,
 )
@@ -16,17 +14,14 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import (
     ControllerFacts,
-    Elbow,
     EntryKind,
-    Hand,
     Pose,
-    Posture,
     Recorded,
     ToolOffset,
-    Wrist,
     answered_by_in_words,
     are_simulated_facts,
     describe_offset,
+    from_json,
     is_simulated_name,
     method_name_now,
     read_offset,
@@ -52,46 +47,22 @@ def recorded_fit(details: Mapping[str, Any]) -> CalibrationResult:
     Raises:
         ConfigError, KeyError, TypeError, ValueError: The entry cannot be understood.
     """
-    return CalibrationResult(
-        method=method_name_now(details["method"]),
-        offset=read_offset(details["proposed"]) or ToolOffset(),
-        measured=tuple(details["measured"]),
-        kept=tuple(details.get("kept", ())),
-        changed=tuple(details.get("changed", ())),
-        reference_point_mm=tuple(details.get("reference_point_mm", ())),
-        sigma_gain=details.get("sigma_gain", 1.0),
-        warnings=tuple(details.get("warnings", ())),
-        inputs=tuple(map(recorded_pose, details.get("poses", ()))),
-        covariance=_vectors(details.get("covariance", ())),
-        half_width95=tuple(details.get("half_width95", ())),
-        sigma_mm=details.get("sigma_mm"),
-        sigma_stated=details.get("sigma_stated", False),
-        rms_mm=details.get("rms_mm"),
-        max_residual_mm=details.get("max_residual_mm"),
-        residuals_mm=_vectors(details.get("residuals_mm", ())),
-        rejected=tuple(details.get("rejected", ())),
-        condition_number=details.get("condition_number"),
-        dof=details.get("dof"),
-        notes=tuple(details.get("information", ())),
-        interval_from=details.get("interval_from", ""),
-        region95_radius_mm=details.get("region95_radius_mm"),
-        budget=UncertaintyBudget.from_json(budget) if (budget := details.get("budget")) else None,
-        accuracy=Accuracy.from_json(accuracy) if (accuracy := details.get("accuracy")) else None,
-    )
+    unsaid = {"kept": (), "reference_point_mm": (), "sigma_gain": 1.0, "warnings": ()}
+    said = {
+        **unsaid,
+        **details,
+        "evidence": None,
+        "method": method_name_now(details["method"]),
+        "offset": read_offset(details["proposed"]) or ToolOffset(),
+        "inputs": tuple(map(recorded_pose, details.get("poses", ()))),
+        "notes": details.get("information", ()),
+    }
+    return from_json(CalibrationResult, said, partial=True)
 
 
 def recorded_pose(pose: Mapping[str, Any]) -> Pose:
-    """Return a pose of an entry."""
-    hand, posture = pose.get("hand"), pose.get("posture")
-    flags: dict[str, Any] = {"hand": Hand(hand) if hand else None}
-    if posture is not None:
-        elbow, wrist = Elbow(posture["elbow"]), Wrist(posture["wrist"])
-        flags["posture"] = Posture(**{**posture, "elbow": elbow, "wrist": wrist})
-    return Pose(**{**pose, **flags})
-
-
-def _vectors(rows: Any) -> tuple[tuple[float, ...], ...]:  # noqa: ANN401 - read from JSON
-    return tuple(map(tuple, rows))
+    """Return a pose of an entry, which has no key for what the controller does not tell."""
+    return from_json(Pose, pose, partial=True)
 
 
 _ENDS: Final = {
@@ -160,10 +131,7 @@ def report_of_tool(
 
 def _facts(said: Mapping[str, Any] | None) -> ControllerFacts:
     """Return what the controller said of itself when it was measured; nothing in old entries."""
-    if said is None:
-        return ControllerFacts()
-    lists = {name: tuple(said.get(name, ())) for name in ("robot_models", "robot_serials")}
-    return ControllerFacts(**{**said, **lists})
+    return from_json(ControllerFacts, said or {}, partial=True)
 
 
 def _touch(said: Mapping[str, Any]) -> TouchOnRecord:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from robolink.stations._lookup import find_stations as find_stations
     from robolink.stations._lookup import learnt_elsewhere as learnt_elsewhere
     from robolink.stations._lookup import require_base_of as require_base_of
+    from robolink.stations._lookup import stations_on_record as stations_on_record
     from robolink.stations._places import BeamStation as BeamStation
     from robolink.stations._places import CameraStation as CameraStation
     from robolink.stations._places import TouchStation as TouchStation
@@ -33,7 +34,10 @@ else:
     __getattr__, __dir__, __all__ = lazy_exports(
         __name__,
         {
-            "_lookup": "base_now find_station find_stations learnt_elsewhere require_base_of",
+            "_lookup": (
+                "base_now find_station find_stations learnt_elsewhere require_base_of "
+                "stations_on_record"
+            ),
             "_places": (
                 "BeamStation CameraStation TouchStation beam_station camera_station "
                 "pin_of sensor_of touch_station"

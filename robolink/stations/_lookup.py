@@ -8,7 +8,7 @@ from robolink.calibration import ACCURACY_ROWS
 from robolink.config import Cell
 from robolink.errors import ConfigError, NotReadyError, NotReadyReason, RobolinkError
 from robolink.messages import tr
-from robolink.model import Controller, Recorded
+from robolink.model import Controller, EntryKind, Recorded, from_json
 from robolink.stations._station import Station, StationKind, apart_mm, station_of
 
 _PLACE = (
@@ -41,6 +41,16 @@ def find_stations(cell: Cell | None, entries: Iterable[Recorded]) -> dict[str, S
         elif declared.kind is newest.kind:
             stations[name] = _together(declared, newest)
     return stations
+
+
+def stations_on_record(controller: Controller, cell: Cell | None = None) -> dict[str, Station]:
+    """Return all stations by name, as :func:`find_stations`, from the record of a controller.
+
+    Args:
+        controller: Whose record is looked at.
+        cell: The cell, if one was named.
+    """
+    return find_stations(cell, controller.outcomes.recorded(kinds=(EntryKind.STATION,)))
 
 
 def find_station(
@@ -102,20 +112,10 @@ def _declared(cell: Cell | None) -> dict[str, Station]:
 
 def _station(name: str, said: object) -> Station:
     values = said.model_dump(exclude_none=True, mode="json")  # type: ignore[attr-defined]
-    return Station(
-        id=name,
-        kind=StationKind(values["kind"]),
-        x_mm=values.get("x_mm"),
-        y_mm=values.get("y_mm"),
-        z_mm=values.get("z_mm"),
-        sigma_mm=values.get("sigma_mm"),
-        how=tr("stated in the cell file"),
-        gauge=values.get("gauge", ""),
-        gauge_due=values.get("gauge_due", ""),
-        check_every_days=values.get("check_every_days"),
-        declared=True,
-        details={key: value for key, value in values.items() if key not in _PLACE},
-    )
+    known = {key: value for key, value in values.items() if key in _PLACE}
+    known |= {"id": name, "how": tr("stated in the cell file"), "declared": True}
+    details = {key: value for key, value in values.items() if key not in _PLACE}
+    return from_json(Station, {**known, "details": details}, partial=True)
 
 
 def _together(declared: Station, learnt: Station) -> Station:

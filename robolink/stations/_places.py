@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, cast
 from robolink.calibration import CameraModel, Sighting
 from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
-from robolink.model import InputEdge, SpotUnit
+from robolink.model import InputEdge, SpotUnit, from_json
 from robolink.runner import SeenAt
 from robolink.stations._station import Station
 from robolink.ways import Way, way
@@ -177,16 +177,7 @@ def _beam(line: Mapping[str, float], sigma_mm: float) -> "Beam":
     """Return a beam as it is on record; one of before says nothing of how sure it is."""
     from robolink.calibration import Beam  # numpy, which a look does without
 
-    dof = line.get("dof")
-    return Beam(
-        line["x_mm"],
-        line["y_mm"],
-        line["direction_deg"],
-        sigma_mm=line.get("sigma_mm", sigma_mm),
-        direction_sigma_deg=line.get("direction_sigma_deg", 0.0),
-        correlation=line.get("correlation", 0.0),
-        dof=None if dof is None else int(dof),
-    )
+    return from_json(Beam, {"sigma_mm": sigma_mm, **line}, partial=True)
 
 
 def camera_station(station: Station) -> CameraStation:

@@ -8,7 +8,7 @@ from enum import StrEnum
 from typing import Final
 
 from robolink.messages import tr
-from robolink.model import EntryKind, NewEntry, Recorded, finding_named_now
+from robolink.model import EntryKind, NewEntry, Recorded, finding_named_now, json_fields
 from robolink.timing import local_label, wall_time
 
 AGREEING_MM: Final = 2.0
@@ -233,12 +233,7 @@ def station_entry(found: Found, *, base: tuple[float, ...] | None = None) -> New
     details: dict[str, object] = {
         "station": found.id,
         "kind": found.kind.value,
-        "x_mm": found.x_mm,
-        "y_mm": found.y_mm,
-        "z_mm": found.z_mm,
-        "sigma_mm": found.sigma_mm,
-        "how": found.how,
-        "gauge": found.gauge,
+        **json_fields(found, "x_mm", "y_mm", "z_mm", "sigma_mm", "how", "gauge"),
         **found.details,
     }
     if base is not None:

@@ -6,6 +6,8 @@ Records what goes over a transport.
 from collections.abc import Callable
 from typing import Final, Literal, Protocol
 
+from robolink.errors import TransportClosedError
+from robolink.messages import tr
 from robolink.timing import Clock, Deadline
 
 
@@ -84,6 +86,19 @@ class Transport(Protocol):
         """Close. Idempotent; a waiting call in another thread ends soon after."""
 
 
+def link_closed(identity: str) -> TransportClosedError:
+    """Return the error for a link that is used after this side has closed it.
+
+    Args:
+        identity: Its far end.
+    """
+    return TransportClosedError(
+        tr("The connection to {identity} is closed.", identity=identity),
+        remedy=tr("Connect again."),
+        controller=identity,
+    )
+
+
 Direction = Literal["sent", "received"]
 
 TraceSink = Callable[[int, Direction, bytes], None]
@@ -101,33 +116,15 @@ class TracingTransport:
     """
 
     def __init__(self, inner: Transport, sink: TraceSink) -> None:
+        self.url, self.identity, self.durable = inner.url, inner.identity, inner.durable
+        self.clock = inner.clock
         self._inner = inner
         self._sink = sink
-
-    @property
-    def url(self) -> str:
-        """The inner transport's."""
-        return self._inner.url
-
-    @property
-    def identity(self) -> str:
-        """The inner transport's."""
-        return self._inner.identity
 
     @property
     def place(self) -> str:
         """The inner transport's."""
         return self._inner.place
-
-    @property
-    def durable(self) -> bool:
-        """The inner transport's."""
-        return self._inner.durable
-
-    @property
-    def clock(self) -> Clock:
-        """The inner transport's."""
-        return self._inner.clock
 
     def send(self, data: bytes, *, deadline: Deadline, secret: bool = False) -> None:
         """See :meth:`robolink.transport.Transport.send`; a secret never reaches the sink."""

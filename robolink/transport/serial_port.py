@@ -12,13 +12,13 @@ from robolink.errors import (
     ConfigError,
     ConnectError,
     TransportBrokenError,
-    TransportClosedError,
     TransportError,
     TransportTimeoutError,
 )
 from robolink.messages import tr
 from robolink.timing import Clock, Deadline, SystemClock
 from robolink.transport._url import LinkUrl, UrlOptions
+from robolink.transport.byte_stream import link_closed
 
 _SLICE_S: Final = 0.02
 _CHUNK_BYTES: Final = 4096
@@ -186,36 +186,14 @@ def _opened(
 class SerialTransport:
     """Implements :class:`~robolink.transport.Transport` on an open port, and owns it."""
 
+    durable: bool = True
+    """What hangs on a cable outlives this process."""
+
     def __init__(self, port: Any, url: LinkUrl, clock: Clock) -> None:  # noqa: ANN401 - pyserial has no types
         self._port = port
-        self._url = url
-        self._clock = clock
+        self.url = self.identity = url.identity
+        self.place, self.clock = url.place, clock
         self._closed = False
-
-    @property
-    def url(self) -> str:
-        """Which port; how it is set is not repeated."""
-        return self._url.identity
-
-    @property
-    def identity(self) -> str:
-        """Which port."""
-        return self._url.identity
-
-    @property
-    def place(self) -> str:
-        """Which port; two names of one port are two places."""
-        return self._url.place
-
-    @property
-    def durable(self) -> bool:
-        """True: what is wired to a port outlives this process."""
-        return True
-
-    @property
-    def clock(self) -> Clock:
-        """The clock it was opened with."""
-        return self._clock
 
     def send(self, data: bytes, *, deadline: Deadline, secret: bool = False) -> None:  # noqa: ARG002 - pyserial has its own write time-out; nothing is recorded here
         """See :meth:`robolink.transport.Transport.send`."""
@@ -257,7 +235,7 @@ class SerialTransport:
                 return True
             if deadline.expired:
                 return False
-            self._clock.sleep(min(deadline.remaining_s(), _SLICE_S))
+            self.clock.sleep(min(deadline.remaining_s(), _SLICE_S))
         return True
 
     def close(self) -> None:
@@ -280,11 +258,7 @@ class SerialTransport:
     def _ended(self, error: Exception) -> TransportError:
         # pyserial reads from a port that another thread has closed as from no number at all.
         if self._closed or isinstance(error, TypeError):
-            return TransportClosedError(
-                tr("The connection to {identity} is closed.", identity=self.identity),
-                remedy=tr("Connect again."),
-                controller=self.identity,
-            )
+            return link_closed(self.identity)
         return TransportBrokenError(
             tr("The connection to {identity} broke: {cause}.", identity=self.identity, cause=error),
             remedy=tr("Check that the adapter is still plugged in, then connect again."),

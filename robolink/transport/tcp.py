@@ -35,13 +35,13 @@ from robolink.errors import (
     ConfigError,
     ConnectError,
     TransportBrokenError,
-    TransportClosedError,
     TransportError,
     TransportTimeoutError,
 )
 from robolink.messages import tr
 from robolink.timing import Clock, Deadline, SystemClock
 from robolink.transport._url import LinkUrl
+from robolink.transport.byte_stream import link_closed
 
 # Unacknowledged data end the connection after 2.5 s. Each constant is missing on some platform.
 _OPTIONS: Final = (
@@ -210,11 +210,14 @@ def open_tcp(url: LinkUrl, *, timeout_s: float = 3.0, clock: Clock | None = None
 class TcpTransport:
     """Implements :class:`~robolink.transport.Transport` on a connected socket, and owns it."""
 
+    durable: bool = True
+    """What listens on a network outlives this process."""
+
     def __init__(self, connection: socket.socket, url: LinkUrl, clock: Clock) -> None:
         self._socket = connection
-        self._identity = url.identity
+        self.url = self.identity = url.identity
+        self.clock = clock
         self._place = url.place
-        self._clock = clock
         self._closed = False
         self._unheard: OSError | None = None
         self._look = looker(connection)
@@ -226,29 +229,9 @@ class TcpTransport:
             connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, slice_us)
 
     @property
-    def url(self) -> str:
-        """The URL; a TCP URL has no options."""
-        return self._identity
-
-    @property
-    def identity(self) -> str:
-        """The URL: it names the far end."""
-        return self._identity
-
-    @property
     def place(self) -> str:
         """The address that answers, and its port."""
         return _peer(self._socket) or self._place
-
-    @property
-    def durable(self) -> bool:
-        """True: what listens on a network outlives this process."""
-        return True
-
-    @property
-    def clock(self) -> Clock:
-        """The machine's clock unless another was given."""
-        return self._clock
 
     def send(self, data: bytes, *, deadline: Deadline, secret: bool = False) -> None:  # noqa: ARG002 - nothing is recorded here
         """See :meth:`robolink.transport.Transport.send`."""
@@ -331,26 +314,22 @@ class TcpTransport:
 
     def _timed_out(self) -> TransportTimeoutError:
         return TransportTimeoutError(
-            tr("{identity} did not answer in time.", identity=self._identity),
+            tr("{identity} did not answer in time.", identity=self.identity),
             remedy=tr("Check cable and power of the controller, then try again."),
-            controller=self._identity,
+            controller=self.identity,
         )
 
     def _ended(self, error: OSError | None) -> TransportError:
         if self._closed or error is None:
-            return TransportClosedError(
-                tr("The connection to {identity} is closed.", identity=self._identity),
-                remedy=tr("Connect again."),
-                controller=self._identity,
-            )
+            return link_closed(self.identity)
         return TransportBrokenError(
             tr(
                 "The connection to {identity} broke: {cause}.",
-                identity=self._identity,
+                identity=self.identity,
                 cause=error.strerror or error,
             ),
             remedy=tr("Check cable and power of the controller, then try again."),
-            controller=self._identity,
+            controller=self.identity,
         )
 
 

@@ -10,7 +10,7 @@ from typing import Final
 from urllib.parse import urlsplit
 
 from robolink.model import TIP, Spot, SpotUnit
-from robolink_simulators.assist.port import AssistClient, simulator_at
+from robolink_simulators.control.assist import AssistClient, simulator_at
 
 SETTLE_S: Final = 0.1
 """How long the simulated camera wants the robot to stand still (assumed)."""

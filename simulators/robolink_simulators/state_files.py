@@ -2,12 +2,15 @@
 
 import json
 import random
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from robolink import ambient
+from robolink.errors import ConfigError
 from robolink.files.durable import sync_folder, write_whole
+from robolink.files.named import read_named
 from robolink.messages import tr
 from robolink_simulators.not_now import NotNowError
 
@@ -34,8 +37,8 @@ class StateNotKeptError(NotNowError):
     """A file of a state cannot be written, so what was changed would not outlive a restart."""
 
 
-class StateFile:
-    """The file that stands for flash or retained memory.
+class StateFile(ABC):
+    """The file that stands for flash or retained memory; a subclass tells what is in it.
 
     A controller whose memory is broken and goes on as if nothing were would make a test green
     that is not: whoever serves it looks at :attr:`failure`, and ends it.
@@ -44,35 +47,66 @@ class StateFile:
         path: Where; ``None`` keeps nothing.
 
     Attributes:
-        path: Where.
         failure: Why something could not be kept; ``None`` as long as all was.
     """
 
     def __init__(self, path: Path | None) -> None:
-        self.path = path
         self.failure: StateNotKeptError | None = None
+        self._path = path
+        self._written: Mapping[str, object] | None = None
 
-    def save(self, document: Mapping[str, object]) -> None:
+    @abstractmethod
+    def _document(self) -> Mapping[str, object]:
+        """Return what is to be kept now, in values of its own."""
+
+    @abstractmethod
+    def _take(self, document: Any) -> bool:  # noqa: ANN401 - whatever the file holds
+        """Take over what a file holds; whether that was all that is kept."""
+
+    @abstractmethod
+    def _foreign(self, path: Path) -> str:
+        """Return the sentence for a file that holds something else."""
+
+    def restore(self) -> bool:
+        """Give the controller what the file holds; False when there is none.
+
+        Raises:
+            ConfigError: The file cannot be read or is not of this machine.
+        """
+        if self._path is None or not self._path.exists():
+            return False
+        try:
+            if self._take(json.loads(read_named(self._path))):
+                self._written = self._document()
+        except (OSError, AttributeError, KeyError, RecursionError, TypeError, ValueError) as error:
+            raise ConfigError(
+                self._foreign(self._path),
+                remedy=tr("Name another file, or delete this one to start afresh."),
+            ) from error
+        return True
+
+    def save_changes(self) -> None:
         """Put a new state in the place of the old one; a crash leaves one of them whole.
 
-        Its folder is made where there is none.
+        Its folder is made where there is none. A state that is written already stays.
 
         Raises:
             StateNotKeptError: It cannot be written.
         """
-        if self.path is None:
+        if self._path is None or (document := self._document()) == self._written:
             return
         try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            write_whole(self.path, json.dumps(document).encode())
-            sync_folder(self.path.parent)
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            write_whole(self._path, json.dumps(document).encode())
+            sync_folder(self._path.parent)
         except OSError as error:
             self.failure = StateNotKeptError(
                 tr(
                     "The simulator cannot save its state in {path}: {cause}.",
-                    path=self.path,
+                    path=self._path,
                     cause=error.strerror or error,
                 ),
                 remedy=tr("Name a file in a folder that can be written."),
             )
             raise self.failure from error
+        self._written = document

@@ -8,8 +8,8 @@ import math
 
 import numpy as np
 import pytest
+from robolink_cli.commands.measure.solve.answer import solve_document
 from robolink_cli.commands.measure.solve.case import Node
-from robolink_cli.commands.measure.solve.solving import solve_document
 from scipy.special import fdtrc
 
 from robolink.calibration import control_chart, gauge_study

@@ -4,8 +4,8 @@ import json
 from pathlib import Path
 
 import pytest
+from robolink_cli.commands.measure.solve.answer import METHODS, solve_document
 from robolink_cli.commands.measure.solve.case import Node
-from robolink_cli.commands.measure.solve.solving import METHODS, solve_document
 
 SHARED = Path(__file__).parents[2].parent / "shared" / "vectors" / "evidence.json"
 QUANTILES = ("limit", "upper99", "coverage_factor", "expanded", "detectable")

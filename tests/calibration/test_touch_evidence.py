@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from robolink_cli.commands.measure.solve.answer import solve_case
 from robolink_cli.commands.measure.solve.case import Node
-from robolink_cli.commands.measure.solve.solving import solve_case
 
 from robolink.calibration import (
     Drift,

@@ -5,8 +5,8 @@ import math
 from pathlib import Path
 
 import pytest
+from robolink_cli.commands.measure.solve.answer import solve_document
 from robolink_cli.commands.measure.solve.case import Node
-from robolink_cli.commands.measure.solve.solving import solve_document
 
 OWN = Path(__file__).with_name("cases.json")
 SHARED = Path(__file__).parents[2].parent / "shared" / "vectors" / "calibration.json"

@@ -14,9 +14,9 @@ from types import SimpleNamespace
 from typing import Any, Final
 
 from robolink_cli.prompts.operator import AssistedOperator
-from robolink_simulators.assist.port import InProcessEyes
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.tip_switches import TouchPlate
+from robolink_simulators.control.assist import InProcessEyes
 from robolink_simulators.hosting.in_process import softmotion
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 

@@ -11,8 +11,8 @@ from robolink_cli import main
 from robolink_cli.access.warnings import marker_notice, note_unsettled
 from robolink_cli.command_map import SECTIONS
 from robolink_cli.commands.groups import cell, expert, robot
-from robolink_cli.console.render import note
-from robolink_cli.session.opening import open_controller
+from robolink_cli.console.render import json_is_on, note
+from robolink_cli.session.connection import open_controller
 
 import robolink
 from robolink.errors import NotReadyError, NotReadyReason
@@ -135,9 +135,10 @@ def test_times_and_the_password_file_reach_the_command(command, tmp_path):
 
 
 def test_without_options_the_defaults_are_in_force(command):
-    seen = command()
+    spoken = []
+    seen = command(lambda _: spoken.append(json_is_on()))
     assert main.run(["status"]) == 0
-    assert (seen[0].timeout_s, seen[0].remote_timeout_s, seen[0].json) == (3.0, 60.0, False)
+    assert (seen[0].timeout_s, seen[0].remote_timeout_s, spoken) == (3.0, 60.0, [False])
 
 
 def test_no_option_takes_a_password():

@@ -5,7 +5,7 @@ import os
 
 import pytest
 from robolink_cli import main
-from robolink_cli.commands.companions import companion_files
+from robolink_cli.commands.companions import spel
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.epson.condition import Task
@@ -104,7 +104,7 @@ def test_the_export_as_a_document(run, tmp_path):
     code, out, _ = run("spel", "export", "project", "--json")
     document = json.loads(out)
     assert (code, document["schema"]) == (0, "robolink/spel-export/1")
-    assert len(document["files"]) == len(companion_files.companion_texts())
+    assert len(document["files"]) == len(spel.companion_texts())
 
 
 def test_a_folder_that_cannot_be_made_is_told(run, tmp_path):

@@ -5,7 +5,7 @@ import json
 import pytest
 from robolink_cli import main
 from robolink_cli.commands.controller import jog
-from robolink_cli.commands.measure.calibrate import options as _options
+from robolink_cli.commands.measure.calibrate import method_command
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process.epson import register, unregister
 
@@ -187,7 +187,7 @@ def test_jog_takes_its_limits_from_the_cell(cell, simulator, monkeypatch, option
         seen.append((speed_mm_s, box_mm))
         return []
 
-    monkeypatch.setattr("robolink_cli.prompts.jogging.plan_jog", remember)
+    monkeypatch.setattr("robolink_cli.prompts.jog_keys.plan_jog", remember)
     assert main.run(["-c", "a", "jog", "x+1", "--dry-run", *options]) == 0
     assert seen == [expected]
 
@@ -205,6 +205,6 @@ def test_what_was_left_unfinished_is_resolved_by_the_cell_s_name(cell, simulator
         memory_journal(URL).log(URL).clear("a")
 
 
-@pytest.mark.parametrize("module", [_options, jog])
+@pytest.mark.parametrize("module", [method_command, jog])
 def test_each_limit_of_a_command_is_a_key_of_the_cell_file(module):
     assert set(module._CELL_KEYS.values()) <= set(CellSettings.model_fields)

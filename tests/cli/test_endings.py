@@ -9,7 +9,7 @@ import sys
 import pytest
 from robolink_cli import main
 from robolink_cli.console.output import watched_output
-from robolink_cli.session.opening import open_controller
+from robolink_cli.session.connection import open_controller
 
 from robolink.errors import OutcomeUnknownError
 from robolink.interrupts import EndedBy, Interrupted, InterruptGate, ended_by, one_ending

@@ -16,10 +16,10 @@ from robolink_cli.commands.record.journal_drift import show_drift
 from robolink_cli.console import render
 from robolink_cli.console.tables import column_widths, drawn_table, is_figures, within
 from robolink_cli.options.impact import show_impact
+from robolink_cli.views.documents import show_change, show_pose, show_tools
 from robolink_cli.views.fit import show_proposal
 from robolink_cli.views.journal import show_entry, show_list
-from robolink_cli.views.tables import show_change, show_pose, show_tools
-from robolink_cli.wizard.screens.told import told_before, told_question
+from robolink_cli.wizard.screens.sentences import told_before, told_question
 from wcwidth import wcswidth, wcwidth
 
 from robolink import Pose, ToolOffset, messages
@@ -27,6 +27,7 @@ from robolink.calibration import AccuracyFacts, assessed, carrying, impact_on, s
 from robolink.calibration_run import Proposal, Seating
 from robolink.drift import CellDrift, MeasuredChange, charts_of
 from robolink.locale.languages import translator
+from robolink.model import json_value
 from robolink.report.pictures.control_chart import chart_drawing
 from robolink.report.pictures.plans import draw, pose_drawings
 from robolink.report.pictures.residuals import fit_drawings, order_drawings
@@ -89,13 +90,9 @@ def entries():
         return list(controller.outcomes.recorded(tool=3))
 
 
-def offset(*numbers):
-    names = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
-    return dict(zip(names, numbers, strict=True))
-
-
-SIX = offset(-1112.512, -1103.252, -1280.001, -179.999, -89.999, -179.999)
-PROPOSED = {"tool": 0, "hand": "right", "local": 0, "joints": [-179.999] * 6, **SIX}
+SIX = ToolOffset(-1112.512, -1103.252, -1280.001, -179.999, -89.999, -179.999)
+PLAIN = json_value(SIX)
+PROPOSED = {"tool": 0, "hand": "right", "local": 0, "joints": [-179.999] * 6, **PLAIN}
 
 
 def show_entries():
@@ -106,10 +103,8 @@ def show_entries():
 TABLES = {
     "change": lambda: show_change(1, SIX, SIX, after_name="measured", unmeasured=("u_deg",)),
     "pose": lambda: show_pose(PROPOSED),
-    "tools": lambda: show_tools({"1": SIX, "15": SIX}, 15),
-    "proposal": lambda: show_proposal(
-        Proposal(1, ToolOffset(*SIX.values()), tilted_result(), seating=Seating())
-    ),
+    "tools": lambda: show_tools({"1": PLAIN, "15": PLAIN}, 15),
+    "proposal": lambda: show_proposal(Proposal(1, SIX, tilted_result(), seating=Seating())),
     "impact": lambda: show_impact(1, tilted_impact()),
     "drift": lambda: show_drift([drift()], all_plots=True),
     "journal": lambda: show_list(entries(), all_controllers=True),

@@ -4,7 +4,7 @@ import json
 
 import pytest
 from robolink_cli import main
-from robolink_cli.commands.computer import new_cell
+from robolink_cli.commands.computer import config
 
 from robolink.config import find_cell
 
@@ -22,8 +22,8 @@ def typing(monkeypatch):
             asked.append(question)
             return left.pop(0)
 
-        monkeypatch.setattr(new_cell, "on_terminal", lambda: True)
-        monkeypatch.setattr(new_cell, "asked_for_text", answer)
+        monkeypatch.setattr(config, "on_terminal", lambda: True)
+        monkeypatch.setattr(config, "asked_for_text", answer)
         return asked
 
     return types

@@ -4,7 +4,7 @@ import pytest
 from robolink_cli import main
 from robolink_cli.prompts import operator
 from robolink_cli.prompts import questions as consent
-from robolink_cli.session import opening
+from robolink_cli.session import connection
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process.epson import register, unregister
 
@@ -49,7 +49,7 @@ def open_markers(url):
 @pytest.fixture
 def person(monkeypatch, request):
     person = Person(request.param)
-    monkeypatch.setattr(opening, "on_terminal", lambda: True)
+    monkeypatch.setattr(connection, "on_terminal", lambda: True)
     monkeypatch.setattr(consent, "on_terminal", lambda: True)
     monkeypatch.setattr(operator, "terminal", lambda: person)
     return person

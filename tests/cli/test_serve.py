@@ -10,7 +10,7 @@ from contextlib import ExitStack
 
 import pytest
 from click.testing import CliRunner
-from robolink_cli.commands.simulate import serving
+from robolink_cli.commands.simulate import service
 from robolink_cli.main import cli
 
 from robolink import ambient
@@ -296,7 +296,7 @@ class OneProgram:
 def test_whoever_watches_reads_why_a_program_was_refused_and_what_to_do(monkeypatch, as_json):
     monkeypatch.setattr("robolink.serving.CallbackServer", OneProgram)
     monkeypatch.setattr("robolink.journal.open_journal", DamagedJournal)
-    monkeypatch.setattr(serving.Termination, "wait", lambda _termination: None)
+    monkeypatch.setattr(service.Termination, "wait", lambda _termination: None)
     line = ["expert", "serve", "--spel", "127.0.0.1:5001", *(["--json"] if as_json else [])]
     result = CliRunner().invoke(cli, line)
     assert result.exit_code == 0, result.output

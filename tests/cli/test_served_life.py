@@ -10,9 +10,9 @@ from time import monotonic
 
 import pytest
 from robolink_cli import main
-from robolink_cli.commands.simulate.serving import ParentWatch, Termination
+from robolink_cli.commands.simulate.service import ParentWatch, Termination
 from robolink_cli.options.simulation import ServedLife
-from robolink_simulators.assist.port import AssistClient
+from robolink_simulators.control.assist import AssistClient
 from robolink_simulators.control.client import ControlClient
 
 import robolink

@@ -10,7 +10,7 @@ from pathlib import Path
 import click
 import pytest
 from robolink_cli import main
-from robolink_cli.commands.simulate.kinds.simulated_kind import plan_faults
+from robolink_cli.commands.simulate.simulated_kind import plan_faults
 from robolink_cli.console.render import switch_json_on
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.faults import LinkKind

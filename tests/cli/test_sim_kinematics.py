@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 import pytest
 from robolink_cli import main
-from robolink_cli.commands.simulate.sim_softmotion import softmotion
+from robolink_cli.commands.simulate.sim import softmotion
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "kinematics"
 

@@ -11,10 +11,9 @@ from pathlib import Path
 
 import pytest
 from robolink_cli import main
-from robolink_cli.commands.simulate.run.cells_file import KINDS, read_cells
-from robolink_cli.commands.simulate.run.declared_keys import DeclaredKeys
-from robolink_cli.commands.simulate.run.sim_run import SCHEMA, _tell_end, made
+from robolink_cli.commands.simulate.cells_file import KINDS, DeclaredKeys, read_cells
 from robolink_cli.commands.simulate.sim import sim
+from robolink_cli.commands.simulate.sim_run import SCHEMA, _tell_end, made
 from robolink_simulators.control.client import ControlClient
 
 import robolink

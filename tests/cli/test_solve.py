@@ -9,9 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from robolink_cli import main
-from robolink_cli.commands.measure.solve.solving import METHODS
-from robolink_cli.commands.measure.solve.station_cases import STATION_METHODS
-from robolink_cli.commands.measure.solve.touch_cases import TOUCH_METHODS
+from robolink_cli.commands.measure.solve.answer import METHODS
 
 from robolink.calibration import Beam
 from robolink.model import rotate_xy
@@ -531,8 +529,9 @@ def test_no_method_is_left_untried():
         "orientation_convert",
     }
     here = {"find_beams", "joint", "board_fit", "uncertainty_budget"}
-    touching = {*TOUCH_METHODS}  # tests/calibration/test_touch_evidence.py
-    lasting = {*STATION_METHODS}  # tests/calibration/test_station.py
+    # tests/calibration/test_touch_evidence.py and test_evidence_vectors.py
+    touching = {"touch_evidence", "verify_evidence"}
+    lasting = {"length_change", "station_shift", "needle_chain", "station_chain"}
     assert set(METHODS) == set(MORE) | shared | here | touching | lasting
 
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from robolink_cli import main
-from robolink_cli.commands.measure.solve.solving import METHODS
+from robolink_cli.commands.measure.solve.answer import METHODS
 
 ODD: st.SearchStrategy[object] = st.sampled_from(
     [0, -1, 1, 2.5, 1e-9, 1e9, 1e11, 1e308, -0.0, True, None, "x", "", [], {}]

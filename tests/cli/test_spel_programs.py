@@ -8,7 +8,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from robolink_cli.commands.simulate.kinds.epson import ProjectSurroundings, load_programs
+from robolink_cli.commands.simulate.epson import ProjectSurroundings, load_programs
 from robolink_simulators.epson import EpsonSimulator
 
 from robolink.errors import ConfigError

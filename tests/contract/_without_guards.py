@@ -147,10 +147,9 @@ def _previewed(table: Any, tool: int, offset: ToolOffset) -> tuple[str, ...]:
     return ("written",)
 
 
-def _unguarded(_statement: object, text: str) -> str:
+def _unguarded(controller: Any, text: str) -> str:
     """Run a statement as it was typed, and tell nobody."""
-    reply: Any = _statement
-    return str(reply._link.session.execute(text).text or "")
+    return str(controller._link.session.exchange("Execute", text).text or "")
 
 
 def _settled_unread(_settler: object, marker: Any) -> Any:
@@ -208,7 +207,7 @@ _ITSELF: Final[Mapping[str, StandIn]] = {
     "robolink.controllers.ToolTableCore.preview_write": _previewed,
     "robolink.controllers.ToolTableCore._require_known": _nothing,
     "robolink.model.ToolOffset.__post_init__": _nothing,
-    "robolink.controllers.epson.controller.RawStatements.execute": _unguarded,
+    "robolink.controllers.epson.controller.EpsonController.execute_raw": _unguarded,
     "robolink.controllers.ControllerCore.close": _nothing,
     "robolink.transport.tcp.TcpTransport.send": _sent_in_part,
 }
@@ -229,8 +228,8 @@ _AS_IMPORTED: Final[Mapping[str, Mapping[str, StandIn]]] = {
         "robolink.controllers.epson.rest.bring_to_rest": _nothing,
         "robolink.controllers.epson.group.bring_to_rest": _nothing,
     },
-    "robolink.controllers.softmotion.commands.bring_group_to_rest": {
-        "robolink.controllers.softmotion.group.bring_group_to_rest": _nothing
+    "robolink.controllers.softmotion.commands.CommandSender.bring_to_rest": {
+        "robolink.controllers.softmotion.commands.CommandSender.bring_to_rest": _nothing
     },
     "robolink.controllers.epson.answers.require_ready": {
         "robolink.controllers.epson.window.require_ready": _nothing,

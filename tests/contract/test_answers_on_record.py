@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 from robolink_cli.prompts import operator as _operator
 from robolink_cli.prompts import questions
-from robolink_cli.prompts.present import sitting_at
+from robolink_cli.prompts.current_desk import sitting_at
 from robolink_cli.views.journal import said_in
-from robolink_simulators.assist.port import open_eyes
+from robolink_simulators.control.assist import open_eyes
 
 from robolink.model import AnsweredBy, EntryKind
 from robolink.report import reports_of

@@ -2,7 +2,7 @@
 
 import pytest
 from robolink_cli.prompts.operator import AssistedOperator
-from robolink_simulators.assist.port import InProcessEyes
+from robolink_simulators.control.assist import InProcessEyes
 
 from robolink.calibration_run import ChangePlan, Limits, NozzleChange, ToolPlan
 from robolink.errors import ControllerFaultError, DeclinedError, HeartbeatLostError

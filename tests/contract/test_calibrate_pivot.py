@@ -10,8 +10,8 @@ from itertools import count
 import pytest
 from robolink_cli import main
 from robolink_cli.prompts.operator import AssistedOperator
-from robolink_simulators.assist.port import InProcessEyes
 from robolink_simulators.cell.clock import ManualClock
+from robolink_simulators.control.assist import InProcessEyes
 from robolink_simulators.hosting.in_process import softmotion
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 

@@ -5,8 +5,8 @@ import sys
 
 import pytest
 from robolink_cli import main
-from robolink_simulators.assist.port import serve_assist
 from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.control.assist import serve_assist
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.hosting.in_process.epson import register, unregister

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 from robolink_cli.prompts.operator import AssistedOperator
-from robolink_simulators.assist.port import InProcessEyes
 from robolink_simulators.cell.world_parameters import WorldParameters
+from robolink_simulators.control.assist import InProcessEyes
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.calibration import rotation_of

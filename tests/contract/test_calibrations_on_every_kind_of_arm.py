@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from robolink_cli.prompts.operator import AssistedOperator
-from robolink_simulators.assist.port import InProcessEyes
+from robolink_simulators.control.assist import InProcessEyes
 from robolink_simulators.hosting.in_process.softmotion import register, unregister
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 from robolink_cli.prompts.operator import AssistedOperator
-from robolink_simulators.assist.port import InProcessEyes, perform
+from robolink_simulators.control.assist import InProcessEyes, perform
 from robolink_simulators.hosting.in_process import epson, softmotion
 
 import robolink

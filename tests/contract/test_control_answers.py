@@ -8,9 +8,8 @@ from urllib.parse import urlencode, urlsplit
 
 import pytest
 from robolink_simulators.cell.clock import ManualClock, SteeredClock
-from robolink_simulators.control.acts.registry import ACTS
+from robolink_simulators.control.acts import ACTS
 from robolink_simulators.control.cell import AnySimulator, ControlledCell
-from robolink_simulators.control.openapi import AnswerSchemas
 from robolink_simulators.control.server import ControlServer
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.faults import FaultAction, PlcFaultAction
@@ -19,6 +18,7 @@ from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 from robolink.register_maps import load_map
 from tests._json_schema import Schemas
+from tools.openapi import AnswerSchemas
 
 MAP = Path(__file__).parents[2] / "examples/plc-maps/commit-bit.toml"
 DOCUMENT = json.loads(files("robolink_simulators.control").joinpath("openapi.json").read_bytes())

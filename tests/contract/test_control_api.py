@@ -14,12 +14,11 @@ import pytest
 from robolink_cli import main
 from robolink_simulators.cell.clock import ManualClock, SteeredClock
 from robolink_simulators.control import http_port
-from robolink_simulators.control.acts import wire
-from robolink_simulators.control.acts.registry import ACTS
+from robolink_simulators.control import wire_acts as wire
+from robolink_simulators.control.acts import ACTS
 from robolink_simulators.control.cell import ControlledCell
 from robolink_simulators.control.client import ControlClient
 from robolink_simulators.control.http_port import LONGEST_REQUEST, MOST_CLIENTS
-from robolink_simulators.control.openapi import openapi
 from robolink_simulators.control.server import ControlServer
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.faults import counted
@@ -32,6 +31,7 @@ import robolink
 from robolink import ToolOffset
 from robolink.errors import ConfigError, ConnectError, OutcomeUnknownError, TransportBrokenError
 from robolink.register_maps import load_map
+from tools.openapi import openapi
 
 ROOT = Path(__file__).parents[2]
 MAP = ROOT / "examples/plc-maps/commit-bit.toml"
@@ -638,7 +638,7 @@ def test_a_simulator_that_ends_cuts_those_who_ask():
 
 def test_the_openapi_document_of_the_wheel_is_the_one_of_the_acts(cells):
     held = json.loads(files("robolink_simulators.control").joinpath("openapi.json").read_bytes())
-    # Made anew: python -m robolink_simulators.control.openapi > .../control/openapi.json
+    # Made anew: python -m tools.openapi > .../control/openapi.json
     assert held == json.loads(json.dumps(openapi()))
     status, served = raw(cells, "GET", f"{urlsplit(cells.url).path}/openapi.json")
     assert (status, served) == (200, held)

@@ -6,9 +6,9 @@ import threading
 from contextlib import contextmanager
 
 import pytest
-from robolink_simulators.assist.port import AssistClient, serve_assist
 from robolink_simulators.cell.clock import ManualClock, ScaledClock
 from robolink_simulators.control import http_port
+from robolink_simulators.control.assist import AssistClient, serve_assist
 from robolink_simulators.control.cell import ControlledCell
 from robolink_simulators.control.client import ControlClient
 from robolink_simulators.control.server import ControlServer

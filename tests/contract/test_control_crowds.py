@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 
 import pytest
 from robolink_simulators.cell.clock import SteeredClock
-from robolink_simulators.control.acts.registry import ACTS
+from robolink_simulators.control.acts import ACTS
 from robolink_simulators.control.cell import AnySimulator, ControlledCell
 from robolink_simulators.control.client import ControlClient
 from robolink_simulators.control.server import ControlServer

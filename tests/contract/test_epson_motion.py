@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from robolink import ToolOffset
-from robolink.controllers.epson.session import EpsonSession
+from robolink.controllers.epson.session import EpsonSession, execution
 from robolink.errors import (
     BusyError,
     ControllerFaultError,
@@ -70,7 +70,7 @@ def test_a_statement_that_may_have_left_is_known_to_a_stop(controller, monkeypat
             session.start_execute(Statement("Wait 1"))
     assert session.pending is not None
     with pytest.raises(BusyError):
-        session.execute(Statement("Wait 1"))
+        session.ask(execution(Statement("Wait 1")))
 
 
 def test_a_joint_move_turns_the_tool(controller):

@@ -6,7 +6,7 @@ touches (0.23 mm), and too much for a person whose touches on record repeat to 0
 
 import pytest
 from robolink_cli.prompts.operator import AssistedOperator
-from robolink_simulators.assist.port import InProcessEyes
+from robolink_simulators.control.assist import InProcessEyes
 
 import robolink
 from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan

@@ -13,9 +13,9 @@ from typing import Any
 
 import pytest
 from robolink_cli.prompts.operator import AssistedOperator
-from robolink_simulators.assist.port import InProcessEyes
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.world_parameters import WorldParameters
+from robolink_simulators.control.assist import InProcessEyes
 from robolink_simulators.hosting.in_process import softmotion
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 

@@ -7,10 +7,15 @@ from contextlib import ExitStack, closing, suppress
 from dataclasses import asdict
 
 import pytest
-from robolink_simulators.assist.port import LONGEST_LINE, MOST_CLIENTS, AssistClient, serve_assist
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.cell.world_parameters import parameter_names
-from robolink_simulators.control.acts.registry import ACTS
+from robolink_simulators.control.acts import ACTS
+from robolink_simulators.control.assist import (
+    LONGEST_LINE,
+    MOST_CLIENTS,
+    AssistClient,
+    serve_assist,
+)
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.hosting.streams.epson import serve_tcp
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator

@@ -11,7 +11,7 @@ from contextlib import closing, contextmanager
 
 import pytest
 from robolink_cli import main
-from robolink_simulators.assist.port import AssistClient
+from robolink_simulators.control.assist import AssistClient
 
 from robolink.timing import Deadline
 from robolink.transport import open_transport

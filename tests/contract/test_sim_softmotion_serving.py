@@ -10,8 +10,8 @@ from contextlib import closing, contextmanager
 
 import pytest
 from robolink_cli import main
-from robolink_simulators.assist.port import AssistClient, open_eyes, serve_assist
 from robolink_simulators.cell.clock import ManualClock, ScaledClock
+from robolink_simulators.control.assist import AssistClient, open_eyes, serve_assist
 from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
 from robolink_simulators.hosting.in_process.softmotion import (
     clock_of,

@@ -2,7 +2,7 @@
 
 import pytest
 from robolink_cli.prompts.operator import AssistedOperator
-from robolink_simulators.assist.port import InProcessEyes
+from robolink_simulators.control.assist import InProcessEyes
 from robolink_simulators.faults import PlcFault, PlcFaultAction
 
 from robolink.backup import (

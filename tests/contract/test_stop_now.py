@@ -84,6 +84,20 @@ def test_the_late_end_of_an_execute_does_not_disturb_a_stop(serve):
 
 
 @pytest.mark.remote_ethernet
+def test_who_does_not_say_who_it_is_is_logged_out_all_the_same(serve):
+    simulator = EpsonSimulator(seed=7)
+    met: list[str] = []
+    with serve(simulator) as cell:
+        simulator.faults.add(Fault(FaultAction.DROP_REPLY, match="GetContNo"))
+        assert stop_now(cell.url, timeout_s=0.2, met=met.append).ready
+        asked = [text for _, way, text in simulator.log if way == ">"]
+    assert met == []
+    assert [text.split(",")[0].strip() for text in asked] == [
+        *("$Login", "$Abort", "$Stop", "$GetStatus", "$GetContNo", "$Logout")
+    ]
+
+
+@pytest.mark.remote_ethernet
 @pytest.mark.parametrize("second", ["ignored", "closed"])
 def test_beside_a_client_that_is_logged_in_nobody_answers(serve, second):
     simulator = EpsonSimulator(seed=7, options=EpsonOptions(second_client=second))

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 from robolink_cli.prompts.operator import AssistedOperator
-from robolink_simulators.assist.port import InProcessEyes
+from robolink_simulators.control.assist import InProcessEyes
 
 import robolink
 from robolink.calibration import NeedleLimits

@@ -8,7 +8,7 @@ import math
 
 import pytest
 from robolink_cli.prompts.operator import AssistedOperator
-from robolink_simulators.assist.port import InProcessEyes, perform
+from robolink_simulators.control.assist import InProcessEyes, perform
 
 import robolink
 from robolink.calibration_run import AcceptanceCriteria, ChangePlan, NozzleChange, ToolPlan

@@ -20,8 +20,8 @@ import robolink_cli.commands.record.recover
 import robolink_cli.main
 import robolink_cli.session.motion_consent
 import robolink_cli.stopping.notes
-import robolink_simulators.assist.port
 import robolink_simulators.cell.clock
+import robolink_simulators.control.assist
 
 import robolink.controllers
 import robolink.journal

@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from robolink_cli import main
-from robolink_simulators.assist.port import serve_assist
 from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.control.assist import serve_assist
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.world import STORED

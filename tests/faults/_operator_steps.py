@@ -16,9 +16,8 @@ from robolink.controllers.epson.session import EpsonSession
 from robolink.controllers.softmotion.wire import MailboxWire
 from robolink.journal import JournalOutcomeLog
 from robolink.journal.store.store import Store, Tables
-from robolink.protocols.epson_text import Refusal, Reply
+from robolink.protocols.epson_text import Refusal, Reply, Request
 from robolink.protocols.mailbox import COMMAND, Opcode
-from robolink.protocols.spel import Statement
 from robolink.transport import MailboxHead
 
 StepKind = Literal[
@@ -77,16 +76,17 @@ def wait_at_each_step(line: Connection, outcomes: JournalOutcomeLog) -> None:
 
 
 def _watch_window(wait: Wait) -> None:
-    execute = EpsonSession.execute
+    ask = EpsonSession.ask
 
-    def executed(session: EpsonSession, statement: Statement) -> Reply | Refusal:
+    def asked(session: EpsonSession, request: Request, *, secret: bool = False) -> Reply | Refusal:
+        statement = request.parameters[0] if request.name == "Execute" else ""
         if statement == "TLSet":
             wait("tool read", ALL_TOOLS)
         elif found := _TOOL.match(statement):
             wait("tool read" if found[1] else "tool write", int(found[2]))
-        return execute(session, statement)
+        return ask(session, request, secret=secret)
 
-    EpsonSession.execute = executed  # type: ignore[method-assign, assignment]
+    EpsonSession.ask = asked  # type: ignore[method-assign, assignment]
 
 
 def _watch_mailbox(wait: Wait) -> None:

@@ -115,8 +115,8 @@ def test_the_simulated_device_on_a_line_answers_one_request_after_the_other():
     simulator = SoftMotionSimulator(seed=7)
     simulator.faults.add(PlcFault(PlcFaultAction.DELAY, match="read_slot 2", seconds=0.1))
     with serve_modbus_rtu(simulator, clock=ScaledClock()) as host:
-        assert host._cable is not None
-        near = os.open(host._cable.near, os.O_RDWR | os.O_NOCTTY)
+        assert host.cable is not None
+        near = os.open(host.cable.near, os.O_RDWR | os.O_NOCTTY)
         answers = b""
         try:
             os.write(near, rtu(bytes([4, *(112 + 36).to_bytes(2, "big"), 0, 36])))
@@ -142,8 +142,8 @@ def test_f03_old_answers_on_a_serial_line_are_thrown_away(length):
         with robolink.connect(host.url) as controller:
             for slot, value in SLOTS.items():
                 controller.tools.write(slot, value, expected=None)
-        assert host._cable is not None
-        far_end = os.open(host._cable.far, os.O_WRONLY | os.O_NOCTTY)
+        assert host.cable is not None
+        far_end = os.open(host.cable.far, os.O_WRONLY | os.O_NOCTTY)
         os.write(far_end, rtu(words(*[0x4242] * length)))
         os.close(far_end)
         with robolink.connect(host.url) as controller:

@@ -12,8 +12,8 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import pytest
-from robolink_simulators.assist.port import serve_assist
 from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.control.assist import serve_assist
 from robolink_simulators.control.cell import ControlledCell
 from robolink_simulators.control.server import ControlServer
 from robolink_simulators.epson.device import EpsonSimulator

@@ -6,7 +6,6 @@ computed bit by bit, both ways, and what the other end would have sampled is wha
 
 import pytest
 from robolink_simulators.epson import EpsonSimulator
-from robolink_simulators.hosting.streams.epson import SerialFace
 
 from robolink.errors import ConnectError, RemoteProtocolError
 from tests.faults._uart import UartSettings, heard
@@ -44,7 +43,7 @@ def test_a_rate_that_is_three_percent_off_is_near_enough():
 def test_f54_an_epson_controller_at_other_settings_is_named(theirs, understood):
     """What it hears, it does not understand; and if it did, its answer would not be taken."""
     simulator = EpsonSimulator(seed=3)
-    far = SerialFace(simulator).connect(0)
+    far = simulator.connect_serial(0)
 
     def answer(piece: bytes) -> bytes:
         far.receive(piece if understood else heard(piece, sent=OURS, by=theirs), 0)

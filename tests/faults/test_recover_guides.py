@@ -5,7 +5,7 @@ import re
 from contextlib import nullcontext
 
 import pytest
-from robolink_cli.prompts.present import sitting_at
+from robolink_cli.prompts.current_desk import sitting_at
 from robolink_cli.wizard.state import ChoiceSubject
 
 from robolink.model import Marker, MarkerKind

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 from robolink_cli.prompts import operator as _operator
-from robolink_cli.prompts.present import sitting_at
-from robolink_simulators.assist.port import open_eyes
+from robolink_cli.prompts.current_desk import sitting_at
+from robolink_simulators.control.assist import open_eyes
 
 from robolink.model import EntryKind, MarkerKind
 from tests.faults import _recipe_instants

@@ -5,7 +5,7 @@ from itertools import count
 
 import pytest
 from robolink_cli.prompts.operator import AssistedOperator
-from robolink_simulators.assist.port import InProcessEyes
+from robolink_simulators.control.assist import InProcessEyes
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.world import STORED
 from robolink_simulators.hosting.in_process.epson import register, unregister

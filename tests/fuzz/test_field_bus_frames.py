@@ -4,7 +4,7 @@ from contextlib import suppress
 from typing import Any
 
 from hypothesis import strategies as st
-from robolink_simulators.plc.frames import LineFrames, PlcRequest, TcpFrames
+from robolink_simulators.hosting.modbus_frames import LineFrames, PlcRequest, TcpFrames
 
 from robolink.errors import RobolinkError
 from robolink.transport.can.bus import CanLine

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 from hypothesis import strategies as st
-from robolink_cli.commands.measure.solve.solving import load as load_case
-from robolink_cli.commands.measure.solve.solving import solve_document
+from robolink_cli.commands.measure.solve.answer import load as load_case
+from robolink_cli.commands.measure.solve.answer import solve_document
 from robolink_simulators.epson.options import PROFILE_SCHEMA, options_from_text, read_profile
 from robolink_simulators.epson.spel.file_commands import read_points
 from robolink_simulators.epson.spel.programs.project import read_io_labels

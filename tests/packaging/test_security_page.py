@@ -4,8 +4,8 @@ import re
 from pathlib import Path
 
 from robolink_cli.access import password
-from robolink_cli.commands.measure.solve import solving
-from robolink_simulators.assist import port
+from robolink_cli.commands.measure.solve import answer
+from robolink_simulators.control import assist as port
 from robolink_simulators.hosting import replay
 
 from robolink.backup import _file as backup
@@ -29,7 +29,7 @@ def test_every_limit_of_the_page_is_the_one_in_the_code():
         "backup, register list": shown(backup._LONGEST),
         "poses, points, state of a simulator, profile": shown(named.MOST_BYTES),
         "a password file": shown(password._MOST_BYTES),
-        "cases of `solve`": shown(solving._MOST_BYTES),
+        "cases of `solve`": shown(answer._MOST_BYTES),
         "a recording that is replayed": shown(replay._MOST_BYTES),
         "a line at a simulator's assist port": (
             f"{port.LONGEST_LINE} bytes, {port.MOST_CLIENTS} clients"

@@ -15,7 +15,7 @@ from tests.packaging._way_to_the_wire import (
 from tools import house
 
 MOST_FILES = {"set_tool": 84, "change_tools": 42}
-MOST_CALLS = 14
+MOST_CALLS = 13
 MOST_FILES_OPEN = 9
 MOST_FILES_TO_SOLVE = 8
 MOST_FILES_OPEN_FROM_THE_POSES = 5

@@ -47,7 +47,6 @@ _WIRE: Final = "robolink.controllers.softmotion.wire.MailboxWire.ended"
 _COMMANDS: Final = "robolink.controllers.softmotion.commands"
 _SENDER: Final = f"{_COMMANDS}.CommandSender"
 _CORE: Final = "robolink.controllers.controller_core.ControllerCore"
-_GROUP: Final = "robolink.controllers.softmotion.group"
 _BEGIN: Final = "robolink.controllers.markers.MarkerStore.begin"
 _SESSION: Final = "robolink.controllers.epson.session.EpsonSession"
 
@@ -67,7 +66,10 @@ DEFECTS: Final = (
     ),
     KnownDefect(
         "a stop is looked for before the lock of the exchange, not under it",
-        {f"{_SESSION}._exchanging": stand_ins.asked_before_the_lock},
+        {
+            f"{_SESSION}._announced": stand_ins.asked_before_the_lock,
+            f"{_SESSION}._admit": stand_ins.admitted_unasked,
+        },
         CellKind.EPSON,
         found_by=_THREAD,
     ),
@@ -103,7 +105,7 @@ DEFECTS: Final = (
     ),
     KnownDefect(
         "a PLC's stop is acknowledged when it is accepted",
-        {f"{_GROUP}.bring_group_to_rest": stand_ins.stop_sent_only},
+        {f"{_SENDER}.bring_to_rest": stand_ins.stop_sent_only},
         CellKind.SOFTMOTION,
     ),
     KnownDefect(

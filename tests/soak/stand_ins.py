@@ -56,29 +56,21 @@ def nothing(*_given: object, **_named: object) -> None:
 # Stopping.
 
 
-def asked_before_the_lock(session: EpsonSession, request: Any) -> Any:
+_announced = EpsonSession._announced
+
+
+def asked_before_the_lock(session: EpsonSession, request: Any) -> str:
     """Ask the latch, and only then wait for the lock of the exchange."""
-
-    @contextmanager
-    def exchanging() -> Iterator[None]:
-        held: Any = session
-        session.latch.admit(command_class_of(request), request.name)
-        checkpoint(Checkpoint.LOCK, _shown(request))
-        try:
-            with held._gate, held._wire:
-                checkpoint(Checkpoint.HELD, _shown(request))
-                held._check_usable(request)
-                if held._pending is not None and request.name == "Abort":
-                    held._pending.abort_requested = True
-                yield
-        finally:
-            checkpoint(Checkpoint.EXCHANGE, _shown(request))
-
-    return exchanging()
+    session.latch.admit(command_class_of(request), request.name)
+    return _announced(session, request)
 
 
-def _shown(request: Any) -> str:
-    return str(request.parameters[0] if request.name == "Execute" else request.name)
+def admitted_unasked(session: Any, request: Any, what: str) -> None:
+    """Look at everything but the latch under the lock."""
+    checkpoint(Checkpoint.HELD, what)
+    session._check_usable(request)
+    if session._pending is not None and request.name == "Abort":
+        session._pending.abort_requested = True
 
 
 def latched_when_at_rest(controller: ControllerCore) -> None:
@@ -100,9 +92,7 @@ def stop_not_looked_after(ask: Function, _clock: object, *, controller: str) -> 
     return parse_status(ask("GetStatus"))
 
 
-def stop_sent_only(
-    commands: CommandSender, _snapshots: object, _clock: object, *, controller: str
-) -> None:
+def stop_sent_only(commands: CommandSender) -> None:
     """Take a stop that was acknowledged for rest."""
     commands.stop()
 

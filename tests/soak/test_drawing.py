@@ -2,12 +2,12 @@
 
 import pytest
 from robolink_simulators.faults import FaultAction, LinkKind, PlcFaultAction, links_of
-from robolink_simulators.faults.drawn import INSTANTS, RARE
 
 from tests.soak.adversary import CellKind, drawn_history
 from tests.soak.adversary.deed_lengths import length_of
 from tests.soak.adversary.drawn_hours import LINE_KINDS, MAILBOX_KINDS, deeds_of
 from tests.soak.adversary.history import Hindrance
+from tests.soak.adversary.instants import INSTANTS, RARE
 from tests.soak.adversary.plant.lines import LineBend
 
 pytestmark = pytest.mark.soak

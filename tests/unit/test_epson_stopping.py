@@ -1,10 +1,22 @@
-"""What counts as rest on an EPSON controller, against one that answers as it is told."""
+"""What counts as rest on an EPSON controller, and what a stop takes for its answer.
+
+Against one that answers as it is told.
+"""
+
+from typing import Any
 
 import pytest
 from robolink_simulators.cell.clock import ManualClock
 
+from robolink.controllers.epson.line import EpsonConversation, text_line
 from robolink.controllers.epson.rest import REST_S, bring_to_rest
-from robolink.errors import BusyError, OutcomeUnknownError, RejectedError
+from robolink.errors import (
+    BusyError,
+    OutcomeUnknownError,
+    RejectedError,
+    RemoteProtocolError,
+    TransportTimeoutError,
+)
 from robolink.protocols.epson_text import Reply
 from robolink.timing import NS_PER_S
 
@@ -83,3 +95,59 @@ def test_a_stop_that_is_not_allowed_is_an_error_at_once():
     robot = Robot(stop_refusal=20, aborts=5)
     with pytest.raises(RejectedError):
         robot.stop()
+
+
+class Wire:
+    """Says one thing whatever is sent, and then nothing."""
+
+    identity = place = "robot"
+
+    def __init__(self, *pieces):
+        self.clock = ManualClock()
+        self.sent = []
+        self._pieces = list(pieces)
+
+    def send(self, data, *, deadline, secret=False):
+        self.sent.append(data)
+
+    def receive(self, *, deadline):
+        if not self._pieces:
+            raise TransportTimeoutError("Nothing came.", remedy="Look at it.")
+        return self._pieces.pop(0)
+
+
+def over(wire: Any) -> EpsonConversation:
+    return EpsonConversation(text_line(wire), timeout_s=1.0)
+
+
+LATE = b"#Execute,0\r\n"
+
+
+@pytest.mark.fault("F01")
+@pytest.mark.parametrize("answer", [b"#Abort,0\r\n", b"#ABORT,0\r\n"])
+def test_a_stop_passes_over_what_it_did_not_ask_for(answer):
+    wire = Wire(LATE * 15 + answer)
+    reply = over(wire).exchange("Abort")
+    assert (reply.name.lower(), reply.fields) == ("abort", ("0",))
+    assert wire.sent == [b"$Abort\r\n"]
+
+
+def test_who_only_ever_answers_something_else_is_no_controller():
+    wire = Wire(LATE * 8, LATE * 8, LATE + b"#Abort,0\r\n")
+    conversation = over(wire)
+    with pytest.raises(RemoteProtocolError, match="a question nobody asked"):
+        conversation.exchange("Abort")
+    # The next request has its own count, and what came late is none of its answers.
+    assert conversation.exchange("Abort").fields == ("0",)
+
+
+def test_a_refusal_without_a_name_is_the_answer_to_a_stop():
+    with pytest.raises(RejectedError, match="refused Stop with code 20") as refused:
+        over(Wire(b"!,20\r\n")).exchange("Stop")
+    assert (refused.value.code, refused.value.request) == (20, "Stop")
+
+
+def test_half_an_answer_to_a_stop_is_told_from_none():
+    wire = Wire(b"#Abo")
+    with pytest.raises(TransportTimeoutError, match="answered 4 bytes, then nothing: Abort"):
+        over(wire).exchange("Abort")

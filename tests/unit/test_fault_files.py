@@ -16,11 +16,11 @@ from robolink_simulators.faults import (
     fault_as_keys,
     read_fault_file,
 )
-from robolink_simulators.faults.page import tables
 from robolink_simulators.hosting.in_process.epson import simulator_named, unregister
 
 import robolink
 from robolink.errors import ConfigError, OutcomeUnknownError
+from tools.fault_tables import tables
 
 HEAD = 'schema = "robolink/faults/1"\nlink = "epson+tcp"\n'
 PAGE = Path(__file__).parents[2] / "docs" / "fault-plans.md"
@@ -165,7 +165,7 @@ def test_a_simulator_in_the_process_takes_a_plan_by_its_url(written):
 
 def test_the_page_shows_the_vocabulary_as_it_is():
     page = PAGE.read_text(encoding="utf-8")
-    command = "python -m robolink_simulators.faults.page"
+    command = "python -m tools.fault_tables"
     assert page.endswith(tables()), f"run: {command}, and put it at the end of {PAGE.name}"
 
 

@@ -1,5 +1,7 @@
 """Map files: everything that is wrong is told, with the path of its key."""
 
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -220,3 +222,8 @@ def test_a_file_that_is_no_toml_is_refused(tmp_path, content):
         load_map(path)
     with pytest.raises(ConfigError, match="cannot be read"):
         load_map(tmp_path / "missing.toml")
+
+
+def test_who_names_a_map_does_not_wait_for_pydantic():
+    look = "import sys, robolink.register_maps; sys.exit('pydantic' in sys.modules)"
+    subprocess.run([sys.executable, "-c", look], check=True)

@@ -6,7 +6,7 @@ import struct
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robolink_simulators.plc import frames
+from robolink_simulators.hosting import modbus_frames as frames
 
 from robolink.register_maps import Number, NumberType, RegisterTable
 

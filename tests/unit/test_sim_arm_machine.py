@@ -37,7 +37,7 @@ def test_the_joints_for_a_point_bring_the_selected_tip_there(machine):
     machine.tools.select(2)
     machine.locals.define(1, Local(10.0, 20.0, -5.0, 30.0))
     target = machine.locals.convert(Point((200.0, 380.0, -60.0, 25.0, 0.0, 0.0)), 1)
-    machine.arm.place(machine.joints_for(target), 0)
+    machine.arm.place(machine.robot.joints_for(target), 0)
     assert machine.tip().coordinates() == pytest.approx((200.0, 380.0, -60.0, 25.0, 0.0, 0.0))
 
 
@@ -95,7 +95,7 @@ def test_motor_on_resets_the_motion_parameters_and_power(machine):
 def test_the_measured_tip_is_that_of_the_selected_tool(machine):
     machine.tools.set(1, NOZZLE)
     machine.tools.select(1)
-    assert machine.real_tip(random.Random(1), 0.0) == machine.tip()
+    assert machine.robot.real_tip(random.Random(1), 0.0) == machine.tip()
 
 
 def test_a_byte_is_eight_bits_with_the_lowest_first():

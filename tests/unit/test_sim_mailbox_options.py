@@ -4,8 +4,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from robolink_simulators.softmotion.mailbox.image import Bank, arranged, places_of
-from robolink_simulators.softmotion.mailbox.option_text import option_names, options_from_text
-from robolink_simulators.softmotion.mailbox.parameters import parameters_from_text
+from robolink_simulators.softmotion.mailbox.option_text import (
+    option_names,
+    options_from_text,
+    parameters_from_text,
+)
 
 from robolink.errors import ConfigError
 from robolink.protocols.mailbox import (

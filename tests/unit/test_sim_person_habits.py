@@ -7,15 +7,15 @@ from statistics import fmean
 
 import pytest
 import robolink_cli.prompts.operator as _operator
-from robolink_simulators.assist.port import (
+from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.cell.world_parameters import WorldParameters
+from robolink_simulators.control.assist import (
     LEAST_THINKING_S,
     AssistClient,
     InProcessEyes,
     perform,
     serve_assist,
 )
-from robolink_simulators.cell.clock import ScaledClock
-from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.hosting.in_process import epson as in_process
 from robolink_simulators.hosting.in_process import softmotion as plc_in_process

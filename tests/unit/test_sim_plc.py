@@ -14,8 +14,8 @@ from pymodbus.pdu.register_message import (
 )
 from robolink_simulators.faults import Fault, FaultAction, PlcFault, PlcFaultAction
 from robolink_simulators.faults.stream import EXCEPTION_CODES
+from robolink_simulators.hosting.modbus_frames import LineFrames
 from robolink_simulators.plc import PlcSimulator, device
-from robolink_simulators.plc.frames import LineFrames
 
 from robolink.errors import ConfigError
 from robolink.register_maps import load_map

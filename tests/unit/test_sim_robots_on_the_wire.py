@@ -266,7 +266,9 @@ def tip_along(robot, statement, share):
     machine = robot.client.simulator.machine
     robot.client.ask(f'$Execute,"{statement}"')
     start_ns, end_ns = robot.client.simulator.now_ns, machine.arm.next_change()
-    pose = machine.tip_at(machine.arm.position_at(start_ns + round(share * (end_ns - start_ns))))
+    pose = machine.robot.tip_at(
+        machine.arm.position_at(start_ns + round(share * (end_ns - start_ns)))
+    )
     while not robot.client.wait(1.0):
         pass
     return pose.coordinates()

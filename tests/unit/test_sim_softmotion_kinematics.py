@@ -19,6 +19,7 @@ from robolink_simulators.cell.frames import (
 )
 from robolink_simulators.softmotion import BlockRefused, CoordRef, ErrorKind, machine_named
 from robolink_simulators.softmotion.catalogue import NAMES, complete_kinematics, parameter_names
+from robolink_simulators.softmotion.group.paths import axes_for_tcp
 from robolink_simulators.softmotion.kinematics.articulated import (
     Palletizer4Axis,
     PosRRR,
@@ -39,7 +40,6 @@ from robolink_simulators.softmotion.kinematics.wrists import (
     Wrist3,
     scara3_z,
 )
-from robolink_simulators.softmotion.motion.paths import axes_for_tcp
 from robolink_simulators.softmotion.rows import five_axes
 
 from robolink.errors import ConfigError

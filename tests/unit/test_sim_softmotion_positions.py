@@ -11,7 +11,7 @@ from robolink_simulators.softmotion import (
     SmcBufferMode,
     Target,
 )
-from robolink_simulators.softmotion.motion.movement import EdgeWatch
+from robolink_simulators.softmotion.group.movement import EdgeWatch
 
 from tests.unit._softmotion_machine import (
     FACTORS,

@@ -3,7 +3,7 @@ from itertools import pairwise
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from robolink_simulators.softmotion.motion.profile import Pace, SpeedProfile
+from robolink_simulators.softmotion.group.profile import Pace, SpeedProfile
 
 rates = st.floats(1e-3, 1e3)
 paces = st.builds(Pace, rates, rates, rates)

@@ -100,9 +100,9 @@ def test_axes_that_a_curve_does_not_rule_stay(cell):
     ],
 )
 def test_what_is_no_curve_is_refused_and_nothing_is_stored(cell, statement, number):
-    before, started = cell.machine.kept.changes, cell.machine.arm.moves_started
+    before, started = cell.machine.kept.to_state(), cell.machine.arm.moves_started
     assert cell.start(statement).error.number == number
-    assert cell.machine.kept.changes == before
+    assert cell.machine.kept.to_state() == before
     assert cell.machine.arm.moves_started == started
 
 

@@ -7,8 +7,7 @@ from pathlib import Path
 from statistics import fmean, pstdev
 
 import pytest
-from robolink_cli.commands.simulate.serving import world_from
-from robolink_simulators.assist.port import perform
+from robolink_cli.commands.simulate.service import world_from
 from robolink_simulators.cell.camera import CameraOptics, CameraTruth
 from robolink_simulators.cell.tip_switches import LightBeam, TouchPlate
 from robolink_simulators.cell.world_parameters import (
@@ -16,6 +15,7 @@ from robolink_simulators.cell.world_parameters import (
     parameter_names,
     parameters_from_text,
 )
+from robolink_simulators.control.assist import perform
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.epson.arm.kinematics import inverse
 from robolink_simulators.hosting.in_process import epson as in_process

@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 import pytest
-from robolink_cli.console.ways import SHELL_WAYS
+from robolink_cli.console.shell_words import SHELL_WAYS
 
 import robolink
 from robolink.controllers.tool_table import require_replacement

@@ -15,7 +15,7 @@ from typing import Final, Literal
 
 import pyte
 from robolink_cli.wizard.keys import ALONE_S
-from robolink_simulators.assist.port import InProcessEyes
+from robolink_simulators.control.assist import InProcessEyes
 from robolink_simulators.epson.device import EpsonSimulator
 from wcwidth import wcwidth
 

@@ -62,8 +62,6 @@ def require_expected_robot(controller: "Controller", cell: "Expected") -> None:
         return
     found = controller.facts().robot_models
     if cell.robot.casefold() not in (model.casefold() for model in found):
-        from robolink.errors import ConfigError  # here, because --help needs none
-
         raise ConfigError(
             tr(
                 "The cell {cell} has a robot {expected}, but at {url} there is: {found}.",

@@ -30,7 +30,7 @@ _ROBOT: Final = {
     "io": (f"{CONTROLLER}.io:io", declared("Read inputs, switch outputs and memory bits.")),
     "variable": (f"{CONTROLLER}.var:var", declared("Read and set the project's variables.")),
     "take-ownership": (
-        f"{CONTROLLER}.take_ownership:take_ownership",
+        f"{CONTROLLER}.operate:take_ownership",
         declared("Take a PLC's mailbox from another client, because a person insists."),
     ),
 }
@@ -38,7 +38,7 @@ _ROBOT: Final = {
 _CELL: Final = {
     "list": (f"{COMPUTER}.config:list_cells", declared("The cells that have a name here.")),
     "new": (
-        f"{COMPUTER}.new_cell:new_cell",
+        f"{COMPUTER}.config:new_cell",
         declared("Write a new cell into a cell file; asks what it needs."),
     ),
     "show": (f"{COMPUTER}.config:show", declared("All settings that count for one cell.")),

@@ -284,9 +284,6 @@ def _plug_in(error: BaseException) -> "PlugInModule | None":
     return plug_in_module(error)
 
 
-_NAMES: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
-
-
 def tell_standing(error: BaseException, typed: Sequence[str] = ()) -> None:
     """Say on stderr what stands; nothing of a command that had no controller, or only looked."""
     from robolink.standing import UNTOUCHED, standing_after
@@ -304,6 +301,8 @@ def standing_payload(standing: "Standing") -> dict[str, object]:
 
     What a tool holds is ``null`` where it is undefined, and where ``known`` is false.
     """
+    from robolink.model import json_fields  # here, because --help needs none
+
     return {
         "tools": {
             str(number): {
@@ -315,14 +314,12 @@ def standing_payload(standing: "Standing") -> dict[str, object]:
             for number, tool in standing.tools.items()
         },
         "selected_tool": standing.selected if standing.selection_known else None,
-        "selected_before": standing.selected_before,
-        "carried_out": list(standing.carried_out),
-        "doubtful": list(standing.doubtful),
-        "moving": list(standing.moving),
-        "settled": standing.settled,
-        "left_open": standing.left_open,
+        **json_fields(standing, "selected_before", "carried_out", "doubtful", "moving"),
+        **json_fields(standing, "settled", "left_open"),
     }
 
 
 def _named(components: "Components") -> dict[str, float] | None:
-    return None if components is None else dict(zip(_NAMES, components, strict=True))
+    from robolink.model import COMPONENTS  # here, because --help needs none
+
+    return None if components is None else dict(zip(COMPONENTS, components, strict=True))

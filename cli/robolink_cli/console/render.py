@@ -6,7 +6,7 @@ it over, and it is printed once, when the command has ended well; an error print
 document instead.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import click
@@ -74,6 +74,19 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) 
         say(captured.get().rstrip("\n"))
         return
     console.print(shown, crop=False)
+
+
+def emit(kind: str, payload: Mapping[str, object], show: Callable[[], None]) -> None:
+    """Give the result: the document ``robolink/KIND/1`` to a machine, else ``show()``."""
+    if json_is_on():
+        emit_json(f"robolink/{kind}/1", payload)
+    else:
+        show()
+
+
+def show_requests(requests: Sequence[str]) -> None:
+    """Give the requests that a dry run would have sent, as they stand on the wire."""
+    emit("dry-run", {"requests": list(requests)}, lambda: say("\n".join(requests)))
 
 
 def emit_json(schema: str, payload: Mapping[str, object]) -> None:

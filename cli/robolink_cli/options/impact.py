@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.model import json_fields
 from robolink_cli.access.capabilities import points_of
 from robolink_cli.console.render import say, table
 from robolink_cli.options.declaration import CliOption
@@ -84,15 +85,8 @@ def impact_payload(impact: "Impact") -> dict[str, object]:
         "points": [
             {
                 "point": entry.number,
-                "x_mm": entry.pose.x_mm,
-                "y_mm": entry.pose.y_mm,
-                "z_mm": entry.pose.z_mm,
-                "u_deg": entry.pose.u_deg,
-                "dx_mm": entry.dx_mm,
-                "dy_mm": entry.dy_mm,
-                "dz_mm": entry.dz_mm,
-                "turn_deg": entry.turn_deg,
-                "distance_mm": entry.distance_mm,
+                **json_fields(entry.pose, "x_mm", "y_mm", "z_mm", "u_deg"),
+                **json_fields(entry, "dx_mm", "dy_mm", "dz_mm", "turn_deg", "distance_mm"),
             }
             for entry in impact.entries
         ],

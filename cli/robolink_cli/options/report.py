@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from robolink import __version__
 from robolink.errors import ConfigError, JournalError
 from robolink.messages import joined, tr
+from robolink.model import json_value
 from robolink_cli.console.render import note
 from robolink_cli.options.declaration import CliOption
 
@@ -127,7 +128,7 @@ class ReportDraft:
             "impact": impact,
             "touches": tuple(_touches(result.inputs)),
             "evidence": result.evidence.as_json() if result.evidence else {},
-            "seating": proposal.seating.as_json() if proposal.seating else None,
+            "seating": json_value(proposal.seating),
         }
 
     def note_result(self, result: "ToolReceipt | VerifyResult") -> None:

@@ -14,7 +14,6 @@ from robolink_cli.console.language import OPTION, VARIABLE
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.output import visible
 from robolink_cli.console.render import switch_json_on
-from robolink_cli.options.declaration import add_declared
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -72,6 +71,8 @@ def shared_options(command: CommandT) -> CommandT:
     What is given later, nearer to the command, wins. What the signature of the command declares is
     added too.
     """
+    from robolink_cli.options.declaration import add_declared
+
     shared: CommandT = add_declared(command, all_shared)
     return shared
 
@@ -109,6 +110,8 @@ class _Language(click.ParamType[str]):
 
 def json_option(command: CommandT) -> CommandT:
     """Add ``--json`` and ``--lang``, and what a command declares that needs no controller."""
+    from robolink_cli.options.declaration import add_declared
+
     alone: CommandT = add_declared(command, _json_and_language)
     return alone
 

@@ -11,13 +11,13 @@ from robolink.messages import tr
 from robolink.model import AnsweredBy
 from robolink.runner import FINEST_STEP, Operator, Question, parse_steps
 from robolink_cli.console.render import note
+from robolink_cli.prompts.current_desk import current_desk
 from robolink_cli.prompts.lines import QUIET_S, Lines, open_lines
-from robolink_cli.prompts.present import present_desk
 
 if TYPE_CHECKING:
-    from robolink_simulators.assist.port import AssistClient, InProcessEyes
     from robolink_simulators.cell.habits import PersonManner
     from robolink_simulators.cell.places import Axis, XyzMm
+    from robolink_simulators.control.assist import AssistClient, InProcessEyes
 
     from robolink.timing import Clock
 
@@ -100,7 +100,7 @@ def terminal() -> Operator:
 
     While a wizard shows it, that is the one whom the wizard asks.
     """
-    return present_desk() or _plain_terminal()
+    return current_desk() or _plain_terminal()
 
 
 @cache
@@ -299,7 +299,7 @@ def operator_at(
     if assist_url is None:
         yield terminal()
         return
-    from robolink_simulators.assist.port import open_eyes
+    from robolink_simulators.control.assist import open_eyes
 
     with open_eyes(assist_url) as eyes:
         yield AssistedOperator.with_eyes(eyes, note, tool=tool, clock=clock)

@@ -4,7 +4,7 @@ from typing import TYPE_CHECKING
 
 from robolink.errors import DeclinedError, NotReadyError, NotReadyReason
 from robolink.messages import joined, tr
-from robolink_cli.prompts.present import present_desk
+from robolink_cli.prompts.current_desk import current_desk
 from robolink_cli.session.motion_consent import (
     agree_to_motion,
     heed_what_was_left,
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from robolink.model import Controller, MotionTerms
     from robolink.stations import StationKind
-    from robolink_cli.prompts.present import AskingDesk
+    from robolink_cli.prompts.current_desk import AskingDesk
     from robolink_cli.wizard.state import CheckPoint
 
 
@@ -47,7 +47,7 @@ def agree_to_procedure(
         NotReadyError: Nothing can move now.
         StoppedError, DeclinedError: As :func:`agree_to_motion`.
     """
-    if yes or present_desk() is None:
+    if yes or current_desk() is None:
         question = motion_question(controller, purpose, speed_mm_s=speed_mm_s, box_mm=box_mm)
         agree_to_motion(question, yes=yes)
         return
@@ -78,7 +78,7 @@ def check_before_start(
         NotReadyError: Nothing can move now, and no key of the list changes that.
         StoppedError, DeclinedError: As :func:`agree_to_motion`.
     """
-    desk = present_desk()
+    desk = current_desk()
     assert desk is not None  # noqa: S101 - looked at by whoever calls
     heed_what_was_left(yes=False)
     foreseen = {"n": moves, "v": f"{speed_mm_s:g}", "d": f"{box_mm:g}"}
@@ -114,7 +114,7 @@ def name_the_needle(
     """
     from robolink_cli.wizard.happenings import CellIs
 
-    desk = present_desk()
+    desk = current_desk()
     assert desk is not None  # noqa: S101 - looked at by whoever calls
     named = list(ids(lambda question: _text(desk, controller, question)))
     if named:

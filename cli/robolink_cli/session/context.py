@@ -2,7 +2,7 @@
 
 import os
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import wraps
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
@@ -21,7 +21,7 @@ from robolink_cli.access.cell import (
     which_cell,
 )
 from robolink_cli.console.output import may_be_guided
-from robolink_cli.console.render import emit_json, json_is_on, note, say
+from robolink_cli.console.render import json_is_on, note
 from robolink_cli.options.declaration import add_declared, packed
 from robolink_cli.options.shared import GIVEN, TYPED, all_shared
 from robolink_cli.stopping.request import StopRequest
@@ -66,11 +66,6 @@ class CliContext(NamedTuple):
         """Return the same with what is mounted, for the record."""
         return self._replace(nozzle=nozzle or "", lot=lot or "")
 
-    @property
-    def json(self) -> bool:
-        """Whether the result goes to stdout as one JSON document."""
-        return json_is_on()
-
     def require_url(self) -> str:
         """Return the URL.
 
@@ -88,34 +83,9 @@ class CliContext(NamedTuple):
             return self.cell.expected
         return self.reach.expected if self.reach is not None else None
 
-    def note(self, text: str) -> None:
-        """Show a remark beside the result, on stderr."""
-        note(text)
-
-    def emit(self, kind: str, payload: Mapping[str, object], show: Callable[[], None]) -> None:
-        """Give the result; see :func:`emit`."""
-        emit(kind, payload, show)
-
-    def show_requests(self, requests: Sequence[str]) -> None:
-        """Give the requests of a dry run; see :func:`show_requests`."""
-        show_requests(requests)
-
 
 Command = Callable[..., int | None]
 """What click calls; it returns the exit code, ``None`` for 0."""
-
-
-def emit(kind: str, payload: Mapping[str, object], show: Callable[[], None]) -> None:
-    """Give the result: the document ``robolink/KIND/1`` to a machine, else ``show()``."""
-    if json_is_on():
-        emit_json(f"robolink/{kind}/1", payload)
-    else:
-        show()
-
-
-def show_requests(requests: Sequence[str]) -> None:
-    """Give the requests that a dry run would have sent, as they stand on the wire."""
-    emit("dry-run", {"requests": list(requests)}, lambda: say("\n".join(requests)))
 
 
 def stop_request() -> StopRequest:

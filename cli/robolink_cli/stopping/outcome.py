@@ -7,7 +7,7 @@ from robolink.messages import joined, tr
 from robolink.stopping import leave_note
 from robolink.transport import parse_url
 from robolink_cli.access.cell import which_cell
-from robolink_cli.console.ways import state_word
+from robolink_cli.console.shell_words import state_word
 from robolink_cli.stopping.request import StopRequest
 from robolink_cli.stopping.stop_first import StopOutcome, is_beside_another, who_asks
 
@@ -124,7 +124,7 @@ class Telling:
     def _recorded(self) -> list[str]:
         if not self._request.record:
             return []
-        from robolink_cli.access.recording import recording
+        from robolink_cli.access.record import recording
 
         try:
             with recording(self._request.record, _shown(self._outcome.url)) as trace:

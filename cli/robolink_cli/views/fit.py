@@ -27,18 +27,39 @@ from robolink.calibration_run import (
 )
 from robolink.messages import tr
 from robolink.methods import NextStep
-from robolink.model import ToolOffset, ToolReceipt, describe_offset
+from robolink.model import (
+    Controller,
+    ToolOffset,
+    ToolReceipt,
+    describe_offset,
+    json_fields,
+    json_value,
+)
 from robolink.runner import TeachPrompt
 from robolink_cli.console.render import next_lines, note, say, table
-from robolink_cli.prompts.present import present_desk
+from robolink_cli.prompts.current_desk import current_desk
 from robolink_cli.views.documents import (
     number,
-    offset_payload,
+    pose_payload,
     proposal_payload,
     receipt_payload,
+    show_change,
     verification_payload,
 )
-from robolink_cli.views.tables import show_change
+
+
+def steps_payload(controller: Controller, steps: Sequence[PlannedStep]) -> list[dict[str, object]]:
+    """Return foreseen steps with their requests and limit checks."""
+    group = controller.groups[0]
+    return [
+        {
+            "text": step.text,
+            "target": pose_payload(step.target) if step.target else None,
+            "requests": list(step.requests(group)),
+            "refusal": step.refusal,
+        }
+        for step in steps
+    ]
 
 
 def remarks(result: CalibrationResult) -> Iterator[str]:
@@ -239,8 +260,8 @@ def show_proposal(proposal: Proposal) -> None:
     """Show what was measured next to what is stored, how accurate it is, and what is in doubt."""
     show_change(
         proposal.tool,
-        offset_payload(proposal.before),
-        offset_payload(proposal.offset),
+        proposal.before,
+        proposal.offset,
         after_name=tr("measured") if proposal.measured is None else tr("proposed"),
         unmeasured=proposal.kept,
     )
@@ -259,7 +280,7 @@ def show_proposal(proposal: Proposal) -> None:
 
 def tell_written(receipt: ToolReceipt) -> None:
     """Tell whoever is guided what the controller reads back, before the turn test is made."""
-    if present_desk() is None:
+    if current_desk() is None:
         return
     value = describe_offset(receipt.read_back or ToolOffset())
     told = tr(
@@ -314,15 +335,8 @@ def show_report(report: ToolReport) -> None:
 
 def judged_payload(proposal: Proposal, verdicts: Sequence[LimitVerdict]) -> dict[str, object]:
     """Return a proposal with what the limits say about it."""
-    judged = [
-        {
-            "code": verdict.code,
-            "found_mm": verdict.found_mm,
-            "limit_mm": verdict.limit_mm,
-            "passed": verdict.passed,
-        }
-        for verdict in verdicts
-    ]
+    said = ("code", "found_mm", "limit_mm", "passed")
+    judged = [json_fields(verdict, *said) for verdict in verdicts]
     return {**proposal_payload(proposal), "verdicts": judged}
 
 
@@ -343,7 +357,7 @@ def _steps(report: ToolReport) -> tuple[NextStep, ...]:
 
 def _following(report: ToolReport) -> dict[str, object]:
     steps = _steps(report)
-    return {"next_steps": [step.as_json() for step in steps]} if steps else {}
+    return {"next_steps": json_value(steps)} if steps else {}
 
 
 def show_course(steps: Sequence[PlannedStep]) -> None:

@@ -9,19 +9,19 @@ from robolink.calibration import stated_mm
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model import (
+    COMPONENTS,
     EntryKind,
     Recorded,
     ToolOffset,
-    angle_difference_deg,
     describe_offset,
+    json_fields,
+    json_value,
     read_offset,
     with_method_name_now,
 )
 from robolink.transaction import id_of_change
 from robolink_cli.console.render import say, table
-
-COMPONENTS: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
-AXES: Final = ("X mm", "Y mm", "Z mm", "U deg", "V deg", "W deg")
+from robolink_cli.views.documents import AXES, offset_difference
 
 SHORT: Final = 8
 """How many characters of an id a table shows."""
@@ -60,19 +60,13 @@ def entry_payload(entry: Recorded, *, as_stored: bool = False) -> dict[str, obje
         as_stored: Whether the details are wanted letter by letter, as the hash counts them; else
             they name the method as it is named now.
     """
-    payload: dict[str, object] = {name: getattr(entry, name) for name in _PLAIN}
-    payload["kind"] = str(entry.kind)
+    payload: dict[str, object] = json_fields(entry, *_PLAIN)
     for key, names in (("before", ("before",)), ("after", AFTER)):
         known, offset = first_offset(entry.details, names)
         if known:
-            payload[key] = offset_payload(offset)
+            payload[key] = json_value(offset)
     payload["details"] = dict(entry.details) if as_stored else with_method_name_now(entry.details)
     return payload | asdict(entry.signature) | {"previous": entry.previous, "hash": entry.hash}
-
-
-def offset_payload(offset: ToolOffset | None) -> dict[str, float] | None:
-    """Return an offset with its units in the keys, ``None`` for an undefined tool."""
-    return None if offset is None else dict(zip(COMPONENTS, offset.components(), strict=True))
 
 
 def first_offset(
@@ -312,10 +306,6 @@ def _plain(value: object) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-_LENGTHS: Final = 3
-"""How many of the components are lengths; the others are angles."""
-
-
 _Offsets: TypeAlias = dict[str, ToolOffset | None]
 """What a tool held 'before' and 'after', as far as it is on record."""
 
@@ -368,8 +358,8 @@ def diff_payload(a: Sequence[Recorded], b: Sequence[Recorded]) -> dict[str, obje
             "tool": {"a": numbers[0], "b": numbers[1]},
             **{
                 key: {
-                    "a": offset_payload(first),
-                    "b": offset_payload(second),
+                    "a": json_value(first),
+                    "b": json_value(second),
                     "difference": _difference(first, second),
                 }
                 for key, first, second in _offsets(values)
@@ -442,14 +432,7 @@ def _offsets(
 
 
 def _difference(a: ToolOffset | None, b: ToolOffset | None) -> dict[str, float] | None:
-    if a is None or b is None:
-        return None
-    pairs = zip(b.components(), a.components(), strict=True)
-    values = [
-        new - old if place < _LENGTHS else angle_difference_deg(new, old)
-        for place, (new, old) in enumerate(pairs)
-    ]
-    return dict(zip(COMPONENTS, values, strict=True))
+    return None if a is None or b is None else offset_difference(a, b)
 
 
 def _different_facts(one: _Side, other: _Side) -> Iterator[tuple[str, str, str]]:

@@ -5,6 +5,7 @@ from typing import Final
 
 from robolink.calibration import Accuracy, CalibrationResult, rows_in_words, stated_mm
 from robolink.messages import declared, spoken, tr
+from robolink.model import json_fields, json_value
 from robolink_cli.console.render import say
 
 SOLVED: Final = "solved"
@@ -31,25 +32,14 @@ def result_payload(result: CalibrationResult) -> dict[str, object]:
         payload[where] = list(result.reference_point_mm)
     payload |= result.evidence.as_json() if result.evidence is not None else {}
     return payload | {
-        "notes": list(result.notes),
-        "measured": list(result.measured),
-        "unobservable": list(result.unobservable),
-        "interval95": {name: list(ends) for name, ends in result.interval95.items()},
+        **json_fields(result, "notes", "measured", "unobservable", "interval95"),
         "half_width95": list(result.half_width95) or None,
         "interval_from": result.interval_from or None,
-        "region95_radius_mm": result.region95_radius_mm,
-        "budget": None if result.budget is None else result.budget.as_json(),
-        "covariance": [list(row) for row in result.covariance],
-        "sigma_mm": result.sigma_mm,
-        "sigma_stated": result.sigma_stated,
-        "sigma_gain_per_axis": result.sigma_gain,
-        "rms_residual": result.rms_mm,
-        "max_residual": result.max_residual_mm,
-        "residuals": list(result.residual_distances_mm),
-        "rejected": list(result.rejected),
-        "condition_number": result.condition_number,
-        "rank": result.rank,
-        "dof": result.dof,
+        **json_fields(result, "region95_radius_mm", "budget", "covariance", "sigma_mm"),
+        **json_fields(result, "sigma_stated", sigma_gain_per_axis="sigma_gain"),
+        **json_fields(result, rms_residual="rms_mm", max_residual="max_residual_mm"),
+        "residuals": json_value(result.residual_distances_mm),
+        **json_fields(result, "rejected", "condition_number", "rank", "dof"),
     }
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.model import EntryKind, Recorded
+from robolink.model import EntryKind, Recorded, json_fields
 from robolink.stations import Station, find_station, find_stations
 from robolink.timing import local_label
 from robolink_cli.console.render import say, table
@@ -87,20 +87,14 @@ def station_payload(station: Station, *, robot: str = "") -> dict[str, Any]:
         "id": station.id,
         "robot": robot or None,
         "kind": station.kind.value,
-        "x_mm": station.x_mm,
-        "y_mm": station.y_mm,
-        "z_mm": station.z_mm,
-        "sigma_mm": station.sigma_mm,
-        "how": station.how,
+        **json_fields(station, "x_mm", "y_mm", "z_mm", "sigma_mm", "how"),
         "found_at": station.found_at or None,
-        "entry": station.entry,
-        "base": None if station.base is None else list(station.base),
+        **json_fields(station, "entry", "base"),
         "gauge": station.gauge or None,
         "gauge_due": station.gauge_due or None,
         "check_due": due.isoformat() if due else None,
         "remark": station.remark() or None,
-        "declared": station.declared,
-        "details": dict(station.details),
+        **json_fields(station, "declared", "details"),
     }
 
 

@@ -1,18 +1,59 @@
 """Runs the work of a command in a thread of its own, while a face shows it in the main one."""
 
+import os
+import sys
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TypeVar
+from typing import Final, TypeVar
+
+import click
 
 from robolink.errors import RobolinkError
-from robolink_cli.console.output import shown_by
+from robolink_cli.console.output import PLAIN, shown_by
 from robolink_cli.console.render import note
-from robolink_cli.prompts.present import sitting_at
+from robolink_cli.prompts.current_desk import sitting_at
 from robolink_cli.wizard.happenings import WizardCommand
-from robolink_cli.wizard.screens.ending import ended_of, kept_lines
+from robolink_cli.wizard.screens.end import ended_of, kept_lines
 from robolink_cli.wizard.state import Header, WizardState
 from robolink_cli.wizard.work import Desk, Face, Work
+
+_POOR: Final = frozenset({"", "dumb", "unknown"})
+"""Terminals that obey nothing."""
+
+
+def face_here() -> "Face":
+    """Return the face for this process's terminal: the full screen where it can be drawn.
+
+    In a small window that one begins with lines.
+    """
+    if draws_whole_screens():
+        from robolink_cli.wizard.faces.full import FullFace
+
+        return FullFace()
+    from robolink_cli.wizard.faces.lines import LineFace
+
+    return LineFace()
+
+
+def draws_whole_screens() -> bool:
+    """Tell whether the terminal, and the person at it, take full screens, once there is room."""
+    context = click.get_current_context(silent=True)
+    plain = context is not None and bool(context.meta.get(PLAIN))
+    if plain or os.environ.get("ROBOLINK_PLAIN") == "1":
+        return False
+    if os.name != "nt" and os.environ.get("TERM", "") in _POOR:
+        return False
+    try:
+        if os.name == "nt":
+            # What prompt_toolkit calls on Windows are functions of stdout's console, whatever it
+            # is told to draw on; with stdout in a file there is none, and it breaks off.
+            os.get_terminal_size(sys.stdout.fileno())
+        size = os.get_terminal_size(sys.stderr.fileno())
+    except (OSError, ValueError, AttributeError):
+        return False
+    return min(size.columns, size.lines) > 0  # where nobody knows the size, none is assumed
+
 
 T = TypeVar("T")
 
@@ -36,8 +77,6 @@ def guided(
     Raises:
         BaseException: Whatever ended the work.
     """
-    from robolink_cli.wizard.faces.choice import face_here
-
     face, offers = face_here(), set()
     if report is not None:
         offers.add(WizardCommand.SHOW_REPORT)

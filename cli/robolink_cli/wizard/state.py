@@ -20,7 +20,7 @@ from robolink.runner import (
     awaited_line,
 )
 from robolink_cli.console.language import other_language, speak_from_now
-from robolink_cli.prompts.present import AskingDesk
+from robolink_cli.prompts.current_desk import AskingDesk
 from robolink_cli.prompts.questions import keep_answer
 from robolink_cli.wizard.happenings import Reading, WasAsked, WizardCommand
 

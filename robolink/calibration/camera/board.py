@@ -25,8 +25,8 @@ from robolink.calibration.camera.camera_uncertainty import (
     camera_sources,
     print_source,
 )
-from robolink.calibration.core.dispersion import Dispersion
-from robolink.calibration.core.pose_checks import keep_unmeasured, require_finite, require_poses
+from robolink.calibration.core.dispersion import Dispersion, interval_of
+from robolink.calibration.core.pose_checks import components, require_finite, require_poses
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.flange_plane import FlangePlane, TipHeight, height_of, with_height_error
 from robolink.calibration.quality.station import with_station
@@ -86,34 +86,24 @@ def solve_board(
     spacing = math.dist(*places)
     check_spacing(spacing, spacing_mm)
     scatter = Dispersion.of(0.0, 0, sigma_mm)
-    covariance: tuple[tuple[float, ...], ...] = ()
-    region_mm = None
     marks_mm = (spacing / 2, 0.0), (-spacing / 2, 0.0)
     gains = _pair_gains((first, second), places)
-    if scatter:
-        half = scatter.sigma_mm**2 / 2
-        angle = 2 * (math.degrees(scatter.sigma_mm) / spacing) ** 2
-        covariance = ((half, 0.0, 0.0), (0.0, half, 0.0), (0.0, 0.0, angle))
-        region_mm = scatter.region_mm(half, 2)
+    one_mm = scatter.sigma_mm if scatter else 0.0
+    half, angle = one_mm**2 / 2, 2 * (math.degrees(one_mm) / spacing) ** 2
     result = CalibrationResult(
         method="board",
-        offset=keep_unmeasured(stored, x_mm=x_mm, y_mm=y_mm, u_deg=u_deg),
-        measured=("x_mm", "y_mm", "u_deg"),
-        kept=("z_mm", "v_deg", "w_deg"),
+        **components(stored, x_mm=x_mm, y_mm=y_mm, u_deg=u_deg),
         reference_point_mm=(),
         sigma_gain=1 / math.sqrt(2),
         warnings=warnings,
         inputs=(first.flange, second.flange),
-        covariance=covariance,
-        half_width95=scatter.half_widths(covariance) if scatter else (),
+        **interval_of(scatter, (half, half, angle), 2),
         sigma_mm=sigma_mm,
         sigma_stated=scatter is not None,
-        region95_radius_mm=region_mm,
         interval_from=scatter.source if scatter else "",
         rank=3,
         # The spacing is known as well, but only used as a check.
         dof=0,
-        unobservable=("z_mm", "v_deg", "w_deg"),
         sources=(
             *camera_sources((first, second), gains, camera=camera, finds_place=False),
             print_source((first, second), gains, marks_mm),

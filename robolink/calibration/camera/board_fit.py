@@ -35,6 +35,7 @@ from robolink.calibration.core.least_squares import Floats, LinearFit, linear_fi
 from robolink.calibration.core.pose_checks import (
     MIN_ROTATION_DEG,
     angle_spread_deg,
+    components,
     keep_unmeasured,
     require_finite,
     require_poses,
@@ -56,8 +57,6 @@ from robolink.messages import tr
 from robolink.model import ToolOffset
 
 UNKNOWNS = 3
-
-_KEPT = ("z_mm", "v_deg", "w_deg")
 
 
 def solve_board_fit(
@@ -117,21 +116,18 @@ def solve_board_fit(
     gains = _gains(unit, turn * drawing, sightings)
     result = CalibrationResult(
         method="board",
-        offset=keep_unmeasured(
+        **components(
             stored,
             x_mm=origin.real,
             y_mm=origin.imag,
             u_deg=math.degrees(math.atan2(turn.imag, turn.real)),
         ),
-        measured=("x_mm", "y_mm", "u_deg"),
-        kept=_KEPT,
         reference_point_mm=(),
         sigma_gain=float(np.sqrt(max(unit[0, 0], unit[1, 1]))),
         warnings=warnings,
         inputs=tuple(sighting.flange for sighting in sightings),
         residuals_mm=_in_base(residuals, sightings),
         rank=UNKNOWNS,
-        unobservable=_KEPT,
         sources=(
             *camera_sources(sightings, gains, camera=camera, finds_place=False),
             print_source(sightings, gains, drawing_mm),
@@ -329,11 +325,11 @@ def solve_board_round(
     result = with_height_error(result, planes[0].in_flange(0.0, 0.0, 1.0), height)
     if camera is not None:
 
-        def components(others: Sequence[Sighting]) -> tuple[float, float, float]:
+        def placed(others: Sequence[Sighting]) -> tuple[float, float, float]:
             moved, _, turned_rad = found(others)
             return float(moved.x[0]), float(moved.x[1]), math.degrees(turned_rad)
 
-        result = with_station(result, camera_part(camera, sightings, components, angles=(2,)))
+        result = with_station(result, camera_part(camera, sightings, placed, angles=(2,)))
     return as_round(result, camera_error_mm=(error_x, error_y))
 
 

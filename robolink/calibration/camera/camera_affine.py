@@ -22,7 +22,7 @@ from robolink.calibration.core.accuracy import ErrorSource
 from robolink.calibration.core.least_squares import Floats, LinearFit, linear_fit
 from robolink.calibration.core.pose_checks import (
     check_poses,
-    keep_unmeasured,
+    components,
     require_finite,
     require_poses,
 )
@@ -39,7 +39,7 @@ from robolink.calibration.quality.doubts import PLANAR_TOLERANCE, Tolerance
 from robolink.calibration.quality.fit_quality import judged
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.model import Pose, ToolOffset
+from robolink.model import Pose, ToolOffset, json_fields
 
 UNKNOWNS = 8
 
@@ -48,8 +48,6 @@ MAX_CONDITION = 100.0
 LEAST_SPREAD_PX = 5.0
 """What is seen has to spread over the image by this much in every direction, rms: the finder's
 scatter alone, of a spot that stands still, spreads too, and has a scale and a shear of its own."""
-
-_KEPT = ("z_mm", "u_deg", "v_deg", "w_deg")
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,17 +74,8 @@ class CameraCalibration(CalibrationResult):
 
     def details(self) -> dict[str, object]:
         """Return the camera."""
-        return {
-            "camera": {
-                "mm_per_px": [list(row) for row in self.camera.mm_per_px],
-                "origin_mm": list(self.camera.origin_mm),
-                "scale_mm_per_px": list(self.camera.scale_mm_per_px),
-                "turn_deg": self.camera.turn_deg,
-                "shear_deg": self.camera.shear_deg,
-                "mirrored": self.camera.mirrored,
-                "rms_px": self.rms_px,
-            }
-        }
+        shown = ("mm_per_px", "origin_mm", "scale_mm_per_px", "turn_deg", "shear_deg", "mirrored")
+        return {"camera": {**json_fields(self.camera, *shown), "rms_px": self.rms_px}}
 
 
 def solve_camera_affine(
@@ -151,9 +140,7 @@ def solve_camera_affine(
     residuals = fit.residuals.reshape(-1, 2)
     result = CameraCalibration(
         method="camera-affine",
-        offset=keep_unmeasured(stored, x_mm=float(fit.x[6]), y_mm=float(fit.x[7])),
-        measured=("x_mm", "y_mm"),
-        kept=_KEPT,
+        **components(stored, x_mm=float(fit.x[6]), y_mm=float(fit.x[7])),
         reference_point_mm=camera.origin_mm,
         sigma_gain=math.sqrt(float(fit.unit_covariance.diagonal()[6:].max())),
         warnings=warnings,
@@ -161,7 +148,6 @@ def solve_camera_affine(
         residuals_mm=tuple(map(tuple, residuals.tolist())),
         condition_number=fit.condition_number,
         rank=fit.rank,
-        unobservable=_KEPT,
         # Place, turn and scale of the camera are found with it.
         sources=(ErrorSource.of_lengths("tip_image_px", 2, gain=camera.largest_mm_per_px),),
         camera=camera,

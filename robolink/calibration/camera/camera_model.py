@@ -56,6 +56,12 @@ class CameraModel:
         (a, b), (c, d) = self.mm_per_px
         return (a * px + b * py + self.origin_mm[0], c * px + d * py + self.origin_mm[1])
 
+    def pixel(self, x_mm: float, y_mm: float) -> tuple[float, float]:
+        """Return the pixel that looks at a place of the base."""
+        (a, b), (c, d) = self.mm_per_px
+        dx, dy, area = x_mm - self.origin_mm[0], y_mm - self.origin_mm[1], self.determinant
+        return (d * dx - b * dy) / area, (a * dy - c * dx) / area
+
     @property
     def determinant(self) -> float:
         """Area of a pixel in mm^2, negative when the image is mirrored."""

@@ -20,7 +20,7 @@ from robolink.calibration.core.least_squares import linear_fit
 from robolink.calibration.core.pose_checks import (
     MIN_ROTATION_DEG,
     check_planar,
-    keep_unmeasured,
+    components,
     require_poses,
 )
 from robolink.calibration.core.result import CalibrationResult
@@ -41,8 +41,6 @@ CAMERA_MOVED_MM = 0.1
 """A camera that is off by more than this since its own calibration is doubted."""
 
 _UNKNOWNS = 4
-
-_KEPT = ("z_mm", "u_deg", "v_deg", "w_deg")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -180,9 +178,7 @@ def _leaning(
     mean = np.mean([(s.x_mm, s.y_mm) for s in sightings], axis=0).tolist()
     result = CalibrationResult(
         method="camera",
-        offset=keep_unmeasured(stored, x_mm=x_mm, y_mm=y_mm),
-        measured=("x_mm", "y_mm"),
-        kept=_KEPT,
+        **components(stored, x_mm=x_mm, y_mm=y_mm),
         reference_point_mm=(mean[0] - error_x, mean[1] - error_y),
         sigma_gain=math.sqrt(float(fit.unit_covariance.diagonal()[:2].max())),
         warnings=warnings,
@@ -190,7 +186,6 @@ def _leaning(
         residuals_mm=tuple(map(tuple, residuals.tolist())),
         condition_number=fit.condition_number,
         rank=fit.rank,
-        unobservable=_KEPT,
         sources=camera_sources(
             sightings, fit.gains(design)[:2].tolist(), camera=camera, finds_place=True
         ),

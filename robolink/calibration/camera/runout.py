@@ -30,12 +30,12 @@ import numpy as np
 from robolink.calibration.camera.camera_model import CameraModel, Sighting, check_sightings
 from robolink.calibration.camera.camera_round import CAMERA_MOVED_MM, CameraRound
 from robolink.calibration.camera.camera_uncertainty import camera_sources
-from robolink.calibration.core.dispersion import Dispersion
+from robolink.calibration.core.dispersion import Dispersion, interval_of
 from robolink.calibration.core.least_squares import Floats, LinearFit, linear_fit
 from robolink.calibration.core.pose_checks import (
     MIN_ROTATION_DEG,
     check_planar,
-    keep_unmeasured,
+    components,
     require_poses,
 )
 from robolink.calibration.core.result import CalibrationResult
@@ -247,8 +247,6 @@ LARGEST_GAP_DEG = 60.0
 
 LEAST_LOOKS = 8
 
-_KEPT = ("z_mm", "u_deg", "v_deg", "w_deg")
-
 
 @dataclass(frozen=True, slots=True)
 class RunoutRow:
@@ -424,12 +422,7 @@ def _result(
     camera: CameraModel | None,
 ) -> CalibrationResult:
     scatter = Dispersion.of(report.noise_mm2, report.dof, sigma_mm)
-    covariance: tuple[tuple[float, ...], ...] = ()
-    region_mm = None
-    if scatter is not None:
-        variance = (scatter.sigma_mm * report.sigma_gain) ** 2
-        covariance = ((variance, 0.0), (0.0, variance))
-        region_mm = scatter.region_mm(variance, 2)
+    variance = (scatter.sigma_mm * report.sigma_gain) ** 2 if scatter else 0.0
     x_mm, y_mm = report.tip_mm
     moved = max(map(abs, report.centre_mm)) > CAMERA_MOVED_MM
     # A wobble is what is measured here, so it is no doubt.
@@ -437,15 +430,12 @@ def _result(
     distances = [math.hypot(*residual) for residual in report.residuals_mm]
     return CalibrationResult(
         method="runout-table",
-        offset=keep_unmeasured(stored, x_mm=x_mm, y_mm=y_mm),
-        measured=("x_mm", "y_mm"),
-        kept=_KEPT,
+        **components(stored, x_mm=x_mm, y_mm=y_mm),
         reference_point_mm=(),
         sigma_gain=report.sigma_gain,
         warnings=(*warnings, "camera_moved") if moved else warnings,
         inputs=tuple(sighting.flange for sighting in sightings),
-        covariance=covariance,
-        half_width95=scatter.half_widths(covariance) if scatter else (),
+        **interval_of(scatter, (variance, variance), 2),
         sigma_mm=scatter.sigma_mm if scatter else None,
         sigma_stated=sigma_mm is not None,
         rms_mm=report.rms_after_mm if report.dof else None,
@@ -453,9 +443,7 @@ def _result(
         residuals_mm=report.residuals_mm,
         rank=report.rank,
         dof=report.dof,
-        unobservable=_KEPT,
         interval_from=scatter.source if scatter else "",
-        region95_radius_mm=region_mm,
         sources=camera_sources(sightings, report.gains, camera=camera, finds_place=True),
     )
 

@@ -17,8 +17,8 @@ from robolink.calibration.camera.camera_model import (
     plane_gains,
 )
 from robolink.calibration.camera.camera_uncertainty import camera_sources
-from robolink.calibration.core.dispersion import Dispersion
-from robolink.calibration.core.pose_checks import keep_unmeasured
+from robolink.calibration.core.dispersion import Dispersion, interval_of
+from robolink.calibration.core.pose_checks import components
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.flange_plane import (
     TipHeight,
@@ -119,32 +119,21 @@ def _one_look(
     stored: ToolOffset | None,
     sigma_mm: float | None,
 ) -> CalibrationResult:
-    scatter, axes = Dispersion.of(0.0, 0, sigma_mm), range(len(found))
-    covariance: tuple[tuple[float, ...], ...] = ()
-    region_mm = None
-    if scatter:
-        # A rotation leaves errors that are alike in all directions as they are.
-        variance = scatter.sigma_mm**2
-        covariance = tuple(tuple(variance if i == j else 0.0 for j in axes) for i in axes)
-        region_mm = scatter.region_mm(variance, len(found))
-    others = tuple(n for n in ("z_mm", "u_deg", "v_deg", "w_deg") if n not in found)
+    scatter, axes = Dispersion.of(0.0, 0, sigma_mm), len(found)
+    # A rotation leaves errors that are alike in all directions as they are.
+    variance = scatter.sigma_mm**2 if scatter else 0.0
     place = (sighting.x_mm, sighting.y_mm, sighting.z_mm)
     return CalibrationResult(
         method="camera",
-        offset=keep_unmeasured(stored, **found),
-        measured=tuple(found),
-        kept=others,
+        **components(stored, **found),
         reference_point_mm=tuple(value for value in place if value is not None),
         sigma_gain=1.0,
         warnings=(),
         inputs=(sighting.flange,),
-        covariance=covariance,
-        half_width95=scatter.half_widths(covariance) if scatter else (),
+        **interval_of(scatter, (variance,) * axes, axes),
         sigma_mm=sigma_mm,
         sigma_stated=scatter is not None,
-        region95_radius_mm=region_mm,
         interval_from=scatter.source if scatter else "",
-        rank=len(found),
+        rank=axes,
         dof=0,
-        unobservable=others,
     )

@@ -20,6 +20,7 @@ from typing import Any, Final, Literal, Self
 
 from robolink.calibration.core.statistics import student_t
 from robolink.messages import declared
+from robolink.model import from_json, json_fields
 
 DIVISORS: Final = {
     "rectangular": math.sqrt(3),
@@ -101,18 +102,10 @@ class UncertaintyBudget:
         Raises:
             KeyError, TypeError, ValueError: It is none.
         """
-        rows = (
-            BudgetRow(
-                row["name"],
-                float(row["u_mm"]),
-                math.inf if row["nu"] is None else float(row["nu"]),
-                float(row["sensitivity"]),
-                row["origin"],
-                row["kind"],
-            )
-            for row in document["rows"]
-        )
-        return cls(tuple(rows), tuple(document["not_assessed"]), float(document["probability"]))
+        rows = [
+            {**row, "nu": math.inf if row["nu"] is None else row["nu"]} for row in document["rows"]
+        ]
+        return from_json(cls, {**document, "rows": rows})
 
     def with_row(self, row: BudgetRow) -> "UncertaintyBudget":
         """Return the budget with one row more, which then counts as assessed."""
@@ -155,25 +148,15 @@ class UncertaintyBudget:
         return {
             "rows": [
                 {
-                    "name": row.name,
-                    "u_mm": row.u_mm,
-                    "sensitivity": row.sensitivity,
-                    "part_mm": row.part_mm,
+                    **json_fields(row, "name", "u_mm", "sensitivity", "part_mm"),
                     "share_percent": 100 * row.part_mm**2 / whole if whole > 0 else 0.0,
-                    "nu": _finite(row.nu),
-                    "kind": row.kind,
-                    "origin": row.origin,
+                    **json_fields(row, "nu", "kind", "origin"),
                 }
                 for row in self.rows
             ],
-            "not_assessed": list(self.not_assessed),
-            "type_a_mm": self.type_a_mm,
-            "type_b_mm": self.type_b_mm,
-            "u_c_mm": self.u_c_mm,
-            "nu_eff": _finite(self.nu_eff),
+            **json_fields(self, "not_assessed", "type_a_mm", "type_b_mm", "u_c_mm", "nu_eff"),
             "coverage_factor": self.k,
-            "probability": self.probability,
-            "expanded_mm": self.expanded_mm,
+            **json_fields(self, "probability", "expanded_mm"),
         }
 
 
@@ -195,10 +178,6 @@ def coverage_factor(nu_eff: float, probability: float = 0.95) -> float:
     """Return Student's t for degrees of freedom cut to a whole number, 1 at least."""
     whole = nu_eff if math.isinf(nu_eff) else max(math.floor(nu_eff), 1)
     return student_t((1 + probability) / 2, whole)
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None  # JSON has no infinity
 
 
 Basis = Literal["stated", "record", "default"]
@@ -379,15 +358,8 @@ class AssessedRow:
 
     def as_json(self) -> dict[str, object]:
         """Return it as plain values."""
-        return {
-            "row": self.key,
-            "title": self.title,
-            "half_width": self.half_width,
-            "unit": self.unit,
-            "basis": self.basis,
-            "told": self.told,
-            "u_mm": self.u_mm,
-        }
+        shown = json_fields(self, "title", "half_width", "unit", "basis", "told", "u_mm")
+        return {"row": self.key, **shown}
 
 
 @dataclass(frozen=True, slots=True)
@@ -430,8 +402,7 @@ class Accuracy:
             "half_width95": halves if measured else list(self.half_width95),
             "largest_row": self.largest.key,
             "without_defaults_mm": self.without_defaults_mm,
-            "rows": [row.as_json() for row in self.rows],
-            "budget": self.budget.as_json(),
+            **json_fields(self, "rows", "budget"),
         }
 
     @classmethod
@@ -443,21 +414,5 @@ class Accuracy:
         """
         halves = document["half_width95"]
         values = halves.values() if isinstance(halves, Mapping) else halves
-        return cls(
-            float(document["within_mm"]),
-            tuple(map(float, values)),
-            tuple(
-                AssessedRow(
-                    row["row"],
-                    row["title"],
-                    None if row["half_width"] is None else float(row["half_width"]),
-                    row["unit"],
-                    row["basis"],
-                    row["told"],
-                    float(row["u_mm"]),
-                )
-                for row in document["rows"]
-            ),
-            UncertaintyBudget.from_json(document["budget"]),
-            float(document["without_defaults_mm"]),
-        )
+        rows = [{**row, "key": row["row"]} for row in document["rows"]]
+        return from_json(cls, {**document, "half_width95": values, "rows": rows})

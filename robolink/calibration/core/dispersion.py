@@ -10,7 +10,7 @@ up. Where there is one it is never 0: what two positions hide that are printed a
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final, Literal, Self
+from typing import Any, Final, Literal, Self
 
 from robolink.calibration.core.accuracy import BudgetRow, UncertaintyBudget
 from robolink.calibration.core.statistics import f_quantile, student_t95
@@ -119,6 +119,29 @@ class Dispersion:
             tr("temperature"),
         )
         return UncertaintyBudget.of((row,), not_assessed=unknown)
+
+
+def interval_of(
+    scatter: Dispersion | None, variances: Sequence[float], lengths: int
+) -> dict[str, Any]:
+    """Return what a result says of components that err independently; nothing without a scatter.
+
+    Args:
+        scatter: What tells it.
+        variances: Of each component, mm^2 or deg^2.
+        lengths: How many of them are lengths; these come first and are known alike.
+    """
+    if scatter is None:
+        return {}
+    covariance = tuple(
+        tuple(one if row == column else 0.0 for column in range(len(variances)))
+        for row, one in enumerate(variances)
+    )
+    return {
+        "covariance": covariance,
+        "half_width95": scatter.half_widths(covariance),
+        "region95_radius_mm": scatter.region_mm(variances[0], lengths),
+    }
 
 
 def require_positive(value: float, name: str) -> None:

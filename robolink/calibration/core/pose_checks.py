@@ -3,10 +3,11 @@
 import math
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from typing import Any
 
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.model import Hand, Pose, ToolOffset
+from robolink.model import COMPONENTS, Hand, Pose, ToolOffset
 
 MAX_OFFSET_MM = 1000.0
 """A tool longer than this is taken for a mistake (docs/reference/calibration.md 3)."""
@@ -125,17 +126,35 @@ def keep_unmeasured(stored: ToolOffset | None, **measured: float) -> ToolOffset:
     return offset
 
 
+def components(stored: ToolOffset | None, **measured: float) -> dict[str, Any]:
+    """Return what a result says of the components: the offset, what was measured of it, what not.
+
+    Args:
+        stored: The offset stored now; what was not measured is kept from it, or 0 without one.
+        measured: The components that were measured.
+
+    Raises:
+        CalibrationError: ``implausible_offset``.
+    """
+    others = tuple(name for name in COMPONENTS if name not in measured)
+    return {
+        "offset": keep_unmeasured(stored, **measured),
+        "measured": tuple(measured),
+        "kept": others,
+        "unobservable": others,
+    }
+
+
 def require_finite_poses(poses: Sequence[Pose]) -> None:
     """Refuse a coordinate that is no finite number.
 
     Raises:
         CalibrationError: ``non_finite``, with pose and name.
     """
-    names = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
     for number, pose in enumerate(poses, start=1):
         if all(type(value) is float and math.isfinite(value) for value in pose.coordinates()):
             continue  # nearly always; what is no float may be one all the same
-        for name, value in zip(names, pose.coordinates(), strict=True):
+        for name, value in zip(COMPONENTS, pose.coordinates(), strict=True):
             if not isinstance(value, (int, float)) or not math.isfinite(value):
                 raise CalibrationError(
                     "non_finite",

@@ -13,6 +13,8 @@ from robolink.calibration.core.turn_claim import TurnJudgement
 from robolink.model import (
     Pose,
     ToolOffset,
+    json_fields,
+    json_value,
 )
 
 NOTICEABLE_MM: Final = 0.002
@@ -88,34 +90,13 @@ class FitEvidence:
     def as_json(self) -> dict[str, object]:
         """Return what is known of it as plain values."""
         found: dict[str, object] = {
-            "distinct": self.distinct,
-            "duplicates": list(self.duplicates),
-            "leverage": list(self.leverage),
-            "high_leverage": list(self.high_leverage),
-            "chi_square": self.chi_square,
-            "chi_square_limit": self.chi_square_limit,
-            "birge_ratio": self.birge_ratio,
-            "consensus": self.consensus,
-            "seed_spread_mm": self.seed_spread_mm,
-            "jog_grid_mm": self.grid_mm,
-            "approach_bias_mm": self.approach_bias_mm,
-            "approach_bias_u_mm": self.approach_bias_u_mm,
+            **json_fields(self, "distinct", "duplicates", "leverage", "high_leverage"),
+            **json_fields(self, "chi_square", "chi_square_limit", "birge_ratio", "consensus"),
+            **json_fields(self, "seed_spread_mm", jog_grid_mm="grid_mm"),
+            **json_fields(self, "approach_bias_mm", "approach_bias_u_mm"),
+            **(json_value(self.run_order) or {}),
         }
-        if self.run_order is not None:
-            order = self.run_order
-            found |= {
-                "step_f": order.step_f,
-                "step_f_limit": order.step_f_limit,
-                "step_after": order.step_after,
-                "step_mm": list(order.step_mm),
-                "drift_f": order.drift_f,
-                "drift_f_limit": order.drift_f_limit,
-                "drift_mm": list(order.drift_mm),
-            }
         return {name: value for name, value in found.items() if value not in (None, [])}
-
-
-COMPONENTS = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
 
 
 class ResidualVectors(Sequence[tuple[float, ...]]):

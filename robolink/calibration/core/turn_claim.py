@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Self
 
+from robolink.model import from_json, json_fields
+
 CONTRADICTS_REPEATABILITY: Final = "proof_contradicts_repeatability"
 CONTRADICTS_ACCURACY: Final = "proof_contradicts_accuracy"
 SMALL_ANGLE: Final = "tested_at_small_angle"
@@ -146,51 +148,10 @@ class TurnJudgement:
         Raises:
             KeyError, TypeError, ValueError: It is none.
         """
-        limits = tuple(
-            DriftLimits(float(a["repeatable_mm"]), float(a["accurate_mm"]), float(a["turn_deg"]))
-            for a in document["limits"]
-        )
-        return cls(
-            document["code"] or "",
-            limits,
-            int(document["worst"]),
-            bool(document["small_angle"]),
-            _length(document["wider_mm"]),
-            bool(document["offers_wider"]),
-            bool(document["covered"]),
-            int(document.get("tests", 1)),
-            _length(document.get("apart_mm")),
-            _length(document.get("shows_from_mm")),
-            _length(document.get("shows_z_from_mm")),
-            bool(document.get("misses_z", False)),
-            _length(document.get("accurate_mm")),
-        )
+        later = {"tests": 1, "apart_mm": None, "shows_from_mm": None, "shows_z_from_mm": None}
+        later |= {"misses_z": False, "accurate_mm": None}
+        return from_json(cls, {**later, **document, "code": document["code"] or ""})
 
     def as_json(self) -> dict[str, object]:
         """Return it as plain values."""
-        return {
-            "code": self.code or None,
-            "limits": [
-                {
-                    "repeatable_mm": one.repeatable_mm,
-                    "accurate_mm": one.accurate_mm,
-                    "turn_deg": one.turn_deg,
-                }
-                for one in self.limits
-            ],
-            "worst": self.worst,
-            "small_angle": self.small_angle,
-            "wider_mm": self.wider_mm,
-            "offers_wider": self.offers_wider,
-            "covered": self.covered,
-            "tests": self.tests,
-            "apart_mm": self.apart_mm,
-            "shows_from_mm": self.shows_from_mm,
-            "shows_z_from_mm": self.shows_z_from_mm,
-            "misses_z": self.misses_z,
-            "accurate_mm": self.accurate_mm,
-        }
-
-
-def _length(value: float | None) -> float | None:
-    return None if value is None else float(value)
+        return {**json_fields(self), "code": self.code or None}

@@ -14,14 +14,18 @@ import numpy as np
 
 from robolink.calibration.core.dispersion import Dispersion
 from robolink.calibration.core.least_squares import Floats, LinearFit, linear_fit
-from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, require_poses
-from robolink.calibration.core.result import COMPONENTS, CalibrationResult
+from robolink.calibration.core.pose_checks import (
+    check_poses,
+    components,
+    require_poses,
+)
+from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.rotations import pose_arrays
 from robolink.calibration.quality.doubts import PLANAR_TOLERANCE, TOUCH_TOLERANCE, Tolerance
 from robolink.calibration.quality.fit_quality import judged
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.model import Pose, ToolOffset
+from robolink.model import COMPONENTS, Pose, ToolOffset
 
 MAX_CONDITION = 100.0
 
@@ -205,12 +209,9 @@ def _result(
     warnings: tuple[str, ...],
     stored: ToolOffset | None,
 ) -> CalibrationResult:
-    kept = tuple(name for name in COMPONENTS if name not in found)
     return CalibrationResult(
         method="joint",
-        offset=keep_unmeasured(stored, **found),
-        measured=tuple(found),
-        kept=kept,
+        **components(stored, **found),
         reference_point_mm=(),
         sigma_gain=math.sqrt(variance),
         warnings=warnings,
@@ -218,5 +219,4 @@ def _result(
         residuals_mm=tuple(map(tuple, (-fit.residuals).reshape(-1, len(found)).tolist())),
         condition_number=fit.condition_number,
         rank=fit.rank,
-        unobservable=kept,
     )

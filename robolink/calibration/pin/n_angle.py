@@ -35,7 +35,7 @@ from robolink.calibration.core.pose_checks import (
     UPRIGHT_WITHIN_DEG,
     WARN_ROTATION_DEG,
     check_rotation,
-    keep_unmeasured,
+    components,
     require_poses,
     some_on_their_head,
     tilted_pose,
@@ -154,8 +154,6 @@ ROBUST_POSES = 6
 
 _ONE = np.eye(2)
 
-_KEPT = ("z_mm", "u_deg", "v_deg", "w_deg")
-
 
 def solve_n_angle(
     poses: Sequence[Pose],
@@ -263,9 +261,7 @@ def _result(
     tip = fit.tip.conjugate() if down else fit.tip
     return CalibrationResult(
         method="n-angle",
-        offset=keep_unmeasured(stored, x_mm=tip.real, y_mm=tip.imag),
-        measured=("x_mm", "y_mm"),
-        kept=_KEPT,
+        **components(stored, x_mm=tip.real, y_mm=tip.imag),
         reference_point_mm=(fit.point.real, fit.point.imag),
         sigma_gain=fit.sigma_gain,
         warnings=warnings,
@@ -274,7 +270,6 @@ def _result(
         residuals_mm=ResidualVectors(fit.residuals.tobytes(), 2),
         condition_number=fit.condition_number,
         rank=UNKNOWNS,
-        unobservable=_KEPT,
         sources=(ErrorSource.of_lengths("touch_mm", 2),),
     )
 

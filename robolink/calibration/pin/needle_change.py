@@ -9,8 +9,8 @@ upside down has R' d in place of Rz(-U) d (docs/reference/evidence.md 3).
 import math
 from dataclasses import dataclass, replace
 
-from robolink.calibration.core.dispersion import Dispersion, require_positive
-from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, require_finite
+from robolink.calibration.core.dispersion import Dispersion, interval_of, require_positive
+from robolink.calibration.core.pose_checks import check_poses, components, require_finite
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.rotations import rotation_of
 from robolink.calibration.core.statistics import NORMAL_95
@@ -19,7 +19,7 @@ from robolink.calibration.pin.needle_chain import NeedleChain, NeedleLimits, Sto
 from robolink.calibration.pin.one_touch import one_touch_sources
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.model import Pose, ToolOffset
+from robolink.model import Pose, ToolOffset, json_fields
 
 Point = tuple[float, ...]
 """(x, y) or (x, y, z) in the base, mm."""
@@ -55,11 +55,7 @@ class NeedleChangeResult(CalibrationResult):
         """Return the change of Z by name, and what is known of what it is added to."""
         if self.stored_z is None:
             return {}
-        return {
-            "change_z_mm": self.change_z_mm,
-            "change_z_half95_mm": self.change_z_half95_mm,
-            "stored_z": self.stored_z.as_json(),
-        }
+        return json_fields(self, "change_z_mm", "change_z_half95_mm", "stored_z")
 
     def added_to(self, stored: StoredZ, *, touch_sigma_mm: float) -> "NeedleChangeResult":
         """Return the same with Z named for what it is: a change of the stored one.
@@ -182,32 +178,20 @@ def solve_needle_change(
         for name, change in zip(names, _in_flange(flange, shift), strict=False)
     }
     scatter = Dispersion.of(0.0, 0, sigma_mm)
-    assert scatter is not None  # noqa: S101 - a sigma was given
     now = chain.after(math.sqrt(2) * sigma_mm, shared_touch=shared_touch)
-    covariance = tuple(
-        tuple(now.sigma_mm**2 if row == column else 0.0 for column in range(len(found)))
-        for row in range(len(found))
-    )
-    halves = scatter.half_widths(covariance)
     due = now.is_due(limits)
-    others = tuple(n for n in ("z_mm", "u_deg", "v_deg", "w_deg") if n not in found)
     return NeedleChangeResult(
         method="needle_change",
-        offset=keep_unmeasured(stored, **found),
-        measured=tuple(found),
-        kept=others,
+        **components(stored, **found),
         reference_point_mm=tuple(after_mm),
         sigma_gain=now.sigma_mm / sigma_mm,
         warnings=("full_calibration_due",) if due else (),
         inputs=(flange,),
-        covariance=covariance,
-        half_width95=halves,
+        **interval_of(scatter, (now.sigma_mm**2,) * len(found), len(found)),
         sigma_mm=sigma_mm,
         sigma_stated=True,
-        region95_radius_mm=scatter.region_mm(now.sigma_mm**2, len(found)),
         rank=len(found),
         dof=0,
-        unobservable=others,
         sources=one_touch_sources(len(found)),
         shift_mm=shift,
         chain=now,

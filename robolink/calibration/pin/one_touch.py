@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from robolink.calibration.core.accuracy import ErrorSource
-from robolink.calibration.core.dispersion import Dispersion
-from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, require_finite
+from robolink.calibration.core.dispersion import Dispersion, interval_of
+from robolink.calibration.core.pose_checks import check_poses, components, require_finite
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.rotations import rotation_of
 from robolink.calibration.flange_plane import require_flange_in_base
@@ -122,27 +122,19 @@ def solve_one_touch(
     away = np.array([pin.x_mm - flange.x_mm, pin.y_mm - flange.y_mm, pin.z_mm - flange.z_mm])
     x, y, z = (rotation_of(flange).T @ away).tolist()
     scatter = Dispersion.of(0.0, 0, sigma_mm)
-    covariance: tuple[tuple[float, ...], ...] = ()
-    if scatter:
-        variance = scatter.sigma_mm**2
-        covariance = ((variance, 0.0, 0.0), (0.0, variance, 0.0), (0.0, 0.0, variance))
+    variance = scatter.sigma_mm**2 if scatter else 0.0
     result = CalibrationResult(
         method="one-touch",
-        offset=keep_unmeasured(stored, x_mm=x, y_mm=y, z_mm=z),
-        measured=("x_mm", "y_mm", "z_mm"),
-        kept=("u_deg", "v_deg", "w_deg"),
+        **components(stored, x_mm=x, y_mm=y, z_mm=z),
         reference_point_mm=(pin.x_mm, pin.y_mm, pin.z_mm),
         sigma_gain=1.0,
         warnings=(),
         inputs=(flange,),
-        covariance=covariance,
-        half_width95=scatter.half_widths(covariance) if scatter else (),
+        **interval_of(scatter, (variance,) * 3, 3),
         sigma_mm=sigma_mm,
         sigma_stated=scatter is not None,
-        region95_radius_mm=scatter.region_mm(scatter.sigma_mm**2, 3) if scatter else None,
         rank=3,
         dof=0,
-        unobservable=("u_deg", "v_deg", "w_deg"),
         sources=one_touch_sources(3),
     )
     return with_station(result, pin.part(flange))

@@ -34,7 +34,7 @@ from robolink.calibration.core.least_squares import (
 )
 from robolink.calibration.core.pose_checks import (
     angle_spread_deg,
-    keep_unmeasured,
+    components,
     refuse_radians,
     require_poses,
 )
@@ -264,10 +264,6 @@ RECOMMENDED_POSES = 4
 ROBUST_POSES = 7
 """Among fewer an outlier search cannot be trusted (docs/reference/evidence.md 10)."""
 
-_MEASURED = ("x_mm", "y_mm", "z_mm")
-
-_KEPT = ("u_deg", "v_deg", "w_deg")
-
 _CLEARLY_ALONG = 0.98
 
 
@@ -375,11 +371,10 @@ def _result(
     inputs: tuple[Pose, ...],
     rejected: tuple[int, ...],
 ) -> CalibrationResult:
+    x_mm, y_mm, z_mm = fit.tip.tolist()
     return CalibrationResult(
         method="pivot",
-        offset=keep_unmeasured(stored, **dict(zip(_MEASURED, fit.tip.tolist(), strict=True))),
-        measured=_MEASURED,
-        kept=_KEPT,
+        **components(stored, x_mm=x_mm, y_mm=y_mm, z_mm=z_mm),
         reference_point_mm=tuple(fit.point.tolist()),
         sigma_gain=math.sqrt(float(design.unit_covariance.diagonal().max())),
         warnings=warnings,
@@ -388,7 +383,6 @@ def _result(
         residuals_mm=ResidualVectors(fit.residuals.tobytes(), 3),
         condition_number=design.condition_number,
         rank=design.rank,
-        unobservable=_KEPT,
         sources=(ErrorSource.of_lengths("touch_mm", 3),),
     )
 

@@ -19,12 +19,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from robolink.calibration.core.accuracy import ErrorSource
-from robolink.calibration.core.dispersion import Dispersion
+from robolink.calibration.core.dispersion import Dispersion, interval_of
 from robolink.calibration.core.pose_checks import (
     MIN_ROTATION_DEG,
     check_planar,
+    components,
     heading_deg,
-    keep_unmeasured,
     on_its_head,
     planar_sigma_gain,
 )
@@ -32,8 +32,6 @@ from robolink.calibration.core.result import CalibrationResult
 from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset, angle_difference_deg, rotate_xy
-
-MEASURED = ("x_mm", "y_mm")
 
 
 def solve_two_pose(
@@ -89,16 +87,13 @@ def solve_two_pose(
         t_y = -t_y
     result = CalibrationResult(
         method="two-pose",
-        offset=keep_unmeasured(stored, x_mm=t_x, y_mm=t_y),
-        measured=MEASURED,
-        kept=("z_mm", "u_deg", "v_deg", "w_deg"),
+        **components(stored, x_mm=t_x, y_mm=t_y),
         reference_point_mm=(first.x_mm + at_x, first.y_mm + at_y),
         sigma_gain=planar_sigma_gain((first, second)),
         warnings=warnings,
         inputs=(first, second),
         rank=4,
         dof=0,
-        unobservable=("z_mm", "u_deg", "v_deg", "w_deg"),
         sources=(ErrorSource.of_lengths("touch_mm", 2),),
     )
     result = replace(result, sigma_stated=sigma_mm is not None)
@@ -111,15 +106,12 @@ def _with_interval(result: CalibrationResult, spread: Dispersion | None) -> Cali
     if spread is None:
         return replace(result, notes=notes)
     variance = (spread.sigma_mm * result.sigma_gain) ** 2
-    covariance = ((variance, 0.0), (0.0, variance))
     return replace(
         result,
         notes=notes,
-        covariance=covariance,
-        half_width95=spread.half_widths(covariance),
+        **interval_of(spread, (variance, variance), 2),
         sigma_mm=spread.sigma_mm,
         interval_from=spread.source,
-        region95_radius_mm=spread.sigma_mm * result.sigma_gain * spread.region_factor(2),
         budget=spread.budget(result.sigma_gain),
     )
 

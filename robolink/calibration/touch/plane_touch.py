@@ -27,7 +27,7 @@ from robolink.calibration.touch.surface_fit import (
 )
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.model import Pose, ToolOffset
+from robolink.model import Pose, ToolOffset, json_fields
 
 LEAST_TOUCHES = 7
 """Six unknowns; six touches may fit in more than one way."""
@@ -66,8 +66,7 @@ class PlaneTouchResult(CalibrationResult):
 
     def details(self) -> dict[str, object]:
         """Return the plane."""
-        plane = {"normal": list(self.plane.normal), "distance_mm": self.plane.distance_mm}
-        return {"plane": plane}
+        return {"plane": json_fields(self.plane, "normal", "distance_mm")}
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,7 +23,7 @@ import numpy as np
 
 from robolink.calibration.core.accuracy import ErrorSource
 from robolink.calibration.core.least_squares import Floats, LinearFit, linear_fit
-from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured
+from robolink.calibration.core.pose_checks import check_poses, components
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.statistics import student_t
 from robolink.calibration.flange_plane import require_flange_in_base
@@ -42,7 +42,6 @@ that is nearly zero does not show in the condition, for which all are brought to
 
 SURFACE_TOLERANCE = Tolerance(rms_mm=0.3, max_residual_mm=1.0)
 
-KEPT = ("u_deg", "v_deg", "w_deg")
 
 ResultT = TypeVar("ResultT", bound=CalibrationResult)
 
@@ -176,9 +175,7 @@ def tip_result(
     misses = -fit.residuals[:, None] * across
     result = kind(
         method=method,
-        offset=keep_unmeasured(stored, x_mm=x_mm, y_mm=y_mm, z_mm=z_mm),
-        measured=("x_mm", "y_mm", "z_mm"),
-        kept=KEPT,
+        **components(stored, x_mm=x_mm, y_mm=y_mm, z_mm=z_mm),
         reference_point_mm=place_mm,
         sigma_gain=math.sqrt(float(fit.unit_covariance.diagonal()[:3].max())),
         warnings=warnings,
@@ -186,7 +183,6 @@ def tip_result(
         residuals_mm=tuple(map(tuple, misses.tolist())),
         condition_number=fit.condition_number,
         rank=fit.rank,
-        unobservable=KEPT,
         sources=(ErrorSource.of_lengths("touch_mm", 3),),
         **surface,
     )

@@ -19,12 +19,13 @@ import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from robolink.calibration.core.accuracy import DIVISORS, BudgetRow, ErrorSource, UncertaintyBudget
 from robolink.calibration.core.least_squares import Floats, LinearFit, linear_fit
-from robolink.calibration.core.pose_checks import keep_unmeasured, require_finite, require_poses
+from robolink.calibration.core.pose_checks import components, require_finite, require_poses
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.statistics import NORMAL_95, f_quantile, shifted_half95, student_t95
 from robolink.calibration.flange_plane import FlangePlane, TipHeight, solvable_planes
@@ -204,8 +205,6 @@ USUAL_DECELERATION_MM_S2 = 300.0
 _SPEEDS_APART = 1.5
 """Speeds that differ by less than this factor do not tell the latency."""
 
-_KEPT = ("x_mm", "y_mm", "u_deg", "v_deg", "w_deg")
-
 
 @dataclass(frozen=True, slots=True)
 class Touch:
@@ -297,9 +296,9 @@ def solve_z_touch(
     alike = min(Counter(speeds).values())
     grid_mm = None if step_mm is None else step_mm * math.sqrt(alike)
     require_plausible(found, sigma_mm, step_mm=step_mm)
-    result = _result(found, len(touches), _length(plane, surface_z_mm, found.flange_z_mm, stored))
+    z_mm = _length(plane, surface_z_mm, found.flange_z_mm, stored)
     result = judged(
-        replace(result, offset=keep_unmeasured(stored, z_mm=result.offset.z_mm)),
+        _result(found, len(touches), components(stored, z_mm=z_mm)),
         found.fit.residuals[:, None],
         found.fit.unit_covariance[:1, :1] / plane.r33**2,
         unknowns=found.fit.rank,
@@ -318,13 +317,11 @@ def solve_z_touch(
     return _with_braking(result, half_mm, origin)
 
 
-def _result(found: TouchFit, count: int, z_mm: float) -> ZTouchResult:
+def _result(found: TouchFit, count: int, told: dict[str, Any]) -> ZTouchResult:
     warnings = ("few_poses",) if count < RECOMMENDED_TOUCHES else ()
     return ZTouchResult(
         method="z-touch",
-        offset=ToolOffset(z_mm=z_mm),
-        measured=("z_mm",),
-        kept=_KEPT,
+        **told,
         reference_point_mm=(),
         sigma_gain=found.gain,
         warnings=(*warnings, "overshoot") if found.overshoot_s2_per_mm is not None else warnings,
@@ -332,7 +329,6 @@ def _result(found: TouchFit, count: int, z_mm: float) -> ZTouchResult:
         residuals_mm=tuple((0.0, 0.0, residual) for residual in found.fit.residuals.tolist()),
         condition_number=found.fit.condition_number,
         rank=found.fit.rank,
-        unobservable=_KEPT,
         sources=(ErrorSource.of_lengths("plate_mm", 1),),
         latency_s=found.latency_s,
         flange_z_mm=found.flange_z_mm,

@@ -68,6 +68,16 @@ def status_from_flags(flags: StatusFlags, code: int) -> ControllerStatus:
     )
 
 
+def may_log_out(status: ControllerStatus) -> bool:
+    """Whether logging out does no harm.
+
+    While a task runs it raises an error on the controller (docs/reference/epson.md 1.1), so the
+    connection is just closed then. So it is when another device starts the cell: a task could
+    begin between the look and the logout.
+    """
+    return status.remote and not (status.running or status.paused)
+
+
 def require_ready(status: ControllerStatus, *, controller: str, request: str) -> None:
     """Hold back an Execute that the controller would refuse, naming the state.
 

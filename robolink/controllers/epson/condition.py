@@ -9,6 +9,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import Final
 
+from robolink.controllers.driver_link import DriverPart
 from robolink.controllers.epson.group import EpsonGroup
 from robolink.controllers.epson.link import EpsonLink
 from robolink.controllers.epson.tools import EpsonToolTable, PublishedTools
@@ -27,10 +28,11 @@ from robolink.protocols.epson_text import Preference
 _HIGHEST = 99_999
 
 
-class EpsonAlarms:
+class EpsonAlarms(DriverPart):
     """The alarms that stand. GetAlm exists from RC+ 7 on; older firmware refuses it (11)."""
 
     def __init__(self, link: EpsonLink) -> None:
+        super().__init__(link)
         self._session = link.session
         self._window = link.window
         self._lock = link.lock
@@ -50,7 +52,6 @@ class EpsonAlarms:
                     found=numbers,
                 ),
                 remedy=tr("Keep this text and report it with the controller's firmware version."),
-                controller=self._session.identity,
                 request="GetAlm",
             )
         return tuple(spel.parse_integer(number) for number in numbers)
@@ -78,8 +79,6 @@ class EpsonAlarms:
                     tr("Alarm {number} is still there after its reset.", number=number),
                     code=number,
                     remedy=tr("Remove the cause; the alarm list in RC+ names it."),
-                    controller=self._session.identity,
-                    request=request,
                 )
 
 

@@ -5,15 +5,21 @@ from functools import cached_property
 from typing import ClassVar
 
 from robolink.controllers.controller_core import ControllerCore
-from robolink.controllers.epson.answers import NOT_EXECUTED
+from robolink.controllers.epson.answers import NOT_EXECUTED, may_log_out, require_ready
 from robolink.controllers.epson.condition import ConditionReader, EpsonAlarms
-from robolink.controllers.epson.group import EpsonActs, EpsonGroup
+from robolink.controllers.epson.group import EpsonGroup
 from robolink.controllers.epson.line import EpsonLine, open_line
 from robolink.controllers.epson.link import EpsonLink, FactReader
 from robolink.controllers.epson.preserve import EpsonPreserver, EpsonResolver, PendingValues
-from robolink.controllers.epson.session import EpsonSession, command_class_of
+from robolink.controllers.epson.session import (
+    EpsonSession,
+    as_sent,
+    command_class_of,
+    execution,
+    log_in,
+)
 from robolink.controllers.epson.singularities import EpsonPoints
-from robolink.controllers.epson.tools import EpsonToolTable, PublishedReader, PublishedTools
+from robolink.controllers.epson.tools import EpsonToolTable, PublishedTools, read_published
 from robolink.controllers.epson.values import EpsonIo, EpsonVariables
 from robolink.controllers.epson.vision_looks import EpsonLooks
 from robolink.controllers.registry import ConnectionTerms
@@ -22,6 +28,9 @@ from robolink.errors import (
     ControllerFaultError,
     JournalError,
     LoginUnansweredError,
+    NotReadyError,
+    NotReadyReason,
+    ReadBackError,
     RejectedError,
 )
 from robolink.messages import tr
@@ -34,12 +43,14 @@ from robolink.model import (
     EntryKind,
     Marker,
     MarkerKind,
+    MotionProfile,
     NewEntry,
     OutcomeLog,
     Secret,
     Spot,
     require_engineer,
 )
+from robolink.protocols import spel
 from robolink.protocols.epson_text import Preference, Refusal, Reply, Request
 from robolink.protocols.spel import Statement
 from robolink.stop_latch import CommandClass
@@ -62,11 +73,10 @@ class EpsonController(ControllerCore):
     Example:
         >>> from robolink.controllers import EpsonController
         >>> from robolink.controllers.epson.line import open_line
-        >>> from robolink.controllers.epson.session import EpsonSession
+        >>> from robolink.controllers.epson.session import log_in
         >>> from robolink.journal import memory_journal
         >>> line = open_line("epson+sim://session-example", timeout_s=1)
-        >>> session = EpsonSession(line, timeout_s=1)
-        >>> session.login(None)
+        >>> session = log_in(line, None, timeout_s=1)
         >>> outcomes = memory_journal("session-example").log("session-example")
         >>> with EpsonController(session, outcomes, remote_timeout_s=60) as controller:
         ...     controller.status().ready
@@ -129,10 +139,6 @@ class EpsonController(ControllerCore):
     def _looks(self) -> EpsonLooks:
         return EpsonLooks(self._link, self.variables)
 
-    @cached_property
-    def _acts(self) -> EpsonActs:
-        return EpsonActs(self._link, self.groups[0])
-
     @property
     def exchanges(self) -> int:
         """Requests sent so far."""
@@ -147,7 +153,7 @@ class EpsonController(ControllerCore):
         Raises:
             ToolError: The table was being changed, or is of another version.
         """
-        return PublishedReader(self.variables).read()
+        return read_published(self.variables)
 
     def require_looks(self) -> None:
         """Find out whether the project publishes looks of its vision system; reads only.
@@ -189,7 +195,25 @@ class EpsonController(ControllerCore):
                 running, no remote control).
             ControllerFaultError: The error or the emergency stop is still there afterwards.
         """
-        self._acts.reset()
+        link, window = self._link, self._link.window
+        with link.lock.held("Reset", calming=True), link.latch.restoring():
+            self._require_resettable(window.status())
+            link.session.exchange("Reset")
+            status = window.status()
+            if status.emergency_stop:
+                raise ControllerFaultError(
+                    tr("The emergency stop is still pressed after the reset."),
+                    code=status.code,
+                    remedy=tr("Release the button, then reset again."),
+                )
+            if status.fault or status.serious_fault:
+                raise ControllerFaultError(
+                    tr("The reset did not clear error {code:04d}.", code=status.code),
+                    code=status.code,
+                    remedy=tr("Remove the cause; a serious error needs the power switched off."),
+                )
+            if status.remote and status.ready:
+                self.groups[0].settings.slow_down(MotionProfile())
 
     def motors(self, on: bool) -> None:
         """Switch the motors of the robot in force, and prove it.
@@ -198,20 +222,37 @@ class EpsonController(ControllerCore):
             NotReadyError: The state forbids it.
             ReadBackError: The motors are not as asked.
         """
-        self._acts.motors(on)
+        name, group = "SetMotorsOn" if on else "SetMotorsOff", self.groups[0]
+        with self._link.lock.held(name, calming=not on):
+            self._link.window.require_ready(name)
+            self._link.session.exchange(name, str(self.robot_number()))
+            if on:
+                group.settings.slow_down(MotionProfile())
+            if group.motors_on() is not on:
+                raise ReadBackError(
+                    tr("The motors are not on.") if on else tr("The motors are not off."),
+                    remedy=tr("Look at the controller; nothing was repeated."),
+                )
 
     def robot_number(self) -> int:
         """Read which robot motors and statements act on."""
-        return self._acts.robot_number()
+        (number,) = self._link.session.exchange("GetCurRobot").fields
+        return spel.parse_integer(number)
 
     def preview(self, act: Act) -> tuple[str, ...]:
         """Return the requests of an act, as they stand on the wire."""
-        return self._acts.preview(act)
+        if act is Act.STOP:
+            return tuple(as_sent(Request(request)) for request in ("Abort", "Stop"))
+        if act is Act.RESET:
+            return (as_sent(Request("Reset")),)
+        name = "SetMotorsOn" if act is Act.MOTORS_ON else "SetMotorsOff"
+        return (as_sent(Request(name, (str(self.robot_number()),))),)
 
     def execute_raw(self, statement: str) -> str:
         """Run a SPEL+ statement as it was typed, and put it on record.
 
-        Only here does text that a person typed reach the controller (docs/reference/rules.md 8). It
+        Only here does text that a person typed reach the controller, past the typed builders
+        (docs/reference/rules.md 8): marked before, and on record after. It
         has to be answered within the time-out, so it is not for movements.
 
         Args:
@@ -228,7 +269,25 @@ class EpsonController(ControllerCore):
             ControllerFaultError: It put the controller in error.
             OutcomeUnknownError: No answer came.
         """
-        return RawStatements(self._link).execute(statement)
+        request, link, markers = _typed_statement(statement), self._link, self._link.markers
+        with link.lock.held(request):
+            # Before an engineer's word for it goes on record.
+            markers.require_settled(request)
+            link.window.require_ready(request)
+            if command_class_of(execution(request)) is CommandClass.ACT:
+                link.window.require_abort()
+            require_engineer(markers.outcomes, tr("run {statement!r} as typed", statement=request))
+            with link.uninterrupted(), markers.ledger.block():
+                marker = markers.begin(MarkerKind.SET, request, {"raw": True})
+                link.forget_robot()
+                with markers.doubt(request):
+                    with markers.unless_stopped(marker):
+                        answer = link.session.ask(execution(request))
+                    self._require_run(request, answer, marker)
+                markers.ledger.proved(marker, None)
+                printed = answer.text or "" if isinstance(answer, Reply) else ""
+                markers.clear(marker, _raw_entry(marker, verdict=tr("carried out"), said=printed))
+        return printed
 
     def preferences(self) -> frozenset[Preference] | None:
         """Read the preferences that are on; asked once a connection.
@@ -243,20 +302,37 @@ class EpsonController(ControllerCore):
         reader = ConditionReader(self._link, self.alarms, self.tools, self.groups[0])
         return reader.read(published=self.published_tools)
 
+    def _require_resettable(self, status: ControllerStatus) -> None:
+        # The flag of an emergency stop stays on after its release until the reset
+        # (docs/reference/epson.md 1.7), so it cannot hold the reset back.
+        if status.serious_fault or status.running or not status.remote:
+            require_ready(status, controller=self._link.identity, request="Reset")
+        if status.guard_open:
+            raise NotReadyError(
+                tr("The safety guard is open."),
+                reason=NotReadyReason.GUARD_OPEN,
+                remedy=tr("Close it before the reset."),
+            )
+
+    def _require_run(self, statement: Statement, answer: Reply | Refusal, marker: Marker) -> None:
+        """Raise unless it ran; a plain refusal settles the marker."""
+        if isinstance(answer, Reply) and (answer.text is not None or answer.fields == ("0",)):
+            return
+        try:
+            raise self._link.window.failure(statement, answer)
+        except (RejectedError, ControllerFaultError) as error:
+            if error.code in NOT_EXECUTED and isinstance(error, RejectedError):
+                self._link.markers.clear(marker, _raw_entry(marker, verdict=error.what))
+            raise
+
     def _read_status(self) -> ControllerStatus:
         return self._link.window.status()
 
     def _take_leave(self) -> None:
-        """Abort what nobody waited on, and log out where that does no harm.
-
-        Logging out while a task runs raises an error on the controller
-        (docs/reference/epson.md 1.1), so the connection is just closed then. So it is when another
-        device starts the cell: a task could begin between the look and the logout.
-        """
+        """Abort what nobody waited on, and log out where that does no harm."""
         if self._link.session.alive:
             self.groups[0].abort_unfinished()
-            status = self.status()
-            if status.remote and not (status.running or status.paused):
+            if may_log_out(self.status()):
                 self._link.session.exchange("Logout")
 
     def _close_link(self) -> None:
@@ -321,64 +397,8 @@ def open_epson(
         ...     controller.tools.indices()[-1]
         15
     """
-    session = EpsonSession(line, timeout_s=timeout_s)
-    try:
-        session.login(password)
-        if session.outlived:
-            from robolink.controllers.epson.session import prove_in_step
-
-            prove_in_step(session)
-    except BaseException:
-        session.close()
-        raise
+    session = log_in(line, password, timeout_s=timeout_s)
     return EpsonController(session, outcomes, remote_timeout_s=remote_timeout_s)
-
-
-class RawStatements:
-    """Runs statements as they were typed, each marked before and on record after.
-
-    The one door past the typed builders (docs/reference/rules.md 8).
-    """
-
-    def __init__(self, link: EpsonLink) -> None:
-        self._link = link
-
-    def execute(self, text: str) -> str:
-        """See :meth:`robolink.controllers.EpsonController.execute_raw`."""
-        statement = _typed_statement(text)
-        with self._link.lock.held(statement):
-            # Before an engineer's word for it goes on record.
-            self._link.markers.require_settled(statement)
-            self._link.window.require_ready(statement)
-            if command_class_of(Request("Execute", (statement,))) is CommandClass.ACT:
-                self._link.window.require_abort(statement)
-            require_engineer(
-                self._link.markers.outcomes, tr("run {statement!r} as typed", statement=statement)
-            )
-            with self._link.uninterrupted(), self._link.markers.ledger.block():
-                marker = self._link.markers.begin(MarkerKind.SET, statement, {"raw": True})
-                self._link.forget_robot()
-                with self._link.markers.doubt(statement):
-                    with self._link.markers.unless_stopped(marker):
-                        answer = self._link.session.execute(statement)
-                    self._check(statement, answer, marker)
-                self._link.markers.ledger.proved(marker, None)
-                printed = answer.text or "" if isinstance(answer, Reply) else ""
-                self._link.markers.clear(
-                    marker, _raw_entry(marker, verdict=tr("carried out"), said=printed)
-                )
-        return printed
-
-    def _check(self, statement: Statement, answer: Reply | Refusal, marker: Marker) -> None:
-        """Raise unless it ran; a plain refusal settles the marker."""
-        if isinstance(answer, Reply) and (answer.text is not None or answer.fields == ("0",)):
-            return
-        try:
-            raise self._link.window.failure(statement, answer)
-        except (RejectedError, ControllerFaultError) as error:
-            if error.code in NOT_EXECUTED and isinstance(error, RejectedError):
-                self._link.markers.clear(marker, _raw_entry(marker, verdict=error.what))
-            raise
 
 
 def _typed_statement(text: str) -> Statement:

@@ -1,36 +1,26 @@
-"""The robot arm of an EPSON controller: where it is, and how it is told to go elsewhere.
-
-What a person asks of the whole controller: stop, reset, switch the motors.
-"""
+"""The robot arm of an EPSON controller: where it is, and how it is told to go elsewhere."""
 
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
-from robolink.controllers.epson.answers import require_ready
 from robolink.controllers.epson.link import EpsonLink
 from robolink.controllers.epson.movement import (
     EpsonMotion,
     EpsonMotionUntilInput,
     Settings,
-    read_input,
-    statement_until,
 )
 from robolink.controllers.epson.rest import bring_to_rest
-from robolink.controllers.epson.session import as_sent, executes
+from robolink.controllers.epson.session import executes
 from robolink.controllers.epson.singularities import SingularPlaces, read_position
 from robolink.controllers.motion_group import MotionGroupCore
 from robolink.errors import (
-    ControllerFaultError,
     NotReadyError,
     NotReadyReason,
-    ReadBackError,
     StoppedError,
 )
 from robolink.messages import joined, tr
 from robolink.model import (
-    Act,
-    ControllerStatus,
     InputEdge,
     MotionProfile,
     MotionTerms,
@@ -39,7 +29,6 @@ from robolink.model import (
     WorkBox,
 )
 from robolink.protocols import spel
-from robolink.protocols.epson_text import Request
 from robolink.ways import Way, way
 
 _PRINTED_MM: Final = 0.001
@@ -60,7 +49,7 @@ class EpsonGroup(MotionGroupCore):
     def __init__(self, link: EpsonLink, *, remote_timeout_s: float) -> None:
         super().__init__(link)
         self._link = link
-        self.settings = Settings(link.window, identity=link.identity)
+        self.settings = Settings(link)
         self._remote_timeout_s = remote_timeout_s
         self._current: EpsonMotion | None = None
 
@@ -99,12 +88,13 @@ class EpsonGroup(MotionGroupCore):
 
         def look_at_input() -> None:
             link.preferences.require_real_inputs(statement)
-            on = read_input(window, edge.number)
+            # Through Execute, as the statement that follows will see it.
+            on = spel.parse_integer(window.printed(spel.print_input(edge.number))) != 0
             edge.require_ahead(on, controller=link.identity, request=statement)
 
         profile = MotionProfile(Path.STRAIGHT, speed_mm_s=speed_mm_s)
         motion = self._start(target, profile, statement, last_look=look_at_input)
-        return EpsonMotionUntilInput(motion, edge, window, identity=link.identity)
+        return EpsonMotionUntilInput(motion, edge, link)
 
     def requests_until(
         self, target: Pose, edge: InputEdge, *, speed_mm_s: float
@@ -141,9 +131,10 @@ class EpsonGroup(MotionGroupCore):
 
     def require_able(self, purpose: str) -> None:
         """Refuse what no movement could begin in now; see :class:`robolink.model.MotionGroup`."""
-        self._require_supervision(purpose)
-        self._link.window.require_ready(purpose)
-        self._require_motors(purpose)
+        with self._link.asked(purpose):
+            self._require_supervision()
+            self._link.window.require_ready(purpose)
+            self._require_motors()
 
     def terms(self) -> MotionTerms:
         """Read what a person must know before the robot moves."""
@@ -216,12 +207,12 @@ class EpsonGroup(MotionGroupCore):
             with link.lock.held(statement):
                 # Before power and speed are set for it.
                 link.markers.require_settled(statement)
-                self._require_supervision(statement)
+                self._require_supervision()
                 window.require_ready(statement)
                 link.preferences.require_real_motion(statement)
-                self._require_motors(statement)
+                self._require_motors()
                 found = spel.parse_integer(window.printed(spel.print_selected_tool()))
-                self._require_tool(target, found, statement)
+                self._require_tool(target, found)
                 singular = self._singular
                 if singular is not None:
                     singular.require_clear(self._flagged(target), profile.path)
@@ -251,7 +242,9 @@ class EpsonGroup(MotionGroupCore):
         return build(self._flagged(target), six_axes=self._six_axes)
 
     def _statement_until(self, target: Pose, edge: InputEdge) -> spel.Statement:
-        return statement_until(self._flagged(target), edge, six_axes=self._six_axes)
+        build = spel.move_find if edge.run_on else spel.move_till
+        on, six_axes = not edge.falling, self._six_axes
+        return build(self._flagged(target), edge.number, on=on, six_axes=six_axes)
 
     @property
     def _six_axes(self) -> bool:
@@ -277,7 +270,7 @@ class EpsonGroup(MotionGroupCore):
             target, hand=target.hand or here.hand, posture=target.posture or here.posture
         )
 
-    def _require_supervision(self, statement: str) -> None:
+    def _require_supervision(self) -> None:
         # With a remote time-out of 0 the robot may keep moving when this PC is gone
         # (docs/reference/epson.md 1.1). The value cannot be read over the wire; a person states it.
         if self._remote_timeout_s <= 0:
@@ -289,96 +282,13 @@ class EpsonGroup(MotionGroupCore):
                     "{timeout}; without it a lost link leaves a moving robot unwatched.",
                     timeout=way(Way.REMOTE_TIMEOUT),
                 ),
-                controller=self._link.identity,
-                request=statement,
             )
-        self._link.window.require_abort(statement)
+        self._link.window.require_abort()
 
-    def _require_motors(self, statement: str) -> None:
+    def _require_motors(self) -> None:
         if not self.motors_on():
             raise NotReadyError(
                 tr("The motors are off."),
                 reason=NotReadyReason.MOTORS_OFF,
                 remedy=tr("Run 'robolink robot motors on' when the cell is clear."),
-                controller=self._link.identity,
-                request=statement,
-            )
-
-
-class EpsonActs:
-    """Carries them out and proves them."""
-
-    def __init__(self, link: EpsonLink, group: EpsonGroup) -> None:
-        self._link = link
-        self._session = link.session
-        self._window = link.window
-        self._group = group
-
-    def reset(self) -> None:
-        """See :meth:`~robolink.controllers.EpsonController.reset_fault`."""
-        with self._link.lock.held("Reset", calming=True), self._link.latch.restoring():
-            self._require_resettable(self._window.status())
-            self._session.exchange("Reset")
-            status = self._window.status()
-            if status.emergency_stop:
-                raise ControllerFaultError(
-                    tr("The emergency stop is still pressed after the reset."),
-                    code=status.code,
-                    remedy=tr("Release the button, then reset again."),
-                    controller=self._link.identity,
-                    request="Reset",
-                )
-            if status.fault or status.serious_fault:
-                raise ControllerFaultError(
-                    tr("The reset did not clear error {code:04d}.", code=status.code),
-                    code=status.code,
-                    remedy=tr("Remove the cause; a serious error needs the power switched off."),
-                    controller=self._link.identity,
-                    request="Reset",
-                )
-            if status.remote and status.ready:
-                self._group.settings.slow_down(MotionProfile())
-
-    def motors(self, on: bool) -> None:
-        """See :meth:`~robolink.controllers.EpsonController.motors`."""
-        name = "SetMotorsOn" if on else "SetMotorsOff"
-        with self._link.lock.held(name, calming=not on):
-            self._window.require_ready(name)
-            self._session.exchange(name, str(self.robot_number()))
-            if on:
-                self._group.settings.slow_down(MotionProfile())
-            if self._group.motors_on() is not on:
-                raise ReadBackError(
-                    tr("The motors are not on.") if on else tr("The motors are not off."),
-                    remedy=tr("Look at the controller; nothing was repeated."),
-                    controller=self._link.identity,
-                    request=name,
-                )
-
-    def robot_number(self) -> int:
-        """Read which robot motors and statements act on."""
-        (number,) = self._session.exchange("GetCurRobot").fields
-        return spel.parse_integer(number)
-
-    def preview(self, act: Act) -> tuple[str, ...]:
-        """Return the requests of an act, as they stand on the wire."""
-        if act is Act.STOP:
-            return tuple(as_sent(Request(request)) for request in ("Abort", "Stop"))
-        if act is Act.RESET:
-            return (as_sent(Request("Reset")),)
-        name = "SetMotorsOn" if act is Act.MOTORS_ON else "SetMotorsOff"
-        return (as_sent(Request(name, (str(self.robot_number()),))),)
-
-    def _require_resettable(self, status: ControllerStatus) -> None:
-        # The flag of an emergency stop stays on after its release until the reset
-        # (docs/reference/epson.md 1.7), so it cannot hold the reset back.
-        if status.serious_fault or status.running or not status.remote:
-            require_ready(status, controller=self._link.identity, request="Reset")
-        if status.guard_open:
-            raise NotReadyError(
-                tr("The safety guard is open."),
-                reason=NotReadyReason.GUARD_OPEN,
-                remedy=tr("Close it before the reset."),
-                controller=self._link.identity,
-                request="Reset",
             )

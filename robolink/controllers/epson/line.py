@@ -1,19 +1,38 @@
-"""The line to a controller: its bytes, and the frames in which both ends speak.
+"""The line to a controller, and the one conversation that is held on it.
 
 Over TCP, and in process, that is Remote Ethernet; on a serial line Remote RS232, whose frames are
-loaded only there, since a stop is timed (docs/decisions/0017).
-What an unanswered or a refused login means stands here too: a stop needs nothing else of the
-answers.
+loaded only there, since a stop is timed (docs/decisions/0017). For the same reason a refusal is
+put into words by a module that is loaded when one comes.
+
+A stop holds the conversation as it stands here: it has no record beside it, nothing of its own can
+be pending, and what turns up unasked, such as the late answer to the Execute that it ends, is
+passed over. A session (:mod:`robolink.controllers.epson.session`) takes nothing unasked but the
+answer to its own Execute, and adds the lock and the latch.
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import TYPE_CHECKING, Final
 
-from robolink.errors import LoginRefusedError, LoginUnansweredError, RejectedError
+from robolink.errors import (
+    LoginRefusedError,
+    LoginUnansweredError,
+    RejectedError,
+    RemoteProtocolError,
+    TransportBrokenError,
+    TransportTimeoutError,
+)
 from robolink.messages import tr
-from robolink.protocols import Role
-from robolink.protocols.epson_text import EpsonTextCodec, ErrorCode, Event
-from robolink.timing import Clock
+from robolink.protocols import NEED_DATA, Role
+from robolink.protocols.epson_text import (
+    EndOfStream,
+    EpsonCodec,
+    EpsonTextCodec,
+    ErrorCode,
+    Refusal,
+    Reply,
+    Request,
+)
+from robolink.timing import Clock, Deadline
 from robolink.transport import LinkUrl, TraceSink, TracingTransport, Transport, open_transport
 from robolink.ways import Way, way
 
@@ -23,26 +42,6 @@ if TYPE_CHECKING:
 
 SERIAL: Final = "serial"
 """The medium of Remote RS232."""
-
-
-class LineCodec(Protocol):
-    """What cuts the bytes of a line into events, and makes bytes of them."""
-
-    @property
-    def bytes_held(self) -> bytes:
-        """What has arrived and is part of no event yet."""
-
-    def carries(self, name: str, *parameters: str) -> bool:
-        """Whether a command can be sent, with these parameters where any are given."""
-
-    def send(self, event: Event) -> bytes:
-        """Return the bytes of one message."""
-
-    def receive_data(self, data: bytes) -> None:
-        """Take what was received; ``b""`` means that the far side closed."""
-
-    def next_event(self) -> object:
-        """Return the next event, or ``NEED_DATA``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +55,7 @@ class EpsonLine:
     """
 
     transport: Transport
-    codec: LineCodec
+    codec: EpsonCodec
     outlives_sessions: bool = False
 
     def require_carried(self, name: str, *parameters: str) -> None:
@@ -135,25 +134,166 @@ def _turned_on(transport: Transport, dialect: "Dialect") -> EpsonLine:
     return EpsonLine(transport, codec, outlives_sessions=True)
 
 
-PASSWORD_REFUSALS: Final = (13, 98)
+_PASSWORD_REFUSALS: Final = (13, 98)
 """The password is wrong, or one is demanded (docs/reference/epson.md 1.6)."""
 
+_STRAYS: Final = 16
+"""As many answers to questions that nobody asked are no controller's."""
 
-def unanswered(controller: str) -> LoginUnansweredError:
-    """Return the error for a controller that is reached and does not answer the login."""
+
+class EpsonConversation:
+    """Requests and answers on one line, one after the other.
+
+    Attributes:
+        identity: Which controller this is.
+        clock: The clock on which the controller's time passes.
+        timeout_s: Longest wait for the answer to one request that moves nothing.
+
+    Args:
+        line: An open line; it is owned from here on.
+        timeout_s: See above.
+    """
+
+    def __init__(self, line: EpsonLine, *, timeout_s: float) -> None:
+        self._line = line
+        self._codec = line.codec
+        self._transport = line.transport
+        self.identity, self.clock = line.transport.identity, line.transport.clock
+        self.timeout_s = timeout_s
+        self._passed_over = 0
+
+    def login(self, password: str) -> None:
+        """Log in, with an empty password where none is set. One attempt.
+
+        Raises:
+            LoginRefusedError: The password is wrong (13) or one is demanded (98).
+            LoginUnansweredError: No answer; most likely another client is logged in.
+        """
+        try:
+            answer = self.ask(Request("Login", (password,)), secret=True)
+        except (TransportTimeoutError, TransportBrokenError) as error:
+            raise _unanswered(self.identity) from error
+        if isinstance(answer, Refusal):
+            self.close()
+            if answer.code in _PASSWORD_REFUSALS:
+                raise _refused(answer.code)
+            raise self._rejected(answer, "Login")
+
+    def exchange(self, name: str, *parameters: str) -> Reply:
+        """Send one request and return its answer.
+
+        Raises:
+            RejectedError: The controller refused; it did not act.
+            BusyError: An Execute is running and this request is not legal meanwhile.
+            TransportError, RemoteProtocolError: The conversation is over.
+        """
+        answer = self.ask(Request(name, parameters))
+        if isinstance(answer, Refusal):
+            raise self._rejected(answer, name)
+        return answer
+
+    def ask(self, request: Request, *, secret: bool = False) -> Reply | Refusal:
+        """Send one request and return whatever was answered.
+
+        Args:
+            request: It moves nothing, so that its answer comes within the time-out.
+            secret: Whether the traces may not see it.
+        """
+        self._line.require_carried(request.name, *request.parameters)
+        self._passed_over = 0
+        data = self._codec.send(request)
+        deadline = Deadline.after(self.clock, self.timeout_s)
+        self._transport.send(data, deadline=deadline, secret=secret)
+        return self._receive(request, deadline)
+
+    def close(self) -> None:
+        """Close the connection. Idempotent."""
+        self._transport.close()
+
+    def _receive(self, request: Request, deadline: Deadline) -> Reply | Refusal:
+        """Read until the answer to a request that was sent has come."""
+        wanted = request.name.lower()
+        while True:
+            try:
+                data = self._transport.receive(deadline=deadline)
+            except TransportTimeoutError as error:
+                self._require_none_held(request, error)
+                raise
+            self._codec.receive_data(data)
+            while (event := self._codec.next_event()) is not NEED_DATA:
+                if isinstance(event, (Reply, Refusal)) and self._answers(event, wanted):
+                    return event
+                # A login that was bent on its way comes back in its refusal, password and all.
+                self._take_aside(event, hidden=wanted == "login")
+
+    def _require_none_held(self, request: Request, error: TransportTimeoutError) -> None:
+        """Say where a time-out cut an answer: the controller is there, unlike without any."""
+        if held := self._codec.bytes_held:
+            raise TransportTimeoutError(
+                tr(
+                    "{identity} answered {count} bytes, then nothing: {request}.",
+                    identity=self.identity,
+                    count=len(held),
+                    request=as_shown(request),
+                ),
+                remedy=error.remedy,
+                request=as_shown(request),
+                raw=held,
+            ) from error
+
+    def _answers(self, event: Reply | Refusal, wanted: str) -> bool:
+        """Whether it answers the request of that name, in small letters.
+
+        A refusal may come without a readable name (docs/reference/epson.md 1.6, unverified).
+        """
+        name = event.name.lower()
+        return name == wanted or (isinstance(event, Refusal) and not name)
+
+    def _take_aside(self, event: object, *, hidden: bool = False) -> None:  # noqa: ARG002 - not shown
+        """Pass over what is no answer to the request that is out.
+
+        Args:
+            event: What it is.
+            hidden: Whether it may hold a password.
+        """
+        if isinstance(event, EndOfStream):
+            raise self._closed_by_far_end()
+        self._passed_over += 1
+        if self._passed_over >= _STRAYS:
+            raise RemoteProtocolError(
+                tr("{identity} sent an answer to a question nobody asked.", identity=self.identity),
+                remedy=tr("Look for a second program on this controller."),
+            )
+
+    def _rejected(self, refusal: Refusal, name: str) -> RejectedError:
+        from robolink.controllers.epson.answers import rejected
+
+        return rejected(refusal, controller=self.identity, request=name)
+
+    def _closed_by_far_end(self) -> TransportBrokenError:
+        return TransportBrokenError(
+            tr("{identity} closed the connection.", identity=self.identity),
+            remedy=tr("Check cable, power and remote time-out of the controller, then try again."),
+        )
+
+
+def as_shown(request: Request) -> str:
+    """Return a request as a person may read it. Never the parameters of a login."""
+    return request.parameters[0] if request.name == "Execute" else request.name
+
+
+def _unanswered(controller: str) -> LoginUnansweredError:
     return LoginUnansweredError(
         tr("{identity} can be reached, but does not answer the login.", identity=controller),
         remedy=tr(
             "Only one client may be logged in: close the other one. If there is none, "
             "check that this port is the controller's Remote Ethernet port."
         ),
-        controller=controller,
         request="Login",
     )
 
 
-def refused(code: int, controller: str) -> LoginRefusedError:
-    """Return the error for a password that the controller does not take."""
+def _refused(code: int) -> LoginRefusedError:
     return LoginRefusedError(
         tr("The controller refused the login (code {code}).", code=code),
         code=code,
@@ -162,6 +302,5 @@ def refused(code: int, controller: str) -> LoginRefusedError:
             "{password}. No second attempt was made.",
             password=way(Way.PASSWORD),
         ),
-        controller=controller,
         request="Login",
     )

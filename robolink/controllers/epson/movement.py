@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from robolink.controllers.epson.link import EpsonLink
 from robolink.controllers.epson.session import PendingExecute
 from robolink.controllers.epson.singularities import read_position
-from robolink.controllers.epson.window import CommandWindow
 from robolink.controllers.motion_group import not_ended_in_time, stopped_before_edge
 from robolink.errors import (
     ControllerFaultError,
@@ -81,7 +80,7 @@ class EpsonMotion:
             raise
         if not arrived:
             self.abort()
-            raise not_ended_in_time(self._link.identity, self.statement, timeout_s)
+            raise not_ended_in_time(self.statement, timeout_s)
         return self._settle()
 
     def abort(self) -> None:
@@ -177,40 +176,22 @@ class EpsonMotionUntilInput:
     keeps none: it is the measured position at rest, past the edge by the way of braking.
     """
 
-    def __init__(
-        self, motion: EpsonMotion, edge: InputEdge, window: CommandWindow, *, identity: str
-    ) -> None:
+    def __init__(self, motion: EpsonMotion, edge: InputEdge, link: EpsonLink) -> None:
         self._motion = motion
         self._edge = edge
-        self._window = window
-        self._identity = identity
+        self._link = link
 
     def wait(self, *, timeout_s: float) -> Pose | None:
         """Wait for the end; see :class:`robolink.model.MotionUntilInput`."""
         if self._motion.wait(timeout_s=timeout_s) is not MotionOutcome.ARRIVED:
-            raise stopped_before_edge(self._identity, self._motion.statement)
+            raise stopped_before_edge(self._link.identity, self._motion.statement)
         if self._edge.run_on:
             met, position = spel.print_position_found(), spel.print_found_position()
         else:
             met, position = spel.print_till_on(), spel.print_real_position()
-        if not spel.parse_boolean(self._window.printed(met)):
+        if not spel.parse_boolean(self._link.window.printed(met)):
             return None
-        return read_position(self._window, position)
-
-
-def statement_until(target: Pose, edge: InputEdge, *, six_axes: bool) -> spel.Statement:
-    """Return the move that waits for an edge.
-
-    Raises:
-        LocalProtocolError: No such input, or a target that cannot be written.
-    """
-    build = spel.move_find if edge.run_on else spel.move_till
-    return build(target, edge.number, on=not edge.falling, six_axes=six_axes)
-
-
-def read_input(window: CommandWindow, bit: int) -> bool:
-    """Read one input through Execute, as the statement that follows will see it."""
-    return spel.parse_integer(window.printed(spel.print_input(bit))) != 0
+        return read_position(self._link.window, position)
 
 
 _SLACK = 0.0005
@@ -230,9 +211,9 @@ class PowerAndSpeed:
 class Settings:
     """Reads, limits and restores power and speed."""
 
-    def __init__(self, window: CommandWindow, *, identity: str) -> None:
-        self._window = window
-        self._identity = identity
+    def __init__(self, link: EpsonLink) -> None:
+        self._link = link
+        self._window = link.window
 
     def read(self) -> PowerAndSpeed:
         """Read what is in force."""
@@ -270,7 +251,7 @@ class Settings:
                 tr("The controller does not confirm low power and the speed that was set."),
                 reason=NotReadyReason.HIGH_POWER,
                 remedy=tr("Nothing was moved. Check the power mode on the controller."),
-                controller=self._identity,
+                controller=self._link.identity,
                 request=spel.power_low(),
             )
 
@@ -295,7 +276,7 @@ class Settings:
                 tr("The previous power mode and speed could not be put back."),
                 reason=NotReadyReason.HIGH_POWER,
                 remedy=tr("Check Power, Speed and SpeedS before you start the cell."),
-                controller=self._identity,
+                controller=self._link.identity,
             )
 
     def power_high(self) -> bool:

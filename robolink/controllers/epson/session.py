@@ -1,4 +1,4 @@
-"""One login on an EPSON controller: a line and a lock.
+"""One login on an EPSON controller: the conversation on its line, a lock, and a latch.
 
 Theory of operation. Remote Ethernet has no transaction numbers; an answer is known by its
 name and by its place in line (docs/reference/epson.md 1.1). So at most two requests are
@@ -11,32 +11,25 @@ A time-out, a broken link or an answer that nobody asked for ends the session fo
 bytes die with the connection and can never be taken for the answer to a later question
 (docs/reference/faults.md F01, F06, F09).
 
-Requests as they stand on the wire: for a person to read, and for a stop to judge.
-
 What a request does is judged from the text that leaves, not from who sends it: one that nobody
 thought of counts as acting, and is held back while a stop is in force.
-
-After the login on a serial line: the answers are those to the questions.
-
-The line that opens does without this, because a stop does.
 """
 
 import re
-from collections.abc import Iterable, Iterator
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Iterable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Final
 
 from robolink import ambient
 from robolink.checkpoints import Checkpoint, checkpoint
-from robolink.controllers.epson.answers import rejected
-from robolink.controllers.epson.line import PASSWORD_REFUSALS, EpsonLine, refused, unanswered
+from robolink.controllers.epson.line import EpsonConversation, EpsonLine, as_shown
 from robolink.errors import (
     BusyError,
+    Concerning,
     RejectedError,
     RemoteProtocolError,
     RobolinkError,
-    TransportBrokenError,
     TransportClosedError,
     TransportError,
     TransportTimeoutError,
@@ -100,9 +93,14 @@ def as_sent(request: Request) -> str:
     return EpsonTextCodec(Role.HOST).send(request).decode("ascii").rstrip()
 
 
+def execution(statement: Statement) -> Request:
+    """Return the request that runs a statement."""
+    return Request("Execute", (statement,))
+
+
 def executes(statements: Iterable[Statement]) -> tuple[str, ...]:
     """Return the lines that run statements."""
-    return tuple(as_sent(Request("Execute", (statement,))) for statement in statements)
+    return tuple(as_sent(execution(statement)) for statement in statements)
 
 
 @dataclass(slots=True)
@@ -118,13 +116,12 @@ _SHOWN = 120
 """Characters of an unexpected answer in a sentence; a text may be thousands long."""
 
 
-class EpsonSession:
-    """Requests and answers on one connection.
+class EpsonSession(EpsonConversation):
+    """A conversation that several threads may share, and that ends for good when it is in doubt.
 
     Attributes:
-        identity: Which controller this is.
         place: Where it was reached, the same for each spelling of the URL.
-        clock: The clock on which the controller's time passes.
+        exchanges: Requests sent so far.
         latch: What holds requests back while a stop is in force.
 
     Args:
@@ -133,18 +130,15 @@ class EpsonSession:
     """
 
     def __init__(self, line: EpsonLine, *, timeout_s: float = 3.0) -> None:
-        self._line = line
-        self._transport = transport = line.transport
-        self.identity, self.place, self.clock = transport.identity, transport.place, transport.clock
-        self._codec = line.codec
+        super().__init__(line, timeout_s=timeout_s)
+        self.place = line.transport.place
+        self.exchanges = 0
         self._wire = ambient.lock()
         self._gate = InterruptGate()
         self._gate.open()
         self._pending: PendingExecute | None = None
         self._ended_by: RobolinkError | None = None
-        self.latch = StopLatch(transport.identity)
-        self.timeout_s = timeout_s
-        self.exchanges = 0
+        self.latch = StopLatch(self.identity)
 
     @property
     def alive(self) -> bool:
@@ -156,65 +150,50 @@ class EpsonSession:
         """The Execute that has not been taken as finished, if any."""
         return self._pending
 
-    @property
-    def outlived(self) -> bool:
-        """Whether bytes of an earlier session may still come: it is a serial line."""
-        return self._line.outlives_sessions
-
     def carries(self, name: str) -> bool:
         """Whether a command of this name can be sent over this line."""
         return self._codec.carries(name)
 
-    def login(self, password: Secret | None) -> None:
-        """Log in. One attempt.
-
-        Raises:
-            LoginRefusedError: The password is wrong (13) or one is demanded (98).
-            LoginUnansweredError: No answer; most likely another client is logged in.
-        """
-        request = Request("Login", (password.reveal() if password else "",))
+    def ask(self, request: Request, *, secret: bool = False) -> Reply | Refusal:
+        """Send one request and return whatever was answered; see :class:`EpsonConversation`."""
+        what = self._announced(request)
         try:
-            answer = self._ask(request, secret=True)
-        except (TransportTimeoutError, TransportBrokenError) as error:
-            raise unanswered(self.identity) from error
-        if isinstance(answer, Refusal):
-            self.close()
-            if answer.code in PASSWORD_REFUSALS:
-                raise refused(answer.code, self.identity)
-            raise rejected(answer, controller=self.identity)
-
-    def exchange(self, name: str, *parameters: str) -> Reply:
-        """Send one request and return its answer.
-
-        Raises:
-            RejectedError: The controller refused; it did not act.
-            BusyError: An Execute is running and this request is not legal meanwhile.
-            TransportError, RemoteProtocolError: The session is over.
-        """
-        answer = self._ask(Request(name, parameters))
-        if isinstance(answer, Refusal):
-            raise rejected(answer, controller=self.identity)
-        return answer
-
-    def execute(self, statement: Statement) -> Reply | Refusal:
-        """Run a statement that moves nothing and return whatever was answered."""
-        return self._ask(Request("Execute", (statement,)))
+            with self._gate, self._wire:
+                self._admit(request, what)
+                try:
+                    self._expect_silence()
+                    data = self._codec.send(request)
+                    deadline = Deadline.after(self.clock, self.timeout_s)
+                    self._transport.send(data, deadline=deadline, secret=secret)
+                    self.exchanges += 1
+                    return self._receive(request, deadline)
+                except RobolinkError as error:
+                    self._end(error)
+                    raise
+        finally:
+            checkpoint(Checkpoint.EXCHANGE, what)
 
     def start_execute(self, statement: Statement) -> PendingExecute:
         """Send a statement that takes its time; its answer is collected by name later."""
-        request = Request("Execute", (statement,))
-        with self._exchanging(request):
-            pending = PendingExecute(statement)
-            try:
-                self._expect_silence()
-                # What the codec refuses never leaves, and nothing would end the wait for it. From
-                # here on some of it may leave, however the sending ends.
-                data = self._codec.send(request)
-                self._pending = pending
-                self._transmit(data, secret=False)
-            except RobolinkError as error:
-                self._end(error)
-                raise
+        request, pending = execution(statement), PendingExecute(statement)
+        what = self._announced(request)
+        try:
+            with self._gate, self._wire:
+                self._admit(request, what)
+                try:
+                    self._expect_silence()
+                    # What the codec refuses never leaves, and nothing would end the wait for it.
+                    # From here on some of it may leave, however the sending ends.
+                    data = self._codec.send(request)
+                    self._pending = pending
+                    deadline = Deadline.after(self.clock, self.timeout_s)
+                    self._transport.send(data, deadline=deadline)
+                    self.exchanges += 1
+                except RobolinkError as error:
+                    self._end(error)
+                    raise
+        finally:
+            checkpoint(Checkpoint.EXCHANGE, what)
         return pending
 
     def uninterrupted(self) -> AbstractContextManager[None]:
@@ -259,37 +238,9 @@ class EpsonSession:
                     self._end(error)
                     raise
 
-    @contextmanager
-    def _exchanging(self, request: Request) -> Iterator[None]:
-        """Hold the exchange lock for ``request``, once it is legal and no stop forbids it."""
-        what = self._announced(request)
-        try:
-            with self._gate, self._wire:
-                self._admit(request, what)
-                yield
-        finally:
-            checkpoint(Checkpoint.EXCHANGE, what)
-
-    def _ask(self, request: Request, *, secret: bool = False) -> Reply | Refusal:
-        # As ``_exchanging``, but written out: a generator would cost each exchange a tenth of what
-        # the driver takes for it, and a function about it would make its way longer.
-        what = self._announced(request)
-        try:
-            with self._gate, self._wire:
-                self._admit(request, what)
-                try:
-                    self._expect_silence()
-                    deadline = self._transmit(self._codec.send(request), secret=secret)
-                    return self._receive(request, deadline)
-                except RobolinkError as error:
-                    self._end(error)
-                    raise
-        finally:
-            checkpoint(Checkpoint.EXCHANGE, what)
-
     def _announced(self, request: Request) -> str:
         """Return a request that this line can carry as a person may read it, before the lock."""
-        what = _shown(request)
+        what = as_shown(request)
         if not self._codec.carries(request.name, *request.parameters):
             self._line.require_carried(request.name, *request.parameters)
         checkpoint(Checkpoint.LOCK, what)
@@ -325,50 +276,10 @@ class EpsonSession:
                     request=request.name,
                 )
 
-    def _transmit(self, data: bytes, *, secret: bool) -> Deadline:
-        deadline = Deadline.after(self.clock, self.timeout_s)
-        self._transport.send(data, deadline=deadline, secret=secret)
-        self.exchanges += 1
-        return deadline
-
-    def _receive(self, request: Request, deadline: Deadline) -> Reply | Refusal:
-        wanted = request.name.lower()
-        while True:
-            # What had arrived before was judged before the request was sent.
-            self._codec.receive_data(self._heard(request, deadline))
-            while (event := self._codec.next_event()) is not NEED_DATA:
-                if isinstance(event, (Reply, Refusal)) and self._answers(event, wanted):
-                    return event
-                # A login that was bent on its way comes back in its refusal, password and all.
-                self._take_aside(event, hidden=wanted == "login")
-
-    def _heard(self, request: Request, deadline: Deadline) -> bytes:
-        try:
-            return self._transport.receive(deadline=deadline)
-        except TransportTimeoutError as error:
-            if not (held := self._codec.bytes_held):
-                raise
-            # Half an answer is another trouble than none: the controller is there.
-            raise TransportTimeoutError(
-                tr(
-                    "{identity} answered {count} bytes, then nothing: {request}.",
-                    identity=self.identity,
-                    count=len(held),
-                    request=_shown(request),
-                ),
-                remedy=error.remedy,
-                controller=self.identity,
-                request=_shown(request),
-                raw=held,
-            ) from error
-
     def _answers(self, event: Reply | Refusal, wanted: str) -> bool:
         name = event.name.lower()
-        if name == wanted:
-            return True
-        # A refusal may come without a readable name (docs/reference/epson.md 1.6, unverified); it
-        # can be ours only when nothing else is outstanding.
-        return isinstance(event, Refusal) and not name and self._pending is None
+        # One without a name can be ours only when nothing else is outstanding.
+        return name == wanted or (isinstance(event, Refusal) and not name and self._pending is None)
 
     def _expect_silence(self) -> None:
         """Read what has arrived unasked; only the pending Execute may answer by itself.
@@ -388,13 +299,7 @@ class EpsonSession:
 
     def _take_aside(self, event: object, *, hidden: bool = False) -> None:
         if isinstance(event, EndOfStream):
-            raise TransportBrokenError(
-                tr("{identity} closed the connection.", identity=self.identity),
-                remedy=tr(
-                    "Check cable, power and remote time-out of the controller, then try again."
-                ),
-                controller=self.identity,
-            )
+            raise self._closed_by_far_end()
         pending = self._pending
         if (
             isinstance(event, (Reply, Refusal))
@@ -413,7 +318,6 @@ class EpsonSession:
                 "The connection is closed, because later answers could be mistaken. Connect "
                 "again; if it happens twice, look for a second program on this controller."
             ),
-            controller=self.identity,
         )
 
     def _end(self, error: RobolinkError) -> None:
@@ -425,12 +329,27 @@ class EpsonSession:
             self._transport.close()
 
 
-def _shown(request: Request) -> str:
-    """Return a request as a person may read it. Never the parameters of a login."""
-    return request.parameters[0] if request.name == "Execute" else request.name
+def log_in(line: EpsonLine, password: Secret | None, *, timeout_s: float) -> EpsonSession:
+    """Log in over a line, which is closed when that fails.
+
+    Raises:
+        LoginRefusedError: Wrong or missing password. One attempt is made.
+        LoginUnansweredError: Nobody answers; another client may be logged in.
+        RemoteProtocolError: The answers on a serial line are not those to the questions.
+    """
+    session = EpsonSession(line, timeout_s=timeout_s)
+    try:
+        with Concerning(session.identity):
+            session.login(password.reveal() if password else "")
+        if line.outlives_sessions:
+            _prove_in_step(session)
+    except BaseException:
+        session.close()
+        raise
+    return session
 
 
-def prove_in_step(session: EpsonSession) -> None:
+def _prove_in_step(session: EpsonSession) -> None:
     """See that an answer belongs to its question, on a line that outlives its sessions.
 
     No other request is answered with the letter of GetCurRobot, and nothing else asks for it so

@@ -15,8 +15,9 @@ from typing import Final
 from robolink.controllers.epson.link import EpsonLink
 from robolink.controllers.epson.session import as_sent
 from robolink.controllers.epson.values import EpsonVariables
+from robolink.controllers.epson.window import CommandWindow
 from robolink.controllers.tool_table import ToolTableCore
-from robolink.controllers.tool_writing import ToolWrite
+from robolink.controllers.tool_writing import Same, ToolWrite
 from robolink.errors import RejectedError, RemoteProtocolError, ToolError
 from robolink.messages import tr
 from robolink.model import Expected, ToolOffset, ToolReceipt
@@ -57,7 +58,7 @@ class EpsonToolTable(ToolTableCore):
     def read_all(self) -> dict[int, ToolOffset | None]:
         """Read all fifteen from one TLSet listing; it is empty when none is defined."""
         self._window.require_ready("TLSet")
-        listed = spel.parse_tool_listing(self._listing())
+        listed = spel.parse_tool_listing(_listing(self._window))
         return {tool: listed.get(tool) for tool in self.indices()}
 
     def selected(self) -> int | None:
@@ -75,7 +76,9 @@ class EpsonToolTable(ToolTableCore):
                 self._link.robot.read(name)
                 self._link.preferences.require_real(name)
             statement = self._statement(tool, requested)
-            return _FlashWrite(self, self._link, tool, requested, statement).change(expected)
+            return _FlashWrite(self._link, tool, requested, statement, same=self.same).change(
+                expected
+            )
 
     def _statement(self, tool: int, requested: ToolOffset | None) -> spel.Statement:
         if requested is None:
@@ -107,39 +110,7 @@ class EpsonToolTable(ToolTableCore):
         self._window.require_ready(request)
 
     def _stored(self, tool: int) -> ToolOffset | None:
-        # What TLSet(n) gives for an undefined tool is not documented, so that is asked first.
-        defined = self._window.printed(spel.print_tool_defined(tool))
-        return self.printed(tool) if spel.parse_boolean(defined) else None
-
-    def stored(self, tool: int) -> ToolOffset | None:
-        """Read a tool for the proof of its write."""
-        return self._stored(tool)
-
-    def printed(self, tool: int) -> ToolOffset:
-        """Read a tool that is known to be defined."""
-        point = spel.parse_point(self._window.printed(spel.print_tool(tool)))
-        return ToolOffset(*point.coordinates)
-
-    def before(
-        self, tool: int, requested: ToolOffset | None, expected: Expected
-    ) -> ToolOffset | None:
-        """Read what a write replaces.
-
-        The list of all tools takes one question, and whatever is in it is defined. How it looks
-        is not documented, so it is believed only where it confirms what was expected to the last
-        digit; and not on six axes, where it may leave V and W out.
-        """
-        with self._window.proving_ready(f"TLSet {tool}"):
-            if isinstance(expected, ToolOffset) and not self._link.robot.read().six_axes:
-                listing = self._listing()
-                with suppress(RemoteProtocolError):
-                    listed = spel.parse_tool_listing(listing).get(tool)
-                    if self.same(listed, expected) and not self.same(listed, requested):
-                        return listed
-            return self._stored(tool)
-
-    def _listing(self) -> str:
-        return self._window.printed(spel.list_tools(), may_be_nothing=True)
+        return _stored_tool(self._window, tool)
 
     def _select_request(self, tool: int) -> str:
         return spel.select_tool(tool)
@@ -159,29 +130,57 @@ class _FlashWrite(ToolWrite):
 
     def __init__(
         self,
-        table: EpsonToolTable,
         link: EpsonLink,
         tool: int,
         requested: ToolOffset | None,
         statement: spel.Statement,
+        *,
+        same: Same,
     ) -> None:
-        super().__init__(link, tool, requested, statement, same=table.same)
-        self._table = table
-        self._window = link.window
+        super().__init__(link, tool, requested, statement, same=same)
+        self._window, self._robot = link.window, link.robot
         self._statement = statement
 
     def read_before(self, expected: Expected) -> ToolOffset | None:
-        return self._table.before(self.tool, self.requested, expected)
+        """Read what a write replaces.
+
+        The list of all tools takes one question, and whatever is in it is defined. How it looks
+        is not documented, so it is believed only where it confirms what was expected to the last
+        digit; and not on six axes, where it may leave V and W out.
+        """
+        with self._window.proving_ready(f"TLSet {self.tool}"):
+            if isinstance(expected, ToolOffset) and not self._robot.read().six_axes:
+                listing = _listing(self._window)
+                with suppress(RemoteProtocolError):
+                    listed = spel.parse_tool_listing(listing).get(self.tool)
+                    if self._same(listed, expected) and not self._same(listed, self.requested):
+                        return listed
+            return _stored_tool(self._window, self.tool)
 
     def send(self) -> None:
         self._window.command(self._statement)
 
     def read_back(self) -> ToolOffset | None:
         # A tool that was set just now is defined.
-        return self.read_doubted() if self.requested is None else self._table.printed(self.tool)
+        return self.read_doubted() if self.requested is None else _printed(self._window, self.tool)
 
     def read_doubted(self) -> ToolOffset | None:
-        return self._table.stored(self.tool)
+        return _stored_tool(self._window, self.tool)
+
+
+def _listing(window: CommandWindow) -> str:
+    return window.printed(spel.list_tools(), may_be_nothing=True)
+
+
+def _stored_tool(window: CommandWindow, tool: int) -> ToolOffset | None:
+    # What TLSet(n) gives for an undefined tool is not documented, so that is asked first.
+    defined = window.printed(spel.print_tool_defined(tool))
+    return _printed(window, tool) if spel.parse_boolean(defined) else None
+
+
+def _printed(window: CommandWindow, tool: int) -> ToolOffset:
+    """Read a tool that is known to be defined."""
+    return ToolOffset(*spel.parse_point(window.printed(spel.print_tool(tool))).coordinates)
 
 
 LAYOUT: Final = 1
@@ -213,51 +212,41 @@ class PublishedTools:
     publication: int
 
 
-class PublishedReader:
-    """Reads the companion's variables, and a torn table again."""
+def read_published(variables: EpsonVariables) -> PublishedTools | None:
+    """Read the companion's variables, and a torn table again.
 
-    def __init__(self, variables: EpsonVariables) -> None:
-        self._variables = variables
+    Returns:
+        The table, ``None`` where the project publishes none.
 
-    def read(self) -> PublishedTools | None:
-        """Return the table, ``None`` where the project publishes none.
+    Raises:
+        ToolError: It was being changed at every attempt, or was arranged by another
+            version of the companion.
+        RejectedError: The controller refused for another reason.
+    """
 
-        Raises:
-            ToolError: It was being changed at every attempt, or was arranged by another
-                version of the companion.
-            RejectedError: The controller refused for another reason.
-        """
-        try:
-            for _ in range(_ATTEMPTS):
-                # The program counts up the one before and the other after it changes the
-                # table; read the other way about, equal counts enclose a whole table.
-                publication = self._whole(_END)
-                state = self._wholes()
-                table = self._numbers()
-                if self._whole(_BEGIN) == publication:
-                    return _understood(publication, state, table)
-        except RejectedError as error:
-            if error.code == ErrorCode.NO_SUCH_VARIABLE:
-                return None
-            raise
-        raise ToolError(
-            tr("The published tool table was being changed at each of {n} readings.", n=_ATTEMPTS),
-            remedy=tr(
-                "Try again. If it stays so, the program was stopped in the middle of "
-                "RobolinkPublish; its next call puts that right."
-            ),
-        )
+    def whole(name: str) -> int:
+        return int(variables.read(name, VariableType.LONG))
 
-    def _whole(self, name: str) -> int:
-        return int(self._variables.read(name, VariableType.LONG))
-
-    def _wholes(self) -> tuple[int, ...]:
-        values = self._variables.read_array(_STATE, (0,), VariableType.LONG, count=_STATE_COUNT)
-        return tuple(int(value) for value in values)
-
-    def _numbers(self) -> tuple[float, ...]:
-        values = self._variables.read_array(_TABLE, (0,), VariableType.DOUBLE, count=_TABLE_COUNT)
-        return tuple(float(value) for value in values)
+    try:
+        for _ in range(_ATTEMPTS):
+            # The program counts up the one before and the other after it changes the
+            # table; read the other way about, equal counts enclose a whole table.
+            publication = whole(_END)
+            state = variables.read_array(_STATE, (0,), VariableType.LONG, count=_STATE_COUNT)
+            table = variables.read_array(_TABLE, (0,), VariableType.DOUBLE, count=_TABLE_COUNT)
+            if whole(_BEGIN) == publication:
+                return _understood(publication, tuple(map(int, state)), tuple(map(float, table)))
+    except RejectedError as error:
+        if error.code == ErrorCode.NO_SUCH_VARIABLE:
+            return None
+        raise
+    raise ToolError(
+        tr("The published tool table was being changed at each of {n} readings.", n=_ATTEMPTS),
+        remedy=tr(
+            "Try again. If it stays so, the program was stopped in the middle of "
+            "RobolinkPublish; its next call puts that right."
+        ),
+    )
 
 
 def _understood(

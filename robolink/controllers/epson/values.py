@@ -14,14 +14,13 @@ Source: docs/reference/epson.md 1.2 note 4; ranges: docs/reference/spel.md 2.
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from decimal import Decimal
 from operator import eq
-from typing import Final, Generic
+from typing import Final
 
-from robolink.controllers.driver_link import MarkedCommand
+from robolink.controllers.driver_link import DriverPart, MarkedCommand
 from robolink.controllers.epson.link import EpsonLink
-from robolink.controllers.epson.session import EpsonSession, as_sent
+from robolink.controllers.epson.session import as_sent
 from robolink.errors import ConfigError, ReadBackError, RejectedError, RemoteProtocolError
 from robolink.messages import tr
 from robolink.model import Marker, NewEntry, Value, ValueReceipt, ValueT
@@ -29,11 +28,11 @@ from robolink.protocols import spel
 from robolink.protocols.epson_text import Reply, Request, VariableType
 
 
-@dataclass(frozen=True, slots=True)
-class Change(Generic[ValueT]):
+class ValueChange(MarkedCommand[ValueT]):
     """One value to set.
 
-    Attributes:
+    Args:
+        link: The controller.
         request: What sets it.
         item: What it is, in plain values, for whoever settles a doubt later.
         requested: The new value.
@@ -41,26 +40,29 @@ class Change(Generic[ValueT]):
         same: Tells whether two values are equal for this controller.
     """
 
-    request: Request
-    item: tuple[str, ...]
-    requested: ValueT
-    read: Callable[[], ValueT]
-    same: Callable[[ValueT, ValueT], bool]
-
-
-class ValueSetter:
-    """Carries out a :class:`Change`."""
-
-    def __init__(self, link: EpsonLink) -> None:
+    def __init__(
+        self,
+        link: EpsonLink,
+        request: Request,
+        item: tuple[str, ...],
+        requested: ValueT,
+        read: Callable[[], ValueT],
+        same: Callable[[ValueT, ValueT], bool],
+    ) -> None:
+        super().__init__(as_sent(request))
         self._link = link
+        self._sent = request
+        self._item = item
+        self._requested = requested
+        self._read = read
+        self._same = same
 
-    def preview(self, change: Change[ValueT]) -> tuple[str, ...]:
+    def preview(self) -> tuple[str, ...]:
         """Return the requests that :meth:`carry_out` would send besides its reads."""
-        request = as_sent(change.request)
-        self._link.window.require_ready(request)
-        return () if change.same(change.read(), change.requested) else (request,)
+        self._link.window.require_ready(self.request)
+        return () if self._same(self.read(), self._requested) else (self.request,)
 
-    def carry_out(self, change: Change[ValueT]) -> ValueReceipt[ValueT]:
+    def carry_out(self) -> ValueReceipt[ValueT]:
         """Set the value and prove it.
 
         Raises:
@@ -69,52 +71,41 @@ class ValueSetter:
             ReadBackError: Another value is there afterwards.
             OutcomeUnknownError: No answer came; motion is blocked until ``recover``.
         """
-        request = as_sent(change.request)
+        request, requested = self.request, self._requested
         with self._link.lock.held(request):
             self._link.window.require_ready(request)
-            before = change.read()
-            if change.same(before, change.requested):
-                return ValueReceipt(request, before, change.requested, before, skipped=True)
-            found = self._link.carry_out(_Setting(change, request, before, self._link.session))
-        if not change.same(found, change.requested):
+            self._before = before = self.read()
+            if self._same(before, requested):
+                return ValueReceipt(request, before, requested, before, skipped=True)
+            found = self._link.carry_out(self)
+        if not self._same(found, requested):
             raise ReadBackError(
                 tr(
                     "{request} was accepted, but reads back as {found!r} instead of {requested!r}.",
                     request=request,
                     found=found,
-                    requested=change.requested,
+                    requested=requested,
                 ),
                 remedy=tr("A program or the PLC may set it too. Nothing was repeated."),
-                controller=self._link.identity,
                 request=request,
             )
-        return ValueReceipt(request, before, change.requested, found, skipped=False)
-
-
-class _Setting(MarkedCommand[ValueT]):
-    """The sending of one value."""
-
-    def __init__(
-        self, change: Change[ValueT], request: str, before: ValueT, session: EpsonSession
-    ) -> None:
-        super().__init__(request)
-        self._change = change
-        self._before = before
-        self._session = session
+        return ValueReceipt(request, before, requested, found, skipped=False)
 
     @property
     def details(self) -> Mapping[str, object]:
-        change = self._change
-        item = list(change.item)
-        return {"item": item, "before": self._before, "requested": change.requested}
+        """What it is, the old value and the new one."""
+        return {"item": list(self._item), "before": self._before, "requested": self._requested}
 
     def send(self) -> None:
-        self._session.exchange(self._change.request.name, *self._change.request.parameters)
+        """Send the request."""
+        self._link.session.exchange(self._sent.name, *self._sent.parameters)
 
     def read(self) -> ValueT:
-        return self._change.read()
+        """Read the value that is there."""
+        return self._read()
 
-    def refusal(self, marker: Marker, error: RejectedError) -> Iterable[NewEntry]:  # noqa: ARG002 - none is kept
+    def refusal(self, marker: Marker, error: RejectedError) -> Iterable[NewEntry]:  # noqa: ARG002 - see below
+        """Put nothing on record: the old value is there."""
         return ()
 
 
@@ -127,7 +118,7 @@ _BYTE: Final = re.compile("[0-9A-Fa-f]{2}")
 _WORD: Final = re.compile("[0-9A-Fa-f]{4}")
 
 
-class EpsonIo:
+class EpsonIo(DriverPart):
     """Bits, counted from 0; a byte is eight of them, a word sixteen, lowest bit first.
 
     Reading inputs and memory is legal at any time, while production runs and for a client
@@ -139,9 +130,10 @@ class EpsonIo:
     """
 
     def __init__(self, link: EpsonLink) -> None:
+        super().__init__(link)
+        self._link = link
         self._session = link.session
         self._window = link.window
-        self._setter = ValueSetter(link)
 
     def read_input(self, bit: int) -> bool:
         """Read one input."""
@@ -186,27 +178,29 @@ class EpsonIo:
                 function.
             OutcomeUnknownError: No answer came.
         """
-        return self._setter.carry_out(self._output(bit, on))
+        return self._output(bit, on).carry_out()
 
     def preview_output(self, bit: int, on: bool) -> tuple[str, ...]:
         """Return what :meth:`set_output` would send besides its reads; reads only."""
-        return self._setter.preview(self._output(bit, on))
+        return self._output(bit, on).preview()
 
     def set_memory(self, bit: int, on: bool) -> ValueReceipt[bool]:
         """Switch one memory bit and read it back; raises as :meth:`set_output`."""
-        return self._setter.carry_out(self._memory(bit, on))
+        return self._memory(bit, on).carry_out()
 
     def preview_memory(self, bit: int, on: bool) -> tuple[str, ...]:
         """Return what :meth:`set_memory` would send besides its reads; reads only."""
-        return self._setter.preview(self._memory(bit, on))
+        return self._memory(bit, on).preview()
 
-    def _output(self, bit: int, on: bool) -> Change[bool]:
+    def _output(self, bit: int, on: bool) -> ValueChange[bool]:
         request = _switch("SetIO", bit, on)
-        return Change(request, ("output", str(bit)), on, lambda: self.read_output(bit), eq)
+        item = ("output", str(bit))
+        return ValueChange(self._link, request, item, on, lambda: self.read_output(bit), eq)
 
-    def _memory(self, bit: int, on: bool) -> Change[bool]:
+    def _memory(self, bit: int, on: bool) -> ValueChange[bool]:
         request = _switch("SetMemIO", bit, on)
-        return Change(request, ("memory", str(bit)), on, lambda: self.read_memory(bit), eq)
+        item = ("memory", str(bit))
+        return ValueChange(self._link, request, item, on, lambda: self.read_memory(bit), eq)
 
     def _number(self, name: str, at: int, form: re.Pattern[str]) -> int:
         reply = self._session.exchange(name, str(_checked(at)))
@@ -218,7 +212,6 @@ class EpsonIo:
         return RemoteProtocolError(
             tr("The controller answered {name} with {answer!r}.", name=name, answer=reply.fields),
             remedy=tr("Keep this text and report it with the controller's firmware version."),
-            controller=self._session.identity,
             request=name,
             raw=",".join(reply.fields).encode("utf-8", "backslashreplace"),
         )
@@ -255,7 +248,7 @@ _RELATIVE: Final = {VariableType.REAL: 5e-6, VariableType.DOUBLE: 5e-14}
 """Half of the last of the valid digits, 6 and 14 (docs/reference/spel.md 2)."""
 
 
-class EpsonVariables:
+class EpsonVariables(DriverPart):
     """Variables that the project in the controller declares Global Preserve.
 
     Reading is legal at any time, while production runs and for a client that may only
@@ -267,8 +260,9 @@ class EpsonVariables:
     """
 
     def __init__(self, link: EpsonLink) -> None:
+        super().__init__(link)
+        self._link = link
         self._session = link.session
-        self._setter = ValueSetter(link)
 
     def text(self, name: str) -> str:
         """Read a variable of any type, as the controller writes it."""
@@ -321,7 +315,6 @@ class EpsonVariables:
                     found=len(fields),
                 ),
                 remedy=tr("Keep this text and report it with the controller's firmware version."),
-                controller=self._session.identity,
                 request=f"GetVariable,{element}",
             )
         return tuple(_from_text(field, kind) for field in fields)
@@ -334,15 +327,16 @@ class EpsonVariables:
             ReadBackError: Another value is there afterwards.
             OutcomeUnknownError: No answer came.
         """
-        return self._setter.carry_out(self._change(name, value, variable_type(kind)))
+        return self._change(name, value, variable_type(kind)).carry_out()
 
     def preview_write(self, name: str, value: Value, kind: VariableType | str) -> tuple[str, ...]:
         """Return what :meth:`write` would send besides its reads; reads only."""
-        return self._setter.preview(self._change(name, value, variable_type(kind)))
+        return self._change(name, value, variable_type(kind)).preview()
 
-    def _change(self, name: str, value: Value, kind: VariableType) -> Change[Value]:
+    def _change(self, name: str, value: Value, kind: VariableType) -> ValueChange[Value]:
         request = Request("SetVariable", (_checked_name(name), _to_text(value, kind), kind))
-        return Change(
+        return ValueChange(
+            self._link,
             request,
             ("variable", name, kind),
             value,

@@ -57,7 +57,7 @@ class EpsonLooks:
             ConfigError: It does not.
         """
         try:
-            self._whole(_END)
+            _whole(self._variables, _END)
         except RejectedError as error:
             if error.code != ErrorCode.NO_SUCH_VARIABLE:
                 raise
@@ -66,7 +66,6 @@ class EpsonLooks:
                 remedy=tr(
                     "Write it with 'robolink expert spel export', add it to the project, build."
                 ),
-                controller=self._link.identity,
             ) from error
 
     def look(self, mark: int, *, program: int) -> tuple[Spot, ...]:
@@ -76,70 +75,28 @@ class EpsonLooks:
         shown = as_sent(request)
         with self._link.lock.held(shown):
             self._link.window.require_ready(shown)
-            before = self._whole(_END)
-            failure, places = self._link.carry_out(_Look(self, request, before))
+            look = _Look(self._link, self._variables, request)
+            failure, places = self._link.carry_out(look)
         if failure:
             text = self._link.window.error_text(failure)
             raise ControllerFaultError(
                 tr("The vision program ended with error {code}: {text}", code=failure, text=text),
                 code=failure,
                 remedy=tr("Check its sequences, their calibration and the camera in RC+."),
-                controller=self._link.identity,
                 request=shown,
             )
         return places
-
-    def start(self, request: Request) -> None:
-        """Send what starts the program."""
-        self._link.session.exchange(request.name, *request.parameters)
-
-    def result(self, request: Request, before: int) -> tuple[int, tuple[Spot, ...]]:
-        """Wait for the end of the program; return its error, 0 for none, and what it saw.
-
-        Raises:
-            OutcomeUnknownError: It did not end well, or published nothing: what it did instead
-                only a person can tell.
-        """
-        clock = self._link.clock
-        until, unseen = Deadline.after(clock, _LONGEST_S), Deadline.after(clock, _UNSEEN_S)
-        while True:
-            status = self._link.window.status()
-            if not status.running and status.ready and (end := self._whole(_END)) != before:
-                break
-            stands = not status.running and unseen.remaining_s() <= 0
-            if stands or status.fault or status.emergency_stop or until.remaining_s() <= 0:
-                raise self._failed(request, status.code)
-            clock.sleep(_POLL_S)
-        failure, count = self._whole(_ERROR), self._whole(_COUNT)
-        numbers = self._numbers(count) if 0 < count <= _MOST_PLACES else ()
-        if self._whole(_BEGIN) != end or not 0 <= count <= _MOST_PLACES:
-            raise self._failed(request, 0)
-        return failure, tuple(map(Spot, numbers[::2], numbers[1::2]))
-
-    def _failed(self, request: Request, code: int) -> OutcomeUnknownError:
-        cause = ControllerFaultError(
-            tr("The vision program did not end as it should, or published nothing."),
-            code=code,
-            controller=self._link.identity,
-        )
-        return self._link.markers.unproved(as_sent(request), cause)
-
-    def _whole(self, name: str) -> int:
-        return int(self._variables.read(name, VariableType.LONG))
-
-    def _numbers(self, count: int) -> tuple[float, ...]:
-        values = self._variables.read_array(_PLACES, (0,), VariableType.DOUBLE, count=2 * count)
-        return tuple(float(value) for value in values)
 
 
 class _Look(MarkedCommand[tuple[int, tuple[Spot, ...]]]):
     """The start of the program, marked until it is known to be over."""
 
-    def __init__(self, looks: EpsonLooks, request: Request, before: int) -> None:
-        super().__init__(as_sent(request))
-        self._looks = looks
-        self._start = request
-        self._before = before
+    def __init__(self, link: EpsonLink, variables: EpsonVariables, start: Request) -> None:
+        super().__init__(as_sent(start))
+        self._link = link
+        self._variables = variables
+        self._start = start
+        self._before = _whole(variables, _END)
 
     @property
     def details(self) -> Mapping[str, object]:
@@ -147,10 +104,47 @@ class _Look(MarkedCommand[tuple[int, tuple[Spot, ...]]]):
         return {"raw": True}
 
     def send(self) -> None:
-        self._looks.start(self._start)
+        self._link.session.exchange(self._start.name, *self._start.parameters)
 
     def read(self) -> tuple[int, tuple[Spot, ...]]:
-        return self._looks.result(self._start, self._before)
+        """Wait for the end of the program; return its error, 0 for none, and what it saw.
+
+        Raises:
+            OutcomeUnknownError: It did not end well, or published nothing: what it did instead
+                only a person can tell.
+        """
+        clock, variables = self._link.clock, self._variables
+        until, unseen = Deadline.after(clock, _LONGEST_S), Deadline.after(clock, _UNSEEN_S)
+        while True:
+            status = self._link.window.status()
+            rests = not status.running and status.ready
+            if rests and (end := _whole(variables, _END)) != self._before:
+                break
+            stands = not status.running and unseen.remaining_s() <= 0
+            if stands or status.fault or status.emergency_stop or until.remaining_s() <= 0:
+                raise self._failed(status.code)
+            clock.sleep(_POLL_S)
+        failure, count = _whole(variables, _ERROR), _whole(variables, _COUNT)
+        numbers = self._numbers(count) if 0 < count <= _MOST_PLACES else ()
+        if _whole(variables, _BEGIN) != end or not 0 <= count <= _MOST_PLACES:
+            raise self._failed(0)
+        return failure, tuple(map(Spot, numbers[::2], numbers[1::2]))
 
     def refusal(self, marker: Marker, error: RejectedError) -> Iterable[NewEntry]:  # noqa: ARG002 - none is kept
         return ()
+
+    def _failed(self, code: int) -> OutcomeUnknownError:
+        cause = ControllerFaultError(
+            tr("The vision program did not end as it should, or published nothing."),
+            code=code,
+            controller=self._link.identity,
+        )
+        return self._link.markers.unproved(self.request, cause)
+
+    def _numbers(self, count: int) -> tuple[float, ...]:
+        values = self._variables.read_array(_PLACES, (0,), VariableType.DOUBLE, count=2 * count)
+        return tuple(float(value) for value in values)
+
+
+def _whole(variables: EpsonVariables, name: str) -> int:
+    return int(variables.read(name, VariableType.LONG))

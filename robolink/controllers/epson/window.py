@@ -1,7 +1,7 @@
 """Statements run through Execute, as if typed in the controller's command window."""
 
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from functools import lru_cache
 
 from robolink.controllers.epson.answers import (
@@ -10,7 +10,7 @@ from robolink.controllers.epson.answers import (
     require_ready,
     status_from_flags,
 )
-from robolink.controllers.epson.session import EpsonSession
+from robolink.controllers.epson.session import EpsonSession, execution
 from robolink.errors import (
     ControllerFaultError,
     NotReadyError,
@@ -41,10 +41,6 @@ class CommandWindow:
         self._session = session
         self._was_ready = False
 
-    def uninterrupted(self) -> AbstractContextManager[None]:
-        """Hold Ctrl-C back over statements that belong together; it is raised at their end."""
-        return self._session.uninterrupted()
-
     def status(self) -> ControllerStatus:
         """Read the flags; legal at any time after the login."""
         return _status(self._session.exchange("GetStatus"))
@@ -61,7 +57,7 @@ class CommandWindow:
         self._was_ready = True
         return status
 
-    def require_abort(self, request: str) -> None:
+    def require_abort(self) -> None:
         """Hold back what could not be ended over this line once it runs.
 
         While a statement runs, Abort alone ends it (docs/reference/epson.md 1.5), and no manual
@@ -80,8 +76,6 @@ class CommandWindow:
                 "expert verify-controller' that the controller knows the letter A, "
                 "and write letters=guessed into the URL."
             ),
-            controller=self._session.identity,
-            request=request,
         )
 
     @contextmanager
@@ -112,7 +106,7 @@ class CommandWindow:
             ControllerFaultError: It failed and put the controller in error.
             UnclearAnswerError: The answer says neither.
         """
-        self.check(statement, self._session.execute(statement))
+        self.check(statement, self._session.ask(execution(statement)))
 
     def printed(self, query: Statement, *, may_be_nothing: bool = False) -> str:
         """Run a statement that prints, and return what it printed.
@@ -124,7 +118,7 @@ class CommandWindow:
         Raises:
             RejectedError, ControllerFaultError: As for :meth:`command`.
         """
-        answer = self._session.execute(query)
+        answer = self._session.ask(execution(query))
         if isinstance(answer, Reply) and answer.text is not None:
             # A failed statement may be answered by a text too; the flags would show it.
             if not answer.text.lstrip().startswith("!"):

@@ -12,13 +12,14 @@ from pathlib import Path
 from typing import ClassVar, Final, NoReturn
 
 from robolink.controllers.controller_core import ControllerCore
+from robolink.controllers.driver_link import DriverPart
 from robolink.controllers.motion_group import MotionGroupCore
-from robolink.controllers.plc_map.link import MappedPlc, RegisterClient, Registers
+from robolink.controllers.plc_map.link import MappedPlc, RegisterClient
 from robolink.controllers.plc_map.slots import OffsetValues
 from robolink.controllers.plc_map.tools import RegisterResolver, RegisterToolTable
 from robolink.controllers.preserving import Preserver
 from robolink.controllers.registry import ConnectionTerms
-from robolink.errors import ConfigError, RejectedError
+from robolink.errors import Concerning, ConfigError, RejectedError
 from robolink.messages import tr
 from robolink.model import (
     Act,
@@ -36,12 +37,13 @@ from robolink.transport import LinkUrl, open_modbus
 from robolink.ways import Way, way
 
 
-class MappedInputs:
+class MappedInputs(DriverPart):
     """Reads inputs by the number that the map gives them."""
 
-    def __init__(self, registers: Registers, register_map: RegisterMap) -> None:
-        self._registers = registers
-        self._inputs = register_map.inputs
+    def __init__(self, plc: MappedPlc) -> None:
+        super().__init__(plc)
+        self._registers = plc.registers
+        self._inputs = plc.register_map.inputs
 
     def names(self) -> dict[int, str]:
         """Return the inputs of the map and what people call them."""
@@ -72,7 +74,6 @@ class MappedInputs:
         raise RejectedError(
             tr("Output {number} was not switched: a PLC map has no outputs.", number=bit),
             remedy=tr("Switch it at the machine."),
-            controller=self._registers.identity,
         )
 
     def preview_output(self, bit: int, on: bool) -> NoReturn:
@@ -94,7 +95,7 @@ class FlangeReader(MotionGroupCore):
         self._registers = plc.registers
         self._flange = plc.register_map.flange
         self._name = plc.register_map.name
-        self._values = OffsetValues(plc.register_map, plc.identity)
+        self._values = OffsetValues(plc.register_map)
 
     @property
     def name(self) -> str:
@@ -115,7 +116,6 @@ class FlangeReader(MotionGroupCore):
                     "map, if the PLC has registers for it.",
                     poses=way(Way.GIVEN_POSES),
                 ),
-                controller=self._registers.identity,
             )
         span = span_of(self._flange)
         table = self._flange["x"].table
@@ -193,7 +193,7 @@ class PlcMapController(ControllerCore):
     @cached_property
     def io(self) -> MappedInputs:
         """The inputs that the map names."""
-        return MappedInputs(self._plc.registers, self.register_map)
+        return MappedInputs(self._plc)
 
     @cached_property
     def resolver(self) -> RegisterResolver:
@@ -358,9 +358,10 @@ def open_plc_map(
     register_map, url, simulated = _with_map(url)
     client = open_modbus(url, timeout_s=timeout_s, clock=clock)
     try:
-        controller = PlcMapController(
-            client, register_map, outcomes(client.identity), simulated=simulated
-        )
+        with Concerning(client.identity):
+            controller = PlcMapController(
+                client, register_map, outcomes(client.identity), simulated=simulated
+            )
     except BaseException:
         client.close()
         raise

@@ -36,7 +36,7 @@ class Handshake:
         """Whether the PLC says that it has taken values over."""
         return self._commit.kind is not CommitKind.NONE
 
-    def make_ready(self, request: str) -> None:
+    def make_ready(self) -> None:
         """Take an old request back, and refuse while the PLC cannot be asked.
 
         A request that stands was left by a client that died; nothing follows from ending it.
@@ -49,7 +49,7 @@ class Handshake:
         if asked is not None and self._registers.is_on(asked):
             self._registers.switch(asked, on=False, kind=CommandClass.CALM)
         deadline = Deadline.after(self._registers.clock, self._commit.timeout_s)
-        while (hindrance := self._hindrance(request)) is not None:
+        while (hindrance := self._hindrance()) is not None:
             if deadline.expired:
                 raise hindrance
             self._registers.clock.sleep(_POLL_S)
@@ -62,7 +62,7 @@ class Handshake:
         """
         self._registers.clock.sleep(self._commit.timeout_s)
 
-    def carry_out(self, tool: int, request: str) -> None:
+    def carry_out(self, tool: int) -> None:
         """Have the PLC take over what stands in the registers.
 
         Raises:
@@ -77,16 +77,14 @@ class Handshake:
             registers.write(commit.tool_number.address, [tool])
         registers.switch(commit.request, on=True)
         try:
-            code = self._answered(commit.request, request)
+            code = self._answered(commit.request)
         except RejectedError as error:  # of a look or of taking back: the PLC may have acted
-            raise self._unknown(error.what, request) from error
+            raise self._unknown(error.what) from error
         if code is not None:
             raise RejectedError(
                 tr("The PLC refused the new value: {error}.", error=self._error_in_words(code)),
                 code=code,
                 remedy=tr("The old value stays. Remove the cause, then try again."),
-                controller=registers.identity,
-                request=request,
             )
 
     def requests(self, tool: int) -> tuple[str, ...]:
@@ -120,19 +118,19 @@ class Handshake:
         """Whether the PLC says that it is busy."""
         return self._registers.is_on(self._commit.busy)
 
-    def _answered(self, asked: Signal, request: str) -> int | None:
+    def _answered(self, asked: Signal) -> int | None:
         """Wait for the answer and take the request back.
 
         Returns:
             The number of an error that came instead of the answer, ``None`` for none.
         """
-        code = self._answer(asked, request)
+        code = self._answer(asked)
         self._registers.switch(asked, on=False, kind=CommandClass.CALM)
         if code is None and self._commit.kind is CommitKind.COMMIT_BIT:
-            self._let_go(request)
+            self._let_go()
         return code
 
-    def _answer(self, asked: Signal, request: str) -> int | None:
+    def _answer(self, asked: Signal) -> int | None:
         timeout_s = self._commit.timeout_s
         deadline = Deadline.after(self._registers.clock, timeout_s)
         while True:
@@ -143,24 +141,22 @@ class Handshake:
                 with suppress(RobolinkError):  # what is said below holds in any case
                     self._registers.switch(asked, on=False, kind=CommandClass.CALM)
                 raise self._unknown(
-                    tr("It did not answer the request within {timeout:g} s.", timeout=timeout_s),
-                    request,
+                    tr("It did not answer the request within {timeout:g} s.", timeout=timeout_s)
                 )
             self._registers.clock.sleep(_POLL_S)
 
-    def _let_go(self, request: str) -> None:
+    def _let_go(self) -> None:
         """Wait until the answer has gone with the request."""
         timeout_s = self._commit.timeout_s
         deadline = Deadline.after(self._registers.clock, timeout_s)
         while self._registers.is_on(self._commit.answer):
             if deadline.expired:
                 raise self._unknown(
-                    tr("Its done signal is still on {timeout:g} s later.", timeout=timeout_s),
-                    request,
+                    tr("Its done signal is still on {timeout:g} s later.", timeout=timeout_s)
                 )
             self._registers.clock.sleep(_POLL_S)
 
-    def _hindrance(self, request: str) -> RobolinkError | None:
+    def _hindrance(self) -> RobolinkError | None:
         """Return why the PLC cannot be asked now."""
         registers = self._registers
         code = self.fault()
@@ -170,15 +166,11 @@ class Handshake:
                 reason=NotReadyReason.FAULT,
                 code=code,
                 remedy=tr("Clear it at the HMI; nothing was written."),
-                controller=registers.identity,
-                request=request,
             )
         if self.is_busy() or registers.is_on(self._commit.answer):
             return BusyError(
                 tr("The PLC is busy with another request."),
                 remedy=tr("Wait until it has finished, then try again; nothing was written."),
-                controller=registers.identity,
-                request=request,
             )
         return None
 
@@ -192,10 +184,8 @@ class Handshake:
             else tr("error {code}, which the map does not explain", code=code)
         )
 
-    def _unknown(self, why: str, request: str) -> OutcomeUnknownError:
+    def _unknown(self, why: str) -> OutcomeUnknownError:
         return OutcomeUnknownError(
             tr("It is not known whether the PLC took the value. {why}", why=why),
             remedy=tr("The request was not repeated. Look at the HMI, then 'robolink recover'."),
-            controller=self._registers.identity,
-            request=request,
         )

@@ -150,7 +150,6 @@ class Registers:
                 "Compare the addresses in the map with the PLC's register list; or "
                 "another program is writing them now."
             ),
-            controller=self.identity,
         )
 
     def word(self, word: Word) -> int:
@@ -214,30 +213,6 @@ _AROUND: Final = 8
 """How many registers before and behind its place it is looked for."""
 
 
-def require_probe(registers: Registers, probe: MapProbe | None) -> None:
-    """Read the constant, if there is one, and refuse a PLC in which it is another.
-
-    Raises:
-        RemoteProtocolError: It differs; says what the map should say, if that can be found.
-    """
-    if probe is None:
-        return
-    number = probe.number
-    words = registers.read(number.table, number.registers)
-    if words == number.encode(probe.value):
-        return
-    raise RemoteProtocolError(
-        tr(
-            "The probe at {place} should be {value:g}, but reads {found:g}.",
-            place=number.place,
-            value=probe.value,
-            found=number.decode(words),
-        ),
-        remedy=tr("{diagnosis} Nothing was written.", diagnosis=_diagnosis(registers, probe)),
-        controller=registers.identity,
-    )
-
-
 def _diagnosis(registers: Registers, probe: MapProbe) -> str:
     number = probe.number
     found = _found(registers, probe)
@@ -282,32 +257,6 @@ def _found(registers: Registers, probe: MapProbe) -> Number | None:
     return None
 
 
-class MapIdentityReader:
-    """Reads the machine's own number, where the map says where it stands."""
-
-    def __init__(self, registers: Registers, register_map: RegisterMap) -> None:
-        self._registers = registers
-        self._place = register_map.device_id
-
-    def read(self) -> Identity:
-        """Return who it is.
-
-        Raises:
-            TransportError, RemoteProtocolError: The link failed, or the number does not stand
-                still.
-            RejectedError: The PLC has no such registers.
-        """
-        address, place = self._registers.identity, f"plc@{self._registers.place}"
-        if self._place is None:
-            return Identity(place, address, place)
-        words = self._registers.read_twice(self._place.table, self._place.registers)
-        if not any(words):
-            # Zeroed by a watchdog, or the program has not started
-            # (docs/reference/softmotion.md 4.1).
-            return Identity(place, address, place, certain=False)
-        return Identity(f"plc:{''.join(f'{word:04X}' for word in words)}", address, place)
-
-
 class MappedPlc(DriverLink):
     """One PLC that is reached by a map.
 
@@ -333,8 +282,7 @@ class MappedPlc(DriverLink):
         self._simulated = simulated
         registers = self.registers = Registers(client)
         self.register_map = register_map
-        self._identity = MapIdentityReader(registers, register_map)
-        outcomes.ask(self._identity.read)
+        outcomes.ask(self.read_identity)
         super().__init__(
             client.identity, registers.clock, registers.latch, outcomes, gate=registers.gate
         )
@@ -355,8 +303,26 @@ class MappedPlc(DriverLink):
         return RejectedError(
             tr("A PLC with a register map is neither moved nor stopped by robolink."),
             remedy=tr("Do it at the machine; in danger press the emergency stop."),
-            controller=self.identity,
         )
+
+    def read_identity(self) -> Identity:
+        """Return who it is: by its own number, where the map says where that stands.
+
+        Raises:
+            TransportError, RemoteProtocolError: The link failed, or the number does not stand
+                still.
+            RejectedError: The PLC has no such registers.
+        """
+        address, place = self.registers.identity, f"plc@{self.registers.place}"
+        number = self.register_map.device_id
+        if number is None:
+            return Identity(place, address, place)
+        words = self.registers.read_twice(number.table, number.registers)
+        if not any(words):
+            # Zeroed by a watchdog, or the program has not started
+            # (docs/reference/softmotion.md 4.1).
+            return Identity(place, address, place, certain=False)
+        return Identity(f"plc:{''.join(f'{word:04X}' for word in words)}", address, place)
 
     def who(self) -> Identity:
         """Return which PLC this is: what a person confirms about a map holds for that one.
@@ -366,7 +332,7 @@ class MappedPlc(DriverLink):
                 still.
             NotReadyError: The map knows where the PLC's number stands, and there is none now.
         """
-        found = self._identity.read()
+        found = self.read_identity()
         if found.certain:
             return found
         raise NotReadyError(
@@ -376,20 +342,36 @@ class MappedPlc(DriverLink):
             ),
             reason=NotReadyReason.NOT_REMOTE,
             remedy=tr("Check that the PLC's program runs, then try again; nothing was written."),
-            controller=self.identity,
         )
 
     def require_probe(self) -> None:
         """Compare the PLC's constant with the map's, if there is one.
 
         Raises:
-            RemoteProtocolError: It differs; says what the map should say.
+            RemoteProtocolError: It differs; says what the map should say, if that can be found.
         """
-        require_probe(self.registers, self.register_map.probe)
+        probe = self.register_map.probe
+        if probe is None:
+            return
+        number = probe.number
+        words = self.registers.read(number.table, number.registers)
+        if words == number.encode(probe.value):
+            return
+        raise RemoteProtocolError(
+            tr(
+                "The probe at {place} should be {value:g}, but reads {found:g}.",
+                place=number.place,
+                value=probe.value,
+                found=number.decode(words),
+            ),
+            remedy=tr(
+                "{diagnosis} Nothing was written.", diagnosis=_diagnosis(self.registers, probe)
+            ),
+        )
 
-    def require_ready(self, tool: int, request: str) -> None:
+    def require_ready(self, tool: int) -> None:
         """Refuse a write where the map is not known to be right, or the machine says no."""
-        self.require_known_place(tool, request)
+        self.require_known_place(tool)
         self.require_probe()
         permit = self.register_map.permit
         if permit is not None and not self.registers.is_on(permit):
@@ -397,11 +379,9 @@ class MappedPlc(DriverLink):
                 tr("The machine does not permit changes now ({place}).", place=permit.place),
                 reason=NotReadyReason.NOT_REMOTE,
                 remedy=tr("Permit it at the machine, then try again; nothing was written."),
-                controller=self.identity,
-                request=request,
             )
 
-    def require_known_place(self, tool: int, request: str) -> None:
+    def require_known_place(self, tool: int) -> None:
         """Refuse a change of a tool of which nobody has compared anything; writes nothing.
 
         Raises:
@@ -409,15 +389,14 @@ class MappedPlc(DriverLink):
         """
         confirmation = self._confirmation()
         if confirmation is None or not confirmation.knows_tool(tool):
-            self._refuse(tool, tuple(self.register_map.slots[tool].components), request)
+            self._refuse(tool, tuple(self.register_map.slots[tool].components))
 
-    def require_compared(self, tool: int, components: tuple[str, ...], request: str) -> None:
+    def require_compared(self, tool: int, components: tuple[str, ...]) -> None:
         """Refuse a change of components that nobody has compared; writes nothing.
 
         Args:
             tool: Number of the tool.
             components: Those that would change.
-            request: What would be written, for a person.
 
         Raises:
             NotComparedError: One was not, with this map at this PLC.
@@ -426,12 +405,12 @@ class MappedPlc(DriverLink):
         missing = confirmation.missing(self.register_map) if confirmation is not None else []
         lacking = tuple(name for name in components if MapValue(tool, name) in missing)
         if lacking or confirmation is None:
-            self._refuse(tool, lacking or components, request)
+            self._refuse(tool, lacking or components)
 
     def _confirmation(self) -> Confirmation | None:
         return confirmation_of(self.who().name, self.register_map)
 
-    def _refuse(self, tool: int, components: tuple[str, ...], request: str) -> NoReturn:
+    def _refuse(self, tool: int, components: tuple[str, ...]) -> NoReturn:
         raise NotComparedError(
             tr(
                 "Nobody has compared {values} of the map {name!r} with the screen of the machine "
@@ -446,6 +425,4 @@ class MappedPlc(DriverLink):
                 "Nothing was written. Run 'robolink expert plc check-map' with the same -c at "
                 "the machine. A changed map has to be compared again."
             ),
-            controller=self.identity,
-            request=request,
         )

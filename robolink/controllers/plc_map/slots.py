@@ -38,9 +38,8 @@ Words = dict[int, int]
 class OffsetValues:
     """What the registers of one map can hold."""
 
-    def __init__(self, register_map: RegisterMap, identity: str) -> None:
+    def __init__(self, register_map: RegisterMap) -> None:
         self._map = register_map
-        self._identity = identity
 
     def offset(self, slot: MapSlot, words: Words) -> ToolOffset | None:
         """Return the tool that registers hold; ``None`` for zeros that mean none.
@@ -97,7 +96,6 @@ class OffsetValues:
                         value=value,
                     ),
                     remedy=tr("Leave it out; nothing was sent."),
-                    controller=self._identity,
                 )
         self._require_believable(slot, words)
         return words
@@ -118,7 +116,6 @@ class OffsetValues:
                     "Where zeros are a tool of this machine, say so in the map: "
                     'all_zero = "tool". To remove a tool: robolink tool clear.'
                 ),
-                controller=self._identity,
             )
         try:
             self.numbers(slot.components, words, largest_mm=self._map.largest_mm)
@@ -129,7 +126,6 @@ class OffsetValues:
                     cause=error.what,
                 ),
                 remedy=tr("Write 0 in place of so small a number."),
-                controller=self._identity,
             ) from error
 
     def rounded(self, slot: MapSlot, offset: ToolOffset) -> ToolOffset:
@@ -190,7 +186,6 @@ class OffsetValues:
                     "otherwise compare address, type, scale and word_order with the PLC's register "
                     "list."
                 ),
-                controller=self._identity,
             )
         raise RemoteProtocolError(
             tr(
@@ -203,7 +198,6 @@ class OffsetValues:
                 "Compare address, type and word_order in the map with the PLC's register list; "
                 "'robolink expert plc check-map' shows all values."
             ),
-            controller=self._identity,
         )
 
     def _encode(self, slot: MapSlot, name: str, value: float) -> tuple[int, ...]:
@@ -227,7 +221,6 @@ class OffsetValues:
                 largest=self._map.largest_mm,
             ),
             remedy=tr("Check the value, then type, scale and largest_mm in the map."),
-            controller=self._identity,
         )
 
     def _all_zero(self, slot: MapSlot) -> RemoteProtocolError:
@@ -240,7 +233,6 @@ class OffsetValues:
                 "Look at the tool on the HMI. If zeros are normal there, say so in the map: "
                 'all_zero = "undefined" or all_zero = "tool".'
             ),
-            controller=self._identity,
         )
 
 
@@ -279,7 +271,7 @@ class Slots:
     def __init__(self, registers: Registers, register_map: RegisterMap) -> None:
         self._registers = registers
         self._map = register_map
-        self.values = OffsetValues(register_map, registers.identity)
+        self.values = OffsetValues(register_map)
         self.handshake = Handshake(registers, register_map.commit)
 
     def read(self, slot: MapSlot) -> ToolOffset | None:
@@ -305,7 +297,6 @@ class Slots:
         raise ToolError(
             tr("Tool {tool} of this PLC cannot be made undefined.", tool=slot.tool),
             remedy=tr("Write another offset; or zeros, if this machine takes zeros as no tool."),
-            controller=self._registers.identity,
         )
 
     def changed(self, slot: MapSlot, content: SlotContent) -> tuple[str, ...]:
@@ -330,7 +321,7 @@ class Slots:
             requests.append(on if content.defined else off)
         return (*requests, *self.handshake.requests(slot.tool))
 
-    def bring_into_force(self, slot: MapSlot, content: SlotContent, request: str) -> None:
+    def bring_into_force(self, slot: MapSlot, content: SlotContent) -> None:
         """Write ``content``, then ask the PLC; after a refusal what was there stands there again.
 
         Raises:
@@ -342,20 +333,19 @@ class Slots:
 
         def write_and_ask() -> None:
             self._write(slot, content)
-            self.handshake.carry_out(slot.tool, request)
+            self.handshake.carry_out(slot.tool)
 
         self._or_put_back(slot, kept, write_and_ask)
 
-    def take_over(self, slot: MapSlot, before: ToolOffset | None, request: str) -> None:
+    def take_over(self, slot: MapSlot, before: ToolOffset | None) -> None:
         """Ask the PLC once to take over what stands there; raises as :meth:`bring_into_force`.
 
         Args:
             slot: The slot.
             before: What is in force, if the PLC refuses.
-            request: What this is about, for a person.
         """
         kept = self.content(slot, before)
-        self._or_put_back(slot, kept, lambda: self.handshake.carry_out(slot.tool, request))
+        self._or_put_back(slot, kept, lambda: self.handshake.carry_out(slot.tool))
 
     def _or_put_back(self, slot: MapSlot, kept: SlotContent, act: Callable[[], None]) -> None:
         """Act; if it is refused or stopped, let the registers show again what is in force."""
@@ -372,7 +362,6 @@ class Slots:
                         tool=slot.tool,
                     ),
                     remedy=tr("Look at the tool on the HMI, then run 'robolink recover'."),
-                    controller=self._registers.identity,
                     request=error.request,
                 ) from error
             raise

@@ -78,12 +78,12 @@ class RegisterToolTable(ToolTableCore):
             ToolError: The PLC's offsets can only be read.
         """
         super().require_writable(tool)
-        self._plc.require_known_place(tool, tr("tool {tool}", tool=tool))
+        with self._plc.asked(tr("tool {tool}", tool=tool)):
+            self._plc.require_known_place(tool)
         if not self._map.slots[tool].table.writable:
             raise ToolError(
                 tr("Tool {tool} is in input registers, which nobody can write.", tool=tool),
                 remedy=tr("Change it at the HMI, or map holding registers."),
-                controller=self._plc.identity,
             )
 
     def preview_select(self, tool: int) -> tuple[str, ...]:
@@ -147,31 +147,32 @@ class RegisterToolTable(ToolTableCore):
             RobolinkError: As :meth:`write`.
         """
         with self._plc.lock.held(request), self._plc.uninterrupted():
-            self._slots.handshake.make_ready(request)
-            self._slots.take_over(self._map.slots[tool], before, request)
+            self._slots.handshake.make_ready()
+            self._slots.take_over(self._map.slots[tool], before)
 
     def _set(self, tool: int, requested: ToolOffset | None, expected: Expected) -> ToolReceipt:
         request = self._request(tool, requested)
         with self._plc.lock.held(request):
-            self._plc.require_ready(tool, request)
+            self._plc.require_ready(tool)
             if not self.same(self.read(tool), requested):
-                self._slots.handshake.make_ready(request)
+                self._slots.handshake.make_ready()
             return _RegisterWrite(self, self._plc, tool, requested, self._slots).change(expected)
 
     def preview_clear(self, tool: int, *, then_select: int | None = None) -> tuple[str, ...]:
         """Return what :meth:`clear` would send besides its reads; raises what it would."""
         requests = super().preview_clear(tool, then_select=then_select)
         if requests:
-            self._require_compared(tool, None, "; ".join(requests))
+            with self._plc.asked("; ".join(requests)):
+                self._require_compared(tool, None)
         return requests
 
     def _require_possible(self, tool: int, offset: ToolOffset) -> None:
-        self._require_compared(tool, offset, self._request(tool, offset))
+        self._require_compared(tool, offset)
 
-    def _require_compared(self, tool: int, offset: ToolOffset | None, request: str) -> None:
+    def _require_compared(self, tool: int, offset: ToolOffset | None) -> None:
         slot = self._map.slots[tool]
         changed = self._slots.changed(slot, self._slots.content(slot, offset))
-        self._plc.require_compared(tool, changed, request)
+        self._plc.require_compared(tool, changed)
 
     def _request(self, tool: int, requested: ToolOffset | None) -> str:
         return "; ".join(self._requests(tool, requested))
@@ -200,7 +201,6 @@ class RegisterToolTable(ToolTableCore):
         raise RejectedError(
             tr("robolink does not select tools on this PLC."),
             remedy=tr("Select tool {tool} at the HMI.", tool=tool),
-            controller=self._plc.identity,
         )
 
     def _choices(self) -> str:
@@ -238,7 +238,7 @@ class _RegisterWrite(ToolWrite):
             NotComparedError: The write would change what nobody has compared.
         """
         changed = self._slots.changed(self._slot, self._content)
-        self._plc.require_compared(self.tool, changed, self.request)
+        self._plc.require_compared(self.tool, changed)
         return self._slots.read(self._slot)
 
     def send(self) -> None:
@@ -247,7 +247,7 @@ class _RegisterWrite(ToolWrite):
         What stands there is read once more for that, register by register: should the PLC refuse,
         it has to stand there again to the last bit.
         """
-        self._slots.bring_into_force(self._slot, self._content, self.request)
+        self._slots.bring_into_force(self._slot, self._content)
 
     def read_back(self) -> ToolOffset | None:
         """Read what is stored."""
@@ -277,7 +277,8 @@ class RegisterResolver(MarkerResolver):
         marker = finding.marker
         if finding.verdict is Verdict.NOT_FINISHED:
             tool = int(str(marker.details["tool"]))
-            self._plc.require_ready(tool, marker.request)
+            with self._plc.asked(marker.request):
+                self._plc.require_ready(tool)
             before = read_offset(marker.details.get("before"))
             self._registers.take_over(tool, before, marker.request)
         super().settle(finding)

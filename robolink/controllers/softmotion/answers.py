@@ -74,7 +74,6 @@ def refused(command: Command, now: Response, error_class: int) -> RejectedError:
         ),
         code=error_class,
         remedy=_remedy(error_class, now.raw_error),
-        request=describe(command),
     )
 
 
@@ -83,7 +82,6 @@ def command_ended_early(command: Command) -> ControllerFaultError:
     return ControllerFaultError(
         tr("{request!r} was ended before it finished.", request=describe(command)),
         remedy=tr("Someone stopped the group, or it went into error. Read the status."),
-        request=describe(command),
     )
 
 
@@ -98,7 +96,6 @@ def motion_failure(request: str, now: Response, error_class: int) -> ControllerE
             ),
             code=error_class,
             remedy=tr("Nothing was repeated. {remedy}", remedy=_remedy(error_class)),
-            request=request,
         )
     kind: type[ControllerError]
     fault = error_class // 100 in _FAULTS or now.group_state == GroupState.ERRORSTOP
@@ -113,7 +110,6 @@ def motion_failure(request: str, now: Response, error_class: int) -> ControllerE
         ),
         code=error_class,
         remedy=tr("Nothing was repeated. {remedy}", remedy=_remedy(error_class)),
-        request=request,
     )
 
 

@@ -16,7 +16,7 @@ axes themselves are compared.
 """
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from typing import Final
 
@@ -34,6 +34,7 @@ from robolink.controllers.softmotion.ownership import Bystanders, Ownership
 from robolink.controllers.softmotion.snapshots import Snapshots
 from robolink.controllers.softmotion.wire import MailboxWire, has_ended
 from robolink.errors import (
+    Concerning,
     ConfigError,
     ControllerError,
     OutcomeUnknownError,
@@ -59,7 +60,7 @@ from robolink.protocols.mailbox import (
     next_number,
 )
 from robolink.stop_latch import CommandClass
-from robolink.timing import Clock, Deadline
+from robolink.timing import Deadline
 
 _CLASSES: Final = {
     Opcode.OWNERSHIP: CommandClass.LOOK,
@@ -88,6 +89,15 @@ def command_class_of(command: Command) -> CommandClass:
         return CommandClass.CALM
     return _CLASSES.get(Opcode(command.opcode), CommandClass.ACT)
 
+
+REST_S: Final = 5.0
+"""Longest time from the stop to a state that shows rest (docs/reference/rules.md 5)."""
+
+_ALREADY: Final = frozenset({ErrorClass.STOPPING, ErrorClass.DISABLED, ErrorClass.ERRORSTOP})
+_LOOK_S: Final = 0.1
+_STILL: Final = 0.05
+"""An axis that changed by less than this, in its units, in :data:`_LOOK_S` stands: drives hold
+a position within microns and millidegrees, and robolink moves no slower than 1 mm/s."""
 
 COMPLETION_S: Final = 10.0
 """Longest time between the acknowledgement and the end of what is not a movement."""
@@ -128,25 +138,61 @@ class CommandSender:
             ConfigError: A value does not fit; nothing was sent.
             TransportError, RemoteProtocolError: The session is over; it may have been done.
         """
-        with self._wire.uninterrupted():
+        with self._naming(draft), self._wire.uninterrupted():
             self._possess(draft)
-            end = self._to_end(draft)
-            return self._taken(end)
+            return self._taken(self._to_end(draft))
 
     def stop(self) -> Callable[[Response], bool]:
         """Send 2003, and return what tells by a later snapshot whether it is done.
 
         What it returns raises like :meth:`carry_out`.
         """
-        with self._wire.uninterrupted():
-            command, now = self._send(Command(0, Opcode.STOP))
+        draft = Command(0, Opcode.STOP)
+        with self._naming(draft), self._wire.uninterrupted():
+            command, now = self._send(draft)
 
         def done(now: Response) -> bool:
-            end = self._end_of(command, now)
-            return end is not None and self._taken(end) is not None
+            with self._naming(draft):
+                end = self._end_of(command, now)
+                return end is not None and self._taken(end) is not None
 
         done(now)
         return done
+
+    def bring_to_rest(self) -> Response:
+        """Send 2003 and return a snapshot that shows that the group rests.
+
+        Raises:
+            RejectedError: The PLC knows no stop: its program moves nothing.
+            OutcomeUnknownError: The group does not come to rest within :data:`REST_S`.
+            TransportError, RemoteProtocolError: The link is over; whether it stops is not known.
+        """
+        snapshots, clock = self._snapshots, self._wire.clock
+        deadline = Deadline.after(clock, REST_S)
+        try:
+            done = self.stop()
+            now = snapshots.take()
+            while not done(now):
+                if deadline.expired:
+                    raise self._restless()
+                now = snapshots.news(now)
+            # A stop of another thread that came meanwhile ends ours before the group stands.
+            stands = not now.bits & Bits.BUSY
+        except RejectedError as error:
+            if error.code not in _ALREADY:
+                raise
+            now, stands = snapshots.take(), False
+        # Here, because nothing may stand before the frame of a stop (docs/reference/rules.md 5).
+        from robolink.controllers.softmotion.condition import is_moving
+
+        while is_moving(now) or not stands:
+            if deadline.expired:
+                raise self._restless()
+            before, looked = now, Deadline.after(clock, _LOOK_S)
+            while not looked.expired:
+                now = snapshots.news(now, wait_s=looked.remaining_s())
+            stands = stands or _still(before, now)
+        return now
 
     def _taken(self, end: Ended) -> Response:
         """Return the snapshot of a command that is done; raise for one that is not."""
@@ -163,7 +209,7 @@ class CommandSender:
             KeyboardInterrupt: Ctrl-C came before a movement was sent; it was not.
         """
         # Who begins a movement is there; at most four begin before one has to be waited on.
-        with self._wire.uninterrupted(), self._wire.attended():
+        with self._naming(draft), self._wire.uninterrupted(), self._wire.attended():
             self._possess(draft)
             command, now = self._send(draft, ride=draft.opcode != Opcode.JOG)
             if now.state == CommandState.ERROR:
@@ -187,6 +233,10 @@ class CommandSender:
             self.ownership.lose()
         return motion_failure(request, now, error_class)
 
+    def _naming(self, draft: Command) -> Concerning:
+        """Let each error that leaves the block name the PLC and the command."""
+        return Concerning(self._wire.identity, describe(draft))
+
     def _possess(self, draft: Command) -> None:
         if draft.needs_owner:
             self.ownership.require(describe(draft))
@@ -197,10 +247,9 @@ class CommandSender:
         return refused(command, now, error_class)
 
     def _to_end(self, draft: Command) -> Ended:
-        if draft.only_ends:
-            with self._wire.ahead():
-                return self._seen_to_end(draft)
-        return self._seen_to_end(draft)
+        """Send a command and return how it ended."""
+        with self._wire.ahead() if draft.only_ends else nullcontext():
+            return self._seen_to_end(draft)
 
     def _seen_to_end(self, draft: Command) -> Ended:
         command, now = self._send(draft)
@@ -210,8 +259,7 @@ class CommandSender:
             if deadline.expired:
                 raise self._wire.ended(
                     self._silence(
-                        command,
-                        tr("{request!r} began, and has not ended.", request=describe(command)),
+                        tr("{request!r} began, and has not ended.", request=describe(command))
                     )
                 )
             now = self._snapshots.news(now, begun_ns=begun_ns)
@@ -303,7 +351,7 @@ class CommandSender:
                 return now, False
             if deadline.expired:
                 silence = self._silence(
-                    command, tr("{request!r} was not acknowledged.", request=describe(command))
+                    tr("{request!r} was not acknowledged.", request=describe(command))
                 )
                 # Something stronger must be able to follow what should have ended a movement.
                 raise silence if command.only_ends else self._wire.ended(silence)
@@ -330,7 +378,6 @@ class CommandSender:
             raise ConfigError(
                 tr("{request!r} cannot be sent: {cause}.", request=describe(command), cause=error),
                 remedy=tr("Correct the value; nothing was sent."),
-                controller=self._wire.identity,
             ) from error
 
     def _require_able(self, draft: Command, before: Response) -> None:
@@ -338,11 +385,22 @@ class CommandSender:
         if OPCODES[opcode].capability not in before.capabilities:
             raise refused(draft, before, ErrorClass.UNKNOWN_OPCODE)
 
-    def _silence(self, command: Command, said: str) -> TransportTimeoutError:
+    def _restless(self) -> OutcomeUnknownError:
+        return OutcomeUnknownError(
+            tr(
+                "{controller} was told to stop, but did not show within {seconds:g} s "
+                "that it is at rest.",
+                controller=self._wire.identity,
+                seconds=REST_S,
+            ),
+            remedy=tr("It may still be moving."),
+            request="Stop",
+        )
+
+    def _silence(self, said: str) -> TransportTimeoutError:
         return TransportTimeoutError(
             said,
             remedy=tr("Look at the PLC; the command may still be carried out."),
-            request=describe(command),
         )
 
     def _unseen(self, command: Command) -> UnclearAnswerError:
@@ -351,8 +409,6 @@ class CommandSender:
         return UnclearAnswerError(
             tr("A stop came before the end of {request!r} was read.", request=describe(command)),
             remedy=tr("Read again what it should have changed."),
-            controller=self._wire.identity,
-            request=describe(command),
         )
 
     def _overtaken(self, command: Command, now: Response) -> RemoteProtocolError:
@@ -365,7 +421,6 @@ class CommandSender:
                 request=describe(command),
             ),
             remedy=tr("Find the other client; one at a time may command this mailbox."),
-            request=describe(command),
         )
 
 
@@ -405,74 +460,7 @@ def _has_taken(command: Command, now: Response) -> bool:
     )
 
 
-REST_S: Final = 5.0
-"""Longest time from the stop to a state that shows rest (docs/reference/rules.md 5)."""
-
-_ALREADY: Final = frozenset({ErrorClass.STOPPING, ErrorClass.DISABLED, ErrorClass.ERRORSTOP})
-_LOOK_S: Final = 0.1
-_STILL: Final = 0.05
-"""An axis that changed by less than this, in its units, in :data:`_LOOK_S` stands: drives hold
-a position within microns and millidegrees, and robolink moves no slower than 1 mm/s."""
-
-
-def bring_group_to_rest(
-    commands: CommandSender, snapshots: Snapshots, clock: Clock, *, controller: str
-) -> Response:
-    """Send 2003 and return a snapshot that shows rest.
-
-    Args:
-        commands: Commands of the mailbox.
-        snapshots: Reads of it.
-        clock: The clock on which the PLC's time passes.
-        controller: Its name in errors.
-
-    Raises:
-        RejectedError: The PLC knows no stop: its program moves nothing.
-        OutcomeUnknownError: The group does not come to rest within :data:`REST_S`.
-        TransportError, RemoteProtocolError: The link is over; whether it stops is not known.
-    """
-    deadline = Deadline.after(clock, REST_S)
-    try:
-        done = commands.stop()
-        now = snapshots.take()
-        while not done(now):
-            if deadline.expired:
-                raise _restless(controller)
-            now = snapshots.news(now)
-        # A stop of another thread that came meanwhile ends ours before the group stands.
-        stands = not now.bits & Bits.BUSY
-    except RejectedError as error:
-        if error.code not in _ALREADY:
-            raise
-        now, stands = snapshots.take(), False
-    # Here, because nothing may stand before the frame of a stop (docs/reference/rules.md 5).
-    from robolink.controllers.softmotion.condition import is_moving
-
-    while is_moving(now) or not stands:
-        if deadline.expired:
-            raise _restless(controller)
-        before, looked = now, Deadline.after(clock, _LOOK_S)
-        while not looked.expired:
-            now = snapshots.news(now, wait_s=looked.remaining_s())
-        stands = stands or _still(before, now)
-    return now
-
-
 def _still(before: Response, now: Response) -> bool:
     return before.plc_heartbeat != now.plc_heartbeat and all(
         abs(a - b) < _STILL for a, b in zip(before.axes, now.axes, strict=True)
-    )
-
-
-def _restless(controller: str) -> OutcomeUnknownError:
-    return OutcomeUnknownError(
-        tr(
-            "{controller} was told to stop, but did not show within {seconds:g} s "
-            "that it is at rest.",
-            controller=controller,
-            seconds=REST_S,
-        ),
-        remedy=tr("It may still be moving."),
-        controller=controller,
-        request="Stop",
     )

@@ -52,7 +52,7 @@ def condition_of(now: Response) -> dict[str, object]:
     }
 
 
-def require_permit(now: Response, *, controller: str, request: str) -> None:
+def require_permit(now: Response) -> None:
     """Hold back what changes something while the machine does not permit it.
 
     Raises:
@@ -65,18 +65,14 @@ def require_permit(now: Response, *, controller: str, request: str) -> None:
             remedy=tr(
                 "The machine's program gives the permit (xPermit); bring it to its service state."
             ),
-            controller=controller,
-            request=request,
         )
 
 
-def require_beats(whole_look_s: float, *, controller: str, request: str) -> None:
+def require_beats(whole_look_s: float) -> None:
     """Hold back what must be kept going on a line that is too slow for it (docs/mailbox.md).
 
     Args:
         whole_look_s: How long a look at the response block and a beat take on the line.
-        controller: Its name in the error.
-        request: What is held back.
 
     Raises:
         ConfigError: No beat would arrive while the block is read.
@@ -94,12 +90,10 @@ def require_beats(whole_look_s: float, *, controller: str, request: str) -> None
                 "9600 or more, or move by Modbus TCP. Tools can still be read, "
                 "written and selected."
             ),
-            controller=controller,
-            request=request,
         )
 
 
-def require_still(now: Response, *, controller: str, request: str) -> None:
+def require_still(now: Response) -> None:
     """Hold back what may not happen while the group moves (docs/reference/faults.md F42).
 
     Raises:
@@ -110,16 +104,12 @@ def require_still(now: Response, *, controller: str, request: str) -> None:
             tr("The axis group is moving."),
             reason=NotReadyReason.RUNNING,
             remedy=tr("Wait until the movement has ended, or stop it."),
-            controller=controller,
-            request=request,
         )
     if now.bits & Bits.INTERRUPTED:
         raise NotReadyError(
             tr("An interrupted movement is waiting to continue."),
             reason=NotReadyReason.PAUSED,
             remedy=tr("Let it continue to its end, or halt it."),
-            controller=controller,
-            request=request,
         )
 
 
@@ -128,7 +118,7 @@ def is_tool_known(now: Response) -> bool:
     return bool(now.bits & Bits.TOOL_KNOWN)
 
 
-def require_tool_known(now: Response, *, controller: str, request: str) -> None:
+def require_tool_known(now: Response) -> None:
     """Hold back a movement whose tip the mailbox cannot vouch for (docs/reference/faults.md F44).
 
     Raises:
@@ -146,12 +136,10 @@ def require_tool_known(now: Response, *, controller: str, request: str) -> None:
                 "group's tool.",
                 slot=now.tool_slot,
             ),
-            controller=controller,
-            request=request,
         )
 
 
-def require_enabled(now: Response, *, controller: str, request: str) -> None:
+def require_enabled(now: Response) -> None:
     """Hold back what an axis group in this state would refuse.
 
     Source: docs/reference/softmotion.md 1.1, 2.2.
@@ -167,8 +155,6 @@ def require_enabled(now: Response, *, controller: str, request: str) -> None:
             reason=reason,
             code=status_of(now).code,
             remedy=remedy,
-            controller=controller,
-            request=request,
         )
 
 
@@ -194,7 +180,7 @@ def _obstacle(now: Response) -> tuple[NotReadyReason, str, str] | None:
     return None
 
 
-def require_power(now: Response, *, controller: str, request: str) -> None:
+def require_power(now: Response) -> None:
     """Hold back a movement while a drive has no power.
 
     Raises:
@@ -206,6 +192,4 @@ def require_power(now: Response, *, controller: str, request: str) -> None:
             tr("The drives of the axis group have no power."),
             reason=NotReadyReason.MOTORS_OFF,
             remedy=tr("The PLC's program switches them on (MC_Power)."),
-            controller=controller,
-            request=request,
         )

@@ -19,7 +19,7 @@ from robolink.controllers.softmotion.ownership import take_command
 from robolink.controllers.softmotion.snapshots import Snapshots
 from robolink.controllers.softmotion.tools import SoftMotionResolver, SoftMotionToolTable
 from robolink.controllers.softmotion.wire import MailboxWire
-from robolink.errors import ConfigError, ControllerFaultError, LeaseHeldError
+from robolink.errors import Concerning, ConfigError, ControllerFaultError, LeaseHeldError
 from robolink.messages import tr
 from robolink.model import (
     Act,
@@ -213,8 +213,6 @@ class SoftMotionController(ControllerCore):
                     tr("The reset did not bring the axis group out of its state."),
                     code=now.error_class,
                     remedy=tr("Remove the cause at the drives or the machine, then reset again."),
-                    controller=self.identity,
-                    request=request,
                 )
 
     def motors(self, on: bool) -> None:
@@ -349,11 +347,12 @@ def open_softmotion(
     """
     wire = MailboxWire(link, owner=owner or ambient.random_number(32), timeout_s=timeout_s)
     try:
-        snapshots = Snapshots(wire)
-        snapshots.meet()
-        device_id = read_device_id(wire)
-        mailbox = Mailbox(wire, snapshots, outcomes, device_id=device_id, tell=tell)
-        return SoftMotionController(mailbox, OrientationImages(kinematics))
+        with Concerning(link.identity):
+            snapshots = Snapshots(wire)
+            snapshots.meet()
+            device_id = read_device_id(wire)
+            mailbox = Mailbox(wire, snapshots, outcomes, device_id=device_id, tell=tell)
+            return SoftMotionController(mailbox, OrientationImages(kinematics))
     except BaseException:
         wire.close()
         raise

@@ -3,14 +3,13 @@
 What a PLC's mailbox shows of itself, reading only: for a person who has just loaded it.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from robolink.controllers.driver_link import MarkedCommand
 from robolink.controllers.softmotion.answers import describe
 from robolink.controllers.softmotion.condition import require_still
-from robolink.controllers.softmotion.mailbox import Mailbox
+from robolink.controllers.softmotion.mailbox import Mailbox, MarkedDraft
 from robolink.errors import ReadBackError, RemoteProtocolError
 from robolink.messages import tr
 from robolink.model import ControllerFacts, of_no_tool
@@ -87,9 +86,10 @@ def set_kinematics(mailbox: Mailbox, position: Kinematics, orientation: Kinemati
     with mailbox.lock.held(request):
         mailbox.markers.require_settled(request)  # before the mailbox is taken
         now = mailbox.prepare(draft, request)
-        require_still(now, controller=mailbox.identity, request=request)
+        require_still(now)
         mailbox.markers.note_selection(0)
-        after = mailbox.carry_out(_Change(mailbox, draft, wanted, now.kinematics))
+        marked = {"kinematics": wanted, "before": now.kinematics}
+        after = mailbox.carry_out(MarkedDraft(mailbox, draft, marked, mailbox.snapshots.take))
         mailbox.markers.ledger.saw_selected(after.tool_slot)
     if after.kinematics != wanted or after.tool_slot:
         raise ReadBackError(
@@ -100,29 +100,8 @@ def set_kinematics(mailbox: Mailbox, position: Kinematics, orientation: Kinemati
                 request=request,
             ),
             remedy=tr("Do not move the robot; compare the mailbox program with its codes."),
-            controller=mailbox.identity,
             request=request,
         )
-
-
-class _Change(MarkedCommand[Response]):
-    """MC_SetKinTransform."""
-
-    def __init__(self, mailbox: Mailbox, draft: Command, wanted: int, before: int) -> None:
-        super().__init__(describe(draft))
-        self._mailbox = mailbox
-        self._draft = draft
-        self._details = {"kinematics": wanted, "before": before}
-
-    @property
-    def details(self) -> Mapping[str, object]:
-        return self._details
-
-    def send(self) -> None:
-        self._mailbox.commands.carry_out(self._draft)
-
-    def read(self) -> Response:
-        return self._mailbox.snapshots.take()
 
 
 def block_name(code: int) -> str:

@@ -4,7 +4,6 @@ import math
 
 from robolink.controllers.motion_group import MotionGroupCore
 from robolink.controllers.softmotion.answers import describe
-from robolink.controllers.softmotion.commands import bring_group_to_rest
 from robolink.controllers.softmotion.condition import (
     require_beats,
     require_enabled,
@@ -64,12 +63,12 @@ class SoftMotionGroup(MotionGroupCore):
 
     def require_able(self, purpose: str) -> None:
         """Refuse what no movement could begin in now; see :class:`robolink.model.MotionGroup`."""
-        identity = self._mailbox.identity
-        require_beats(self._mailbox.wire.whole_look_s, controller=identity, request=purpose)
-        now = self._mailbox.snapshots.take()
-        require_permit(now, controller=identity, request=purpose)
-        require_enabled(now, controller=identity, request=purpose)
-        require_power(now, controller=identity, request=purpose)
+        with self._mailbox.asked(purpose):
+            require_beats(self._mailbox.wire.whole_look_s)
+            now = self._mailbox.snapshots.take()
+            require_permit(now)
+            require_enabled(now)
+            require_power(now)
 
     def terms(self) -> MotionTerms:
         """Read what a person must know before the group moves."""
@@ -156,11 +155,8 @@ class SoftMotionGroup(MotionGroupCore):
         Raises:
             OutcomeUnknownError: The group did not come to rest in time.
         """
-        mailbox = self._mailbox
-        with mailbox.latch.stopping():
-            bring_group_to_rest(
-                mailbox.commands, mailbox.snapshots, mailbox.clock, controller=mailbox.identity
-            )
+        with self._mailbox.latch.stopping():
+            self._mailbox.commands.bring_to_rest()
 
     def halt(self) -> None:
         """Bring the group to rest, ending every movement; it may be moved again at once."""
@@ -179,11 +175,12 @@ class SoftMotionGroup(MotionGroupCore):
         draft = Command(0, Opcode.CONTINUE)
         request = describe(draft)
         mailbox = self._mailbox
-        require_beats(mailbox.wire.whole_look_s, controller=mailbox.identity, request=request)
-        self._require_settled(request)
-        mailbox.prepare(draft, request)
-        with mailbox.markers.doubt(request):
-            mailbox.commands.carry_out(draft)
+        with mailbox.asked(request):
+            require_beats(mailbox.wire.whole_look_s)
+            self._require_settled(request)
+            mailbox.prepare(draft, request)
+            with mailbox.markers.doubt(request):
+                mailbox.commands.carry_out(draft)
 
     def abort_unfinished(self) -> None:
         """Halt what was sent here and not seen to its end."""
@@ -196,9 +193,9 @@ class SoftMotionGroup(MotionGroupCore):
         mailbox, request = self._mailbox, describe(draft)
         try:
             with mailbox.lock.held(request):
-                mailbox.wire.motions.require_room(request, controller=mailbox.identity)
+                mailbox.wire.motions.require_room(request)
                 now = self._require_startable(draft, request)
-                require_tool_known(now, controller=mailbox.identity, request=request)
+                require_tool_known(now)
                 with mailbox.uninterrupted():
                     motion = self._started(target, draft, now.tool_slot)
                     self._current = [*(m for m in self._current if not m.settled), motion]
@@ -229,13 +226,13 @@ class SoftMotionGroup(MotionGroupCore):
             LeaseHeldError, LeaseLostError: Another client owns the mailbox.
         """
         mailbox = self._mailbox
-        require_beats(mailbox.wire.whole_look_s, controller=mailbox.identity, request=request)
+        require_beats(mailbox.wire.whole_look_s)
         self._require_settled(request)
         now = mailbox.prepare(draft, request)
-        require_enabled(now, controller=mailbox.identity, request=request)
-        require_power(now, controller=mailbox.identity, request=request)
+        require_enabled(now)
+        require_power(now)
         if not mailbox.wire.motions.unfinished:
-            require_still(now, controller=mailbox.identity, request=request)
+            require_still(now)
         return now
 
     def _require_settled(self, request: str) -> None:
@@ -290,12 +287,10 @@ class SoftMotionGroup(MotionGroupCore):
             if self.motors_on() is enabled:
                 return
             now = mailbox.prepare(draft, request)
-            require_still(now, controller=mailbox.identity, request=request)
+            require_still(now)
             mailbox.commands.carry_out(draft)
             if self.motors_on() is not enabled:
                 raise ReadBackError(
                     tr("The axis group did not change its state."),
                     remedy=tr("Look at the PLC; nothing was repeated."),
-                    controller=mailbox.identity,
-                    request=request,
                 )

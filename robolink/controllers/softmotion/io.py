@@ -1,20 +1,19 @@
 """Inputs and outputs that the PLC's program offers by number (opcodes 30006 and 30007)."""
 
-from collections.abc import Mapping
-
-from robolink.controllers.driver_link import MarkedCommand
+from robolink.controllers.driver_link import DriverPart
 from robolink.controllers.softmotion.answers import describe
-from robolink.controllers.softmotion.mailbox import Mailbox
+from robolink.controllers.softmotion.mailbox import Mailbox, MarkedDraft
 from robolink.protocols.mailbox import Command, Opcode
 
 
-class SoftMotionIo:
+class SoftMotionIo(DriverPart):
     """Reads inputs and sets outputs; both need the ownership.
 
     An output cannot be read back through the mailbox: the PLC's acknowledgement is the proof.
     """
 
     def __init__(self, mailbox: Mailbox) -> None:
+        super().__init__(mailbox)
         self._mailbox = mailbox
 
     def read_input(self, bit: int) -> bool:
@@ -43,32 +42,17 @@ class SoftMotionIo:
         mailbox, request = self._mailbox, describe(draft)
         with mailbox.lock.held(request):
             mailbox.prepare(draft, request)
-            mailbox.carry_out(_Switching(mailbox, draft))
+            marked = {"output": bit, "requested": int(on)}
+            mailbox.carry_out(MarkedDraft(mailbox, draft, marked, _nothing))
 
     def preview_output(self, bit: int, on: int) -> tuple[str, ...]:
         """Return what :meth:`set_output` would send, in words."""
         return (describe(_set_draft(bit, on)),)
 
 
-class _Switching(MarkedCommand[None]):
-    """The setting of one output, which nothing can read back."""
-
-    def __init__(self, mailbox: Mailbox, draft: Command) -> None:
-        super().__init__(describe(draft))
-        self._mailbox = mailbox
-        self._draft = draft
-
-    @property
-    def details(self) -> Mapping[str, object]:
-        number, value, *_ = self._draft.operands
-        return {"output": number, "requested": value}
-
-    def send(self) -> None:
-        self._mailbox.commands.carry_out(self._draft)
-
-    def read(self) -> None:
-        return None
-
-
 def _set_draft(number: int, value: int) -> Command:
     return Command(0, Opcode.WRITE_OUTPUT, operands=(number, int(value), 0, 0))
+
+
+def _nothing() -> None:
+    """Read nothing: an output cannot be read back."""

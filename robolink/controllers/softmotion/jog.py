@@ -148,7 +148,6 @@ class JogWatch:
         if failure is None and self._taken_over(now):
             failure = self._ended_by_plc(now)
         if failure is not None:
-            failure.controller = failure.controller or self._mailbox.identity
             raise failure
         return self._pose(now)
 
@@ -241,8 +240,6 @@ class JogWatch:
                     jog=self.request,
                 ),
                 remedy=tr("Look at the link to the PLC before the next jog."),
-                controller=mailbox.identity,
-                request=self.request,
             ) from refusal
         return now
 
@@ -281,7 +278,6 @@ class JogWatch:
                 "Press the emergency stop if the robot still moves. Next: 'robolink "
                 "recover'. The robot stays blocked until then."
             ),
-            request=self.request,
         )
         error.__cause__ = cause
         return error

@@ -161,22 +161,18 @@ _SHOWN_MM: Final = 0.0005
 _AXES: Final = {(1.0, 0.0, 0.0): "X", (0.0, 1.0, 0.0): "Y", (0.0, 0.0, 1.0): "Z"}
 
 
-def require_fit(
-    images: OrientationImages, now: Response, offset: ToolOffset, *, controller: str, request: str
-) -> None:
+def require_fit(images: OrientationImages, now: Response, offset: ToolOffset) -> None:
     """Refuse a tool that the kinematics in force cannot carry; one nobody knows is the PLC's.
 
     Args:
         images: What is known of the kinematics.
         now: A snapshot that was taken just now.
         offset: The tool.
-        controller: Its name in the error.
-        request: What is held back.
 
     Raises:
         RejectedError: Names the kinematics, each impossible component, and why.
     """
-    space = _space(images, now, controller=controller, request=request)
+    space = _space(images, now)
     shift = (offset.x_mm, offset.y_mm, offset.z_mm)
     if space is None or space.accepts(shift):
         return
@@ -187,14 +183,10 @@ def require_fit(
             parts=_parts(space, shift),
             why=_why(space),
         ),
-        controller=controller,
-        request=request,
     )
 
 
-def require_measurable(
-    images: OrientationImages, now: Response, components: Sequence[str], *, controller: str
-) -> None:
+def require_measurable(images: OrientationImages, now: Response, components: Sequence[str]) -> None:
     """Refuse to measure components of a shift that the kinematics in force cannot carry.
 
     A measured one is never exactly zero, so it would be refused when it is written, with the
@@ -204,12 +196,11 @@ def require_measurable(
         images: What is known of the kinematics.
         now: A snapshot that was taken just now.
         components: ``x_mm``, ``y_mm``, ``z_mm`` and other parts of a tool.
-        controller: Its name in the error.
 
     Raises:
         RejectedError: Names the kinematics, each impossible component, and why.
     """
-    space = _space(images, now, controller=controller, request="")
+    space = _space(images, now)
     if space is None:
         return
     directions = {"x_mm": (1.0, 0.0, 0.0), "y_mm": (0.0, 1.0, 0.0), "z_mm": (0.0, 0.0, 1.0)}
@@ -223,14 +214,10 @@ def require_measurable(
                 parts=", ".join(name[0].upper() for name in impossible),
                 why=_why(space),
             ),
-            controller=controller,
-            request="",
         )
 
 
-def _space(
-    images: OrientationImages, now: Response, *, controller: str, request: str
-) -> OrientationSpace | None:
+def _space(images: OrientationImages, now: Response) -> OrientationSpace | None:
     try:
         return images.space(now.position_kinematics, now.orientation_kinematics)
     except NoOrientationImageError:
@@ -241,12 +228,10 @@ def _space(
                 "The PLC's own kinematics must implement ISMKinematicsWithOrientationImage. "
                 "Nothing was sent."
             ),
-            controller=controller,
-            request=request,
         ) from None
 
 
-def _incompatible(what: str, *, controller: str, request: str) -> RejectedError:
+def _incompatible(what: str) -> RejectedError:
     return RejectedError(
         what,
         code=ErrorClass.TOOL_INCOMPATIBLE,
@@ -254,8 +239,6 @@ def _incompatible(what: str, *, controller: str, request: str) -> RejectedError:
             "Couple an orientation kinematics in the PLC, or mount the tip on that line. Nothing "
             "was sent."
         ),
-        controller=controller,
-        request=request,
     )
 
 

@@ -6,11 +6,12 @@ Source: docs/mailbox.md, "Which PLC this is".
 """
 
 import math
-from collections.abc import Callable
-from typing import Final, Protocol
+from collections.abc import Callable, Mapping
+from typing import Final, Protocol, TypeVar
 
 from robolink import ambient
-from robolink.controllers.driver_link import DriverLink
+from robolink.controllers.driver_link import DriverLink, MarkedCommand
+from robolink.controllers.softmotion.answers import describe
 from robolink.controllers.softmotion.commands import CommandSender
 from robolink.controllers.softmotion.condition import require_permit
 from robolink.controllers.softmotion.ownership import Bystanders
@@ -146,12 +147,13 @@ class Mailbox(DriverLink):
             NotReadyError: The machine does not permit it.
             LeaseHeldError, LeaseLostError: Another client owns the mailbox.
         """
-        now = now or self.snapshots.take()
-        if draft.needs_permit:
-            require_permit(now, controller=self.identity, request=request)
-        if draft.needs_owner:
-            self.commands.ownership.require(request)
-        return now
+        with self.asked(request):
+            now = now or self.snapshots.take()
+            if draft.needs_permit:
+                require_permit(now)
+            if draft.needs_owner:
+                self.commands.ownership.require(request)
+            return now
 
     def same(self, a: ToolOffset | None, b: ToolOffset | None) -> bool:
         """Tell whether this PLC holds both alike; rotations are compared as matrices."""
@@ -211,3 +213,41 @@ class Mailbox(DriverLink):
                 )
             )
         return from_frame(frame, unit_um=self.unit_um)
+
+
+T = TypeVar("T")
+
+
+class MarkedDraft(MarkedCommand[T]):
+    """A command of a mailbox that is marked meanwhile.
+
+    Args:
+        mailbox: Where it is sent.
+        draft: The command.
+        details: Plain JSON values needed to settle it later.
+        read: Reads what it changes.
+    """
+
+    def __init__(
+        self,
+        mailbox: Mailbox,
+        draft: Command,
+        details: Mapping[str, object],
+        read: Callable[[], T],
+    ) -> None:
+        super().__init__(describe(draft))
+        self._mailbox, self._draft = mailbox, draft
+        self._details, self._read = details, read
+
+    @property
+    def details(self) -> Mapping[str, object]:
+        """Plain JSON values needed to settle it later."""
+        return self._details
+
+    def send(self) -> None:
+        """Send it; raises unless the PLC accepted it."""
+        self._mailbox.commands.carry_out(self._draft)
+
+    def read(self) -> T:
+        """Read what it changes."""
+        return self._read()

@@ -96,7 +96,6 @@ class SoftMotionMotion:
                     TransportTimeoutError(
                         tr("The PLC did not finish {request!r}.", request=self._request),
                         remedy=tr("Press the emergency stop if the robot still moves."),
-                        request=self._request,
                     )
                 )
             self._take_end()
@@ -122,8 +121,6 @@ class SoftMotionMotion:
                     timeout_s=timeout_s,
                 ),
                 remedy=tr("Read where the robot is ('robolink robot where') before you go on."),
-                controller=mailbox.identity,
-                request=self._request,
             )
         end = self._take_end()
         self._await_rest()
@@ -135,9 +132,7 @@ class SoftMotionMotion:
         ):
             return MotionOutcome.STOPPED
         now = self._mailbox.snapshots.take()
-        error = self._mailbox.commands.motion_failure(self._request, now, end.error_class)
-        error.controller = self._mailbox.identity
-        raise error
+        raise self._mailbox.commands.motion_failure(self._request, now, end.error_class)
 
     def _watch(self, deadline: Deadline) -> bool:
         """Beat and look until the end is known; False when the deadline passes first."""
@@ -195,7 +190,6 @@ class SoftMotionMotion:
         return RemoteProtocolError(
             tr("The PLC shows neither {request!r} nor how it ended.", request=self._request),
             remedy=tr("Another client has moved the group meanwhile."),
-            request=self._request,
         )
 
 
@@ -216,13 +210,15 @@ class SoftMotionMotionUntilInput:
             ControllerError: It was stopped, refused, or ended by an error.
             MotionTimeoutError, OutcomeUnknownError: As for any movement.
         """
-        with self._mailbox.wire.latch.ending(describe(self._motion.command)):
-            end = self._motion.await_end(timeout_s)
-        if end.error_class == ErrorClass.NO_EDGE:
-            return None
-        if self._motion.wait(timeout_s=timeout_s) is not MotionOutcome.ARRIVED:
-            raise stopped_before_edge(self._mailbox.identity, describe(self._motion.command))
-        return self._latched()
+        request = describe(self._motion.command)
+        with self._mailbox.asked(request):
+            with self._mailbox.wire.latch.ending(request):
+                end = self._motion.await_end(timeout_s)
+            if end.error_class == ErrorClass.NO_EDGE:
+                return None
+            if self._motion.wait(timeout_s=timeout_s) is not MotionOutcome.ARRIVED:
+                raise stopped_before_edge(self._mailbox.identity, request)
+            return self._latched()
 
     def _latched(self) -> Pose:
         now = self._mailbox.snapshots.take()
@@ -230,8 +226,6 @@ class SoftMotionMotionUntilInput:
             raise RemoteProtocolError(
                 tr("Another command came before the latched position was read."),
                 remedy=tr("Repeat the measurement."),
-                controller=self._mailbox.identity,
-                request=describe(self._motion.command),
             )
         target = self._motion.target
         return self._mailbox.pose(now.answer.pose, tool=target.tool)

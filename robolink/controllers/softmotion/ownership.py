@@ -12,7 +12,7 @@ from typing import Final
 
 from robolink.controllers.softmotion.answers import DISPOSSESSED, Ended, describe
 from robolink.controllers.softmotion.wire import MailboxWire
-from robolink.errors import LeaseHeldError, LeaseLostError, RejectedError
+from robolink.errors import Concerning, LeaseHeldError, LeaseLostError, RejectedError
 from robolink.messages import joined, tr
 from robolink.model import ClientRun, OutcomeLog
 from robolink.protocols.mailbox import Command, CommandState, ErrorClass, Opcode
@@ -146,7 +146,7 @@ class Ownership:
             self._outcomes.note_client(token)
         # A Ctrl-C before the answer is read would leave it taken by nobody who knows of it.
         with self._wire.uninterrupted():
-            end = self._send(take_command(insist=insist))
+            end = self._sent(take_command(insist=insist))
             answer = end.now.answer
             if end.state != CommandState.DONE or answer.holder != self._wire.owner:
                 self._forget()
@@ -203,10 +203,14 @@ class Ownership:
         with self._wire.uninterrupted():
             if self._wire.epoch:
                 if self._wire.motions.unfinished:
-                    self._send(Command(0, Opcode.HALT))
+                    self._sent(Command(0, Opcode.HALT))
                 self._give_back()
                 self._wire.epoch = 0
                 self._forget()
+
+    def _sent(self, command: Command) -> Ended:
+        with Concerning(self._wire.identity, describe(command)):
+            return self._send(command)
 
     def _forget(self) -> None:
         if self._outcomes is not None:
@@ -219,12 +223,10 @@ class Ownership:
         return LeaseLostError(
             tr("{request!r} was not sent: another client took the mailbox.", request=request),
             remedy=tr("Connect again when it has ended."),
-            controller=self._wire.identity,
-            request=request,
         )
 
     def _held_by(self, holder: int) -> LeaseHeldError:
-        error = LeaseHeldError("", controller=self._wire.identity)
+        error = LeaseHeldError("")
         error.holder = f"{holder:08X}"
         run = self._run_of(error)
         insist = tr("A person at the cell can take it over: 'robolink robot take-ownership'.")
@@ -276,7 +278,7 @@ class Ownership:
         deadline = Deadline.after(self._wire.clock, _LONGEST_STOP_S)
         while True:
             try:
-                end = self._send(_GIVE_BACK)
+                end = self._sent(_GIVE_BACK)
             except RejectedError as error:
                 if error.code != ErrorClass.BUSY or deadline.expired:
                     raise

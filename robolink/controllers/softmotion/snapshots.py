@@ -90,7 +90,6 @@ def _require_place(words: Sequence[int], controller: str) -> None:
             "Nothing was written. Low word first at +0 is right: correct the response address in "
             "the URL, or the word order in the PLC's union or in the gateway."
         ),
-        controller=controller,
     )
 
 
@@ -105,7 +104,6 @@ def _foreign(meaning: str, controller: str) -> RemoteProtocolError:
             "Nothing was written. Compare the addresses in the URL and the program in the PLC "
             "with 'robolink expert plc export'."
         ),
-        controller=controller,
     )
 
 

@@ -65,7 +65,7 @@ class GroupTool:
             raise
         return self._mailbox.from_plc(now.answer.pose)
 
-    def require(self, offset: ToolOffset | None, request: str) -> None:
+    def require(self, offset: ToolOffset | None) -> None:
         """Prove that the group works with ``offset``.
 
         Raises:
@@ -73,11 +73,9 @@ class GroupTool:
         """
         found = self.read()
         if not self._mailbox.same(found, offset):
-            raise self.differs(offset, found, request)
+            raise self.differs(offset, found)
 
-    def differs(
-        self, offset: ToolOffset | None, found: ToolOffset | None, request: str
-    ) -> ReadBackError:
+    def differs(self, offset: ToolOffset | None, found: ToolOffset | None) -> ReadBackError:
         """Return the error for a group that works with another tool than its slot holds."""
         return ReadBackError(
             tr(
@@ -86,8 +84,6 @@ class GroupTool:
                 found=describe_offset(found),
             ),
             remedy=tr("Do not move the robot; another program may set the group's tool."),
-            controller=self._mailbox.identity,
-            request=request,
         )
 
 
@@ -118,18 +114,7 @@ class SlotWrite(ToolWrite):
         self._draft = draft
         self._stored = stored
         self._group_tool = group_tool
-        self._found: ToolOffset | None = None
         self._group_differs = False
-
-    def change(self, expected: Expected) -> ToolReceipt:
-        """Write and read back; see :class:`robolink.controllers.tool_writing.ToolWrite`."""
-        try:
-            return super().change(expected)
-        except ReadBackError as error:
-            if self._group_differs and self._group_tool is not None:
-                differs = self._group_tool.differs(self.requested, self._found, self.request)
-                raise differs from error
-            raise
 
     def read_before(self, expected: Expected) -> ToolOffset | None:  # noqa: ARG002 - one way only
         """Read what the write replaces.
@@ -145,11 +130,16 @@ class SlotWrite(ToolWrite):
 
     def read_back(self) -> ToolOffset | None:
         """Return what is stored, or what the group works with where that differs."""
-        self._found, group_tool = self._slot(), self._group_tool
-        if group_tool is not None and self._mailbox.same(self._found, self.requested):
-            self._found = group_tool.read()
-            self._group_differs = not self._mailbox.same(self._found, self.requested)
-        return self._found
+        found, group_tool = self._slot(), self._group_tool
+        if group_tool is not None and self._mailbox.same(found, self.requested):
+            found = group_tool.read()
+            self._group_differs = not self._mailbox.same(found, self.requested)
+        return found
+
+    def _differs(self, found: ToolOffset | None) -> ReadBackError:
+        if self._group_differs and self._group_tool is not None:
+            return self._group_tool.differs(self.requested, found)
+        return super()._differs(found)
 
     def _slot(self) -> ToolOffset | None:
         mailbox = self._mailbox
@@ -204,12 +194,12 @@ class SoftMotionToolTable(ToolTableCore):
             slot = mailbox.snapshots.slot(tool)
             stored = mailbox.tool_in(slot)
             now = mailbox.snapshots.take()
-            require_still(now, controller=mailbox.identity, request=request)
+            require_still(now)
             in_force = now.tool_slot == tool
             if not self.same(stored, requested):
                 if in_force:
-                    self._require_changeable(tool, requested, now, request)
-                self._require_carried(requested, now, request)
+                    self._require_changeable(tool, requested, now)
+                self._require_carried(requested, now)
                 mailbox.prepare(draft, request, now=now)
             return SlotWrite(
                 mailbox,
@@ -249,38 +239,33 @@ class SoftMotionToolTable(ToolTableCore):
     def _prepare_selection(self, tool: int, request: str) -> None:
         mailbox = self._mailbox
         now = mailbox.prepare(_select_draft(tool), request)
-        require_still(now, controller=mailbox.identity, request=request)
-        require_enabled(now, controller=mailbox.identity, request=request)
-        self._require_carried(self._stored(tool) if tool else None, now, request)
+        require_still(now)
+        require_enabled(now)
+        self._require_carried(self._stored(tool) if tool else None, now)
 
-    def _require_possible(self, tool: int, offset: ToolOffset) -> None:
-        now = self._mailbox.snapshots.take()
-        self._require_carried(offset, now, self._request(tool, offset))
+    def _require_possible(self, tool: int, offset: ToolOffset) -> None:  # noqa: ARG002 - alike
+        self._require_carried(offset, self._mailbox.snapshots.take())
 
     def require_measurable(self, components: Sequence[str]) -> None:
         """Refuse to measure what this kinematics could not be told; see the model."""
-        mailbox, now = self._mailbox, self._mailbox.snapshots.take()
-        require_measurable(self._images, now, components, controller=mailbox.identity)
+        require_measurable(self._images, self._mailbox.snapshots.take(), components)
 
-    def _require_carried(self, offset: ToolOffset | None, now: Response, request: str) -> None:
+    def _require_carried(self, offset: ToolOffset | None, now: Response) -> None:
         """Refuse what the kinematics cannot carry, unless it is put back."""
-        mailbox = self._mailbox
-        if offset is not None and not mailbox.latch.restores:
-            require_fit(self._images, now, offset, controller=mailbox.identity, request=request)
+        if offset is not None and not self._mailbox.latch.restores:
+            require_fit(self._images, now, offset)
 
-    def _prove_selected(self, offset: ToolOffset, request: str) -> None:
-        self._group_tool.require(offset, request)
+    def _prove_selected(self, offset: ToolOffset, request: str) -> None:  # noqa: ARG002 - alike
+        self._group_tool.require(offset)
 
     def _known(self, lowest: int) -> str:  # noqa: ARG002 - alike for both
         return tr("The mailbox has tools 0 to 15.")
 
-    def _require_changeable(
-        self, tool: int, requested: ToolOffset | None, now: Response, request: str
-    ) -> None:
+    def _require_changeable(self, tool: int, requested: ToolOffset | None, now: Response) -> None:
         """Hold back what the PLC would refuse for the slot in force."""
         if requested is None:
             require_replacement(tool, None)
-        require_enabled(now, controller=self._mailbox.identity, request=request)
+        require_enabled(now)
 
 
 def _name(tool: int, slot: Slot) -> str:
@@ -305,8 +290,8 @@ class SoftMotionResolver(MarkerResolver):
         self._mailbox.commands.ownership.fence()
 
     def _require_rest(self) -> None:
-        now = self._mailbox.snapshots.take()
-        require_still(now, controller=self._mailbox.identity, request=tr("recover"))
+        with self._mailbox.asked(tr("recover")):
+            require_still(self._mailbox.snapshots.take())
 
     def _examine_more(self, marker: Marker) -> Finding | None:
         if "kinematics" in marker.details:

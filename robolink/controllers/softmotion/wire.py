@@ -32,6 +32,7 @@ from robolink.protocols.mailbox import CommandState, Finished, Response
 from robolink.stop_latch import StopLatch
 from robolink.timing import Deadline
 from robolink.transport import MailboxHead, MailboxLink
+from robolink.transport.byte_stream import link_closed
 
 MOST: Final = 4
 """Movements whose end may be unread."""
@@ -64,7 +65,7 @@ class MotionTracker:
         """Whether there are movements whose end nobody has taken."""
         return bool(self._ends)
 
-    def require_room(self, request: str, *, controller: str) -> None:
+    def require_room(self, request: str) -> None:
         """Refuse a fifth movement.
 
         Raises:
@@ -74,8 +75,6 @@ class MotionTracker:
             raise BusyError(
                 tr("{request} has to wait: four movements are unfinished.", request=request),
                 remedy=tr("Wait for the first of them, then send the next."),
-                controller=controller,
-                request=request,
             )
 
     def begin(self, sequence: int) -> None:
@@ -281,18 +280,13 @@ class MailboxWire:
 
     def ended(self, error: ErrorT) -> ErrorT:
         """End the session because of ``error``, and return it to be raised."""
-        error.controller = error.controller or self.identity
         self._ended_by = self._ended_by or error
         self._link.close()
         return error
 
     def close(self) -> None:
         """Close the link. Idempotent."""
-        self._ended_by = self._ended_by or TransportClosedError(
-            tr("The connection to {identity} is closed.", identity=self.identity),
-            remedy=tr("Connect again."),
-            controller=self.identity,
-        )
+        self._ended_by = self._ended_by or link_closed(self.identity)
         self._link.close()
         self._gate.close()
 
@@ -380,5 +374,4 @@ class MailboxWire:
             raise TransportClosedError(
                 tr("The connection to {identity} has ended.", identity=self.identity),
                 remedy=tr("Connect again; the controller's state is then read again."),
-                controller=self.identity,
             ) from self._ended_by

@@ -3,11 +3,11 @@
 import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field, replace
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final, Self
 
 from annotated_types import Ge, Le, Len
 
-from robolink.calibration import MIN_ROTATION_DEG, CalibrationResult, tip_pose
+from robolink.calibration import MIN_ROTATION_DEG
 from robolink.files.toml import Problem
 from robolink.messages import declared, tr
 from robolink.methods.method import (
@@ -20,14 +20,18 @@ from robolink.methods.method import (
     InputNumber,
     Length,
     Method,
-    MethodParameters,
     Needs,
     Option,
     Site,
 )
-from robolink.methods.z_touch import retake_of_nothing
+from robolink.methods.shared_parameters import SampledParameters
 from robolink.model import MotionGroup, Pose, ToolOffset, angle_difference_deg
-from robolink.procedures import InputSource, MeasurementContext, SamplingPolicy, may_end_early
+from robolink.procedures import (
+    InputSource,
+    MeasurementContext,
+    ProofBasis,
+    may_end_early,
+)
 from robolink.runner import Procedure
 from robolink.stations import BeamStation, StationKind
 
@@ -54,7 +58,7 @@ class BeamLine:
 
 
 @dataclass(frozen=True, kw_only=True)
-class BeamsParameters(MethodParameters):
+class BeamsParameters(SampledParameters):
     """How a tip is driven through two crossed light beams."""
 
     beams: Annotated[
@@ -163,11 +167,6 @@ class BeamsParameters(MethodParameters):
         Help(declared("Whether robolink offers to make the crossing that fits worst again.")),
     ] = False
 
-    @property
-    def sampling(self) -> SamplingPolicy:
-        """When it ends, and whether a crossing is offered to be made again."""
-        return SamplingPolicy(self.until_mm, retake=self.retake)
-
     def may_end_early(self, *, sigma_stated: bool) -> bool:
         """Tell whether the tip can be known well enough before the last crossing.
 
@@ -180,7 +179,7 @@ class BeamsParameters(MethodParameters):
 
     def problems(self, check: Check) -> Iterator[Problem]:
         """Check that the beams cross, and that one breaks at a time."""
-        yield from self._of_sampling(check)
+        yield from super().problems(check)
         yield from self._of_beams(check)
         if self.aside_mm <= self.search_mm:
             yield Problem(
@@ -211,21 +210,14 @@ class BeamsParameters(MethodParameters):
         """Tell whether the beams are stated here, so that the station need not be known."""
         return self.beams is not None
 
-    def _of_sampling(self, check: Check) -> Iterator[Problem]:
-        if "retake" in check.given and self.retake and self.no_residual():
-            yield retake_of_nothing()
-        if self.until_mm is None or check.sigma_stated is None:
-            return
-        if not self.may_end_early(sigma_stated=check.sigma_stated):
-            yield Problem(
-                "until_mm",
-                tr(
-                    "has nothing to leave out; give 3 {repeats}, or 2 with {sigma} or {turn}",
-                    repeats=check.spell("repeats"),
-                    sigma=check.spell("sigma_mm"),
-                    turn=check.spell("turn_deg"),
-                ),
-            )
+    def nothing_to_leave_out(self, check: Check) -> str:
+        """Return why it cannot end early, and what to give."""
+        return tr(
+            "has nothing to leave out; give 3 {repeats}, or 2 with {sigma} or {turn}",
+            repeats=check.spell("repeats"),
+            sigma=check.spell("sigma_mm"),
+            turn=check.spell("turn_deg"),
+        )
 
     def _of_beams(self, check: Check) -> Iterator[Problem]:
         if (self.beams is None) != (self.z_mm is None):
@@ -303,15 +295,12 @@ class BeamsSource(InputSource[BeamsParameters]):
         """What to do when a measurement makes the tip jump."""
         return tr("Were the beams moved since the reference was taken, or does the needle lean?")
 
-    def measure(
-        self, context: MeasurementContext, tool: int, stored: ToolOffset | None
-    ) -> CalibrationResult:
-        """Cross and solve; see :class:`~robolink.procedures.MovingSource`."""
+    def told_by(self, context: MeasurementContext) -> Self:
+        """Return the source with the run-up and the step of a crossing."""
         group, speed_mm_s = context.controller.groups[0], self.plan.crossing_mm_s
-        told = replace(
+        return replace(
             self, run_up_mm=group.run_up_mm(speed_mm_s), step_mm=group.edge_step_mm(speed_mm_s)
         )
-        return InputSource.measure(told, context, tool, stored)
 
     def require_able(self, group: MotionGroup, change_mm: float) -> None:
         """Refuse crossings that are too fast for their way.
@@ -331,16 +320,8 @@ class BeamsSource(InputSource[BeamsParameters]):
 
         return cross_beams(self, stored, here)
 
-    def proof(
-        self,
-        context: MeasurementContext,
-        tool: int,
-        result: CalibrationResult,
-        *,
-        tip: ToolOffset,
-        tolerance_mm: float,
-    ) -> "CrossingTest":
-        """Return the proof at another U; see :class:`~robolink.procedures.KeepsProof`.
+    def proof_of(self, basis: ProofBasis) -> "CrossingTest":
+        """Return the proof at another U; see :meth:`~robolink.procedures.ProvesAgain.proof_of`.
 
         Its crossings are others than those that were measured, and as far from them as a turn goes:
         90 degrees and more from each. Where the beams were found too it is about those places: with
@@ -350,24 +331,18 @@ class BeamsSource(InputSource[BeamsParameters]):
         from robolink.calibration import moved_beams
         from robolink.methods.beams.procedure import CrossingTest  # numpy
 
-        measured_deg = [
-            tip_pose(pose, result.offset, tool=tool).u_deg
-            for pose in (result.inputs[0], result.inputs[-1])
-        ]
-        station, lean = self.station, getattr(result, "lean", None)
+        station, measured_deg = self.station, basis.measured_deg
+        lean = getattr(basis.result, "lean", None)
         return CrossingTest(
-            tool=tool,
-            written=result.offset,
-            tip=tip,
-            tolerance_mm=tolerance_mm,
-            beams=moved_beams(station.beams, getattr(result, "moved_mm", ())),
+            **basis.common,
+            beams=moved_beams(station.beams, getattr(basis.result, "moved_mm", ())),
             z_mm=station.z_mm,
             inputs=station.inputs,
             off_when_broken=station.off_when_broken,
             plan=self.plan,
-            angles_deg=(farthest_from(*measured_deg),),
+            angles_deg=(farthest_from(measured_deg[0], measured_deg[-1]),),
             lean=None if lean is None else (lean.x, lean.y),
-            run_up_mm=context.controller.groups[0].run_up_mm(self.plan.crossing_mm_s),
+            run_up_mm=basis.context.controller.groups[0].run_up_mm(self.plan.crossing_mm_s),
         )
 
 

@@ -223,10 +223,6 @@ class CrossingTest(PlacedProof):
             run_up_mm=self.run_up_mm,
         )
 
-    def steps_after_a_break(self, here: Pose) -> Procedure[VerifyResult]:
-        """Return the same steps: they begin straight up."""
-        return self.steps(here)
-
     def _lean_in_frame(self, here: Pose) -> tuple[float, float]:
         """Return the lean in the axes of the frame that was written, which may be turned."""
         if self.lean is None:

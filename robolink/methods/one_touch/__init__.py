@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 
 from annotated_types import Ge, Le
 
-from robolink.calibration import CalibrationResult, carrying, tip_pose
+from robolink.calibration import CalibrationResult, carrying
 from robolink.errors import ConfigError
 from robolink.messages import declared, tr
 from robolink.methods.method import (
@@ -26,6 +26,7 @@ from robolink.model import Pose, ToolOffset
 from robolink.procedures import (
     MeasurementContext,
     PinTouches,
+    ProofBasis,
     ProvesAgain,
     TouchPlan,
     TurnTest,
@@ -238,32 +239,20 @@ class OneTouchSource(ProvesAgain):
             solve=lambda touch: self.solver.solve([touch], stored),
         )
 
-    def proof(
-        self,
-        context: MeasurementContext,  # noqa: ARG002 - nothing of it is read
-        tool: int,
-        result: CalibrationResult,
-        *,
-        tip: ToolOffset,
-        tolerance_mm: float,
-    ) -> TurnTest:
-        """Return the test by half a turn; see :class:`~robolink.procedures.KeepsProof`.
+    def proof_of(self, basis: ProofBasis) -> TurnTest:
+        """Return the test by half a turn; see :meth:`~robolink.procedures.ProvesAgain.proof_of`.
 
         Z was measured, or its change: where an input shows contact the height counts as drift.
         """
         from robolink.calibration import toward_zero  # numpy, which a look does without
 
-        measured_deg = tip_pose(result.inputs[-1], result.offset, tool=tool).u_deg
         return TurnTest(
-            tool=tool,
+            **basis.common,
             touch=self.touch,
-            contact=contact_pose(result, tool=tool),
-            angles_deg=(toward_zero(measured_deg, HALF_A_TURN_DEG),),
-            tolerance_mm=tolerance_mm,
-            u_mm=drift_uncertainty_mm(result),
-            written=result.offset,
-            tip=tip,
-            in_space=self.touch.contact is not None and "z_mm" in result.found,
+            contact=contact_pose(basis.result, tool=basis.tool),
+            angles_deg=(toward_zero(basis.measured_deg[-1], HALF_A_TURN_DEG),),
+            u_mm=drift_uncertainty_mm(basis.result),
+            in_space=self.touch.contact is not None and "z_mm" in basis.result.found,
         )
 
 

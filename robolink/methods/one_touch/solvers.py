@@ -24,6 +24,7 @@ from robolink.model import (
     Recorded,
     ToolOffset,
     describe_offset,
+    from_json,
     read_offset,
 )
 from robolink.timing import local_label
@@ -148,12 +149,8 @@ def _last_touch(entry: Recorded, station: str) -> LastTouch | None:
         place_mm=(float(said["x_mm"]), float(said["y_mm"]), float(said["z_mm"])),
         u_deg=float(said["u_deg"]),
         value=value,
-        chain=NeedleChain(
-            float(said["sigma_mm"]),
-            int(said["changes"]),
-            # Records of before do not say it; their chain then starts where it had got to.
-            said.get("full_sigma_mm"),
-        ),
+        # Records of before do not say ``full_sigma_mm``; their chain starts where it had got to.
+        chain=from_json(NeedleChain, said, partial=True),
         touch_sigma_mm=None if sigma_mm is None else float(sigma_mm),
         nozzle=entry.signature.nozzle,
         at=entry.at,

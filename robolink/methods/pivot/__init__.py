@@ -24,8 +24,8 @@ from robolink.methods.shared_parameters import PinParameters, Retake
 from robolink.model import Controller, Pose, ToolOffset
 from robolink.procedures import (
     TAKE_ALL,
-    MeasurementContext,
     PinSource,
+    ProofBasis,
     SamplingPolicy,
     TouchPlan,
     drift_uncertainty_mm,
@@ -116,30 +116,19 @@ class PivotSource(PinSource):
             tilt=self._tilt_deg,
         )
 
-    def proof(
-        self,
-        context: MeasurementContext,  # noqa: ARG002 - nothing of it is read
-        tool: int,
-        result: CalibrationResult,
-        *,
-        tip: ToolOffset,
-        tolerance_mm: float,
-    ) -> "TiltTest":
-        """Return the tilt test; see :class:`~robolink.procedures.KeepsProof`."""
+    def proof_of(self, basis: ProofBasis) -> "TiltTest":
+        """Return the tilt test; see :meth:`~robolink.procedures.ProvesAgain.proof_of`."""
         from robolink.methods.pivot.procedure import TiltTest  # numpy
         from robolink.procedures.tilt_proof import upright_of
 
-        x_mm, y_mm, z_mm = result.reference_point_mm
+        x_mm, y_mm, z_mm = basis.result.reference_point_mm
         return TiltTest(
-            tool=tool,
-            written=result.offset,
-            tip=tip,
-            tolerance_mm=tolerance_mm,
+            **basis.common,
             touch=self.touch,
             pin_mm=(x_mm, y_mm, z_mm),
             tilt_deg=self._tilt_deg,
-            u_mm=drift_uncertainty_mm(result),
-            upright=upright_of(result, result.offset, tool),
+            u_mm=drift_uncertainty_mm(basis.result),
+            upright=upright_of(basis.result, basis.result.offset, basis.tool),
         )
 
     def foreseen(self) -> Self:

@@ -15,6 +15,7 @@ from robolink.errors import CalibrationError
 from robolink.messages import tr
 from robolink.model import Path, Pose, ToolOffset
 from robolink.procedures import NO_OFFSET
+from robolink.procedures.samples import TouchNames
 from robolink.runner import Consider, Move, Notify, Procedure
 from robolink.ways import Way, way
 
@@ -160,7 +161,7 @@ def _own_rotation(frame: ToolOffset) -> Floats:
     return rotation_of(Pose(0.0, 0.0, 0.0, *frame.components()[3:]))
 
 
-class TiltedNames:
+class TiltedNames(TouchNames):
     """What is the same for all samplers whose tool is tilted and turned."""
 
     __slots__ = ()
@@ -170,17 +171,9 @@ class TiltedNames:
         """Which lengths become known."""
         return tr("X, Y and Z")
 
-    def counted(self, count: int) -> str:
-        """Return how many were taken."""
-        return tr("{count} touches", count=count)
-
     def named(self, pose: Pose) -> str:
         """Return where one was taken."""
         return tr("U {u:.1f} V {v:.1f} W {w:.1f}", u=pose.u_deg, v=pose.v_deg, w=pose.w_deg)
-
-    def which(self, number: int, pose: Pose) -> str:
-        """Return which one it is."""
-        return tr("Touch {number} at {where}", number=number, where=self.named(pose))
 
 
 MOST_DEVIATION_DEG: Final = 1.0

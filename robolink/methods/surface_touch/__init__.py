@@ -3,13 +3,13 @@
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, Generic, Self
+from typing import TYPE_CHECKING, Annotated, Any, Generic, Self
 
 from annotated_types import Ge, Le
 
 from robolink.messages import declared
-from robolink.methods.method import DEGREES, MM, Help, InputNumber, Option
-from robolink.methods.pivot import require_known_tip
+from robolink.methods.method import DEGREES, MM, AnyMethod, Help, InputNumber, Option, Site
+from robolink.methods.pivot import axes_of, require_known_tip, require_tilting
 from robolink.methods.shared_parameters import PinParameters, Retake
 from robolink.methods.surface_touch.survey import SurveyT
 from robolink.model import Pose, ToolOffset
@@ -69,6 +69,20 @@ class SurfaceParameters(PinParameters):
     def states_station(self) -> bool:
         """Tell that nothing need be known about the surface: it is found with the tip."""
         return True
+
+
+def told_at(method: AnyMethod, parameters: SurfaceParameters, site: Site) -> dict[str, Any]:
+    """Return what the site tells a source of touches of a surface.
+
+    Raises:
+        CalibrationError: ``rank_deficient``: the robot cannot tilt its tool.
+    """
+    require_tilting(site.controller, method.name)
+    return {
+        "axes": axes_of(site.controller),
+        "sigma_mm": site.sigma_mm,
+        "sampling": parameters.sampling,
+    }
 
 
 @dataclass(frozen=True, slots=True)

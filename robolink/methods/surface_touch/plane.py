@@ -11,12 +11,12 @@ from robolink.files.toml import Problem
 from robolink.messages import declared, tr
 from robolink.methods.method import MM, Check, Help, Method, Needs, Option, PoseHelp, Site
 from robolink.methods.pivot import TiltedTouches
-from robolink.methods.surface_touch import SurfaceParameters, SurfaceTouchSource
+from robolink.methods.surface_touch import SurfaceParameters, SurfaceTouchSource, told_at
 from robolink.methods.surface_touch.survey import PlaneSurvey
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import (
     TAKE_ALL,
-    MeasurementContext,
+    ProofBasis,
     SamplingPolicy,
     TouchPlan,
     drift_uncertainty_mm,
@@ -96,16 +96,8 @@ class PlaneTouchSource(SurfaceTouchSource[PlaneSurvey, "PlaneTouchResult"]):
         """What to do when a measurement makes the tip jump."""
         return tr("Check that all touches were on the same flat surface, and that it is fixed.")
 
-    def proof(
-        self,
-        context: MeasurementContext,  # noqa: ARG002 - nothing of it is read
-        tool: int,
-        result: CalibrationResult,
-        *,
-        tip: ToolOffset,
-        tolerance_mm: float,
-    ) -> "PlaneTest":
-        """Return the proof in other tilts; see :class:`~robolink.procedures.KeepsProof`.
+    def proof_of(self, basis: ProofBasis) -> "PlaneTest":
+        """Return the proof in other tilts; see :meth:`~robolink.procedures.ProvesAgain.proof_of`.
 
         Raises:
             TypeError: The result is not that of a plane.
@@ -114,19 +106,16 @@ class PlaneTouchSource(SurfaceTouchSource[PlaneSurvey, "PlaneTouchResult"]):
         from robolink.methods.surface_touch.plane_procedure import PlaneTest  # numpy
         from robolink.procedures.tilt_proof import upright_of
 
-        if not isinstance(result, PlaneTouchResult):
+        if not isinstance(basis.result, PlaneTouchResult):
             raise TypeError("the plane that was touched is a part of the result")
         return PlaneTest(
-            tool=tool,
-            written=result.offset,
-            tip=tip,
-            tolerance_mm=tolerance_mm,
+            **basis.common,
             touch=self.touch,
-            plane=result.plane,
+            plane=basis.result.plane,
             tilt_deg=self.survey.tilt_deg,
             axes=self.axes,
-            u_mm=drift_uncertainty_mm(result),
-            upright=upright_of(result, result.offset, tool),
+            u_mm=drift_uncertainty_mm(basis.result),
+            upright=upright_of(basis.result, basis.result.offset, basis.tool),
         )
 
     def _kind(self) -> "SurfaceKind[PlaneSurvey, PlaneTouchResult]":
@@ -191,15 +180,8 @@ class PlaneTouches(TiltedTouches):
 
 
 def _source(parameters: PlaneTouchParameters, site: Site) -> "TipSource":
-    from robolink.methods.pivot import axes_of, require_tilting
-
-    require_tilting(site.controller, METHOD.name)
     return PlaneTouchSource(
-        parameters.touch,
-        parameters.survey,
-        axes=axes_of(site.controller),
-        sigma_mm=site.sigma_mm,
-        sampling=parameters.sampling,
+        parameters.touch, parameters.survey, **told_at(METHOD, parameters, site)
     )
 
 

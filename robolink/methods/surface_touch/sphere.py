@@ -11,12 +11,12 @@ from robolink.files.toml import Problem
 from robolink.messages import declared, tr
 from robolink.methods.method import MM, Check, Help, Method, Needs, Option, PoseHelp, Site
 from robolink.methods.pivot import TiltedTouches
-from robolink.methods.surface_touch import SurfaceParameters, SurfaceTouchSource
+from robolink.methods.surface_touch import SurfaceParameters, SurfaceTouchSource, told_at
 from robolink.methods.surface_touch.survey import SphereSurvey
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import (
     TAKE_ALL,
-    MeasurementContext,
+    ProofBasis,
     SamplingPolicy,
     TouchPlan,
     drift_uncertainty_mm,
@@ -103,16 +103,8 @@ class SphereTouchSource(SurfaceTouchSource[SphereSurvey, "SphereTouchResult"]):
         """What to do when a measurement makes the tip jump."""
         return tr("Check that all touches were on the same sphere, and that it is fixed.")
 
-    def proof(
-        self,
-        context: MeasurementContext,  # noqa: ARG002 - nothing of it is read
-        tool: int,
-        result: CalibrationResult,
-        *,
-        tip: ToolOffset,
-        tolerance_mm: float,
-    ) -> "SphereTest":
-        """Return the proof in other tilts; see :class:`~robolink.procedures.KeepsProof`.
+    def proof_of(self, basis: ProofBasis) -> "SphereTest":
+        """Return the proof in other tilts; see :meth:`~robolink.procedures.ProvesAgain.proof_of`.
 
         Raises:
             TypeError: The result is not that of a sphere.
@@ -124,20 +116,17 @@ class SphereTouchSource(SurfaceTouchSource[SphereSurvey, "SphereTouchResult"]):
         )
         from robolink.procedures.tilt_proof import upright_of
 
-        if not isinstance(result, SphereTouchResult):
+        if not isinstance(basis.result, SphereTouchResult):
             raise TypeError("the sphere that was touched is a part of the result")
-        x_mm, y_mm, z_mm = result.reference_point_mm
+        x_mm, y_mm, z_mm = basis.result.reference_point_mm
         return SphereTest(
-            tool=tool,
-            written=result.offset,
-            tip=tip,
-            tolerance_mm=tolerance_mm,
+            **basis.common,
             touch=self.touch,
             survey=self.survey,
-            sphere=TouchedSphere((x_mm, y_mm, z_mm), result.radius_mm),
+            sphere=TouchedSphere((x_mm, y_mm, z_mm), basis.result.radius_mm),
             axes=self.axes,
-            u_mm=drift_uncertainty_mm(result),
-            upright=upright_of(result, result.offset, tool),
+            u_mm=drift_uncertainty_mm(basis.result),
+            upright=upright_of(basis.result, basis.result.offset, basis.tool),
         )
 
     def _kind(self) -> "SurfaceKind[SphereSurvey, SphereTouchResult]":
@@ -205,15 +194,8 @@ class SphereTouches(TiltedTouches):
 
 
 def _source(parameters: SphereTouchParameters, site: Site) -> "TipSource":
-    from robolink.methods.pivot import axes_of, require_tilting
-
-    require_tilting(site.controller, METHOD.name)
     return SphereTouchSource(
-        parameters.touch,
-        parameters.survey,
-        axes=axes_of(site.controller),
-        sigma_mm=site.sigma_mm,
-        sampling=parameters.sampling,
+        parameters.touch, parameters.survey, **told_at(METHOD, parameters, site)
     )
 
 

@@ -2,11 +2,11 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import TYPE_CHECKING, Annotated, Final, Self
 
 from annotated_types import Ge, Le, MinLen
 
-from robolink.calibration import MIN_ROTATION_DEG, CalibrationResult, tip_pose
+from robolink.calibration import MIN_ROTATION_DEG, tip_pose
 from robolink.files.toml import Problem
 from robolink.messages import declared, tr
 from robolink.methods.method import (
@@ -19,14 +19,18 @@ from robolink.methods.method import (
     InputNumber,
     Length,
     Method,
-    MethodParameters,
     Needs,
     Option,
     Site,
 )
-from robolink.methods.shared_parameters import clearance_below_lift
+from robolink.methods.shared_parameters import SampledParameters, clearance_below_lift
 from robolink.model import Pose, ToolOffset
-from robolink.procedures import InputSource, MeasurementContext, SamplingPolicy, may_end_early
+from robolink.procedures import (
+    InputSource,
+    MeasurementContext,
+    ProofBasis,
+    may_end_early,
+)
 from robolink.runner import Procedure
 from robolink.stations import StationKind, TouchStation
 
@@ -41,7 +45,7 @@ _SPEEDS_APART: Final = 1.5
 
 
 @dataclass(frozen=True, kw_only=True)
-class ZTouchParameters(MethodParameters):
+class ZTouchParameters(SampledParameters):
     """How a tip is brought down on a surface that switches an input."""
 
     input: Annotated[
@@ -118,11 +122,6 @@ class ZTouchParameters(MethodParameters):
         Help(declared("Whether robolink offers to make the touch that fits worst again.")),
     ] = False
 
-    @property
-    def sampling(self) -> SamplingPolicy:
-        """When it ends, and whether a touch is offered to be made again."""
-        return SamplingPolicy(self.until_mm, retake=self.retake)
-
     def may_end_early(self, *, sigma_stated: bool) -> bool:
         """Tell whether the tip can be known well enough before the last touch.
 
@@ -134,27 +133,21 @@ class ZTouchParameters(MethodParameters):
 
     def problems(self, check: Check) -> Iterator[Problem]:
         """Check speeds and heights, and that an early end and a retake can do something."""
-        if "retake" in check.given and self.retake and self.no_residual():
-            yield retake_of_nothing()
-        if (
-            self.until_mm is not None
-            and check.sigma_stated is not None
-            and not self.may_end_early(sigma_stated=check.sigma_stated)
-        ):
-            yield Problem(
-                "until_mm",
-                tr(
-                    "has nothing to leave out; give 7 {speeds}, or 4 with {sigma}",
-                    speeds=check.spell("speeds_mm_s"),
-                    sigma=check.spell("sigma_mm"),
-                ),
-            )
+        yield from super().problems(check)
         if max(self.speeds_mm_s) < _SPEEDS_APART * min(self.speeds_mm_s):
             yield Problem(
                 "speeds_mm_s",
                 tr("must differ by a factor of {factor:g} or more", factor=_SPEEDS_APART),
             )
         yield from clearance_below_lift(self.clearance_mm, self.lift_mm, check)
+
+    def nothing_to_leave_out(self, check: Check) -> str:
+        """Return why it cannot end early, and what to give."""
+        return tr(
+            "has nothing to leave out; give 7 {speeds}, or 4 with {sigma}",
+            speeds=check.spell("speeds_mm_s"),
+            sigma=check.spell("sigma_mm"),
+        )
 
     def room_mm(self) -> float:
         """Return how high the box has to be."""
@@ -168,11 +161,6 @@ class ZTouchParameters(MethodParameters):
             "cannot be judged: two touches cannot check each other; give four speeds, "
             "or limit the interval and state the standard deviation"
         )
-
-
-def retake_of_nothing() -> Problem:
-    """Return what is wrong with a retake where nothing is repeated."""
-    return Problem("retake", tr("means nothing: nothing is repeated, so nothing can fit badly"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -203,14 +191,11 @@ class ZTouchSource(InputSource[ZTouchParameters]):
         """What to do when a measurement makes the tip jump."""
         return tr("Clean tip and surface, and check that the nozzle is tight.")
 
-    def measure(
-        self, context: MeasurementContext, tool: int, stored: ToolOffset | None
-    ) -> CalibrationResult:
-        """Touch and solve; see :class:`~robolink.procedures.MovingSource`."""
-        told = replace(
+    def told_by(self, context: MeasurementContext) -> Self:
+        """Return the source with how the robot brakes and how finely an edge is told."""
+        return replace(
             self, deceleration_mm_s2=_told_braking(context), step_mm=_told_step(context, self.plan)
         )
-        return InputSource.measure(told, context, tool, stored)
 
     def steps(self, stored: ToolOffset | None, here: Pose) -> "Procedure[ZTouchResult]":
         """Return the steps of the measurement."""
@@ -218,27 +203,17 @@ class ZTouchSource(InputSource[ZTouchParameters]):
 
         return touch_surface(self, stored, here)
 
-    def proof(
-        self,
-        context: MeasurementContext,
-        tool: int,
-        result: CalibrationResult,
-        *,
-        tip: ToolOffset,
-        tolerance_mm: float,
-    ) -> "ProbeTest":
-        """Return the proof at another U; see :class:`~robolink.procedures.KeepsProof`."""
+    def proof_of(self, basis: ProofBasis) -> "ProbeTest":
+        """Return the proof at another U; see :meth:`~robolink.procedures.ProvesAgain.proof_of`."""
         from robolink.calibration import toward_zero
         from robolink.methods.z_touch.procedure import ProbeTest  # numpy
 
+        context, tool = basis.context, basis.tool
         here = context.stands or context.controller.groups[0].pose()
         # After a measurement that is the flange; else whatever is in force.
-        frame = here if here.tool == tool else tip_pose(here, result.offset, tool=tool)
+        frame = here if here.tool == tool else tip_pose(here, basis.result.offset, tool=tool)
         return ProbeTest(
-            tool=tool,
-            written=result.offset,
-            tip=tip,
-            tolerance_mm=tolerance_mm,
+            **basis.common,
             station=self.station,
             plan=self.plan,
             angles_deg=(toward_zero(frame.u_deg, self.plan.proof_turn_deg),),

@@ -29,6 +29,7 @@ from robolink.procedures import (
     sample_sequentially,
     seek_or_retract,
 )
+from robolink.procedures.samples import TouchNames
 from robolink.runner import Move, Procedure, Seek
 from robolink.stations import TouchStation
 
@@ -99,7 +100,7 @@ def verify_by_touching(
 
 
 @dataclass(slots=True)
-class _ZTouchSampler:
+class _ZTouchSampler(TouchNames):
     """Touches of a surface, each at a speed; implements ``SequentialSampler``.
 
     Attributes:
@@ -123,9 +124,6 @@ class _ZTouchSampler:
     @property
     def known(self) -> str:
         return tr("Z")
-
-    def counted(self, count: int) -> str:
-        return tr("{count} touches", count=count)
 
     def take(self, place: float) -> Procedure[Touch]:
         if not self.near:
@@ -168,9 +166,6 @@ class _ZTouchSampler:
 
     def named(self, touch: Touch) -> str:
         return tr("{speed:g} mm/s", speed=touch.speed_mm_s)
-
-    def which(self, number: int, touch: Touch) -> str:
-        return tr("Touch {number} at {where}", number=number, where=self.named(touch))
 
     @property
     def _above(self) -> Pose:
@@ -218,7 +213,3 @@ class ProbeTest(PlacedProof):
             deceleration_mm_s2=self.deceleration_mm_s2,
             step_mm=self.step_mm,
         )
-
-    def steps_after_a_break(self, here: Pose) -> Procedure[VerifyResult]:
-        """Return the same steps: they begin straight up."""
-        return self.steps(here)

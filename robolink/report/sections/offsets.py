@@ -6,10 +6,9 @@ from typing import Final
 
 from robolink.calibration import Impact, PointImpact
 from robolink.messages import tr
-from robolink.model import angle_difference_deg
+from robolink.model import COMPONENTS, angle_difference_deg
 from robolink.report._values import Report
 
-NAMES: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
 AXES: Final = ("X mm", "Y mm", "Z mm", "U deg", "V deg", "W deg")
 
 
@@ -70,7 +69,7 @@ def offsets(report: Report) -> OffsetTables | None:
         # Neither a measurement nor typed components are on record: all that is known changed.
         return OffsetTables(components, tr("Offset"), (), "")
     own = tuple(
-        one for one, name in zip(components, NAMES, strict=True) if name in report.determined
+        one for one, name in zip(components, COMPONENTS, strict=True) if name in report.determined
     )
     kept = tuple(one for one in components if one not in own)
     if report.method is None:
@@ -89,7 +88,7 @@ def _components(report: Report) -> Iterator[OffsetComponent]:
         if fit is None or accuracy is None or report.widened_mm is not None
         else dict(zip(fit.measured, accuracy.half_width95, strict=False))
     )
-    for name, axis, old, new in zip(NAMES, AXES, before, after, strict=True):
+    for name, axis, old, new in zip(COMPONENTS, AXES, before, after, strict=True):
         change = None
         if old is not None and new is not None:
             change = angle_difference_deg(new, old) if name.endswith("deg") else new - old

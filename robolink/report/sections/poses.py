@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 from robolink.calibration import CalibrationResult
 from robolink.messages import tr
-from robolink.model import Pose
+from robolink.model import COMPONENTS, Pose
 from robolink.report._values import Report
-from robolink.report.sections.offsets import AXES, NAMES
+from robolink.report.sections.offsets import AXES
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +73,7 @@ def _table(
     names += [name for name in ("v_deg", "w_deg") if any(getattr(pose, name) for pose in poses)]
     handed = any(pose.hand for pose in poses)
     residuals = fit.residuals_mm if fit else ()
-    columns = [AXES[NAMES.index(name)] for name in names] + ([tr("hand")] if handed else [])
+    columns = [AXES[COMPONENTS.index(name)] for name in names] + ([tr("hand")] if handed else [])
     if residuals:
         axes = ("Z", "X, Y", "X, Y, Z")[max(map(len, residuals)) - 1]
         columns += [tr("residual {axes} mm", axes=axes), tr("length mm")]

@@ -22,13 +22,13 @@ from robolink.errors import (
     ConnectError,
     RemoteProtocolError,
     TransportBrokenError,
-    TransportClosedError,
     TransportError,
 )
 from robolink.messages import tr
 from robolink.timing import NS_PER_S, Clock, Deadline
 from robolink.transport._mailbox_link import MailboxHead
 from robolink.transport._url import LinkUrl, UrlOptions
+from robolink.transport.byte_stream import link_closed
 
 # It writes to standard error when nobody listens; every failure is an exception here.
 logging.getLogger("can").addHandler(logging.NullHandler())
@@ -140,11 +140,7 @@ class CanLine:
 
     def _ended(self, error: Exception) -> TransportError:
         if self._closed.is_set():
-            return TransportClosedError(
-                tr("The connection to {identity} is closed.", identity=self._identity),
-                remedy=tr("Connect again."),
-                controller=self._identity,
-            )
+            return link_closed(self._identity)
         return TransportBrokenError(
             tr("The CAN bus {identity} failed: {cause}.", identity=self._identity, cause=error),
             remedy=tr("Check the adapter, the bit rate and the terminators, then connect again."),
@@ -240,7 +236,6 @@ class NodeWatch:
                 count=_MOST_WAITING,
             ),
             remedy=tr("Look for a second device with its node number, or one that is defective."),
-            controller=self._identity,
         )
 
     def pump(self, deadline: Deadline) -> None:
@@ -321,7 +316,6 @@ class NodeWatch:
                     silent_s=self._silent_s(),
                 ),
                 remedy=tr("Check cable, power and state of the PLC, then try again."),
-                controller=self._identity,
             )
 
     def _restarted(self) -> TransportBrokenError:
@@ -330,5 +324,4 @@ class NodeWatch:
                 "Node {node} of {identity} has restarted.", node=self._node, identity=self._identity
             ),
             remedy=tr("Connect again, then check what was under way."),
-            controller=self._identity,
         )

@@ -8,6 +8,7 @@ from typing import Final
 
 from robolink import ambient
 from robolink.errors import (
+    Concerning,
     ConnectError,
     RejectedError,
     RemoteProtocolError,
@@ -84,7 +85,13 @@ def open_canopen_link(
 
 
 class CanopenMailboxLink:
-    """Implements :class:`~robolink.transport.MailboxLink` on a bus, and owns it."""
+    """Implements :class:`~robolink.transport.MailboxLink` on a bus, and owns it.
+
+    A virtual bus lives in this process, so its far end is not durable.
+    """
+
+    whole_look_s: Final = 0.0
+    """A bus at 125 kbit/s carries the block in some 60 ms, one at 1 Mbit/s in 8."""
 
     def __init__(
         self,
@@ -100,32 +107,11 @@ class CanopenMailboxLink:
         self._line = line
         self._node = node
         self._again = again
-        self._identity = identity
-        self._durable = durable
+        self.identity, self.place = identity, identity.partition("://")[2]
+        self.durable, self.clock = durable, clock
         self._timeout_s = timeout_s
-        self._clock = clock
         self._watch = NodeWatch(line, node, identity, clock)
         self._lock = ambient.lock()
-
-    @property
-    def identity(self) -> str:
-        """The URL with the node, without its other options."""
-        return self._identity
-
-    @property
-    def place(self) -> str:
-        """The bus and the node."""
-        return self._identity.partition("://")[2]
-
-    @property
-    def durable(self) -> bool:
-        """False on a virtual bus, which lives in this process; else True."""
-        return self._durable
-
-    @property
-    def clock(self) -> Clock:
-        """The clock it was opened with."""
-        return self._clock
 
     def meet(self, *, start: bool) -> None:
         """Ask for the node's heartbeat period, then start the node if wanted.
@@ -143,19 +129,14 @@ class CanopenMailboxLink:
                 tr(
                     "Node {node} of {identity} does not answer.",
                     node=self._node,
-                    identity=self._identity,
+                    identity=self.identity,
                 ),
                 remedy=tr(
                     "Check that the PLC runs, its node number, the bit rate, the wiring and both "
                     "terminators."
                 ),
-                controller=self._identity,
+                controller=self.identity,
             ) from error
-
-    @property
-    def whole_look_s(self) -> float:
-        """0: a bus at 125 kbit/s carries the block in some 60 ms, one at 1 Mbit/s in 8."""
-        return 0.0
 
     def write_command(self, words: Sequence[int]) -> None:
         """See :meth:`robolink.transport.MailboxLink.write_command`; one DOMAIN download."""
@@ -209,10 +190,10 @@ class CanopenMailboxLink:
     @contextmanager
     def _exchange(self) -> Iterator[Deadline]:
         """Hold the lock and one deadline; after an error that is no refusal, close."""
-        with self._lock:
+        with Concerning(self.identity), self._lock:
             try:
                 self._watch.drain()
-                yield Deadline.after(self._clock, self._timeout_s)
+                yield Deadline.after(self.clock, self._timeout_s)
             except RejectedError:
                 raise
             except RobolinkError:
@@ -234,33 +215,31 @@ class CanopenMailboxLink:
             raise RemoteProtocolError(
                 tr(
                     "{identity} holds {found} bytes in object {index:04X}h instead of {due}.",
-                    identity=self._identity,
+                    identity=self.identity,
                     found=len(data),
                     index=index,
                     due=2 * count,
                 ),
                 remedy=tr("The PLC's mailbox has another version: compare its EDS."),
-                controller=self._identity,
                 raw=data,
             )
         return struct.unpack(f"<{count}H", data)
 
     def _upload(self, index: int, subindex: int, deadline: Deadline) -> bytes:
-        return SdoTransfer(self._watch, self._identity, (index, subindex), deadline).upload()
+        return SdoTransfer(self._watch, self.identity, (index, subindex), deadline).upload()
 
     def _download(self, index: int, subindex: int, data: bytes, deadline: Deadline) -> None:
-        SdoTransfer(self._watch, self._identity, (index, subindex), deadline).download(data)
+        SdoTransfer(self._watch, self.identity, (index, subindex), deadline).download(data)
 
     def _no_heads(self) -> TransportTimeoutError:
         return TransportTimeoutError(
             tr(
                 "Node {node} of {identity} sends no TPDO1.",
                 node=self._node,
-                identity=self._identity,
+                identity=self.identity,
             ),
             remedy=tr(
                 "Check in the PLC that TPDO1 is mapped and sent at least every 100 ms, and that "
                 "the node is operational (start=yes in the URL)."
             ),
-            controller=self._identity,
         )

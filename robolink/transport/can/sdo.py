@@ -157,7 +157,6 @@ class SdoTransfer:
                 "Check that the PLC runs, its node number, the bit rate and the terminators, then "
                 "connect again."
             ),
-            controller=self._identity,
             request=self._shown,
         )
 
@@ -177,9 +176,7 @@ class SdoTransfer:
             remedy = tr("The PLC's mailbox has another version: compare its EDS.")
         else:
             remedy = tr("Look at the PLC's state; nothing was changed by this request.")
-        return RejectedError(
-            what, code=code, remedy=remedy, controller=self._identity, request=self._shown
-        )
+        return RejectedError(what, code=code, remedy=remedy, request=self._shown)
 
     def _mismatched(self, answer: bytes) -> RemoteProtocolError:
         self._abort(_ABORT_UNKNOWN_SERVICE)
@@ -193,7 +190,6 @@ class SdoTransfer:
                 "Look for a second SDO client, or a second node with this number, on the bus; "
                 "then connect again."
             ),
-            controller=self._identity,
             request=self._shown,
             raw=answer,
         )

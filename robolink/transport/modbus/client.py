@@ -10,12 +10,13 @@ from typing import Final, Protocol
 from robolink import ambient
 from robolink.errors import (
     ConfigError,
+    RejectedError,
     RemoteProtocolError,
-    TransportError,
+    RobolinkError,
     TransportTimeoutError,
 )
 from robolink.messages import tr
-from robolink.timing import Clock, Deadline
+from robolink.timing import Deadline
 from robolink.transport.byte_stream import Transport
 from robolink.transport.modbus.errors import refused
 from robolink.transport.modbus.frames import (
@@ -95,27 +96,17 @@ class ModbusClient:
         self.most_registers = most_registers
         self._transport = transport
         self._exchange = exchange
-        self._identity = identity
+        self.identity, self.clock = identity, transport.clock
         self._unit = unit
         self._timeout_s = timeout_s
         self._lock = ambient.lock()
         self._repeats_until: Deadline | None = None
 
     @property
-    def identity(self) -> str:
-        """Which far end this is: many units may share a line or a gateway."""
-        return self._identity
-
-    @property
     def place(self) -> str:
         """Where it was reached; the unit only where it is not the usual one."""
-        unit = self._identity.partition("?")[2]
+        unit = self.identity.partition("?")[2]
         return f"{self._transport.place}?{unit}" if unit else self._transport.place
-
-    @property
-    def clock(self) -> Clock:
-        """The clock on which deadlines are kept."""
-        return self._transport.clock
 
     def read_takes_s(self, count: int) -> float:
         """Return how long a read of so many registers takes on the line alone; 0 on a network."""
@@ -209,14 +200,14 @@ class ModbusClient:
                 reply = self._exchange.ask(request, deadline)
                 if reply.refusal is not None:
                     raise refused(self.identity, request, reply.refusal)
-            except (TransportTimeoutError, RemoteProtocolError) as error:
-                if not self._exchange.recovers:
+            except RobolinkError as error:
+                error.concern(self.identity)
+                silent = isinstance(error, TransportTimeoutError)
+                if self._exchange.recovers and (silent or isinstance(error, RemoteProtocolError)):
+                    if silent and self._repeats_until is None:
+                        self._repeats_until = Deadline.after(self.clock, self._retry_s)
+                elif not isinstance(error, RejectedError):
                     self._transport.close()
-                elif isinstance(error, TransportTimeoutError) and self._repeats_until is None:
-                    self._repeats_until = Deadline.after(self.clock, self._retry_s)
-                raise
-            except TransportError:
-                self._transport.close()
                 raise
             self._repeats_until = None
             return reply

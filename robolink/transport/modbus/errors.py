@@ -65,7 +65,6 @@ def unanswered(
     return TransportTimeoutError(
         what,
         remedy=remedy,
-        controller=identity,
         request=describe(request),
         raw=held,
     )
@@ -84,7 +83,6 @@ def flooding(identity: str, request: ModbusRequest, count: int, raw: bytes) -> R
             "Check that this is the PLC's Modbus port; on a serial line look for a second client, "
             "or a device that never stops."
         ),
-        controller=identity,
         request=describe(request),
         raw=raw[-_SHOWN_BYTES:],
     )
@@ -99,7 +97,6 @@ def restless(identity: str, count: int, raw: bytes) -> RemoteProtocolError:
             count=count,
         ),
         remedy=tr("Look for a second client on it, or a device that never stops."),
-        controller=identity,
         raw=raw[-_SHOWN_BYTES:],
     )
 
@@ -112,7 +109,6 @@ def hung_up(identity: str) -> TransportBrokenError:
             "Its number of clients may be limited, or its watchdog has run out: close other "
             "clients, then connect again."
         ),
-        controller=identity,
     )
 
 
@@ -137,7 +133,6 @@ def unintelligible(
     return RemoteProtocolError(
         tr("What {identity} sent is not Modbus.", identity=identity),
         remedy=remedy,
-        controller=identity,
         request=describe(request),
         raw=raw,
     )
@@ -151,7 +146,6 @@ def mismatched(identity: str, request: ModbusRequest) -> RemoteProtocolError:
             "Check the unit in the URL ({unit}) and that no other device shares this address.",
             unit=request.unit,
         ),
-        controller=identity,
         request=describe(request),
     )
 
@@ -161,7 +155,6 @@ def echoing(identity: str, request: ModbusRequest, raw: bytes) -> RemoteProtocol
     return RemoteProtocolError(
         tr("{identity} returns what is sent to it.", identity=identity),
         remedy=tr("An RS-485 adapter that hears itself needs echo=yes in the URL."),
-        controller=identity,
         request=describe(request),
         raw=raw,
     )
@@ -175,7 +168,6 @@ def echo_missing(identity: str, request: ModbusRequest, raw: bytes) -> RemotePro
             "Either the adapter does not hear itself: remove echo=yes. Or two devices spoke at "
             "once: look for a second client on the line."
         ),
-        controller=identity,
         request=describe(request),
         raw=raw,
     )
@@ -196,12 +188,12 @@ def refused(identity: str, request: ModbusRequest, code: int) -> RobolinkError:
     remedy = _remedy(code, request.unit)
     shown = describe(request)
     if code == _GATEWAY_NO_PATH:
-        return ConnectError(what, remedy=remedy, controller=identity, request=shown)
+        return ConnectError(what, remedy=remedy, request=shown)
     if code == _GATEWAY_NO_ANSWER:
-        return TransportTimeoutError(what, remedy=remedy, controller=identity, request=shown)
+        return TransportTimeoutError(what, remedy=remedy, request=shown)
     if request.values and code not in _NOT_DONE:
-        return RemoteProtocolError(what, remedy=remedy, controller=identity, request=shown)
-    return RejectedError(what, code=code, remedy=remedy, controller=identity, request=shown)
+        return RemoteProtocolError(what, remedy=remedy, request=shown)
+    return RejectedError(what, code=code, remedy=remedy, request=shown)
 
 
 def _name(code: int) -> str:

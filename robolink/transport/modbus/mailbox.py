@@ -95,7 +95,13 @@ def open_modbus_link(
 
 
 class ModbusMailboxLink:
-    """Implements :class:`~robolink.transport.MailboxLink` on a client, and owns it."""
+    """Implements :class:`~robolink.transport.MailboxLink` on a client, and owns it.
+
+    Its identity and place name which of a unit's mailboxes it is, when that is not the usual one.
+    """
+
+    durable: bool = True
+    """A PLC outlives this process."""
 
     def __init__(
         self,
@@ -105,27 +111,13 @@ class ModbusMailboxLink:
     ) -> None:
         self._client = client
         self._places = places
+        self.identity, self.clock = self._which(client.identity), client.clock
         self._again = again
-
-    @property
-    def identity(self) -> str:
-        """The client's, and which of a unit's mailboxes when it is not the usual one."""
-        return self._which(self._client.identity)
 
     @property
     def place(self) -> str:
         """The client's, and which of a unit's mailboxes when it is not the usual one."""
         return self._which(self._client.place)
-
-    @property
-    def durable(self) -> bool:
-        """True: a PLC outlives this process."""
-        return True
-
-    @property
-    def clock(self) -> Clock:
-        """The client's clock."""
-        return self._client.clock
 
     @property
     def whole_look_s(self) -> float:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
-from robolink.errors import ConfigError, ConnectError, TransportTimeoutError
+from robolink.errors import Concerning, ConfigError, ConnectError, TransportTimeoutError
 from robolink.messages import tr
 from robolink.timing import Clock, Deadline, SystemClock
 from robolink.transport._url import LinkUrl, UrlOptions
@@ -137,7 +137,8 @@ def _open_rtu(
     identity = _identity(url, unit)
     exchange = RtuExchange(transport, identity, line, RtuFraming())
     try:
-        exchange.get_in_step(unit, Deadline.after(clock, timeout_s))
+        with Concerning(identity):
+            exchange.get_in_step(unit, Deadline.after(clock, timeout_s))
     except TransportTimeoutError as error:
         transport.close()
         raise _nobody_there(error, url, unit, settings) from error

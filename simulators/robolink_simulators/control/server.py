@@ -21,7 +21,7 @@ from urllib.parse import parse_qsl, urlsplit
 from robolink.errors import ConfigError, RobolinkError
 from robolink.interrupts import ClosedAtExit
 from robolink.messages import tr
-from robolink_simulators.control.acts.registry import (
+from robolink_simulators.control.acts import (
     ACTS,
     MACHINE_REFUSALS,
     UnknownActError,

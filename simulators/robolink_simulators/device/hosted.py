@@ -2,7 +2,7 @@
 
 import threading
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
@@ -252,11 +252,26 @@ class HostedDevice(ABC):
 Act = Callable[[], None]
 
 
-class PlannedActs:
-    """Acts, each at its own instant."""
+class PlannedActs(ABC):
+    """What goes wrong around a controller, each act at its own instant."""
 
     def __init__(self) -> None:
         self._planned: list[tuple[int, Act]] = []
+
+    def strike(self, faults: Sequence[Any], now_ns: int) -> None:
+        """Do what is due now, and note what comes later."""
+        for fault in faults:
+            act = self._act_of(fault)
+            if act is not None:
+                self.plan(now_ns, fault.seconds, act)
+
+    @abstractmethod
+    def plan(self, now_ns: int, seconds: float, act: Act) -> None:
+        """Have something done some time from now."""
+
+    @abstractmethod
+    def _act_of(self, fault: Any) -> Act | None:  # noqa: ANN401 - of the kind of controller
+        """Return what a fault does, if it is anything of this kind."""
 
     def plan_at(self, at_ns: int, act: Act) -> None:
         """Have something done at an instant."""

@@ -1,24 +1,24 @@
 """What a controller keeps over a power cycle, as one small file; and a whole moment of it."""
 
-import json
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from pathlib import Path
 from typing import Any, Final
 
-from robolink.errors import ConfigError
-from robolink.files.named import read_named
 from robolink.messages import tr
 from robolink_simulators.cell.workplace import Workplace
 from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.memory.variables import Variables
-from robolink_simulators.state_files import StateFile, StateNotKeptError
+from robolink_simulators.state_files import StateFile
 
 SCHEMA: Final = "robolink/sim-state/1"
 
 
-class Flash:
+class Flash(StateFile):
     """Keeps tools, what else a robot is told once, and which it is (docs/reference/spel.md 6.3).
+
+    An older file lacks the serial number, or all but tools; the machine keeps its own then. A
+    serial number that was drawn is kept with the first writing.
 
     Args:
         path: Where; ``None`` keeps nothing.
@@ -26,64 +26,10 @@ class Flash:
     """
 
     def __init__(self, path: Path | None, machine: Machine) -> None:
-        self._file = StateFile(path)
+        super().__init__(path)
         self._machine = machine
-        # Nothing is written yet: a serial number that was drawn is kept with the first writing.
-        self._written: list[object] | None = None
 
-    @property
-    def failure(self) -> StateNotKeptError | None:
-        """Why something could not be kept; ``None`` as long as all was."""
-        return self._file.failure
-
-    def restore(self) -> None:
-        """Give the machine what the file holds, if there is one.
-
-        An older file lacks the serial number, or all but tools; the machine keeps its own then.
-
-        Raises:
-            ConfigError: The file cannot be read or is not of this robot.
-        """
-        path = self._file.path
-        if path is None or not path.exists():
-            return
-        first, *others = self._machine.robots
-        robot = first.model.name
-        try:
-            state = json.loads(read_named(path))
-            if state["schema"] != SCHEMA or state["robot"] != robot:
-                raise ValueError(state["robot"])
-            first.tools.restore(state["tools"])
-            for other, tools in zip(others, state.get("other_tools", ()), strict=True):
-                other.tools.restore(tools)
-            for one, kept in zip(self._machine.robots, state.get("kept", ()), strict=False):
-                one.kept.restore(kept)
-                one.take_up_kept()
-            serial = state.get("serial")
-        except (OSError, KeyError, RecursionError, TypeError, ValueError) as error:
-            raise ConfigError(
-                tr(
-                    "{path} is not a saved state of a simulated {robot}.",
-                    path=path,
-                    robot=robot,
-                ),
-                remedy=tr("Name another file, or delete this one to start afresh."),
-            ) from error
-        if serial is not None:
-            first.serial = str(serial)
-            self._written = self._mark()
-
-    def save_changes(self) -> None:
-        """Write the file if something of that changed since it was written last.
-
-        Raises:
-            StateNotKeptError: It cannot be written.
-        """
-        if self._file.path is None:
-            return
-        mark = self._mark()
-        if mark == self._written:
-            return
+    def _document(self) -> dict[str, object]:
         first, *others = self._machine.robots
         document: dict[str, object] = {
             "schema": SCHEMA,
@@ -94,12 +40,25 @@ class Flash:
         }
         if others:
             document["other_tools"] = [other.tools.to_state() for other in others]
-        self._file.save(document)
-        self._written = mark
+        return document
 
-    def _mark(self) -> list[object]:
-        robots = self._machine.robots
-        return [(one.tools.flash_writes, one.tools.selected, one.kept.changes) for one in robots]
+    def _take(self, document: Any) -> bool:  # noqa: ANN401 - whatever the file holds
+        first, *others = self._machine.robots
+        if document["schema"] != SCHEMA or document["robot"] != first.model.name:
+            raise ValueError(document["robot"])
+        first.tools.restore(document["tools"])
+        for other, tools in zip(others, document.get("other_tools", ()), strict=True):
+            other.tools.restore(tools)
+        for one, kept in zip(self._machine.robots, document.get("kept", ()), strict=False):
+            one.kept.restore(kept)
+            one.take_up_kept()
+        serial = document.get("serial")
+        first.serial = first.serial if serial is None else str(serial)
+        return serial is not None
+
+    def _foreign(self, path: Path) -> str:
+        robot = self._machine.robots[0].model.name
+        return tr("{path} is not a saved state of a simulated {robot}.", path=path, robot=robot)
 
 
 def moment_of(

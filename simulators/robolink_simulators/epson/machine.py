@@ -1,6 +1,5 @@
 """What SPEL+ statements touch: the robots of a controller, and the bits that all of them share."""
 
-import random
 from collections.abc import Sequence
 from functools import partial
 from typing import Any, Generic, TypeVar, overload
@@ -88,7 +87,7 @@ class Machine:
     kept = _OfTheRobotInForce[KeptDefinitions]()
     sensed = _OfTheRobotInForce[bool]()
     till_met = _OfTheRobotInForce[bool]()
-    found = _OfTheRobotInForce["Point | None"]()
+    found = _OfTheRobotInForce[Point | None]()
     motors_on = _OfTheRobotInForce[bool]()
     power_high = _OfTheRobotInForce[bool]()
 
@@ -174,38 +173,6 @@ class Machine:
     def tip(self) -> Pose:
         """See :meth:`DrivenRobot.tip`."""
         return self.robot.tip()
-
-    def real_tip(self, rng: random.Random, noise_mm: float) -> Pose:
-        """See :meth:`DrivenRobot.real_tip`."""
-        return self.robot.real_tip(rng, noise_mm)
-
-    def tip_at(self, joints: Joints) -> Pose:
-        """See :meth:`DrivenRobot.tip_at`."""
-        return self.robot.tip_at(joints)
-
-    def joints_for(self, target: Point) -> Joints:
-        """See :meth:`DrivenRobot.joints_for`."""
-        return self.robot.joints_for(target)
-
-    def solved(self, target: Point) -> Joints:
-        """See :meth:`DrivenRobot.solved`."""
-        return self.robot.solved(target)
-
-    def flagged(self, target: Point, joints: Joints) -> Point:
-        """See :meth:`DrivenRobot.flagged`."""
-        return self.robot.flagged(target, joints)
-
-    def pose_of(self, target: Point) -> Pose:
-        """See :meth:`DrivenRobot.pose_of`."""
-        return self.robot.pose_of(target)
-
-    def point_at(self, pose: Pose) -> Point:
-        """See :meth:`DrivenRobot.point_at`."""
-        return self.robot.point_at(pose)
-
-    def here(self) -> Point:
-        """See :meth:`DrivenRobot.here`."""
-        return self.robot.here()
 
     def advance(self, now_ns: int) -> None:
         """Let simulated time reach ``now_ns`` for every arm."""

@@ -7,15 +7,16 @@ tests run with each). Evidence marks: [D] document, [R] transcript of a real con
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, fields, make_dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import Final, Literal
+from typing import TYPE_CHECKING, Final, Literal
 
 from robolink.errors import ConfigError
 from robolink.files.named import read_named
 from robolink.messages import tr
 from robolink.protocols.epson_binary import Dialect, Letters, NakCode, Numbers
+from robolink_simulators.epson.condition import RefusalKind
 from robolink_simulators.option_values import require_known, values_from_text
 
 
@@ -46,145 +47,27 @@ class ControllerCard:
     messages: dict[int, str] = field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
-class SpelNumbers:
-    """Error numbers. Those with a section stand in the language reference or in the table of
-    errors; the others do not [U], and any number would do: each reason has one of its own.
-    """  # noqa: D205 - one sentence over two lines
+if TYPE_CHECKING:
 
-    syntax: int = 2100
-    not_allowed_here: int = 2353  # docs/reference/spel.md 10
-    function_only: int = 2120
-    name_undefined: int = 2121
-    not_simulated: int = 2199
-    wait_timed_out: int = 2280  # docs/reference/spel.md 4.6
-    value_out_of_range: int = 4002  # docs/reference/spel.md 10, for AvoidSingularity
-    out_of_reach: int = 4001
-    motors_off: int = 4023
-    emergency_stop: int = 4025
-    guard_open: int = 4026
-    joint_free: int = 4027
-    other_robot: int = 4028
-    joint_too_fast: int = 4242  # docs/reference/spel.md 10
-    fine_not_reached: int = 4024  # docs/reference/spel.md 10, as the six that follow
-    torque_too_late: int = 4030
-    speed_too_late: int = 4088
-    torque_high_power: int = 5040
-    torque_low_power: int = 5041
-    collision_high_power: int = 5057
-    collision_low_power: int = 5058
-    arm_undefined: int = 2227  # docs/reference/spel.md 10
-    ecp_undefined: int = 2232  # docs/reference/spel.md 10
-    pallet_undefined: int = 2238  # docs/reference/spel.md 10
-    box_number: int = 2216  # docs/reference/spel.md 10
-    box_undefined: int = 2217  # docs/reference/spel.md 10
-    plane_number: int = 2218  # docs/reference/spel.md 10
-    plane_undefined: int = 2219  # docs/reference/spel.md 10
-    robot_number: int = 2262  # docs/reference/spel.md 10
-    tool_undefined: int = 2230  # docs/reference/spel.md 10
-    tool_zero_fixed: int = 2207  # docs/reference/spel.md 10
-    tool_in_force: int = 2206  # docs/reference/spel.md 10
-    local_undefined: int = 2222  # docs/reference/spel.md 10
-    point_undefined: int = 7007  # docs/reference/spel.md 10, sample handler
-    above_limz: int = 4005  # docs/reference/spel.md 10
-    subscript: int = 2240  # docs/reference/spel.md 10
-    type_mismatch: int = 2130
-    aborted: int = 2995
-    logged_out_in_task: int = 2996
-    home_undefined: int = 2228  # docs/reference/spel.md 10
-    calibration_pulses: int = 2197
-    motors_on: int = 4029
-    not_reserved: int = 2198
-    latch_unset: int = 2196
-    serious: int = 9001
-    no_such_file: int = 7213  # docs/reference/spel.md 10, path not found
-    task_gone: int = 2261  # docs/reference/spel.md 10
-    return_without_gosub: int = 2383  # docs/reference/spel.md 10
-    next_without_for: int = 2381  # docs/reference/spel.md 10
-    input_count: int = 2505  # docs/reference/spel.md 10
-    excessive_loop: int = 2556  # docs/reference/spel.md 10
-    no_such_function: int = 2122
-    task_number: int = 2260  # docs/reference/spel.md 17
-    no_mover: int = 2191  # docs/reference/spel.md 10
-    mover_ended: int = 2192
-    aborted_at_rest: int = 2998  # docs/reference/spel.md 10
-    motion_aborted: int = 2999  # docs/reference/spel.md 10
-    not_in_this_task: int = 2295  # docs/reference/spel.md 10
-    robot_in_use: int = 2200  # docs/reference/spel.md 10
-    preference_off: int = 2194
-    port_not_open: int = 2909
-    port_of_other_task: int = 2912
-    port_in_use: int = 2900
-    port_address: int = 2904
-    port_unset: int = 2906
-    port_open_already: int = 2908
-    port_broken: int = 2902  # docs/reference/spel.md 17
-    port_timed_out: int = 2910
-    port_line_too_long: int = 2915
-    file_number_in_use: int = 2440  # docs/reference/spel.md 10, as those that follow
-    file_opening: int = 2441
-    file_not_open: int = 2442
-    file_of_other_task: int = 2443
-    file_seeking: int = 2445
-    file_numbers_used: int = 2446
-    file_not_readable: int = 2447
-    file_not_writable: int = 2448
-    file_not_binary: int = 2449
-    file_access: int = 2450
-    file_writing: int = 2451
-    file_reading: int = 2452
-    file_drive: int = 2455
-    file_folder: int = 2456
-    file_denied: int = 7203  # docs/reference/spel.md 10, access denied
-    point_file_long: int = 2520
-    point_file_name: int = 2522
-    # Those below stand in docs/reference/spel.md 10.
-    tool_number: int = 2229
-    arm_number: int = 2226
-    arm_zero: int = 2205
-    arm_in_force: int = 2204
-    joint_number: int = 2265
-    arch_number: int = 2271
-    ecp_number: int = 2231
-    ecp_zero: int = 2208
-    ecp_in_force: int = 2209
-    local_number: int = 2223
-    local_zero: int = 2203
-    pallet_number: int = 2237
-    resume_without_error: int = 2386
-    virtual_io_off: int = 2350
-    lock_taken: int = 2512
-    lock_not_held: int = 2511
-    format: int = 2519
-    counters_used: int = 2507
-    output_time: int = 2343
-    io_bit: int = 2344
-    io_byte: int = 2345
-    memory_bit: int = 2347
-    memory_byte: int = 2348
-    square_root: int = 2276
-    arc_sine: int = 2274
-    arc_cosine: int = 2275
-    text_length: int = 2370
-    overflow: int = 2243
-    underflow: int = 2244
-    division: int = 2242
-    decimal_in: int = 2340
-    decimal_out: int = 2341
-    wait_time: int = 2266
-    tasks_full: int = 2502
-    task_busy: int = 2503
-    distance: int = 2270
-    label_undefined: int = 2510
-    point_label_undefined: int = 2513
-    shared_wait_timed_out: int = 2281
-    net_wait_timed_out: int = 2282
-    vision_sequence: int = 2543  # docs/reference/spel.md 10
-    vision_object: int = 2544  # docs/reference/spel.md 10
-    vision_name: int = 7803
-    vision_uncalibrated: int = 7804
-    vision_calibration: int = 2545  # docs/reference/spel.md 10
-    vision_camera: int = 7806
+    @dataclass(frozen=True, slots=True)
+    class SpelNumbers:
+        """What is made below, as a reader of types has to see it."""
+
+        def __init__(self, **numbers: int) -> None: ...
+
+        def __getattr__(self, name: str) -> int: ...
+
+else:
+    SpelNumbers = make_dataclass(
+        "SpelNumbers",
+        [(kind.option, int, kind.value) for kind in RefusalKind],
+        frozen=True,
+        slots=True,
+        namespace={
+            "__doc__": "The number of each refusal, by the name of its :class:`RefusalKind`.",
+            "__module__": __name__,
+        },
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -363,7 +246,7 @@ class EpsonOptions:
     vision_not_found: Literal["keep", "zero"] = "keep"
     vision_acquisition_ms: int = 40
     vision_object_ms: int = 5
-    numbers: SpelNumbers = SpelNumbers()
+    numbers: SpelNumbers = field(default_factory=SpelNumbers)
 
 
 PROFILE_SCHEMA: Final = "robolink/epson-profile/1"

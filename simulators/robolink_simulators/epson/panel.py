@@ -1,6 +1,6 @@
 """What a person or the rest of the cell does to the controller past the wire, and mishaps."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 from functools import cached_property
 
@@ -197,14 +197,6 @@ class EpsonMishaps(PlannedActs):
             FaultAction.TEACH_MODE: panel.teach,
             FaultAction.RESTART: self._restart,
         }
-
-    def strike(self, faults: Sequence[Fault], now_ns: int) -> None:
-        """Do what is due now, and note what comes later."""
-        for fault in faults:
-            act = self._act_of(fault)
-            if act is None:
-                continue
-            self.plan(now_ns, fault.seconds, act)
 
     def plan(self, now_ns: int, seconds: float, act: Act) -> None:
         """Have something done some time from now; at once when that is no time at all."""

@@ -1,21 +1,19 @@
 """The simulated PLC: a program behind a Modbus server."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
 from dataclasses import fields
 from math import isfinite
-from typing import Any, Final, Protocol
+from typing import Any, Final
 
 from robolink.model import ToolOffset
 from robolink.register_maps import RegisterMap, RegisterTable
 from robolink.timing import NS_PER_S
 from robolink_simulators.device.hosted import HostedDevice
 from robolink_simulators.device.wire_record import MotionLog
-from robolink_simulators.device.wire_time import WireTime
 from robolink_simulators.faults import Departure, FaultAction, FaultPlan
 from robolink_simulators.faults.departing import DepartingReplies
 from robolink_simulators.faults.links import PLC_LINKS
-from robolink_simulators.plc.frames import (
+from robolink_simulators.hosting.modbus_frames import (
     ILLEGAL_ADDRESS,
     ILLEGAL_FUNCTION,
     ILLEGAL_VALUE,
@@ -27,18 +25,6 @@ from robolink_simulators.plc.frames import (
 from robolink_simulators.plc.program import OutsideError, PlcProgram
 
 
-class ActedOn(Protocol):
-    """The PLC, as its panel sees it."""
-
-    program: PlcProgram
-
-    def acting(self) -> AbstractContextManager[int]:
-        """Surround an act that comes past the wire."""
-
-    def cut_links(self) -> None:
-        """End every connection."""
-
-
 class MappedPlcPanel:
     """The machine's permit, and its cable. Any thread may act.
 
@@ -46,7 +32,7 @@ class MappedPlcPanel:
         plc: The controller.
     """
 
-    def __init__(self, plc: ActedOn) -> None:
+    def __init__(self, plc: "PlcSimulator") -> None:
         self._plc = plc
 
     def give_permit(self) -> None:
@@ -73,27 +59,6 @@ of them, and no busy computer cuts a frame in two.
 """
 
 
-class ServedFrame(Protocol):
-    """The PLC, as its connections see it."""
-
-    wire_time: WireTime
-
-    @property
-    def now_ns(self) -> int:
-        """The simulated time."""
-
-    def advance(self, now_ns: int) -> None:
-        """Let simulated time reach ``now_ns``."""
-
-    def serve(
-        self, request: PlcRequest, frames: Frames, link: "PlcLink", *, counted: bool = False
-    ) -> list[Departure]:
-        """Carry a request out and return what leaves for it, when.
-
-        One that was ``counted`` meets no fault again.
-        """
-
-
 class PlcLink:
     """Implements :class:`~robolink_simulators.hosting.addresses.DeviceLink`.
 
@@ -102,7 +67,7 @@ class PlcLink:
         frames: How requests and answers are wrapped.
     """
 
-    def __init__(self, plc: ServedFrame, frames: Frames) -> None:
+    def __init__(self, plc: "PlcSimulator", frames: Frames) -> None:
         self._plc = plc
         self._frames = frames
         self._outbox = DepartingReplies()
@@ -182,6 +147,9 @@ class PlcLink:
         if not self._outbox.depart(departures, self._plc.now_ns):
             self._over = True
 
+
+_SEVERAL_COILS: Final = 15
+"""The one function of those that are read here which this PLC does not have."""
 
 MOST_WRITES: Final = 2000
 MOST_REGISTERS_READ: Final = 125
@@ -318,7 +286,7 @@ class PlcSimulator(HostedDevice):
             >>> from pathlib import Path
             >>> from robolink.register_maps import RegisterTable, load_map
             >>> from robolink_simulators.plc import PlcSimulator
-            >>> from robolink_simulators.plc.frames import PlcRequest, TcpFrames
+            >>> from robolink_simulators.hosting.modbus_frames import PlcRequest, TcpFrames
             >>> from robolink_simulators.testkit.operator import written_map
             >>> plc, frames = PlcSimulator(load_map(written_map(Path.cwd()))), TcpFrames()
             >>> link = plc.connect(now_ns=0, frames=frames)
@@ -355,7 +323,9 @@ class PlcSimulator(HostedDevice):
     def _answer(self, request: PlcRequest, frames: Frames, *, ignored: bool) -> bytes:
         if request.unit != self.unit:
             return frames.refusal(request, NO_SUCH_UNIT)
-        if request.table is None:
+        if request.illegal:
+            return frames.refusal(request, ILLEGAL_VALUE)
+        if request.table is None or request.function == _SEVERAL_COILS:
             return frames.refusal(request, ILLEGAL_FUNCTION)
         words = request.table in (RegisterTable.HOLDING, RegisterTable.INPUT)
         if words and request.values is None and request.count > self.most_registers:

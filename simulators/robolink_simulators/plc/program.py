@@ -15,7 +15,7 @@ from robolink.register_maps import (
     Signal,
 )
 from robolink.timing import NS_PER_S
-from robolink_simulators.plc.frames import decode, encode
+from robolink_simulators.hosting.modbus_frames import decode, encode
 from robolink_simulators.state_files import drawn_number
 
 _BEYOND: Final = 16

@@ -8,10 +8,15 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.transport import parse_url
 from robolink_simulators.cell.clock import ScaledClock
-from robolink_simulators.hosting.streams.serial_host import PTY_LINE, LineHost, no_pseudo_terminal
+from robolink_simulators.hosting.modbus_frames import LineFrames
+from robolink_simulators.hosting.streams.serial_host import (
+    PTY_LINE,
+    DeviceOnLine,
+    LineHost,
+    no_pseudo_terminal,
+)
 from robolink_simulators.hosting.streams.tcp_host import TcpHost
-from robolink_simulators.plc.device import PlcLink, PlcSimulator
-from robolink_simulators.plc.frames import LineFrames
+from robolink_simulators.plc.device import PlcSimulator
 
 _DEFAULT_UNIT: Final = 1
 _SIMULATED: Final = "&simulated=yes"
@@ -56,7 +61,6 @@ class PlcHost(TcpHost):
         *,
         allow_remote: bool,
     ) -> None:
-        self._options = f"?unit={simulator.unit}&{_map_option(map_file)}"
         super().__init__(
             simulator,
             "plc+modbus-tcp",
@@ -65,22 +69,10 @@ class PlcHost(TcpHost):
             lock=simulator.lock,
             allow_remote=allow_remote,
         )
-        self._simulator = simulator
-        simulator.keep_time(clock)
-        simulator.watchers.append(self.wake)
-
-    @property
-    def url(self) -> str:
-        """Where clients connect to, with the unit and the map."""
-        url = super().url + self._options
+        self.url += f"?unit={simulator.unit}&{_map_option(map_file)}"
         # What leads out of this computer may lead to a machine, and says nothing of itself.
-        return url + _SIMULATED if parse_url(url).stays_here else url
-
-    def close(self) -> None:
-        """Stop serving and close every connection. Idempotent."""
-        super().close()
-        if self.wake in self._simulator.watchers:
-            self._simulator.watchers.remove(self.wake)
+        self.url += _SIMULATED if parse_url(self.url).stays_here else ""
+        self.present(simulator)
 
 
 class PlcLineHost(LineHost):
@@ -91,7 +83,7 @@ class PlcLineHost(LineHost):
     """
 
     def __init__(self, simulator: PlcSimulator, map_file: Path, clock: ScaledClock) -> None:
-        super().__init__(PlcOnLine(simulator), clock=clock, lock=simulator.lock)
+        super().__init__(plc_on_line(simulator), clock=clock, lock=simulator.lock)
         options = dict(PTY_LINE)
         if simulator.unit != _DEFAULT_UNIT:
             options["unit"] = str(simulator.unit)
@@ -99,17 +91,9 @@ class PlcLineHost(LineHost):
         simulator.keep_time(clock)
 
 
-class PlcOnLine:
-    """The PLC as a line sees it: a :class:`~robolink_simulators.hosting.addresses.WireDevice`."""
-
-    def __init__(self, simulator: PlcSimulator) -> None:
-        self._simulator = simulator
-        self.advance = simulator.advance
-        self.next_change = simulator.next_change
-
-    def connect(self, now_ns: int) -> PlcLink:
-        """Listen at the line."""
-        return self._simulator.connect(now_ns, LineFrames())
+def plc_on_line(simulator: PlcSimulator) -> DeviceOnLine:
+    """Return the PLC as a line sees it."""
+    return DeviceOnLine(simulator, lambda now_ns: simulator.connect(now_ns, LineFrames()))
 
 
 def serve_plc(

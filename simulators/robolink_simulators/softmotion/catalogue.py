@@ -26,6 +26,7 @@ from robolink.model import (
     kinematics_object,
 )
 from robolink_simulators.cell.frames import Frame, Matrix, Vector
+from robolink_simulators.softmotion.group.axes import ASSUMED_LIMITS, AxisLimits
 from robolink_simulators.softmotion.kinematics.kinematics import (
     ANY_CONFIGURATION,
     AxisValues,
@@ -33,7 +34,6 @@ from robolink_simulators.softmotion.kinematics.kinematics import (
     KinematicsModel,
 )
 from robolink_simulators.softmotion.kinematics.wrists import Coupled, require_solvable
-from robolink_simulators.softmotion.motion.axes import ASSUMED_LIMITS, AxisLimits
 from robolink_simulators.softmotion.rows import (
     ORIENTATION_ROWS,
     POSITION_ROWS,

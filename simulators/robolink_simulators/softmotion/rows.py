@@ -11,6 +11,7 @@ from functools import partial
 from typing import Final
 
 from robolink.model import AxisKind
+from robolink_simulators.softmotion.group.axes import ASSUMED_LIMITS, AxisLimits
 from robolink_simulators.softmotion.kinematics.articulated import (
     Palletizer4Axis,
     PosRRR,
@@ -27,7 +28,6 @@ from robolink_simulators.softmotion.kinematics.wrists import (
     Wrist3,
     scara3_z,
 )
-from robolink_simulators.softmotion.motion.axes import ASSUMED_LIMITS, AxisLimits
 
 _LINEAR: Final = ASSUMED_LIMITS[AxisKind.LINEAR]
 _HALF: Final = 0.5

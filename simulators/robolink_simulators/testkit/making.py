@@ -358,7 +358,7 @@ def _furnished(
         return own.keep(simulator, clock, urls)
     assist = url
     if isinstance(clock, SteeredClock):
-        from robolink_simulators.assist.port import serve_assist
+        from robolink_simulators.control.assist import serve_assist
 
         assist = own.stack.enter_context(serve_assist(simulator, clock=clock)).url
     return own.keep(simulator, clock, urls, assist=assist, recipe=written_recipe(own.folder))

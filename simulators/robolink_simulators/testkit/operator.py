@@ -6,7 +6,7 @@ from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_simulators.control.acts.registry import act_named, perform
+from robolink_simulators.control.acts import act_named, perform
 from robolink_simulators.control.cell import ControlledCell
 
 

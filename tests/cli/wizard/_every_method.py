@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import click
+from robolink_cli.prompts.current_desk import sitting_at
 from robolink_cli.prompts.operator import AssistedOperator
-from robolink_cli.prompts.present import sitting_at
 from robolink_cli.session.check_before_start import check_before_start
 from robolink_cli.wizard.faces.lines import carry_out
 from robolink_cli.wizard.flow import advance
@@ -26,12 +26,12 @@ from robolink_cli.wizard.happenings import (
     TooFast,
     WaitsForAnswer,
 )
-from robolink_cli.wizard.screens.drawing import screen_of
-from robolink_cli.wizard.screens.ending import ended_of
-from robolink_cli.wizard.screens.told import told_before, told_question
+from robolink_cli.wizard.screens.end import ended_of
+from robolink_cli.wizard.screens.screen import screen_of
+from robolink_cli.wizard.screens.sentences import told_before, told_question
 from robolink_cli.wizard.state import CheckSubject, Header, Mark, WizardState
 from robolink_cli.wizard.work import Desk, Work
-from robolink_simulators.assist.port import InProcessEyes
+from robolink_simulators.control.assist import InProcessEyes
 from wcwidth import wcswidth
 
 import robolink

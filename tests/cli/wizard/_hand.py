@@ -2,7 +2,7 @@
 
 import time
 
-from robolink_simulators.assist.port import InProcessEyes
+from robolink_simulators.control.assist import InProcessEyes
 
 FINE_MM = 0.07
 """Left for the last step, which has to be a fine one."""

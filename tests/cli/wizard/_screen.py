@@ -11,7 +11,7 @@ import termios
 import time
 
 import pyte
-from robolink_simulators.assist.port import InProcessEyes
+from robolink_simulators.control.assist import InProcessEyes
 
 from tests.cli.wizard._hand_at_screen import HandAtScreen
 

@@ -15,8 +15,8 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from robolink_simulators.assist.port import InProcessEyes, serve_assist
 from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.control.assist import InProcessEyes, serve_assist
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.hosting.streams.epson import serve_tcp

@@ -8,7 +8,7 @@ from html import escape
 from itertools import groupby
 from pathlib import Path
 
-from robolink_cli.wizard.screens.drawing import screen_of
+from robolink_cli.wizard.screens.screen import screen_of
 from wcwidth import wcwidth
 
 from robolink import messages

@@ -18,10 +18,10 @@ from robolink_cli.wizard.happenings import (
     WasTold,
     WizardCommand,
 )
-from robolink_cli.wizard.screens.choosing import choice_screen
-from robolink_cli.wizard.screens.drawing import screen_of
-from robolink_cli.wizard.screens.told import told_question
-from robolink_cli.wizard.screens.touching import instruction
+from robolink_cli.wizard.screens.choice import choice_screen
+from robolink_cli.wizard.screens.screen import screen_of
+from robolink_cli.wizard.screens.sentences import told_question
+from robolink_cli.wizard.screens.touch import instruction
 from robolink_cli.wizard.state import STEP_SIZES, CheckPoint, ChoiceSubject, LastScreen, Mark
 
 from robolink.model import Path as Way
@@ -91,7 +91,7 @@ def test_a_take_right_after_a_step_is_not_meant_for_it():
 
 @pytest.mark.parametrize("quarters", range(4))
 def test_turned_keys_still_name_what_they_do(quarters):
-    from robolink_cli.wizard.screens.touching import touch_screen
+    from robolink_cli.wizard.screens.touch import touch_screen
 
     hand = at_touch()
     for _ in range(quarters):

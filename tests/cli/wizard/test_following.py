@@ -3,11 +3,11 @@
 from dataclasses import replace
 
 import pytest
-from robolink_cli.prompts.present import sitting_at
-from robolink_cli.session.stop_listening import watched_at_desk
+from robolink_cli.prompts.current_desk import sitting_at
+from robolink_cli.session.stop_listener import watched_at_desk
 from robolink_cli.wizard.flow import advance
 from robolink_cli.wizard.happenings import CellIs, Reading, WasRead, WasRegarded
-from robolink_cli.wizard.screens.drawing import screen_of
+from robolink_cli.wizard.screens.screen import screen_of
 from robolink_cli.wizard.state import WizardState
 from robolink_cli.wizard.work import Desk
 from robolink_simulators.cell.clock import ScaledClock

@@ -5,7 +5,7 @@ import threading
 
 import click
 import pytest
-from robolink_cli.prompts.present import present_desk
+from robolink_cli.prompts.current_desk import current_desk
 from robolink_cli.wizard.host import _shown, guided
 from robolink_cli.wizard.state import WizardState
 from robolink_cli.wizard.work import Desk, Work
@@ -56,7 +56,7 @@ def test_lines_offer_the_page_and_the_next_tool_once_a_job_is_carried_out(monkey
 
     def job(name):
         done.append(name)
-        desk = present_desk()
+        desk = current_desk()
         assert desk is not None
         desk.regard(None)
         desk.regard(carried_out())

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from robolink_cli.wizard.keys import AXES
-from robolink_cli.wizard.screens.drawing import screen_of
+from robolink_cli.wizard.screens.screen import screen_of
 
 from robolink.runner import Question
 from tests.cli.wizard._people import ARRIVAL, Sitting, touch_subject

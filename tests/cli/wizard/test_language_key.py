@@ -12,7 +12,7 @@ from prompt_toolkit.input import create_pipe_input
 from prompt_toolkit.input.vt100_parser import Vt100Parser
 from prompt_toolkit.key_binding import KeyPress
 from prompt_toolkit.output.vt100 import Vt100_Output
-from robolink_cli.commands.measure.choosing import choose_cell, choose_recipe
+from robolink_cli.commands.measure.recipe_choice import choose_cell, choose_recipe
 from robolink_cli.console.language import language_now, speaking_for
 from robolink_cli.wizard.faces.full import FullFace
 from robolink_cli.wizard.happenings import LineTyped, WasRegarded, WasTold

@@ -14,9 +14,9 @@ from dataclasses import replace
 
 import pytest
 from robolink_cli import main
-from robolink_simulators.assist.port import serve_assist
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.cell.tip_switches import TouchPlate
+from robolink_simulators.control.assist import serve_assist
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.hosting.streams.epson import serve_tcp

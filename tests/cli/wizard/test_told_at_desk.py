@@ -9,18 +9,18 @@ import click
 import pytest
 from robolink_cli import main
 from robolink_cli.commands.measure import recalibration
-from robolink_cli.commands.measure.choosing import choose_recipe
 from robolink_cli.commands.measure.recalibrate import _chosen_anew, steps_of
+from robolink_cli.commands.measure.recipe_choice import choose_recipe
 from robolink_cli.options.shared import GIVEN, TYPED
-from robolink_cli.prompts.present import sitting_at
+from robolink_cli.prompts.current_desk import sitting_at
 from robolink_cli.session.check_before_start import check_before_start
 from robolink_cli.session.context import context_of_cell
 from robolink_cli.wizard.glance import ControllerGlance
 from robolink_cli.wizard.happenings import Reading, WasAsked, WasRegarded, WasTold
-from robolink_cli.wizard.screens.choosing import point_rows
-from robolink_cli.wizard.screens.drawing import screen_of
+from robolink_cli.wizard.screens.choice import point_rows
 from robolink_cli.wizard.screens.layout import JobStep, status_row, title_row
-from robolink_cli.wizard.screens.told import told_before
+from robolink_cli.wizard.screens.screen import screen_of
+from robolink_cli.wizard.screens.sentences import told_before
 from robolink_cli.wizard.state import (
     CheckPoint,
     CheckSubject,

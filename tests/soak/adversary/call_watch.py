@@ -9,7 +9,7 @@ is where the tip is, a stop holds. The driver's own reads prove nothing here.
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 from unittest import mock
 
 from robolink.controllers.controller_core import ControllerCore
@@ -21,9 +21,9 @@ from robolink.controllers.softmotion.controller import SoftMotionController
 from robolink.controllers.softmotion.group import SoftMotionGroup
 from robolink.controllers.softmotion.movement import SoftMotionMotion
 from robolink.controllers.tool_table import ToolTableCore
-from robolink.model import Marker, Motion, MotionOutcome, Pose, ToolOffset, ToolReceipt, WorkBox
+from robolink.model import Marker, Motion, MotionOutcome, Pose
 from tests.soak.adversary.computer import VirtualProcess
-from tests.soak.adversary.plant.machine import MachineState
+from tests.soak.adversary.rules.contract import ContractRules
 
 Call = Callable[..., Any]
 Tell = Callable[[VirtualProcess, Any, "WatchedCall"], None]
@@ -44,58 +44,8 @@ class WatchedCall:
     named: Mapping[str, Any]
 
 
-class Promises(Protocol):
-    """Who judges what a call of a process has returned."""
-
-    def begins(self, process: VirtualProcess) -> None:
-        """A call begins: whatever the machine holds from now on may be what it tells."""
-
-    def aims(self, process: VirtualProcess, tool: int | None) -> None:
-        """A movement is about to leave that is meant for the tip of a tool."""
-
-    def has_read(self, process: VirtualProcess, tool: int, offset: ToolOffset | None) -> None:
-        """A tool was read."""
-
-    def has_read_selection(self, process: VirtualProcess, tool: int | None) -> None:
-        """The tool in force was read."""
-
-    def has_written(self, process: VirtualProcess, receipt: ToolReceipt) -> None:
-        """A tool was written or cleared."""
-
-    def has_selected(self, process: VirtualProcess, tool: int) -> None:
-        """A tool was put in force."""
-
-    def has_begun(
-        self, process: VirtualProcess, motion: Motion, target: Pose, box: WorkBox
-    ) -> None:
-        """A movement to a target was begun, which has to lie in a box."""
-
-    def has_arrived(self, process: VirtualProcess, motion: Motion) -> None:
-        """A movement ended by itself."""
-
-    def has_read_pose(self, process: VirtualProcess, pose: Pose) -> None:
-        """It was read where the tip of the tool in force is."""
-
-    def has_read_robot(self, process: VirtualProcess, robot: int) -> None:
-        """The number of the robot in force was read."""
-
-    def stopping(self, process: VirtualProcess) -> None:
-        """A stop begins: nothing begins to move from here on."""
-
-    def has_stopped(
-        self, process: VirtualProcess, controller: ControllerCore, *, acknowledged: bool
-    ) -> None:
-        """A stop has ended; ``acknowledged`` where it said that the machine rests."""
-
-    def has_reset(self, process: VirtualProcess, controller: ControllerCore) -> None:
-        """An error was cleared."""
-
-    def releasing(self, process: VirtualProcess) -> None:
-        """A person says that things may move again."""
-
-
 @contextmanager
-def watched(judge: Promises, process_of_this_thread: Callable[[], object]) -> Iterator[None]:
+def watched(judge: ContractRules, process_of_this_thread: Callable[[], object]) -> Iterator[None]:
     """Let each call of this library pass a judge.
 
     Args:
@@ -181,29 +131,3 @@ def watched(judge: Promises, process_of_this_thread: Callable[[], object]) -> It
         stack.enter_context(mock.patch.object(ControllerCore, "stop", stopping))
         stack.enter_context(mock.patch.object(ControllerCore, "release_stop", releasing))
         yield
-
-
-class SeenStates:
-    """What the machine has held since each call began, event by event."""
-
-    def __init__(self) -> None:
-        self._seen: list[MachineState] = []
-        self._since: dict[int, int] = {}
-
-    def note(self, state: MachineState) -> None:
-        """Note what it holds, where that is something else than before."""
-        if not self._seen or self._seen[-1] != state:
-            self._seen.append(state)
-
-    def begin(self, process: VirtualProcess) -> None:
-        """Let a call of a process begin now."""
-        self._since[process.number] = max(0, len(self._seen) - 1)
-
-    def since(self, process: VirtualProcess) -> list[MachineState]:
-        """Return what it has held since the last call of a process began."""
-        return self._seen[self._since.get(process.number, 0) :]
-
-    def forget(self) -> None:
-        """Begin anew."""
-        self._seen.clear()
-        self._since.clear()

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Final
 
 from robolink_simulators.faults import FaultAction, LinkKind, PlcFaultAction, links_of
-from robolink_simulators.faults.drawn import ONLY_BY_NAME, drawn_instant, drawn_rarity
+from robolink_simulators.faults.drawn import ONLY_BY_NAME
 
 from tests.soak.adversary.command_lines import drawn_line
 from tests.soak.adversary.deed_lengths import length_of
@@ -19,6 +19,7 @@ from tests.soak.adversary.history import (
     History,
     Hour,
 )
+from tests.soak.adversary.instants import drawn_instant, drawn_rarity
 from tests.soak.adversary.plant.lines import LineBend
 
 MAILBOX_KINDS: Final = frozenset(

@@ -12,7 +12,7 @@ from unittest import mock
 from robolink_cli import main
 from robolink_cli.commands.controller.contract_report import TrialConnections
 from robolink_cli.console.exit_codes import UNKNOWN
-from robolink_cli.console.ways import SHELL_WAYS
+from robolink_cli.console.shell_words import SHELL_WAYS
 from robolink_simulators.hosting.in_process import epson, softmotion
 
 from robolink.errors import OutcomeUnknownError
@@ -64,7 +64,7 @@ def run_line(
         stack.enter_context(mock.patch.dict(os.environ, ROBOLINK_PASSWORD=plant.password))
         stack.enter_context(mock.patch(f"{_PASSWORDS}.from_keyring", return_value=None))
         # A socket of this computer, with a thread of its own, is no part of a cell.
-        unheard = "robolink_cli.session.opening.listening_for_stop"
+        unheard = "robolink_cli.session.connection.listening_for_stop"
         stack.enter_context(mock.patch(unheard, _listening(process)))
         stack.enter_context(mock.patch.object(TrialConnections, "_listen", _heard_by(process)))
         stack.enter_context(speaking(SHELL_WAYS))

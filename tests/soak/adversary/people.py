@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Final
 
 from robolink_cli.prompts.operator import AssistedOperator
-from robolink_simulators.assist.port import InProcessEyes
 from robolink_simulators.cell.world_parameters import WorldParameters
+from robolink_simulators.control.assist import InProcessEyes
 
 from robolink.calibration_run import ChangePlan, ChangeReport, NozzleChange, ToolPlan
 from robolink.checkpoints import Checkpoint, checkpoint

@@ -8,6 +8,7 @@ import click
 
 from robolink.errors import ConfigError, DeclinedError, RobolinkError
 from robolink.messages import joined, tr
+from robolink.model import json_fields
 from robolink.register_maps import (
     COMPONENTS,
     ComparedValue,
@@ -25,7 +26,7 @@ from robolink.register_maps import (
     values_of,
 )
 from robolink.timing import local_label
-from robolink_cli.console.render import note, say, table
+from robolink_cli.console.render import emit, json_is_on, note, say, table
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.questions import on_terminal
 from robolink_cli.session.context import CliContext, controller_options
@@ -66,25 +67,19 @@ def check_map(
     of each tool are enough; a component that is 0 needs a test value.
     """
     if register_list is not None:
-        _start(context, register_list)
+        _start(register_list)
     elif file is not None:
-        _check_file(context, file)
+        _check_file(file)
     else:
         _check_values(context, shows)
 
 
-def _start(context: CliContext, register_list: Path) -> None:
+def _start(register_list: Path) -> None:
     from robolink.register_maps import draft_from_csv
 
     draft = draft_from_csv(register_list)
-    payload: dict[str, object] = {
-        "map": draft.text,
-        "found": draft.found,
-        "left": list(draft.left),
-        "bad": list(draft.bad),
-        "notes": list(draft.notes),
-    }
-    context.emit("plc-map-draft", payload, lambda: say(draft.text.rstrip()))
+    payload = {"map": draft.text, **json_fields(draft, "found", "left", "bad", "notes")}
+    emit("plc-map-draft", payload, lambda: say(draft.text.rstrip()))
     for remark in (*draft.notes, *draft.bad):
         note(remark)
     note(
@@ -97,9 +92,8 @@ def _start(context: CliContext, register_list: Path) -> None:
     )
 
 
-def _check_file(context: CliContext, file: Path) -> None:
+def _check_file(file: Path) -> None:
     from robolink.register_maps import load_map
-    from robolink_cli.commands.companions.check_map import place_rows
 
     found = load_map(file)
     rows = place_rows(found)
@@ -113,17 +107,15 @@ def _check_file(context: CliContext, file: Path) -> None:
         table(found.name, (tr("what"), tr("place"), tr("how")), rows)
         say(tr("The file is right. With -c its values are compared with the HMI."))
 
-    context.emit("plc-map", payload, show)
+    emit("plc-map", payload, show)
 
 
 def _check_values(context: CliContext, shows: tuple[str, ...]) -> None:
-    from robolink.register_maps import confirmation_of
-    from robolink_cli.commands.companions.check_map import MapComparison, MapValues
 
     with _opened(context) as controller:
         register_map = controller.register_map
         values = MapValues(controller)
-        if not context.json:
+        if not json_is_on():
             values.show()
         controller.require_probe()
         comparison = MapComparison(context, controller)
@@ -160,7 +152,7 @@ def _check_values(context: CliContext, shows: tuple[str, ...]) -> None:
                 )
             )
 
-    context.emit("plc-map-values", payload, show)
+    emit("plc-map-values", payload, show)
 
 
 def _opened(context: CliContext) -> "PlcMapController":

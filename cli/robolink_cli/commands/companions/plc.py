@@ -92,10 +92,6 @@ def export(
     docs/plc-program.md says what to do with them. Their licence is 0BSD: they may be used in a
     machine without any duty.
     """
-    from robolink.protocols.mailbox import ExportProfile
-    from robolink.protocols.mailbox.exports import PlcopenSchema
-    from robolink_cli.commands.companions.plc import export_texts, plc_texts
-
     schema = PlcopenSchema(plcopen)
     texts = plc_texts(ExportProfile(profile), base, kinematics, read_modes, schema=schema)
     written = [str(path) for path in export_texts(folder, texts, replace=force)]

@@ -8,16 +8,15 @@ import click
 from robolink.errors import CalibrationError, RobolinkError
 from robolink.messages import tr
 from robolink.serving import PermitCall, free_machine
-from robolink_cli.commands.simulate.serving import Termination
+from robolink_cli.commands.simulate.service import Termination
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.output import hand_over, show
 from robolink_cli.console.render import json_is_on, note
 from robolink_cli.options.declaration import CliOption
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, optional_controller
-from robolink_cli.session.opening import open_controller
 
 if TYPE_CHECKING:
-    from robolink.errors import RobolinkError
     from robolink.model import ToolOffset
     from robolink.serving import CallbackLimits, CallbackServer, PermitPlan
 
@@ -117,7 +116,6 @@ def serve(
             tr("--plc needs --tool, and --permit-is-contact: without it nothing shows a touch.")
         )
     from robolink.serving import PermitPlan
-    from robolink_cli.commands.companions.serve import serve_plc
 
     plan = PermitPlan(tool, str(method), touches, proofs)
     serve_plc(context, plan, limits)
@@ -134,8 +132,7 @@ def _serve_programs(
     from robolink import __version__
     from robolink.journal import open_journal, signature_here
     from robolink.serving import CallbackConversation, CallbackServer
-    from robolink_cli.commands.companions.serve import ServeEvents
-    from robolink_cli.commands.simulate.serving import Termination, host_and_port
+    from robolink_cli.commands.simulate.service import host_and_port
 
     host, port = host_and_port(address, "--spel")
     journal, signature = open_journal(), signature_here(__version__)
@@ -169,9 +166,6 @@ def _serve_programs(
 def _announce(server: "CallbackServer") -> None:
     """Say where it listens, at once, because whoever started it waits for that."""
     import json
-
-    from robolink_cli.console.output import hand_over, show
-    from robolink_cli.console.render import json_is_on
 
     host, port = server.address
     if json_is_on():

@@ -1,27 +1,88 @@
 """spel: programs that run on the controller itself."""
 
 import sys
+from collections.abc import Mapping
+from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 import click
 
-from robolink.errors import ControllerFaultError
+from robolink.errors import ConfigError, ControllerFaultError
+from robolink.files.durable import sync_folder, write_whole
+from robolink.files.named import holds
 from robolink.messages import tr
+from robolink.model import json_fields
 from robolink.timing import NS_PER_S
 from robolink_cli.console.exit_codes import USAGE
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import emit_json, json_is_on, note, say
 from robolink_cli.options.declaration import CliArgument, CliOption
-from robolink_cli.options.program_encoding import Encoding, tell_encoding
 from robolink_cli.options.shared import json_option
-from robolink_cli.options.simulation import ProjectOptions
+from robolink_cli.options.simulation import Encoding, ProjectOptions, tell_encoding
 
 if TYPE_CHECKING:
     from robolink_simulators.epson import EpsonSimulator
     from robolink_simulators.epson.spel.programs.program_load import CheckedProject
     from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
     from robolink_simulators.epson.spel.tasks.task import TaskFailure
+
+
+_EPSON: Final = (
+    "epson/robolink_tools.prg",
+    "epson/robolink_vision.prg",
+    "epson/recal.prg",
+    "epson/calc_tool.prg",
+    "epson/calc_board_tool.prg",
+    "LICENSE",
+)
+
+
+def companion_texts() -> Mapping[str, bytes]:
+    """Return the EPSON companions' files by the name they get, with the line ends of RC+'s PC."""
+    packaged = files("robolink_cli").joinpath("companions")
+    # A source checkout holds them at its top; only a wheel brings them in the package.
+    folder = packaged if packaged.is_dir() else Path(__file__).parents[4] / "companions"
+    texts = {Path(name).name: folder.joinpath(name).read_bytes() for name in _EPSON}
+    return {name: text.replace(b"\n", b"\r\n") for name, text in texts.items()}
+
+
+def export_companions(folder: Path, *, replace: bool = False) -> list[Path]:
+    """Write the files into ``folder``, which is made when it is missing.
+
+    A file that is there already with the same content is fine.
+
+    Raises:
+        ConfigError: A file is there that differs, or one cannot be written.
+    """
+    texts = companion_texts()
+    if not replace:
+        _require_own(folder, texts)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, data in texts.items():
+            write_whole(folder / name, data, mode=0o666)
+        sync_folder(folder)
+    except OSError as error:
+        raise ConfigError(
+            tr(
+                "{folder} cannot be written: {cause}.",
+                folder=folder,
+                cause=error.strerror or error,
+            ),
+            remedy=tr("Name a folder that can be written."),
+        ) from error
+    return [folder / name for name in texts]
+
+
+def _require_own(folder: Path, texts: Mapping[str, bytes]) -> None:
+    for name, data in texts.items():
+        path = folder / name
+        if path.exists() and not holds(path, data):
+            raise ConfigError(
+                tr("{path} is there already and differs; it was not written over.", path=path),
+                remedy=tr("Name another folder, or give --force."),
+            )
 
 
 LONGEST_RUN_S: Final = 3600.0
@@ -82,15 +143,12 @@ def _document(checked: "CheckedProject") -> dict[str, object]:
         "files": [str(path) for path in checked.data.programs],
         "functions": list(checked.functions),
         "labels_known": checked.data.known,
-        "missing_points": list(checked.data.missing_points),
-        "encoding": checked.data.encoding,
+        **json_fields(checked.data, "missing_points", "encoding"),
         "faults": [
             {
-                "file": fault.place.file,
-                "line": fault.place.line,
+                **json_fields(fault.place, "file", "line"),
                 "column": fault.column or None,
-                "text": fault.text,
-                "expected": list(fault.expected),
+                **json_fields(fault, "text", "expected"),
             }
             for fault in checked.faults
         ],
@@ -143,7 +201,7 @@ def run(
     """
     from robolink_simulators.epson import EpsonSimulator
 
-    from robolink_cli.commands.simulate.kinds.epson import ProjectSurroundings, habits
+    from robolink_cli.commands.simulate.epson import ProjectSurroundings, habits
 
     simulator = EpsonSimulator(robot or DEFAULT_ROBOT, options=habits(options, None))
     printed = list[str]()
@@ -180,7 +238,7 @@ def _run(
     """Run a program to its end; tell whether that came in time."""
     from robolink_simulators.epson.spel.tasks.runner import run_to_end
 
-    from robolink_cli.commands.simulate.kinds.epson import start_function
+    from robolink_cli.commands.simulate.epson import start_function
 
     def show(text: str) -> None:
         printed.append(text)
@@ -257,8 +315,6 @@ def export(
     calc_board_tool.prg set tool 1 by Vision Guide; add them only where they are needed. The
     licence is 0BSD: they may be used in a machine without any duty.
     """
-    from robolink_cli.commands.companions.companion_files import export_companions
-
     written = [str(path) for path in export_companions(folder, replace=force)]
     if json_is_on():
         emit_json("robolink/spel-export/1", {"files": written})

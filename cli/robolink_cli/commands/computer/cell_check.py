@@ -17,15 +17,15 @@ from robolink.model import Controller
 from robolink.recipe import LoadedRecipe, load_recipe
 from robolink_cli.access.cell import complete_cell
 from robolink_cli.console.exit_codes import DIFFERENT, exit_code
-from robolink_cli.console.render import note, say
+from robolink_cli.console.render import emit, note, say
 from robolink_cli.options.consent import Published
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.operator import terminal
 from robolink_cli.prompts.questions import on_terminal
-from robolink_cli.session.completing import complete_recipe
+from robolink_cli.session.completion import complete_recipe
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, context_of_cell, optional_controller
 from robolink_cli.session.motion_consent import agree_to_motion, motion_question
-from robolink_cli.session.opening import open_controller
 
 if TYPE_CHECKING:
     from robolink.backup import ToolState
@@ -102,14 +102,12 @@ def check(
     limits. Each check goes on record as one entry of the journal. Exit code 1 when somebody should
     see to something; when a cell could not be checked, the code of why not.
     """
-    from robolink_cli.commands.computer.cell_check import SensorCheck
-
     contexts = _contexts(context, cells)
     sensor = None if recipe is None else SensorCheck.of(recipe, cells=len(contexts))
     scope = CheckScope(published, f"{since:%Y-%m-%d}" if since else "", sensor)
     checked = [_checked(one, scope) for one in contexts]
     payload = {"ok": all(one.well for one in checked), "cells": [_payload(one) for one in checked]}
-    context.emit("check", payload, lambda: _show(checked))
+    emit("check", payload, lambda: _show(checked))
     for one in checked:
         if one.error is not None:
             return exit_code(one.error)
@@ -204,7 +202,7 @@ def _not_looked(error: RobolinkError) -> "NewEntry":
 
 def _payload(one: CheckedCell) -> Mapping[str, object]:
     """Return what is known of one cell; ``None`` for what nobody could look at."""
-    from robolink_cli.views.documents import offset_payload
+    from robolink.model import json_value
 
     error = one.error and {
         "kind": type(one.error).__name__,
@@ -212,7 +210,7 @@ def _payload(one: CheckedCell) -> Mapping[str, object]:
         "remedy": one.error.remedy,
     }
     found = one.inspection
-    tools = found and {str(number): offset_payload(it) for number, it in found.tools.items()}
+    tools = found and {str(number): json_value(it) for number, it in found.tools.items()}
     return {
         "cell": one.name,
         "ok": one.well,

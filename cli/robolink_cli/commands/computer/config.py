@@ -1,14 +1,131 @@
 """cell list, show, people, files, validate: cells that have a name, and where it stands."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 import click
 
-from robolink_cli.console.render import emit_json, json_is_on
+from robolink.errors import ConfigError, DeclinedError
+from robolink.messages import tr
+from robolink_cli.console.numbers import NumberInside
+from robolink_cli.console.render import emit, emit_json, json_is_on, note, say
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
-from robolink_cli.session.context import CliContext, emit, optional_controller
+from robolink_cli.prompts.questions import asked_for_text, on_terminal
+from robolink_cli.session.context import CliContext, optional_controller
+
+_LEFT_OUT = "-"
+"""What a person types for something that is not known yet."""
+
+
+@click.command("new")
+@json_option
+def new_cell(
+    *,
+    name: Annotated[str | None, CliArgument()] = None,
+    url: Annotated[str | None, CliOption(metavar="URL", help="The controller's URL.")] = None,
+    robot: Annotated[
+        str | None,
+        CliOption(metavar="MODEL", help="The model that must be there, as the controller says it."),
+    ] = None,
+    remote_timeout_s: Annotated[
+        float | None,
+        NumberInside(min=0, min_open=True),
+        CliOption("--time-out-set", help="The remote time-out that is set in an EPSON controller."),
+    ] = None,
+    read_by: Annotated[
+        str | None,
+        CliOption(
+            metavar="WHO", help="Who read that time-out on the controller, and when; goes with it."
+        ),
+    ] = None,
+    file: Annotated[
+        Path, CliOption(metavar=None, help="The cell file; what it says already stays.")
+    ] = Path("robolink.toml"),
+) -> None:
+    """Write a cell into a cell file; what is not given is asked for on a terminal.
+
+    No controller is asked. A cell of the same name is never changed.
+    """
+    from robolink.config import add_cell, content_with_cell
+
+    asks = on_terminal() and not json_is_on()
+    if not asks and (name is None or url is None):
+        raise DeclinedError(
+            tr("A cell needs a name and a URL, and there is nobody to ask."),
+            remedy=tr("Write for example: robolink cell new line3 --url URL"),
+        )
+    name = _right(
+        name,
+        lambda: asked_for_text(tr("What is the cell called? For example: line3")),
+        lambda typed: content_with_cell(file, typed, {}),
+    )
+    url = _right(
+        url,
+        lambda: asked_for_text(
+            tr(
+                "Where is the controller? For example: epson+tcp://192.168.0.1:5000 or "
+                "softmotion+modbus-tcp://192.168.0.2"
+            )
+        ),
+        lambda typed: content_with_cell(file, name, {"url": typed}),
+    )
+    said: dict[str, str | float] = {"url": url}
+    robot = robot or (_if_known(tr("Which robot model must be there?")) if asks else None)
+    if robot:
+        said["robot"] = robot
+    if remote_timeout_s is None and asks and url.startswith("epson+"):
+        typed = _right(
+            None,
+            lambda: (
+                _if_known(tr("Which remote time-out is set in the controller, in seconds?"))
+                or _LEFT_OUT
+            ),
+            lambda typed: typed == _LEFT_OUT or _seconds(typed),
+        )
+        remote_timeout_s = None if typed == _LEFT_OUT else _seconds(typed)
+    if remote_timeout_s is not None:
+        said["remote_timeout_s"] = remote_timeout_s
+        read_by = read_by or (asked_for_text(tr("Who read it there, and when?")) if asks else None)
+    if read_by:
+        said["remote_timeout_confirmed_by"] = read_by
+    add_cell(file, name, said)
+    if json_is_on():
+        emit_json("robolink/cell-new/1", {"cell": name, "path": str(file)})
+        return
+    say(tr("Written: {path}", path=file))
+    say(tr("Next: {command}", command=f'robolink -c "{name}" status'))
+
+
+def _right(given: str | None, ask: Callable[[], str], check: Callable[[str], object]) -> str:
+    """Return what was given, or typed; of what is typed wrongly a person is told, and asked again.
+
+    Raises:
+        ConfigError: What was given is wrong.
+    """
+    if given is not None:
+        check(given)
+        return given
+    while True:
+        typed = ask()
+        try:
+            check(typed)
+        except ConfigError as error:
+            note(error.what)
+        except click.BadParameter as error:
+            note(error.format_message())
+        else:
+            return typed
+
+
+def _if_known(question: str) -> str | None:
+    answer = asked_for_text(tr("{question} Type - if you do not know.", question=question))
+    return None if answer == _LEFT_OUT else answer
+
+
+def _seconds(text: str) -> float:
+    return float(NumberInside(min=0, min_open=True).convert(text, None, None))
 
 
 @click.command()
@@ -18,10 +135,7 @@ def path() -> None:
     from robolink_cli.views.cells import files_payload, show_files
 
     payload = files_payload()
-    if json_is_on():
-        emit_json("robolink/config-path/1", {"files": payload})
-    else:
-        show_files(payload)
+    emit("config-path", {"files": payload}, lambda: show_files(payload))
 
 
 @click.command()
@@ -34,10 +148,7 @@ def check(
     from robolink_cli.views.cells import check_payload, show_check
 
     payload = check_payload(file)
-    if json_is_on():
-        emit_json("robolink/config-check/1", payload)
-    else:
-        show_check(payload)
+    emit("config-check", payload, lambda: show_check(payload))
     return 0 if payload["ok"] else 2
 
 
@@ -60,10 +171,10 @@ def show(
     chosen = find_cell(cell) if cell else context.cell
     if chosen is None:
         payload = cells_payload(load_cells().values())
-        context.emit("config-cells", payload, lambda: show_cells(payload))
+        emit("config-cells", payload, lambda: show_cells(payload))
     else:
         payload = cell_payload(chosen, context, origin=origin)
-        context.emit("config-show", payload, lambda: show_cell(payload))
+        emit("config-show", payload, lambda: show_cell(payload))
 
 
 @click.command("list")
@@ -90,4 +201,4 @@ def people(
 
     chosen = find_cell(cell) if cell else context.cell
     payload = people_payload([chosen] if chosen else load_cells().values())
-    context.emit("cell-people", payload, lambda: show_people(payload))
+    emit("cell-people", payload, lambda: show_people(payload))

@@ -1,5 +1,6 @@
 """ports: the serial ports of this computer."""
 
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 import click
@@ -10,7 +11,7 @@ from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.options.shared import json_option
 
 if TYPE_CHECKING:
-    from robolink_cli.commands.computer.serial_ports import SerialPort
+    from robolink_cli.commands.computer.lines import SerialPort
 
 
 @click.command()
@@ -20,11 +21,8 @@ def ports() -> int:
 
     Ends with 1 when the system or a cell file could not be asked; what could be is shown.
     """
-    from dataclasses import asdict
-
-    from robolink_cli.commands.computer.checkup import tried
-    from robolink_cli.commands.computer.lines import devices_of_cells
-    from robolink_cli.commands.computer.serial_ports import ports_unknown, serial_ports
+    from robolink_cli.commands.computer.doctor import tried
+    from robolink_cli.commands.computer.lines import devices_of_cells, ports_unknown, serial_ports
 
     problems: list[str] = []
     found = tried(serial_ports, ports_unknown, problems) or []

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import Annotated, Final
 
 import click
 
@@ -17,9 +17,6 @@ from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
 
 
 @click.command()
@@ -55,10 +52,14 @@ def scan(
     and tell the status. That changes and moves nothing on an EPSON controller; do not name a line
     with a device on it that these five bytes could harm.
     """
-    from robolink_cli.commands.computer.checkup import tried
-    from robolink_cli.commands.computer.lines import as_json, ask_lines, show_lines
-    from robolink_cli.commands.computer.scan import State, parse_range, probe_all
-    from robolink_cli.commands.computer.serial_ports import ports_unknown, serial_ports
+    from robolink_cli.commands.computer.doctor import tried
+    from robolink_cli.commands.computer.lines import (
+        as_json,
+        ask_lines,
+        ports_unknown,
+        serial_ports,
+        show_lines,
+    )
 
     if addresses is None and not lines:
         raise click.UsageError(tr("Give a range of addresses, or a serial line with --line."))
@@ -95,7 +96,6 @@ def scan(
 def _show(
     probes: "Sequence[AddressProbe]", port: int, timeout_s: float, answering: list[str]
 ) -> None:
-    from robolink_cli.commands.computer.scan import State
 
     for url in answering:
         say(url)

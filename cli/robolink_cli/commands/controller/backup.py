@@ -6,21 +6,142 @@ from typing import Annotated
 
 import click
 
-from robolink.backup import RestorePlan, keep_first_backup
+from robolink.backup import (
+    Backup,
+    Comparison,
+    ComparisonTolerance,
+    RestorePlan,
+    ToolComparison,
+    keep_first_backup,
+)
 from robolink.backup import restore as restore_tools
 from robolink.messages import tr
-from robolink.model import Controller, ToolReceipt, require_engineer
+from robolink.model import Controller, ToolReceipt, json_fields, json_value, require_engineer
 from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.numbers import NumberInside
-from robolink_cli.console.render import note, say
+from robolink_cli.console.render import emit, json_is_on, note, say, show_requests, table
 from robolink_cli.options.consent import DryRun, Overwrite, Published, Yes
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.questions import AcceptedAngle, AcceptedLength, accepted_jump, agree
-from robolink_cli.session.completing import complete_tool
+from robolink_cli.session.completion import complete_tool
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, controller_options
-from robolink_cli.session.opening import open_controller
-from robolink_cli.views.documents import offset_payload, receipt_payload
-from robolink_cli.views.tables import show_change
+from robolink_cli.views.documents import number, receipt_payload, show_change
+
+
+def backup_payload(backup: Backup, file: Path) -> dict[str, object]:
+    """Return what was saved."""
+    tools = backup.state.tools
+    return {
+        "file": str(file),
+        **json_fields(backup, "controller", "saved_at", "facts"),
+        "selected_tool": backup.state.selected,
+        "tools": {str(tool): json_value(offset) for tool, offset in tools.items()},
+    }
+
+
+def show_backup(backup: Backup, file: Path) -> None:
+    """Say what was saved, and of which controller."""
+    facts, tools = backup.facts, backup.state.tools
+    unknown = tr("unknown")
+    say(
+        tr(
+            "{url}: robot {models}, serial {serials}, firmware {firmware}",
+            url=backup.controller,
+            models=", ".join(facts.robot_models) or unknown,
+            serials=", ".join(facts.robot_serials) or unknown,
+            firmware=facts.firmware or unknown,
+        )
+    )
+    say(
+        tr(
+            "Saved in {file}: {defined} of {count} tools are defined.",
+            file=file,
+            defined=sum(offset is not None for offset in tools.values()),
+            count=len(tools),
+        )
+    )
+    if backup.state.selected is not None:
+        say(tr("Tool {tool} is selected.", tool=backup.state.selected))
+
+
+def comparison_payload(comparison: Comparison, tolerance: ComparisonTolerance) -> dict[str, object]:
+    """Return every tool that differs, with all its components."""
+    return {
+        "equal": comparison.equal,
+        "tolerance_mm": tolerance.length_mm,
+        "tolerance_deg": tolerance.angle_deg,
+        "selected_tool": json_fields(
+            comparison,
+            expected="expected_selected",
+            found="found_selected",
+            equal="same_selection",
+            counts="selection_counts",
+        ),
+        "differing": [_tool_payload(tool) for tool in comparison.differing],
+    }
+
+
+def show_comparison(comparison: Comparison, tolerance: ComparisonTolerance, identity: str) -> None:
+    """Print a row for each component of each tool that differs."""
+    rows = [row for tool in comparison.differing for row in _rows(tool)]
+    if rows:
+        columns = (
+            tr("tool"),
+            "",
+            tr("file"),
+            tr("controller"),
+            tr("difference"),
+            tr("allowed"),
+            "",
+        )
+        table(identity, columns, rows)
+    if not comparison.same_selection:
+        say(
+            tr(
+                "  selected tool: {expected} in the file, {found} on the controller",
+                expected=comparison.expected_selected,
+                found=comparison.found_selected,
+            )
+        )
+    if comparison.equal:
+        say(
+            tr(
+                "Equal: all tools of {url} are as in the file, within {mm:g} mm and {deg:g} deg.",
+                url=identity,
+                mm=tolerance.length_mm,
+                deg=tolerance.angle_deg,
+            )
+        )
+    elif rows:
+        numbers = ", ".join(str(tool.tool) for tool in comparison.differing)
+        say(tr("Different tools: {numbers}.", numbers=numbers))
+
+
+def _tool_payload(tool: ToolComparison) -> dict[str, object]:
+    parts = [json_fields(part) | {"equal": part.equal} for part in tool.components]
+    return {**json_fields(tool, "tool", "expected", "found"), "components": parts}
+
+
+def _rows(tool: ToolComparison) -> list[list[object]]:
+    if not tool.components:
+        defined, undefined = tr("defined"), tr("undefined")
+        sides = (tool.expected, tool.found)
+        return [[tool.tool, "", *(undefined if s is None else defined for s in sides), "", "", "<"]]
+    return [
+        [
+            tool.tool,
+            part.name.replace("_", " ").upper().replace("MM", "mm").replace("DEG", "deg"),
+            number(part.expected),
+            number(part.found),
+            f"{part.delta:+.3f}",
+            f"{part.tolerance:g}",
+            "" if part.equal else "<",
+        ]
+        for part in tool.components
+        if part.expected or part.found or not part.name.startswith(("v", "w"))
+    ]
+
 
 _FILE = click.Path(dir_okay=False, path_type=Path)
 
@@ -36,13 +157,12 @@ def backup(
     """Save all fifteen tools, the one that is selected, and which controller it is. Reads only."""
     from robolink.backup import save, take_backup
     from robolink.files.named import require_free
-    from robolink_cli.views.backup import backup_payload, show_backup
 
     require_free(file, replace=force)
     with open_controller(context) as controller:
         taken = take_backup(controller)
     save(taken, file, replace=force)
-    context.emit("backup-saved", backup_payload(taken, file), lambda: show_backup(taken, file))
+    emit("backup-saved", backup_payload(taken, file), lambda: show_backup(taken, file))
 
 
 @click.command()
@@ -74,10 +194,9 @@ def compare(
 
     The file may be of another controller: one good file can be compared with many cells.
     """
-    from robolink.backup import ComparisonTolerance, load
     from robolink.backup import compare as compare_tools
+    from robolink.backup import load
     from robolink_cli.session.context import find_tools
-    from robolink_cli.views.backup import comparison_payload, show_comparison
 
     expected, tolerance = load(file), ComparisonTolerance(length_mm, angle_deg)
     with open_controller(context) as controller:
@@ -92,7 +211,7 @@ def compare(
         "source": "published" if published else "controller",
         **comparison_payload(comparison, tolerance),
     }
-    context.emit("compare", payload, lambda: show_comparison(comparison, tolerance, identity))
+    emit("compare", payload, lambda: show_comparison(comparison, tolerance, identity))
     return 0 if comparison.equal else DIFFERENT
 
 
@@ -121,7 +240,6 @@ def restore(
     the cell's max_change_mm or max_change_deg is asked about, even with --yes.
     """
     from robolink.backup import load, plan_restore, read_tools, require_same_controller
-    from robolink_cli.commands.controller.backup import Restoration
 
     wanted = load(file)
     with open_controller(context, changes=not dry_run) as controller:
@@ -131,18 +249,18 @@ def restore(
         restoration = Restoration(controller, plan)
         requests = restoration.requests()
         if dry_run:
-            context.show_requests(requests)
+            show_requests(requests)
             return
         if not plan.empty:
-            if not context.json:
+            if not json_is_on():
                 restoration.show()
             agree(
                 tr("Write these values to the controller? 'robolink undo' takes them back."),
                 yes=yes,
-                asks=not context.json,
+                asks=not json_is_on(),
             )
         payload = restoration.run(accepted_mm=accepted_mm, accepted_deg=accepted_deg)
-    context.emit("restore", {"file": str(file), **payload}, restoration.show_end)
+    emit("restore", {"file": str(file), **payload}, restoration.show_end)
 
 
 class Restoration:
@@ -175,12 +293,7 @@ class Restoration:
     def show(self) -> None:
         """Show what would change."""
         for change in self._plan.changes:
-            show_change(
-                change.tool,
-                offset_payload(change.now),
-                offset_payload(change.wanted),
-                after_name=tr("backup"),
-            )
+            show_change(change.tool, change.now, change.wanted, after_name=tr("backup"))
         if self._plan.select is not None:
             say(tr("tool {tool} will be selected", tool=self._plan.select))
 

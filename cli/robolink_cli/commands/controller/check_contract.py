@@ -12,11 +12,11 @@ from robolink.errors import ConfigError, DeclinedError
 from robolink.messages import joined, tr
 from robolink_cli.console.exit_codes import DIFFERENT
 from robolink_cli.console.numbers import NumberInside
-from robolink_cli.console.render import note, say, table
+from robolink_cli.console.render import emit, note, say, table
 from robolink_cli.options.consent import Yes
 from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.shared import controller_argument
-from robolink_cli.session.context import CliContext, controller_options, emit
+from robolink_cli.session.context import CliContext, controller_options
 
 if TYPE_CHECKING:
     from robolink.model import Controller
@@ -141,7 +141,7 @@ def _of_a_cell(context: CliContext, asked: _Asked, report: "ContractReport") -> 
     """Check a controller of a cell; what was there stands on its record meanwhile."""
     from robolink.testing import kept_on_site
     from robolink_cli.commands.controller.contract_report import TrialConnections
-    from robolink_cli.session.opening import open_controller
+    from robolink_cli.session.connection import open_controller
 
     trials = TrialConnections(context)
     with ExitStack() as stack:

@@ -16,11 +16,11 @@ from robolink.files.named import save_named
 from robolink.messages import tr
 from robolink.model import ControllerStatus
 from robolink.stopping import far_end_of, find_note
-from robolink_cli.access.recording import recording
+from robolink_cli.access.record import recording
 from robolink_cli.console.exit_codes import error_body
 from robolink_cli.console.render import note
+from robolink_cli.session.connection import password_of
 from robolink_cli.session.context import CliContext
-from robolink_cli.session.opening import password_of
 
 if TYPE_CHECKING:
     from robolink.model import Controller, Ledger

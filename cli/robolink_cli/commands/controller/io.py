@@ -8,13 +8,13 @@ import click
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink_cli.access.capabilities import io_of, require_epson
-from robolink_cli.console.render import say
-from robolink_cli.console.ways import io_words
+from robolink_cli.console.render import emit, say, show_requests
+from robolink_cli.console.shell_words import io_words
 from robolink_cli.options.consent import DryRun, Yes
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.questions import agree
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, controller_options
-from robolink_cli.session.opening import open_controller
 
 if TYPE_CHECKING:
     from robolink.model import Controller, ValueReceipt
@@ -69,7 +69,7 @@ def get(
     at = next(number for number in (bit, byte, word) if number is not None)
     kind = "output" if output else "memory" if memory else "input"
     payload: dict[str, object] = {"kind": kind, "size": size, "number": at, "value": value}
-    context.emit("io", payload, lambda: say(_shown(kind, size, at, value)))
+    emit("io", payload, lambda: say(_shown(kind, size, at, value)))
 
 
 @io.command("set")
@@ -89,7 +89,7 @@ def set_bit(
     with open_controller(context) as controller:
         preview, change = _switching(controller, memory=memory)
         if dry_run:
-            context.show_requests(preview(bit, on))
+            show_requests(preview(bit, on))
             return
         agree(tr("Switch {kind} {bit} {switch}?", kind=kind, bit=bit, switch=switch), yes=yes)
         receipt = change(bit, on)
@@ -107,7 +107,7 @@ def set_bit(
     else:
         done = tr("switched, read back")
     line = tr("{kind} {bit} is {switch}: {done}", kind=kind, bit=bit, switch=switch, done=done)
-    context.emit("io-set", payload, lambda: say(line))
+    emit("io-set", payload, lambda: say(line))
 
 
 def _switching(

@@ -11,11 +11,12 @@ from robolink.messages import tr
 from robolink_cli.access.cell import with_cell_limits
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.output import may_be_guided
+from robolink_cli.console.render import emit, show_requests
 from robolink_cli.options.consent import DryRun, Plain, Yes
 from robolink_cli.options.declaration import CliArgument, CliOption
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, controller_options, guided_if_alone
 from robolink_cli.session.motion_consent import agree_to_motion, motion_question
-from robolink_cli.session.opening import open_controller
 
 if TYPE_CHECKING:
     from robolink.model import Pose
@@ -88,8 +89,7 @@ def jog(
     of them is an emergency stop.
     """
     from robolink.runner import parse_steps
-    from robolink_cli.views.documents import pose_payload
-    from robolink_cli.views.tables import show_pose
+    from robolink_cli.views.documents import pose_payload, show_pose
 
     if keys:
         _require_keys(steps, dry_run=dry_run)
@@ -109,7 +109,7 @@ def jog(
     pose = guided_if_alone(context, work, job=tr("Jog"), alone=keys)
     if pose is not None:
         payload = pose_payload(pose)
-        context.emit("jog", payload, lambda: show_pose(payload))
+        emit("jog", payload, lambda: show_pose(payload))
 
 
 def _jogged(
@@ -122,11 +122,11 @@ def _jogged(
     yes: bool,
 ) -> "Pose | None":
     """Jog, and return where the tool is then; ``None`` where requests were only shown."""
-    from robolink_cli.prompts.jogging import jog_by_hand, jog_by_steps, plan_jog
+    from robolink_cli.prompts.jog_keys import jog_by_hand, jog_by_steps, plan_jog
 
     with open_controller(context) as controller:
         if dry_run:
-            context.show_requests(plan_jog(controller, steps, speed_mm_s, box_mm))
+            show_requests(plan_jog(controller, steps, speed_mm_s, box_mm))
             return None
         question = motion_question(
             controller,
@@ -153,7 +153,7 @@ class _Turning:
 
     def done(self, context: CliContext, *, dry_run: bool, yes: bool) -> "Pose | None":
         """Carry it out, and return where the tool is then; ``None`` where it was only shown."""
-        from robolink_cli.prompts.jogging import plan_turn, require_turn, turn
+        from robolink_cli.prompts.jog_keys import plan_turn, require_turn, turn
 
         how = {"lift_mm": self.lift_mm, "speed_mm_s": self.speed_mm_s, "box_mm": self.box_mm}
         with open_controller(context) as controller:
@@ -169,7 +169,7 @@ class _Turning:
 
             require_inside()
             if dry_run:
-                context.show_requests(plan_turn(controller, self.turn_deg, **how))
+                show_requests(plan_turn(controller, self.turn_deg, **how))
                 return None
             purpose = tr(
                 "with tool {tool}: up by {lift:g} mm, then U by {turn:+g} degrees, and stay there",

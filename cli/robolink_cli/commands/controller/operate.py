@@ -4,31 +4,30 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 import click
 
-from robolink.errors import JournalError
+from robolink.errors import DeclinedError, JournalError, LeaseHeldError
 from robolink.messages import tr
 from robolink.model import Act
 from robolink_cli.access.capabilities import preferences_of, require_epson, require_softmotion
 from robolink_cli.access.warnings import note_unsettled
-from robolink_cli.console.render import note, say
-from robolink_cli.console.ways import state_word
+from robolink_cli.console.render import emit, note, say, show_requests
+from robolink_cli.console.shell_words import state_word
 from robolink_cli.options.consent import DryRun, Yes
 from robolink_cli.options.declaration import CliArgument
 from robolink_cli.options.shared import shared_options
 from robolink_cli.prompts.questions import agree, on_terminal
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import (
     CliContext,
     calming_options,
     controller_options,
-    emit,
     looking_options,
-    show_requests,
     stop_request,
 )
 from robolink_cli.session.motion_consent import agree_to_motion
-from robolink_cli.session.opening import open_controller
 from robolink_cli.stopping.notes import forget_stop, own_name_of
 
 if TYPE_CHECKING:
+    from robolink.controllers import SoftMotionController
     from robolink.model import Controller, Marker
 
 
@@ -41,33 +40,31 @@ def status(context: CliContext) -> None:
     it: who that is, and what it saw last, is shown instead.
     """
     from robolink_cli.session.motion_consent import note_doubts
-    from robolink_cli.session.stop_listening import seen_by_another
-    from robolink_cli.views.documents import status_payload
-    from robolink_cli.views.tables import show_seen, show_status
+    from robolink_cli.session.stop_listener import seen_by_another
+    from robolink_cli.views.documents import show_seen, show_status, status_payload
 
     named = context.expected.cell if context.expected else context.require_url()
     beside = seen_by_another(context.require_url())
     if beside is not None:
-        context.emit("status-beside", beside, lambda: show_seen(beside, named))
+        emit("status-beside", beside, lambda: show_seen(beside, named))
         return
     with open_controller(context, looks=True) as controller:
         payload = status_payload(controller)
         note_doubts(payload, controller, context.expected)
-    context.emit("status", payload, lambda: show_status(payload))
+    emit("status", payload, lambda: show_status(payload))
 
 
 @click.command()
 @looking_options
 def where(context: CliContext) -> None:
     """Show where the selected tool is (measured), and the joints."""
-    from robolink_cli.views.documents import pose_payload
-    from robolink_cli.views.tables import show_pose
+    from robolink_cli.views.documents import pose_payload, show_pose
 
     with open_controller(context, looks=True) as controller:
         group = controller.groups[0]
         pose, axes = group.pose(), group.axes()
     payload = pose_payload(pose) | {name: list(values) for name, values in axes.items()}
-    context.emit("where", payload, lambda: show_pose(payload))
+    emit("where", payload, lambda: show_pose(payload))
 
 
 @click.command()
@@ -134,7 +131,7 @@ def reset(
     """Clear an error. May switch outputs off: a gripper may drop its part."""
     with open_controller(context, calms=True, quiet=True) as controller:
         if dry_run:
-            context.show_requests(controller.preview(Act.RESET))
+            show_requests(controller.preview(Act.RESET))
             return
         effect, told = _effect_of_reset(controller)
         if told and (yes or not on_terminal()):
@@ -150,7 +147,7 @@ def reset(
         note_unsettled(controller, left, named)
     forget_stop(context.require_url(), name)
     payload: dict[str, object] = {"state": state}
-    context.emit(
+    emit(
         "reset",
         payload,
         lambda: say(
@@ -192,13 +189,13 @@ def motors(
     on = switch == "on"
     with open_controller(context, calms=not on) as controller:
         if dry_run:
-            context.show_requests(controller.preview(Act.MOTORS_ON if on else Act.MOTORS_OFF))
+            show_requests(controller.preview(Act.MOTORS_ON if on else Act.MOTORS_OFF))
             return
         if on:
             agree(tr("Switch the motors on? Nobody may be in the cell."), yes=yes)
         controller.motors(on)
     payload: dict[str, object] = {"motors_on": on}
-    context.emit(
+    emit(
         "motors",
         payload,
         lambda: say(tr("The motors are {switch}.", switch=tr("on") if on else tr("off"))),
@@ -233,14 +230,14 @@ def _switch_group(context: CliContext, *, on: bool, dry_run: bool, yes: bool) ->
     with open_controller(context) as controller:
         require_softmotion(controller)
         if dry_run:
-            context.show_requests(controller.preview(Act.MOTORS_ON if on else Act.MOTORS_OFF))
+            show_requests(controller.preview(Act.MOTORS_ON if on else Act.MOTORS_OFF))
             return
         if on:
             agree(tr("Enable the axis group? Nobody may be at the machine."), yes=yes)
         controller.motors(on)
     payload: dict[str, object] = {"enabled": on}
     state = tr("enabled") if on else tr("disabled")
-    context.emit("group", payload, lambda: say(tr("The axis group is {state}.", state=state)))
+    emit("group", payload, lambda: say(tr("The axis group is {state}.", state=state)))
 
 
 @click.command("execute-raw")
@@ -264,4 +261,90 @@ def execute_raw(
         )
         printed = require_epson(controller, tr("SPEL+ statements")).execute_raw(statement)
     payload: dict[str, object] = {"statement": statement, "printed": printed}
-    context.emit("execute-raw", payload, lambda: say(printed or tr("carried out")))
+    emit("execute-raw", payload, lambda: say(printed or tr("carried out")))
+
+
+@click.command("take-ownership")
+@controller_options
+def take_ownership(
+    context: CliContext,
+    *,
+    dry_run: DryRun = False,
+    yes: Yes = False,
+) -> None:
+    """Take a PLC's mailbox from the client that holds it; nobody has it afterwards.
+
+    For a program that hangs or that nobody finds. What that client has under way is halted by
+    the PLC within half a second, and it is refused from then on.
+    """
+    with open_controller(context, changes=not dry_run) as controller:
+        plc = require_softmotion(controller)
+        if dry_run:
+            show_requests((plc.preview_take(insist=True),))
+            return
+        held = _holder(plc)
+        if held is not None:
+            _ask(plc, held, yes=yes)
+            _record(plc, held)
+            plc.take(insist=True)
+    payload: dict[str, object] = {"taken_from": held}
+    emit(
+        "ownership",
+        payload,
+        lambda: say(
+            tr("Nobody else held the mailbox. It is free.")
+            if held is None
+            else tr("The mailbox was taken from client {holder}, and is free now.", holder=held)
+        ),
+    )
+
+
+def _holder(plc: "SoftMotionController") -> str | None:
+    """Ask for the mailbox as everybody does; return who holds it, ``None`` when it was given."""
+    try:
+        plc.take()
+    except LeaseHeldError as error:
+        return error.holder
+    return None
+
+
+def _ask(plc: "SoftMotionController", holder: str, *, yes: bool) -> None:
+    """Have a person insist.
+
+    Raises:
+        DeclinedError: The answer was no, or nobody could be asked.
+    """
+    if not yes and not on_terminal():
+        raise DeclinedError(
+            tr(
+                "Client {holder} holds the mailbox of {controller}, but there is nobody to ask.",
+                holder=holder,
+                controller=plc.identity,
+            ),
+            remedy=tr(
+                "End that program; 10 s after its last sign the mailbox is free. To insist all the "
+                "same, run it on a terminal, or give --yes."
+            ),
+            controller=plc.identity,
+        )
+    if plc.status().running:
+        question = tr(
+            "Client {holder} holds the mailbox, and the axis group moves: the PLC will halt "
+            "it. Take the mailbox away? Only if you see the cell.",
+            holder=holder,
+        )
+    else:
+        question = tr(
+            "Client {holder} holds the mailbox. Take it away? Only if you see the cell.",
+            holder=holder,
+        )
+    agree(question, yes=yes)
+
+
+def _record(plc: "SoftMotionController", holder: str) -> None:
+    from robolink.model import EntryKind, NewEntry
+
+    verdict = tr("the mailbox was taken from client {holder}", holder=holder)
+    plc.outcomes.append(
+        NewEntry(EntryKind.DECISION, verdict=verdict, details={"taken_from": holder})
+    )

@@ -10,7 +10,7 @@ import click
 from robolink.errors import ConfigError
 from robolink.messages import declared, tr
 from robolink_cli.access.warnings import note_change
-from robolink_cli.console.render import note, say
+from robolink_cli.console.render import emit, json_is_on, note, say, show_requests
 from robolink_cli.lazy_group import LazyGroup
 from robolink_cli.options.consent import (
     DryRun,
@@ -20,10 +20,10 @@ from robolink_cli.options.consent import (
 )
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.questions import AcceptedAngle, AcceptedLength, accepted_jump, agree
-from robolink_cli.session.completing import complete_tool
+from robolink_cli.session.completion import complete_tool
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, controller_options
-from robolink_cli.session.opening import open_controller
-from robolink_cli.session.ordering import (
+from robolink_cli.session.order import (
     OrderId,
     ordered,
     require_no_dry_run,
@@ -67,16 +67,16 @@ def list_tools(
     published: Published = False,
 ) -> None:
     """Show all tools and which one is selected."""
+    from robolink.model import json_value
     from robolink_cli.session.context import find_tools
-    from robolink_cli.views.documents import offset_payload
-    from robolink_cli.views.tables import show_tools
+    from robolink_cli.views.documents import show_tools
 
     with open_controller(context, looks=True) as controller:
         found = find_tools(controller, published=published)
-    tools = {str(number): offset_payload(offset) for number, offset in found.tools.items()}
+    tools = {str(number): json_value(offset) for number, offset in found.tools.items()}
     payload: dict[str, object] = {"selected_tool": found.selected, "tools": tools}
     payload["source"] = "published" if published else "controller"
-    context.emit("tools", payload, lambda: show_tools(tools, found.selected))
+    emit("tools", payload, lambda: show_tools(tools, found.selected))
 
 
 @tool.command("get")
@@ -95,8 +95,8 @@ def get(
     ] = None,
 ) -> None:
     """Show one tool; 0 is the flange."""
-    from robolink_cli.views.documents import offset_payload
-    from robolink_cli.views.tables import show_tools
+    from robolink.model import json_value
+    from robolink_cli.views.documents import show_tools
 
     if (number is None) == (mode is None):
         raise ConfigError(
@@ -110,29 +110,29 @@ def get(
         offset, selected = controller.tools.read(number), controller.tools.selected()
         if number:
             note_change(controller, number, offset)
-    value = offset_payload(offset)
+    value = json_value(offset)
     payload: dict[str, object] = {
         "tool": number,
         "defined": value is not None,
         "offset": value,
         "selected": selected == number,
     }
-    context.emit("tool", payload, lambda: show_tools({str(number): value}, selected))
+    emit("tool", payload, lambda: show_tools({str(number): value}, selected))
 
 
 def _get_by_mode(context: CliContext, mode: str) -> None:
     """Show what the PLC's own reading block says about the tool in force."""
+    from robolink.model import json_value
     from robolink.protocols.mailbox import ReadMode
     from robolink_cli.access.capabilities import require_softmotion
-    from robolink_cli.views.documents import offset_payload
-    from robolink_cli.views.tables import show_offset
+    from robolink_cli.views.documents import show_offset
 
     modes = {"set": ReadMode.SET, "active": ReadMode.ACTIVE, "last": ReadMode.LAST_COMMANDED}
     with open_controller(context, looks=True) as controller:
         offset = require_softmotion(controller).tools.read_mode(modes[mode])
-    value = offset_payload(offset)
+    value = json_value(offset)
     payload: dict[str, object] = {"mode": mode, "offset": value}
-    context.emit("tool-mode", payload, lambda: show_offset(mode, value))
+    emit("tool-mode", payload, lambda: show_offset(mode, value))
 
 
 class _Components(NamedTuple):
@@ -196,7 +196,7 @@ def set_tool(
             if dry_run:
                 if jump is not None:
                     note(guard.limits.figure(number, jump))
-                context.show_requests(controller.tools.preview_write(number, wanted))
+                show_requests(controller.tools.preview_write(number, wanted))
                 return
             setting.show_change(controller, before, wanted)
             if jump is not None:
@@ -248,13 +248,11 @@ class _Setting:
         self, controller: "Controller", before: "ToolOffset | None", wanted: "ToolOffset"
     ) -> None:
         """Show a person what the tool holds, and what it is to hold."""
-        from robolink_cli.views.documents import offset_payload
-        from robolink_cli.views.tables import show_change
+        from robolink_cli.views.documents import show_change
 
         controller.tools.selected()  # read now: the last line of a failure names it
-        if not self._context.json:
-            shown = offset_payload(before), offset_payload(wanted)
-            show_change(self._number, *shown, after_name=tr("new"))
+        if not json_is_on():
+            show_change(self._number, before, wanted, after_name=tr("new"))
 
     def ask(self, controller: "Controller", *, agreed: bool, yes: bool) -> None:
         """Have a person agree who did not yet; back up before the first write."""
@@ -267,7 +265,7 @@ class _Setting:
                     tool=self._number,
                 ),
                 yes=yes,
-                asks=not self._context.json,
+                asks=not json_is_on(),
             )
         keep_first_backup(controller, tell=note)
 
@@ -290,7 +288,7 @@ class _Setting:
                 say(tr("tool {number}: {done}", number=self._number, done=done))
 
         shown = payload if order is None else with_order(payload, order)
-        self._context.emit("tool-write", shown, tell)
+        emit("tool-write", shown, tell)
 
 
 @tool.command("clear")
@@ -316,11 +314,11 @@ def clear(
         before = controller.tools.read(number)
         if dry_run:
             requests = controller.tools.preview_clear(number, then_select=then_select)
-            context.show_requests(requests)
+            show_requests(requests)
             return
         # What is refused is refused before anybody is asked.
         controller.tools.preview_clear(number, then_select=then_select)
-        agree(_clear_question(number, then_select), yes=yes, asks=not context.json)
+        agree(_clear_question(number, then_select), yes=yes, asks=not json_is_on())
         keep_first_backup(controller, tell=note)
         wanted = Wanted(number, None, before, then_select=then_select)
         (receipt,) = change_tools(controller, [wanted], tell=note)
@@ -332,7 +330,7 @@ def clear(
         if selected is not None:
             say(tr("Tool {tool} is selected.", tool=selected))
 
-    context.emit("tool-clear", receipt_payload(receipt) | {"selected_tool": selected}, show)
+    emit("tool-clear", receipt_payload(receipt) | {"selected_tool": selected}, show)
 
 
 def _clear_question(number: int, then_select: int | None) -> str:
@@ -359,17 +357,17 @@ def select(
         before = controller.tools.selected()
         if dry_run:
             requests = controller.tools.preview_select(number)
-            context.show_requests(requests)
+            show_requests(requests)
             return
         if before != number:
             agree(
                 tr("Select tool {number} in place of {before}?", number=number, before=before),
                 yes=yes,
-                asks=not context.json,
+                asks=not json_is_on(),
             )
         controller.tools.select(number)
     payload: dict[str, object] = {"before": before, "selected_tool": number}
-    context.emit(
+    emit(
         "tool-select",
         payload,
         lambda: say(

@@ -6,12 +6,12 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_cli.console.render import say
+from robolink_cli.console.render import emit, say, show_requests
 from robolink_cli.options.consent import DryRun, Yes
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.questions import agree
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, controller_options
-from robolink_cli.session.opening import open_controller
 
 if TYPE_CHECKING:
     from robolink.controllers import EpsonVariables
@@ -68,7 +68,7 @@ def get(
     if subscripts:
         payload["index"] = list(subscripts)
     line = ", ".join(str(item) for item in value) if isinstance(value, list) else value
-    context.emit("variable", payload, lambda: say(f"{name} = {line}"))
+    emit("variable", payload, lambda: say(f"{name} = {line}"))
 
 
 # A negative value is no option.
@@ -97,7 +97,7 @@ def set_variable(
     wanted = typed_value(value, kind)
     with open_controller(context) as controller:
         if dry_run:
-            context.show_requests(variables_of(controller).preview_write(name, wanted, kind))
+            show_requests(variables_of(controller).preview_write(name, wanted, kind))
             return
         agree(tr("Set {name} to {value}?", name=name, value=wanted), yes=yes)
         receipt = variables_of(controller).write(name, wanted, kind)
@@ -110,7 +110,7 @@ def set_variable(
     }
     done = tr("was so already") if receipt.skipped else tr("set, read back")
     line = tr("{name} = {value}: {done}", name=name, value=receipt.read_back, done=done)
-    context.emit("variable-set", payload, lambda: say(line))
+    emit("variable-set", payload, lambda: say(line))
 
 
 def _read(

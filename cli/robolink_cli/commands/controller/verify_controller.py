@@ -8,11 +8,12 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_cli.access.recording import recording
-from robolink_cli.console.render import say, table
+from robolink.model import json_fields
+from robolink_cli.access.record import recording
+from robolink_cli.console.render import emit, note, say, table
 from robolink_cli.options.declaration import CliOption
+from robolink_cli.session.connection import password_of
 from robolink_cli.session.context import CliContext, controller_options
-from robolink_cli.session.opening import password_of
 
 if TYPE_CHECKING:
     from robolink.controllers.epson.verify import Fact, Verification
@@ -76,10 +77,10 @@ def verify_controller(
         "profile": None if profile is None else str(profile),
         "transcript": None if transcript is None else str(transcript),
     }
-    context.emit("verification", payload, lambda: _show(found))
+    emit("verification", payload, lambda: _show(found))
     for path in (profile, transcript):
         if path is not None:
-            context.note(tr("Written: {path}", path=path))
+            note(tr("Written: {path}", path=path))
 
 
 def _verify_plc(context: CliContext, url: str, kind: str) -> None:
@@ -117,7 +118,7 @@ def _verify_plc(context: CliContext, url: str, kind: str) -> None:
                 say(tr("{name}: {remedy}", name=one.name, remedy=one.remedy))
         say(tr("Nothing was written, and nothing moved."))
 
-    context.emit("mailbox-verification", payload, show)
+    emit("mailbox-verification", payload, show)
 
 
 def _said(found: "Verification", *, redact: bool) -> str:
@@ -139,12 +140,9 @@ def _write(path: Path, text: str) -> None:
 
 def _fact_payload(fact: "Fact") -> dict[str, object]:
     return {
-        "name": fact.name,
-        "finding": fact.finding,
-        "settled": fact.settled,
+        **json_fields(fact, "name", "finding", "settled"),
         "option": fact.option or None,
-        "value": fact.value,
-        "evidence": fact.evidence,
+        **json_fields(fact, "value", "evidence"),
     }
 
 

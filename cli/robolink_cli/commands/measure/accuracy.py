@@ -24,20 +24,20 @@ from robolink.accuracy import (
 from robolink.calibration import ACCURACY_ROWS, gauge_study
 from robolink.errors import ConfigError
 from robolink.messages import spoken, tr
-from robolink.model import Controller, EntryKind, require_engineer
+from robolink.model import Controller, EntryKind, json_fields, require_engineer
 from robolink.stations import StationKind, find_station
 from robolink.timing import wall_time
-from robolink_cli.commands.measure.solve.solving import load
-from robolink_cli.commands.measure.solve.touch_cases import study_values
+from robolink_cli.commands.measure.solve.answer import load
+from robolink_cli.commands.measure.solve.lasting_cases import study_values
 from robolink_cli.console.numbers import NumberInside, decimal
-from robolink_cli.console.render import note
+from robolink_cli.console.render import emit, note
 from robolink_cli.options.consent import Yes
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import LINE
 from robolink_cli.prompts.questions import agree
-from robolink_cli.session.completing import complete_station, complete_tool
+from robolink_cli.session.completion import complete_station, complete_tool
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, controller_options
-from robolink_cli.session.opening import open_controller
 from robolink_cli.views.accuracy import show_tips
 
 _ROWS = (
@@ -70,7 +70,7 @@ def accuracy(
 
     known = known_rows(context, robot=robot)
     payload = accuracy_payload(context, known)
-    context.emit("cell-accuracy", payload, lambda: show_accuracy(known))
+    emit("cell-accuracy", payload, lambda: show_accuracy(known))
 
 
 @accuracy.command("measure", short_help="Put a row on record that was measured.")
@@ -134,8 +134,6 @@ def measure(
 
     Other rows are learnt without this command, or stated; it says how.
     """
-    from robolink_cli.commands.measure.accuracy import Asked, measure_row
-
     asked = Asked(
         tool=tool,
         true=true,
@@ -208,19 +206,17 @@ def measure_row(context: CliContext, row: str, asked: Asked, *, yes: bool) -> No
             half_width=found.half_width,
         )
         controller.outcomes.append(measured_entry(found))
-    context.emit("cell-accuracy-row", row_payload(found), lambda: note(tr("It is on record.")))
+    emit("cell-accuracy-row", row_payload(found), lambda: note(tr("It is on record.")))
 
 
 def row_payload(found: MeasuredRow) -> dict[str, object]:
     """Return a measured row for a document."""
     return {
-        "row": found.row,
-        "half_width": found.half_width,
+        **json_fields(found, "row", "half_width"),
         "unit": ACCURACY_ROWS[found.row].unit,
         "by": found.by,
         "station": found.station or None,
-        "count": found.count,
-        "records": list(found.records),
+        **json_fields(found, "count", "records"),
         **found.details,
     }
 

@@ -9,8 +9,9 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink_cli.console.render import emit
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, controller_options
-from robolink_cli.session.opening import open_controller
 
 if TYPE_CHECKING:
     from robolink.model import Controller, ToolOffset
@@ -41,17 +42,16 @@ def cell_tools(context: CliContext) -> None:
         "selected_tool": found.selected,
         "tools": tools,
     }
-    context.emit("cell-tools", payload, lambda: show_cell_tools(payload))
+    emit("cell-tools", payload, lambda: show_cell_tools(payload))
 
 
 def _told(
     controller: "Controller", number: int, offset: "ToolOffset", left: int | None
 ) -> Mapping[str, object]:
-    """Return what is known of one tool, plain JSON."""
-    from robolink.model import EntryKind
+    """Return what is known of one tool JSON."""
+    from robolink.model import EntryKind, json_value
     from robolink.transaction import changed_since
-    from robolink_cli.commands.measure.choosing import due_in
-    from robolink_cli.views.documents import offset_payload
+    from robolink_cli.commands.measure.recipe_choice import due_in
 
     last = next(controller.outcomes.recorded(tool=number, kinds=(EntryKind.DONE,)), None)
     since = changed_since(controller, number, offset)
@@ -60,7 +60,7 @@ def _told(
         due.append(tr("Tool {tool}: {said}", tool=number, said=due_in(left)))
     signature = None if last is None else last.signature
     return {
-        "offset": offset_payload(offset),
+        "offset": json_value(offset),
         "changed_at": last and last.at,
         "age_days": None if last is None else _days_since(last.at),
         "change": last and last.change,
@@ -77,8 +77,8 @@ def _changes_left(context: CliContext) -> dict[int, int]:
     """Return after how many changes each tool needs a full calibration; the recipes say it."""
     from robolink.journal import default_location, may_exist, open_journal
     from robolink.recipe import changes_left_of, load_recipe
-    from robolink_cli.commands.measure.choosing import recipes_at
-    from robolink_cli.session.completing import address_of
+    from robolink_cli.commands.measure.recipe_choice import recipes_at
+    from robolink_cli.session.completion import address_of
 
     address, name = address_of(context.url), context.cell.name if context.cell else ""
     if not (address and may_exist(default_location())):

@@ -8,13 +8,13 @@ import click
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink_cli.console.render import say
+from robolink_cli.console.render import emit, say
 from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.impact import impact_payload, impact_request, show_impact
 from robolink_cli.options.report import ForceReport, ReportPath, report_request, reporting
-from robolink_cli.session.completing import complete_tool
+from robolink_cli.session.completion import complete_tool
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, controller_options
-from robolink_cli.session.opening import open_controller
 
 
 class _Components(NamedTuple):
@@ -58,9 +58,8 @@ def impact(
     """
     from robolink.calibration import impact_on
     from robolink.errors import UndefinedToolError
-    from robolink.model import says_it_is_simulated
-    from robolink_cli.views.documents import offset_payload
-    from robolink_cli.views.tables import show_change
+    from robolink.model import json_value, says_it_is_simulated
+    from robolink_cli.views.documents import show_change
 
     request = impact_request(points, path, names=("--points", "--pts"))
     if request is None:
@@ -81,16 +80,16 @@ def impact(
         simulated = says_it_is_simulated(controller)
         found = impact_on(request.read(controller), old=before, new=after)
         draft.offer(tool, before=before, after=after, given=tuple(changes), impact=found)
-    shown = offset_payload(before), offset_payload(after)
-    payload = {"tool": tool, "before": shown[0], "after": shown[1], **impact_payload(found)}
+    values = {"before": json_value(before), "after": json_value(after)}
+    payload = {"tool": tool, **values, **impact_payload(found)}
     payload |= {"simulated": simulated, "report": draft.saved}
 
     def show() -> None:
-        show_change(tool, *shown, after_name=tr("new"))
+        show_change(tool, before, after, after_name=tr("new"))
         show_impact(tool, found)
         say(tr("Nothing was written."))
 
-    context.emit("impact", payload, show)
+    emit("impact", payload, show)
 
 
 def _changes(given: dict[str, float | None]) -> dict[str, float]:

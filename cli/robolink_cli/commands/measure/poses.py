@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Final
 import click
 
 from robolink.messages import tr
-from robolink_cli.console.render import emit_json, json_is_on, say, table
+from robolink.model import json_fields
+from robolink_cli.console.render import emit, say, table
 from robolink_cli.options.declaration import CliArgument
 from robolink_cli.options.pose_source import reading_options
 from robolink_cli.options.shared import json_option
@@ -32,10 +33,7 @@ def show(*, file: Annotated[Path, CliArgument()], choices: "ReadingChoices") -> 
     from robolink.pose_tables import read_poses
 
     found = read_poses(file, choices)
-    if json_is_on():
-        emit_json("robolink/poses/1", _payload(found))
-        return
-    _show_table(file, found)
+    emit("poses", _payload(found), lambda: _show_table(file, found))
 
 
 def _payload(found: "PoseTable") -> dict[str, object]:
@@ -43,15 +41,12 @@ def _payload(found: "PoseTable") -> dict[str, object]:
     read_as: dict[str, object] = {
         "encoding": how.encoding,
         "format": how.layout,
-        "length": str(how.length),
-        "length_by": how.length_by,
+        **json_fields(how, "length", "length_by"),
         "angle": how.angle or None,
         "rotation": how.rotation,
         "separator": how.separator or None,
         "decimal": how.decimal or None,
-        "columns": list(how.columns),
-        "ignored": list(how.ignored),
-        "skipped": how.skipped,
+        **json_fields(how, "columns", "ignored", "skipped"),
     }
     poses = [_pose_payload(entry) for entry in found.entries]
     # What one pose has all have, so that a list from which something was lost shows it.
@@ -68,18 +63,17 @@ _BESIDE: Final = ("name", "number", "hand", "local", "tool")
 
 def _pose_payload(entry: "TabledPose") -> dict[str, object]:
     """Return a pose with its units in the keys; ``None`` for what the file does not say."""
-    from robolink_cli.views.documents import COMPONENTS
+    from robolink.model import COMPONENTS
 
     pose = entry.pose
-    payload: dict[str, object] = dict(zip(COMPONENTS, pose.coordinates(), strict=True))
-    known = {
+    return {
+        **json_fields(pose, *COMPONENTS),
         "name": entry.name or None,
         "number": entry.number,
         "hand": pose.hand,
         "local": pose.local if "local" in entry.stated else None,
         "tool": pose.tool,
     }
-    return payload | known
 
 
 def _show_table(file: Path, found: "PoseTable") -> None:

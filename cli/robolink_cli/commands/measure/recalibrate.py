@@ -1,25 +1,104 @@
 """recalibrate RECIPE.toml: the scripted nozzle change."""
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
 
 import click
 
+from robolink.errors import ConfigError
 from robolink.messages import declared, tr
 from robolink_cli.console.numbers import NumberInside
+from robolink_cli.console.render import json_is_on
 from robolink_cli.options.consent import DryRun, Plain, Yes
 from robolink_cli.options.declaration import CliArgument, CliOption
-from robolink_cli.options.recipe_answers import AnswerTexts, TypedHeights
-from robolink_cli.options.sensor import Sensor
 from robolink_cli.options.shared import TYPED
-from robolink_cli.session.completing import complete_recipe
+from robolink_cli.session.completion import complete_recipe
 from robolink_cli.session.context import CliContext, optional_controller
 from robolink_cli.session.operator_identity import Lot, Nozzle
-from robolink_cli.session.ordering import OrderId, require_no_dry_run
+from robolink_cli.session.order import OrderId, require_no_dry_run
 
 if TYPE_CHECKING:
-    from robolink.recipe import LoadedRecipe
+    from robolink.recipe import Answers, LoadedRecipe, Recipe
     from robolink_cli.wizard.state import Header
+
+
+_NUMBERED = re.compile(r"([0-9]{1,3})=(.+)", re.ASCII | re.DOTALL)
+
+
+AnswerTexts = Annotated[
+    tuple[str, ...],
+    CliOption(
+        "--answer",
+        metavar="N=TEXT",
+        help="Answer to prompt number N of the recipe, counted from 1.",
+    ),
+]
+
+TypedHeights = Annotated[
+    tuple[str, ...],
+    CliOption(
+        metavar="TOOL=MM",
+        help='Z of a new tip in mm from the flange, for a recipe with z = "typed".',
+    ),
+]
+
+
+def answers_from(
+    recipe: "Recipe",
+    *,
+    texts: tuple[str, ...],
+    z_mm: tuple[str, ...],
+    nozzle: str | None,
+    lot: str | None,
+    yes: bool,
+) -> "Answers":
+    """Return what the options answer.
+
+    Raises:
+        ConfigError: An answer to nothing that the recipe asks, or one that is no answer.
+    """
+    from robolink.recipe import Answers
+    from robolink.runner import parse_decimal
+
+    tools = {tool.number for tool in recipe.tools}
+    heights = {number: parse_decimal(text) for number, text in _pairs(z_mm, "--z").items()}
+    if heights and (recipe.z != "typed" or not heights.keys() <= tools):
+        raise ConfigError(
+            tr("The recipe asks for no Z of tool {tool}.", tool=next(iter(heights))),
+            remedy=tr('--z is for the tools of a recipe with z = "typed".'),
+        )
+    answers = _pairs(texts, "--answer")
+    for number in answers:
+        if not 1 <= number <= len(recipe.prompts) or recipe.prompts[number - 1].answer != "text":
+            raise ConfigError(
+                tr("Prompt {number} of the recipe asks for no text.", number=number),
+                remedy=tr('--answer is for prompts with answer = "text"; count from 1.'),
+            )
+    return Answers(yes=yes, nozzle=nozzle or "", lot=lot or "", texts=answers, z_mm=heights)
+
+
+def _pairs(texts: tuple[str, ...], option: str) -> dict[int, str]:
+    found: dict[int, str] = {}
+    for text in texts:
+        match = _NUMBERED.fullmatch(text)
+        if match is None or int(match[1]) in found:
+            raise ConfigError(
+                tr("{option} {text!r} is not NUMBER=VALUE, once each.", option=option, text=text),
+                remedy=tr("For example --answer 2=checked, or --z 1=-120.35."),
+            )
+        found[int(match[1])] = match[2].strip()
+    return found
+
+
+Sensor = Annotated[
+    str | None,
+    CliOption(
+        metavar="NAME|URL",
+        help="The camera: a plug-in's name or URL, or a simulator's assist or sim URL.",
+    ),
+]
+
 
 _STEPS: Final = 7
 """Choose, check, on the way, touch, fit, new values, turn test: numbered in the first row."""
@@ -71,11 +150,10 @@ def recalibrate(
     refusal, Ctrl-C or an emergency stop leaves the old values, and the tool that was selected.
     Without RECIPE, on a terminal, cell and recipe are chosen from lists.
     """
-    from robolink_cli.commands.measure.choosing import nobody_to_ask
     from robolink_cli.commands.measure.recalibration import EventStream, Recalibration, RunOptions
+    from robolink_cli.commands.measure.recipe_choice import nobody_to_ask
     from robolink_cli.console.output import may_be_guided
     from robolink_cli.console.render import note
-    from robolink_cli.options.recipe_answers import answers_from
     from robolink_cli.session.context import guided_if_alone
 
     if recipe is None and not may_be_guided():
@@ -117,20 +195,20 @@ def recalibrate(
         alone = recipe is None or (assist is None and not dry_run and order is None)
         job = tr("Change needle")
         # A program that reads what comes of it waits for one result.
-        following = None if jsonl or context.json else another
+        following = None if jsonl or json_is_on() else another
         guided_if_alone(context, change, job=job, alone=alone, following=following, steps=_STEPS)
 
 
 def _chosen(context: CliContext, recipe: Path | None) -> "tuple[CliContext, LoadedRecipe]":
     """Have cell and recipe chosen, as far as the line does not name them."""
     from robolink.recipe import load_recipe
-    from robolink_cli.commands.measure.choosing import choose_recipe, context_at_desk
-    from robolink_cli.prompts.present import present_desk
+    from robolink_cli.commands.measure.recipe_choice import choose_recipe, context_at_desk
+    from robolink_cli.prompts.current_desk import current_desk
     from robolink_cli.session.context import header_of
 
     named = None if recipe is None else load_recipe(recipe)
     at = context_at_desk(context, declared("Change needle"), steps=_STEPS)
-    desk = present_desk()
+    desk = current_desk()
 
     def head(*chosen: str, steps: int = _STEPS) -> "Header":
         return header_of(at, tr("Change needle"), *chosen, steps=steps)
@@ -147,11 +225,11 @@ def _chosen(context: CliContext, recipe: Path | None) -> "tuple[CliContext, Load
 
 def _chosen_anew(before: CliContext) -> "tuple[CliContext, LoadedRecipe]":
     """Have cell and recipe chosen for the next tool, the cell of the one before marked."""
-    from robolink_cli.commands.measure.choosing import choose_cell, choose_recipe
-    from robolink_cli.prompts.present import present_desk
+    from robolink_cli.commands.measure.recipe_choice import choose_cell, choose_recipe
+    from robolink_cli.prompts.current_desk import current_desk
     from robolink_cli.session.context import context_of_cell, header_of
 
-    desk = present_desk()
+    desk = current_desk()
     assert desk is not None  # noqa: S101 - it is offered at a desk alone
 
     def head(*typed: str, steps: int = _STEPS) -> "Header":

@@ -12,7 +12,7 @@ from robolink.calibration import VerifyResult
 from robolink.calibration_run import ChangeReport, Listener, Moment, Proposal, RecipeRun, preview
 from robolink.errors import CalibrationError, DeclinedError
 from robolink.messages import tr
-from robolink.model import AnsweredBy, Controller, ToolReceipt
+from robolink.model import AnsweredBy, Controller, ToolReceipt, json_fields
 from robolink.procedures import MeasurementContext
 from robolink.recipe import Answers, LoadedRecipe, require_answers
 from robolink.runner import Ask, Confirm, Notify, StepDone, TakenStep
@@ -20,23 +20,22 @@ from robolink.transaction import Order
 from robolink_cli.access.capabilities import io_of
 from robolink_cli.console.exit_codes import error_body, exit_code
 from robolink_cli.console.output import drawn_elsewhere, hand_over
-from robolink_cli.console.render import note, say, switch_json_on
+from robolink_cli.console.render import emit, note, say, switch_json_on
+from robolink_cli.prompts.current_desk import current_desk
 from robolink_cli.prompts.operator import operator_at
-from robolink_cli.prompts.present import present_desk
 from robolink_cli.prompts.questions import asked, keep_answer, on_terminal
 from robolink_cli.session.check_before_start import check_before_start, name_the_needle
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext
 from robolink_cli.session.motion_consent import agree_to_motion, motion_question
-from robolink_cli.session.opening import open_controller
-from robolink_cli.session.ordering import ordered, show_done, with_order
+from robolink_cli.session.order import ordered, show_done, with_order
 from robolink_cli.views.documents import (
     pose_payload,
     proposal_payload,
     receipt_payload,
     verification_payload,
 )
-from robolink_cli.views.fit import report_payload, show_report
-from robolink_cli.views.planned_steps import steps_payload
+from robolink_cli.views.fit import report_payload, show_report, steps_payload
 
 
 class EventStream:
@@ -226,9 +225,7 @@ class Recalibration:
         payload = with_order(document, order)
         self.events.emit("result", **payload)
         if not self.events.on:
-            self.context.emit(
-                "recalibration", payload, lambda: _show_plan(payload) if dry_run else None
-            )
+            emit("recalibration", payload, lambda: _show_plan(payload) if dry_run else None)
 
     @contextmanager
     def _opened(self) -> Iterator[tuple[Controller, Order | None]]:
@@ -332,7 +329,7 @@ class Recalibration:
 
     @property
     def _at_desk(self) -> bool:
-        return present_desk() is not None and not self.options.answers.yes
+        return current_desk() is not None and not self.options.answers.yes
 
     def _purpose(self, run: RecipeRun) -> str:
         return tr(
@@ -383,9 +380,7 @@ class Recalibration:
             "prompts": [{"at": prompt.at, "text": prompt.text} for prompt in recipe.prompts],
             "outputs": [
                 {
-                    "at": output.at,
-                    "output": output.output,
-                    "on": output.on,
+                    **json_fields(output, "at", "output", "on"),
                     "requests": list(io_of(controller).preview_output(output.output, output.on)),
                 }
                 for output in recipe.outputs
@@ -397,7 +392,7 @@ class Recalibration:
     ) -> dict[str, object]:
         """Show a person what was done; return the document of it."""
         # Now, because Ctrl-C may come before the logout is answered.
-        desk = present_desk()
+        desk = current_desk()
         if desk is not None:
             desk.regard(report)
         for one in report.tools if desk is None else ():

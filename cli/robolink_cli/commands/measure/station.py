@@ -6,9 +6,10 @@ import click
 
 from robolink.messages import tr
 from robolink_cli.console.numbers import NumberInside
+from robolink_cli.console.render import emit
 from robolink_cli.options.consent import DryRun, Yes
 from robolink_cli.options.declaration import CliArgument, CliOption
-from robolink_cli.session.completing import complete_station, complete_tool
+from robolink_cli.session.completion import complete_station, complete_tool
 from robolink_cli.session.context import CliContext, controller_options
 
 
@@ -38,7 +39,7 @@ def list_stations(
 
     known = known_stations(context, robot=robot)
     payload = {"stations": [station_payload(one.station, robot=one.robot) for one in known]}
-    context.emit("stations", payload, lambda: show_stations(known))
+    emit("stations", payload, lambda: show_stations(known))
 
 
 @station.command("show")
@@ -54,7 +55,7 @@ def show(
 
     found = known_station(context, name, robot=robot)
     payload = station_payload(found.station, robot=found.robot)
-    context.emit("station", payload, lambda: show_station(found))
+    emit("station", payload, lambda: show_station(found))
 
 
 @station.command("learn", short_help="Find a station with a tool whose offset is known.")

@@ -28,14 +28,13 @@ from robolink.stations import (
     require_base_of,
     station_entry,
 )
-from robolink_cli.console.render import note, table
+from robolink_cli.console.render import emit, note, table
 from robolink_cli.prompts.operator import operator_at
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext
 from robolink_cli.session.motion_consent import agree_to_motion, motion_question
-from robolink_cli.session.opening import open_controller
 from robolink_cli.views.documents import number
-from robolink_cli.views.fit import show_plan
-from robolink_cli.views.planned_steps import steps_payload
+from robolink_cli.views.fit import show_plan, steps_payload
 from robolink_cli.views.stations import station_payload
 
 
@@ -75,7 +74,7 @@ def learn(
         steps = foresee(course, here=here, settings=limits.settings(here, None), arm=ahead)
         if dry_run:
             payload = {"dry_run": True, "tool": tool, "steps": steps_payload(controller, steps)}
-            context.emit("dry-run", payload, lambda: show_plan(payload))
+            emit("dry-run", payload, lambda: show_plan(payload))
             return
         require_inside(controller, steps)
         require_contact_input(controller, touch)
@@ -110,7 +109,7 @@ def learn(
                 )
             controller.outcomes.append(station_entry(found, base=base_now(controller)))
         kept = _known(context, controller, name)
-    context.emit("station", station_payload(kept), lambda: None)
+    emit("station", station_payload(kept), lambda: None)
 
 
 def _height_of_pin(controller: Controller, known: Station, found: Found, tool: int) -> Found:

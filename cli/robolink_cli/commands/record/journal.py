@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Final, Literal, NamedTuple
 import click
 
 from robolink.messages import declared, tr
-from robolink.model import EntryKind
+from robolink.model import EntryKind, json_fields
 from robolink_cli.commands.record.journal_drift import drift
 from robolink_cli.commands.record.journal_lookup import (
     OfController,
@@ -19,12 +19,12 @@ from robolink_cli.commands.record.journal_lookup import (
     journal_to_read,
 )
 from robolink_cli.console.exit_codes import DIFFERENT
-from robolink_cli.console.render import emit_json, json_is_on, say
+from robolink_cli.console.render import emit, emit_json, json_is_on, say
 from robolink_cli.lazy_group import LazyGroup
 from robolink_cli.options.consent import Overwrite
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
-from robolink_cli.session.completing import complete_tool
+from robolink_cli.session.completion import complete_tool
 
 if TYPE_CHECKING:
     from robolink.journal import Journal
@@ -149,10 +149,7 @@ def diff(
 
     opened = journal_to_read()
     sides = entries_named(opened, a), entries_named(opened, b)
-    if json_is_on():
-        emit_json("robolink/journal-diff/1", diff_payload(*sides))
-    else:
-        show_diff(*sides)
+    emit("journal-diff", diff_payload(*sides), lambda: show_diff(*sides))
 
 
 @journal.command("export", short_help="Write entries to a file, oldest first.")
@@ -196,13 +193,8 @@ def verify() -> int:
     opened = journal_to_read()
     with _progress(opened) as progress:
         found = opened.verify(progress)
-    payload = {
-        "entry_count": found.checked,
-        "problems": list(found.problems),
-        "last_number": found.last_number,
-        "last_hash": found.last_hash,
-        "keyed": False,
-    }
+    said_of = ("problems", "last_number", "last_hash")
+    payload = {"entry_count": found.checked, **json_fields(found, *said_of), "keyed": False}
     if json_is_on():
         emit_json("robolink/journal-verified/1", payload)
     else:

@@ -9,6 +9,7 @@ import click
 
 from robolink.drift import CellDrift, Chart, ChartPoint, last_statements
 from robolink.messages import tr
+from robolink.model import json_fields
 from robolink.report import chart_title
 from robolink_cli.commands.record.journal_lookup import (
     OfController,
@@ -21,10 +22,9 @@ from robolink_cli.console.render import emit_json, json_is_on, say, table
 from robolink_cli.options.consent import Overwrite
 from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.shared import json_option
-from robolink_cli.session.completing import complete_tool
+from robolink_cli.session.completion import complete_tool
 
 if TYPE_CHECKING:
-    from robolink.drift import CellDrift
     from robolink.journal import Journal
     from robolink.model import Recorded
 
@@ -62,7 +62,6 @@ def drift(
     changes that were measured and kept count. Exit code 1 when something stands out.
     """
     from robolink.journal import default_location, may_exist
-    from robolink_cli.commands.record.journal_drift import drift_payload, show_drift
 
     if page is not None:
         from robolink.files.named import require_free
@@ -255,21 +254,16 @@ def _mark(point: ChartPoint) -> str:
 
 def drift_payload(cells: Sequence[CellDrift]) -> dict[str, object]:
     """Return charts and findings as plain JSON values."""
+    told = ("code", "subject", "since", "change", "shift_mm")
     return {
         "controllers": [
             {
-                "controller": cell.controller,
-                "simulated": cell.simulated,
+                **json_fields(cell, "controller", "simulated"),
                 "change_count": len(cell.changes),
                 "charts": [_chart(chart) for chart in cell.charts],
                 "findings": [
                     {
-                        "code": str(finding.code),
-                        "subject": list(finding.subject),
-                        "since": finding.since,
-                        "change": finding.change,
-                        "shift_mm": dict(finding.shift_mm),
-                        "text": finding.sentence,
+                        **json_fields(finding, *told, text="sentence"),
                         "remedy": finding.remedy,
                     }
                     for finding in cell.findings
@@ -282,26 +276,16 @@ def drift_payload(cells: Sequence[CellDrift]) -> dict[str, object]:
 
 def _chart(chart: Chart) -> dict[str, object]:
     return {
-        "quantity": chart.quantity,
-        "subject": chart.subject,
+        **json_fields(chart, "quantity", "subject"),
         "axis": chart.axis or None,
         "baseline_count": chart.baseline,
-        "centre_mm": chart.centre_mm,
-        "sigma_mm": chart.sigma_mm,
-        "limits_mm": chart.limits_mm and list(chart.limits_mm),
-        "mean_limits_mm": chart.mean_limits_mm and list(chart.mean_limits_mm),
+        **json_fields(chart, "centre_mm", "sigma_mm", "limits_mm", "mean_limits_mm"),
         "points": [
             {
-                "at": point.change.at,
-                "change": point.change.change,
+                **json_fields(point.change, "at", "change"),
                 "nozzle": point.change.nozzle or None,
-                "value_mm": point.value_mm,
-                "repeat": point.repeat,
-                "outside": point.outside,
-                "mean_mm": point.mean_mm,
-                "mean_outside": point.mean_outside,
-                "repeatable_to_mm": point.change.repeatable_to_mm,
-                "accurate_to_mm": point.change.accurate_to_mm,
+                **json_fields(point, "value_mm", "repeat", "outside", "mean_mm", "mean_outside"),
+                **json_fields(point.change, "repeatable_to_mm", "accurate_to_mm"),
             }
             for point in chart.points
         ],

@@ -11,8 +11,8 @@ from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.model import Recorded, Signature
-from robolink_cli.views.journal import COMPONENTS, entry_payload
+from robolink.model import COMPONENTS, Recorded, Signature
+from robolink_cli.views.journal import entry_payload
 
 _OFFSETS: Final = ("before", "after")
 _FIGURES: Final = (

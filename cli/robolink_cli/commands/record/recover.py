@@ -9,21 +9,20 @@ from robolink.messages import declared, tr
 from robolink.model import AnsweredBy, Controller, Finding, MarkerKind, Verdict, begun_in_words
 from robolink.timing import local_label
 from robolink.transaction import Recovery, look
-from robolink_cli.commands.measure.choosing import context_at_desk
+from robolink_cli.commands.measure.recipe_choice import context_at_desk
 from robolink_cli.commands.record.recovery_guide import Guide, show_end
-from robolink_cli.console.render import json_is_on
+from robolink_cli.console.render import emit, json_is_on
 from robolink_cli.options.consent import DryRun, Plain, Yes
 from robolink_cli.options.declaration import CliOption
-from robolink_cli.prompts.present import present_desk
+from robolink_cli.prompts.current_desk import current_desk
 from robolink_cli.prompts.questions import on_terminal
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import (
     CliContext,
     controller_options,
-    emit,
     guided_if_alone,
     optional_controller,
 )
-from robolink_cli.session.opening import open_controller
 from robolink_cli.views.documents import finding_payload
 from robolink_cli.wizard.state import ChoiceSubject, choose
 
@@ -43,7 +42,7 @@ def chosen_at_desk(controller: Controller) -> str | None:
     """
     from robolink.calibration_run import open_turn_tests, untested_sentences
 
-    desk = present_desk()
+    desk = current_desk()
     if desk is None:
         return None
     findings = look(controller)
@@ -226,7 +225,7 @@ def resolve(
 
 def _somebody_there() -> bool:
     """Whether a person can agree to movements, and bring the tip onto the pin."""
-    return present_desk() is not None or (on_terminal() and not json_is_on())
+    return current_desk() is not None or (on_terminal() and not json_is_on())
 
 
 def _gone_through(guide: Guide, *, forget: bool, yes: bool, dry_run: bool) -> tuple[Recovery, int]:

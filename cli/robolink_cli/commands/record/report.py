@@ -10,19 +10,19 @@ import click
 from robolink.errors import ConfigError
 from robolink.journal import Journal
 from robolink.messages import tr
-from robolink.model import EntryKind, Recorded
+from robolink.model import EntryKind, Recorded, json_fields
 from robolink.report import Report
 from robolink.transaction import id_of_change
 from robolink_cli.commands.record.journal_lookup import controller_meant, entries_of_change
 from robolink_cli.console.exit_codes import DIFFERENT
-from robolink_cli.console.render import note, say
+from robolink_cli.console.render import emit, note, say
 from robolink_cli.options.consent import Overwrite
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.impact import ImpactRequest, judge
 from robolink_cli.options.pose_source import point_numbers
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, optional_controller
-from robolink_cli.session.opening import open_controller
-from robolink_cli.views.documents import offset_payload, verification_payload
+from robolink_cli.views.documents import verification_payload
 
 _ENDINGS = (".html", ".htm")
 
@@ -52,15 +52,8 @@ def report(
     """
     from robolink.files.named import require_free
     from robolink.report import save
-    from robolink.transaction import id_of_change
     from robolink_cli.access.change_page import free_page, reports_from
     from robolink_cli.commands.record.journal_lookup import journal_to_read
-    from robolink_cli.commands.record.report import (
-        find_change,
-        report_payload,
-        with_points,
-    )
-    from robolink_cli.options.impact import ImpactRequest
 
     if change is not None and file is None and change.lower().endswith(_ENDINGS):
         file, change = Path(change), None
@@ -78,7 +71,7 @@ def report(
     for problem in problems:
         note(problem)
     payload = report_payload(reports, path)
-    context.emit("report", payload, lambda: say(tr("Report: {path}", path=path)))
+    emit("report", payload, lambda: say(tr("Report: {path}", path=path)))
     return DIFFERENT if problems else 0
 
 
@@ -160,9 +153,7 @@ def _tool_payload(report: Report) -> dict[str, object]:
         "method": report.method,
         "local_time": report.local_time or None,
         "machine": {name: value or None for name, value in asdict(report.facts).items()},
-        "gauges": [asdict(gauge) for gauge in report.gauges],
-        "before": offset_payload(report.before),
-        "after": offset_payload(report.after),
+        **json_fields(report, "gauges", "before", "after"),
         "measured": [name for name in report.determined if not fit or name not in fit.changed],
         "changed": list(fit.changed) if fit else [],
         "repeatable_to_mm": fit.repeatable_to_mm if fit else None,

@@ -10,15 +10,14 @@ from robolink.messages import tr
 from robolink.model import Controller
 from robolink.transaction import Undone, UndoPlan
 from robolink.transaction import undo as take_back
-from robolink_cli.console.render import note, say
+from robolink_cli.console.render import emit, json_is_on, note, say, show_requests
 from robolink_cli.options.consent import DryRun, ThenSelect, Yes
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.prompts.questions import agree, on_terminal
-from robolink_cli.session.completing import complete_tool
+from robolink_cli.session.completion import complete_tool
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import CliContext, controller_options
-from robolink_cli.session.opening import open_controller
-from robolink_cli.views.documents import offset_payload, receipt_payload
-from robolink_cli.views.tables import show_change
+from robolink_cli.views.documents import receipt_payload, show_change
 
 
 @click.command()
@@ -49,7 +48,6 @@ def undo(
     """
     from robolink.transaction import plan_undo
     from robolink_cli.commands.record.journal_lookup import change_named
-    from robolink_cli.commands.record.undo import Undoing
 
     if change is not None and to is not None:
         raise ConfigError(
@@ -62,25 +60,25 @@ def undo(
         plan = plan_undo(controller, tool=tool, change=chosen, to=to)
         undoing = Undoing(controller, plan, then_select=then_select)
         requests = undoing.requests()
-        if not context.json:
+        if not json_is_on():
             undoing.show()
         if dry_run:
-            context.show_requests(requests)
+            show_requests(requests)
             return
         if requests:
-            _agree(context, yes=yes)
+            _agree(yes=yes)
         payload = undoing.run()
     called = context.cell.name if context.cell else str(context.url)
-    context.emit("undo", payload, lambda: undoing.show_end(called))
+    emit("undo", payload, lambda: undoing.show_end(called))
 
 
-def _agree(context: CliContext, *, yes: bool) -> None:
+def _agree(*, yes: bool) -> None:
     """Ask on a terminal; off it only ``--yes`` is consent.
 
     Raises:
         DeclinedError: The answer was no, or nobody could be asked.
     """
-    if not yes and (context.json or not on_terminal()):
+    if not yes and (json_is_on() or not on_terminal()):
         raise DeclinedError(
             tr("An undo writes to the controller, but there is nobody to ask."),
             remedy=tr("Nothing was written. Look at it with --dry-run, then add --yes."),
@@ -128,8 +126,7 @@ class Undoing:
         for remark in self._plan.remarks:
             say(f"  {remark}")
         for step in self._plan.steps:
-            shown = offset_payload(step.before), offset_payload(step.requested)
-            show_change(step.tool, *shown, after_name=tr("restored"))
+            show_change(step.tool, step.before, step.requested, after_name=tr("restored"))
 
     def run(self) -> dict[str, object]:
         """Carry it out and return the document; nothing is sent when nothing differs."""

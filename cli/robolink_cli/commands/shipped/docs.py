@@ -96,8 +96,6 @@ def _list(titles: dict[str, str]) -> None:
 def _show(text: str) -> None:
     """Show a page: through the pager on a terminal, as it stands to a program."""
     if is_terminal(sys.stdout) and is_terminal(sys.stdin):
-        from robolink_cli.commands.shipped.docs import page_lines
-
         click.echo_via_pager(page_lines(_COMMENT.sub("", text), shutil.get_terminal_size().columns))
     else:
         say(text.rstrip("\n"))

@@ -18,7 +18,7 @@ from robolink_cli.console.render import emit_json, json_is_on, say, say_listed
 from robolink_cli.options.consent import Overwrite
 from robolink_cli.options.declaration import CliArgument
 from robolink_cli.options.shared import json_option
-from robolink_cli.session.completing import complete_recipe
+from robolink_cli.session.completion import complete_recipe
 
 _OF_THE_CELL: Final = re.compile(
     r"^[^#]*\b([xyz]_mm|origin_mm|mm_per_px|direction_deg|points|input|sideways_mm|down_mm|up_mm"
@@ -45,8 +45,6 @@ def purpose_of(path: Path) -> str:
     Args:
         path: One that comes along.
     """
-    from robolink_cli.commands.shipped.recipe import PURPOSES
-
     return PURPOSES.get(path.stem) or first_comment(path)
 
 

@@ -8,9 +8,9 @@ from enum import StrEnum
 from typing import Annotated, Literal
 
 import click
-from robolink_simulators.assist.port import LEAST_THINKING_S, InProcessEyes
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.cell.world_parameters import WorldParameters
+from robolink_simulators.control.assist import LEAST_THINKING_S, InProcessEyes
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process.softmotion import simulator_named
 from robolink_simulators.hosting.streams.epson import serve_tcp
@@ -28,13 +28,12 @@ from robolink.calibration_run import (
 from robolink.errors import CalibrationError, VerifyError
 from robolink.journal import memory_journal
 from robolink.messages import tr
-from robolink.model import Controller, ToolOffset
+from robolink.model import Controller, ToolOffset, json_fields, json_value
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.shared import json_option
 from robolink_cli.prompts.operator import AssistedOperator
-from robolink_cli.views.documents import offset_payload
 from robolink_cli.views.fit import report_payload, show_proposal, show_report
 
 
@@ -63,8 +62,6 @@ def demo(
     The SCARA is reached over a TCP connection on this machine's loopback, the PLC through its
     mailbox inside this process. No machine is touched.
     """
-    from robolink_cli.commands.simulate.demo import DemoOperator, demonstrate
-
     demonstrate(seed=seed, speed=speed, operator=DemoOperator(operator))
 
 
@@ -90,13 +87,7 @@ class DemonstratedChange(ABC):
 
     def payload(self) -> dict[str, object]:
         """Return it as plain JSON."""
-        return {
-            "kind": self.kind,
-            "robot": self.robot,
-            "truth": offset_payload(self.truth),
-            "exchanges": self.exchanges,
-            **self.end(),
-        }
+        return {**json_fields(self, "kind", "robot", "truth", "exchanges"), **self.end()}
 
     @abstractmethod
     def end(self) -> dict[str, object]:
@@ -134,7 +125,7 @@ class AcceptedChange(DemonstratedChange):
         """Return how it ended, as plain JSON."""
         return {
             "refused": None,
-            "recovered": offset_payload(self.report.proposal.offset),
+            "recovered": json_value(self.report.proposal.offset),
             "error_mm": self.error_mm,
             "drift_mm": self.drift_mm,
             **report_payload(self.report),
@@ -174,7 +165,7 @@ class RefusedChange(DemonstratedChange):
         code = error.code if isinstance(error, CalibrationError) else "large_drift"
         return {
             "refused": {"code": code, "what": error.what, "remedy": error.remedy},
-            "in_force": offset_payload(self.in_force),
+            "in_force": json_value(self.in_force),
         }
 
     def show(self) -> None:

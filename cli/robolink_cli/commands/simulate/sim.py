@@ -5,20 +5,146 @@ from typing import Annotated, Literal, NamedTuple
 
 import click
 
-from robolink_cli.commands.simulate.run.sim_run import sim_run
-from robolink_cli.commands.simulate.sim_plc import sim_plc
-from robolink_cli.commands.simulate.sim_softmotion import softmotion
+from robolink_cli.commands.simulate.sim_run import sim_run
 from robolink_cli.console.help_pages import SectionedCommand
 from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
 from robolink_cli.options.simulation import (
     EXISTING_FILE,
     SECTIONS,
+    AllowRemote,
+    ExchangeTime,
+    FaultPlan,
+    ModbusPlaces,
+    Pace,
     ProjectOptions,
+    Seed,
     ServedLife,
     SimulationOptions,
     one_place,
 )
+
+
+@click.command(
+    "plc",
+    cls=SectionedCommand,
+    sections=SECTIONS,
+    short_help="Serve a simulated PLC with the registers of any map.",
+)
+@json_option
+def sim_plc(
+    *,
+    map_file: Annotated[Path, CliOption("--map", help="The map; docs/plc-maps.md explains it.")],
+    places: ModbusPlaces,
+    unit: Annotated[
+        int,
+        click.IntRange(0, 255),
+        CliOption(help="The unit identifier that answers; 1 to 247 on a serial line."),
+    ] = 1,
+    most_registers: Annotated[
+        int,
+        click.IntRange(4, 125),
+        CliOption(help="How many registers one read may ask for; some servers allow 61 or 50."),
+    ] = 125,
+    seed: Seed = 1,
+    speed: Pace = 1.0,
+    exchange: ExchangeTime = None,
+    faults: FaultPlan = None,
+    allow_remote: AllowRemote = False,
+    life: ServedLife,
+) -> None:
+    """Serve a simulated PLC with the registers of any map until Ctrl-C.
+
+    Both buses may be given; one PLC stands behind them.
+    """
+    from robolink_cli.commands.simulate.plc import PLC_KIND
+    from robolink_cli.commands.simulate.simulated_kind import serve_alone
+
+    options = {
+        "map_file": map_file,
+        **places.by_name_of_today(),
+        "unit": unit,
+        "most_registers": most_registers,
+        "seed": seed,
+        "speed": speed,
+        "exchange": exchange,
+        "faults": faults,
+        "allow_remote": allow_remote,
+    }
+    serve_alone(PLC_KIND, life, options)
+
+
+def _complete_kinematics(_: click.Context, __: click.Parameter, start: str) -> list[str]:
+    """Return the kinematics whose names begin so, for TAB."""
+    from robolink_simulators.softmotion.catalogue import complete_kinematics
+
+    return complete_kinematics(start)
+
+
+class _SoftMotionOptions(NamedTuple):
+    """What a simulated SoftMotion PLC has for itself, beside Modbus."""
+
+    can: Annotated[
+        str | None,
+        CliOption(
+            metavar="INTERFACE:CHANNEL",
+            help="Be a CANopen node, for example on udp_multicast:239.74.163.2:43113 or "
+            "socketcan:vcan0.",
+        ),
+    ] = None
+    unit: Annotated[
+        int, click.IntRange(1, 247), CliOption(help="Unit identifier on the serial line.")
+    ] = 1
+    node: Annotated[
+        int, click.IntRange(1, 127), CliOption(help="Number of the node on the CAN bus.")
+    ] = 5
+    kinematics: Annotated[
+        str,
+        CliOption(
+            metavar="NAME[+ORIENTATION]",
+            shell_complete=_complete_kinematics,
+            help="Kinematics of the axis group; TAB completes the names. Or module:Class for one "
+            "of your own, which may stand in the present folder.",
+        ),
+    ] = "Kin_Scara3_Z"
+    parameters: Annotated[
+        tuple[str, ...],
+        CliOption(
+            "--param",
+            metavar="NAME=VALUE",
+            help="A parameter of the kinematics or a drive, for example dArmLength1=250. May be "
+            "repeated.",
+        ),
+    ] = ()
+    program: Annotated[
+        Path | None,
+        click.Path(exists=True, file_okay=False, path_type=Path),
+        CliOption(
+            metavar="DIR",
+            help="Execute the program in this folder, as 'plc export' writes it, changed or not.",
+        ),
+    ] = None
+
+
+@click.command(cls=SectionedCommand, sections=SECTIONS)
+@json_option
+def softmotion(
+    *,
+    places: ModbusPlaces,
+    given: _SoftMotionOptions,
+    simulation: SimulationOptions,
+    life: ServedLife,
+) -> None:
+    """Serve a simulated SoftMotion PLC with a mailbox until Ctrl-C.
+
+    Several buses may be given; one PLC stands behind them. The assist port stands in for the
+    person at the machine.
+    """
+    from robolink_cli.commands.simulate.simulated_kind import serve_alone
+    from robolink_cli.commands.simulate.softmotion import SOFTMOTION_KIND
+
+    options = {**places.by_name_of_today(), **given._asdict(), **simulation._asdict()}
+    serve_alone(SOFTMOTION_KIND, life, options)
 
 
 def _complete_robot(_: click.Context, __: click.Parameter, start: str) -> list[str]:
@@ -124,8 +250,11 @@ def epson(
     the truth, and presses the emergency stop.
     """
     if given.replay is not None:
-        from robolink_cli.commands.simulate.replaying import serve_recording
-        from robolink_cli.commands.simulate.serving import Termination, host_and_port
+        from robolink_cli.commands.simulate.service import (
+            Termination,
+            host_and_port,
+            serve_recording,
+        )
 
         listen = host_and_port(given.address, "--tcp")
         with Termination() as stopped:
@@ -133,8 +262,8 @@ def epson(
                 given.replay, listen, allow_remote=simulation.allow_remote, wait=stopped.wait
             )
         return
-    from robolink_cli.commands.simulate.kinds.epson import EPSON_KIND
-    from robolink_cli.commands.simulate.kinds.simulated_kind import serve_alone
+    from robolink_cli.commands.simulate.epson import EPSON_KIND
+    from robolink_cli.commands.simulate.simulated_kind import serve_alone
 
     options = {**given._asdict(), **project._asdict(), **simulation._asdict()}
     del options["replay"]
@@ -155,7 +284,7 @@ def assist(
     release_estop, open_guard, teach, auto, teach_point number=901 u_deg=180, truth; an unknown
     one lists them all.
     """
-    from robolink_cli.commands.simulate.assisting import do_act
+    from robolink_cli.commands.simulate.acts import do_act
 
     do_act(url, act, values)
 
@@ -183,6 +312,6 @@ def ctl(
     set_clock factor=0, step seconds=2. An unknown one lists them all, and docs/control-api.md
     explains each.
     """
-    from robolink_cli.commands.simulate.assisting import do_controlled
+    from robolink_cli.commands.simulate.acts import do_controlled
 
     do_controlled(url, act, values)

@@ -27,9 +27,9 @@ from robolink_cli.wizard.faces.lines import LineFace, carry_out, leaves
 from robolink_cli.wizard.flow import advance, armed_anew, stops_at_once
 from robolink_cli.wizard.happenings import Happening, HasEnded, KeyPressed, TooFast
 from robolink_cli.wizard.keys import CountedKey, KeyGate, name_of
-from robolink_cli.wizard.screens.drawing import screen_of
-from robolink_cli.wizard.screens.ending import ended_of
+from robolink_cli.wizard.screens.end import ended_of
 from robolink_cli.wizard.screens.layout import HEIGHT, WIDTH
+from robolink_cli.wizard.screens.screen import screen_of
 from robolink_cli.wizard.state import WizardState
 from robolink_cli.wizard.work import Desk
 

@@ -24,9 +24,9 @@ from robolink_cli.wizard.happenings import (
     WasTold,
     WizardCommand,
 )
-from robolink_cli.wizard.screens.ending import ended_of, told_end
+from robolink_cli.wizard.screens.end import ended_of, told_end
 from robolink_cli.wizard.screens.layout import WIDTH
-from robolink_cli.wizard.screens.told import told_after_jog, told_before, told_question
+from robolink_cli.wizard.screens.sentences import told_after_jog, told_before, told_question
 from robolink_cli.wizard.state import WizardState
 from robolink_cli.wizard.work import Desk
 

@@ -7,8 +7,8 @@ from typing import Final
 
 from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
+from robolink_cli.console.shell_words import state_word
 from robolink_cli.console.tables import SCREEN, columns, cut, filled, pieces
-from robolink_cli.console.ways import state_word
 from robolink_cli.wizard.happenings import Reading
 from robolink_cli.wizard.state import WizardState
 

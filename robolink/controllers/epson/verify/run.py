@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from robolink.controllers.epson.controller import EpsonController
 from robolink.controllers.epson.line import SERIAL, EpsonLine, open_line
-from robolink.controllers.epson.session import EpsonSession
+from robolink.controllers.epson.session import log_in
 from robolink.controllers.epson.verify import facts
 from robolink.controllers.epson.verify.verification import Fact, Interview, Verification
 from robolink.journal import memory_journal
@@ -95,13 +95,8 @@ def verify_epson(
     log = DialogueLog(parse_url(url).identity, wall_label())
     traces = (log,) if trace is None else (log, trace)
     line = open_line(_with_every_letter(parse_url(url)), timeout_s=timeout_s, traces=traces)
-    session = EpsonSession(line, timeout_s=timeout_s)
+    session = log_in(line, password, timeout_s=timeout_s)
     try:
-        session.login(password)
-        if session.outlived:
-            from robolink.controllers.epson.session import prove_in_step
-
-            prove_in_step(session)
         # It only reads, and the login sees to it that nobody else is there.
         outcomes = memory_journal(session.identity).log(session.identity)
         controller = EpsonController(session, outcomes, remote_timeout_s=0.0)

@@ -7,8 +7,9 @@ import re
 from dataclasses import dataclass, replace
 from typing import Final
 
+from robolink.controllers.epson.answers import may_log_out
 from robolink.controllers.epson.controller import EpsonController
-from robolink.controllers.epson.session import EpsonSession
+from robolink.controllers.epson.session import EpsonSession, execution
 from robolink.controllers.epson.window import CommandWindow
 from robolink.errors import ControllerError, RejectedError
 from robolink.model import ControllerFacts
@@ -181,7 +182,7 @@ class Interview:
         """
         if self.why_no_statement():
             return None
-        answer = self._session.execute(query)
+        answer = self._session.ask(execution(query))
         if isinstance(answer, Reply) and answer.fields == ("0",):
             return ""
         if isinstance(answer, Reply) and answer.text is not None:
@@ -208,8 +209,7 @@ class Interview:
 
     def log_out(self) -> None:
         """Log out where that does no harm, and close."""
-        status = self.controller.status()
-        if status.remote and not (status.running or status.paused):
+        if may_log_out(self.controller.status()):
             self._session.exchange("Logout")
         self._session.close()
 
@@ -217,12 +217,10 @@ class Interview:
         """Log out and close; tell whether Logout was answered before its line end came.
 
         Logout is the one request after which nothing can be mistaken any more. The line end
-        follows in any case. Logging out while a task runs raises an error on the controller
-        (docs/reference/epson.md 1.1), so the connection is just closed then, and also where another
-        device could start one meanwhile; ``None`` is returned.
+        follows in any case. Where it would do harm the connection is just closed, and ``None``
+        returned.
         """
-        status = self.controller.status()
-        if not status.remote or status.running or status.paused:
+        if not may_log_out(self.controller.status()):
             self._session.close()
             return None
         clock = self._session.clock

@@ -9,14 +9,13 @@ Source: docs/reference/spel.md 7.1.
 import cmath
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from robolink.model import Hand, Pose, Posture, ToolOffset
-from robolink.timing import NS_PER_S
 from robolink_simulators.cell.frames import Vector, add, cross, dot, scale, subtract
 from robolink_simulators.epson.arm.kinematics import flange_of, hand_of, posture_of, solve
 from robolink_simulators.epson.arm.robots import Joints, RobotModel, check_ranges
-from robolink_simulators.epson.arm.trajectory import BrakedRamp, LinePace, Ramp, TimeLaw
+from robolink_simulators.epson.arm.trajectory import LinePace, Ramp, RampedLeg
 from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 
 _CHECKS = 90
@@ -32,7 +31,7 @@ MeasuredWay = tuple[Way, float]
 
 
 @dataclass(frozen=True, slots=True)
-class WayLeg:
+class WayLeg(RampedLeg):
     """The tip on a way of its own; U runs evenly along it."""
 
     model: RobotModel
@@ -42,12 +41,6 @@ class WayLeg:
     offset: ToolOffset | None
     hand: Hand
     posture: Posture | None
-    ramp: TimeLaw
-
-    @property
-    def duration_ns(self) -> int:
-        """How long it takes."""
-        return math.ceil(self.ramp.duration_s * NS_PER_S)
 
     def joints_at(self, elapsed_ns: int) -> Joints:
         """Return the joints that long after the start."""
@@ -57,18 +50,9 @@ class WayLeg:
         """Return the pose of the flange that long after the start."""
         return self._flange_after(self._share_at(elapsed_ns))
 
-    def braked(self, elapsed_ns: int) -> "WayLeg":
-        """Return the same leg, left to come to rest."""
-        if not isinstance(self.ramp, Ramp):
-            return self
-        return replace(self, ramp=BrakedRamp(self.ramp, elapsed_ns / NS_PER_S))
-
     def joints_after(self, share: float) -> Joints:
         """Return the joints after a share of the way."""
         return solve(self.model, self._flange_after(share), self.hand, self.posture)
-
-    def _share_at(self, elapsed_ns: int) -> float:
-        return self.ramp.share_at(min(elapsed_ns, self.duration_ns) / NS_PER_S)
 
     def _flange_after(self, share: float) -> Pose:
         a, b = self.start, self.end
@@ -108,7 +92,7 @@ def plan_level_way(
     rate = pace.speed_mm_s / length_mm
     ramp = Ramp.fastest(rate, pace.accel_mm_s2 / length_mm, pace.decel_mm_s2 / length_mm)
     posture = posture_of(model, near)
-    leg = WayLeg(model, start, end, course, offset, hand, posture, ramp)
+    leg = WayLeg(ramp, model, start, end, course, offset, hand, posture)
     for step in range(1, _CHECKS + 1):
         check_ranges(model, leg.joints_after(step / _CHECKS))
     return leg

@@ -36,14 +36,9 @@ AT_DELIVERY: Final = tuple(Arch(10.0 * n, 10.0 * n) for n in range(3, 10))
 
 
 class ArchTable:
-    """Arches 0 to 6 of one robot; nothing puts them back (documented).
-
-    Attributes:
-        changes: How often one was changed.
-    """
+    """Arches 0 to 6 of one robot; nothing puts them back (documented)."""
 
     def __init__(self) -> None:
-        self.changes = 0
         self._arches = list(AT_DELIVERY)
 
     def get(self, number: int) -> Arch | None:
@@ -67,7 +62,6 @@ class ArchTable:
         if min(arch) < 0:
             raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, "An arch is not below 0 mm")
         self._arches[number] = arch
-        self.changes += 1
 
     def all(self) -> tuple[Arch, ...]:
         """Return arches 0 to 6."""

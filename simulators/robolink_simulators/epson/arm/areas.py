@@ -63,9 +63,6 @@ class AreaTable(Generic[_Area]):
         word: What they are called.
         no_number: The refusal of another number.
         undefined: The refusal of one that is not defined.
-
-    Attributes:
-        changes: How often one was defined or cleared.
     """
 
     def __init__(self, word: str, no_number: RefusalKind, undefined: RefusalKind) -> None:
@@ -73,7 +70,6 @@ class AreaTable(Generic[_Area]):
         self._no_number = no_number
         self._undefined = undefined
         self._areas: dict[int, _Area] = {}
-        self.changes = 0
 
     def find(self, number: int) -> _Area | None:
         """Return an area, ``None`` where none is defined.
@@ -104,7 +100,6 @@ class AreaTable(Generic[_Area]):
         """
         self.find(number)
         self._areas[number] = area
-        self.changes += 1
 
     def clear(self, number: int) -> None:
         """Forget an area; one that is not defined is none after it, too.
@@ -114,7 +109,6 @@ class AreaTable(Generic[_Area]):
         """
         self.find(number)
         self._areas.pop(number, None)
-        self.changes += 1
 
     def all(self) -> dict[int, _Area]:
         """Return the areas by their numbers."""
@@ -138,11 +132,6 @@ class CheckedAreas:
         self.planes = AreaTable[CheckPlane](
             "Plane", RefusalKind.PLANE_NUMBER, RefusalKind.PLANE_UNDEFINED
         )
-
-    @property
-    def changes(self) -> int:
-        """How often one was defined or cleared."""
-        return self.boxes.changes + self.planes.changes
 
     def to_state(self) -> dict[str, object]:
         """Return what survives power-off, ready for JSON."""
@@ -177,12 +166,10 @@ class XYLimits:
 
     Attributes:
         strict: XYLimMode 1: the way counts too, not the target alone.
-        changes: How often a limit was set.
     """
 
     def __init__(self) -> None:
         self.strict = False
-        self.changes = 0
         self._pairs: tuple[tuple[float, float], ...] = (_OFF, _OFF)
 
     @property
@@ -213,7 +200,6 @@ class XYLimits:
         if any(low > high for low, high in pairs):
             raise SpelRefusal(RefusalKind.VALUE_OUT_OF_RANGE, "A lower limit lies above its upper")
         self._pairs = pairs
-        self.changes += 1
 
     def clear(self) -> None:
         """Limit nothing."""

@@ -92,13 +92,9 @@ class RobotBase:
     Args:
         tilting: Whether the robot tilts its tool, so that its base may lean. Of a SCARA V and W are
             0, as those of its locals are (assumed).
-
-    Attributes:
-        changes: How often it was moved.
     """
 
     def __init__(self, *, tilting: bool) -> None:
-        self.changes = 0
         self._tilting = tilting
         self._place = Local()
 
@@ -133,7 +129,6 @@ class RobotBase:
         if place == self._place:
             return False
         self._place = place
-        self.changes += 1
         return True
 
     def seen(self, in_robot: Coordinates) -> Coordinates:
@@ -158,7 +153,6 @@ class RobotBase:
             raise ValueError(state)
         x, y, z, u, v, w = map(float, state)
         self._place = Local(x, y, z, u, v, w)
-        self.changes += 1
 
 
 HIGHEST_ARM: Final = 15
@@ -173,14 +167,12 @@ class AddedArms:
 
     Attributes:
         selected: Which is in force.
-        changes: How often one was set, cleared or put in force.
     """
 
     def __init__(self, own: Sequence[float]) -> None:
         self._own = tuple(own)
         self._added: dict[int, tuple[float, ...]] = {}
         self.selected = 0
-        self.changes = 0
 
     def is_defined(self, number: int) -> bool:
         """Tell whether an arm is defined; arm 0 is.
@@ -214,7 +206,6 @@ class AddedArms:
         """
         self._require_added(number)
         self._added[number] = (*map(float, values), *self._own[len(values) :])
-        self.changes += 1
 
     def clear(self, number: int) -> None:
         """Forget an added arm; one that is not defined is none after it, too.
@@ -226,7 +217,6 @@ class AddedArms:
         if number == self.selected:
             raise SpelRefusal(RefusalKind.ARM_IN_FORCE, f"Arm {number} is in force")
         self._added.pop(number, None)
-        self.changes += 1
 
     def select(self, number: int) -> None:
         """Put an arm in force.
@@ -236,7 +226,6 @@ class AddedArms:
         """
         self.values(number)
         self.selected = number
-        self.changes += 1
 
     def to_state(self) -> dict[str, object]:
         """Return what survives power-off, ready for JSON."""

@@ -47,7 +47,7 @@ from robolink_simulators.epson.arm.robots import (
     nearest_turn,
 )
 from robolink_simulators.epson.arm.tilted_legs import TiltedLeg, carried_by, plan_course
-from robolink_simulators.epson.arm.trajectory import LinePace
+from robolink_simulators.epson.arm.trajectory import LinePace, RampedLeg
 from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 
 Place = tuple[float, ...]
@@ -86,20 +86,14 @@ class FreeCurve(NamedTuple):
 
 
 class CurveFiles:
-    """The curve files of one robot, by name in any case.
-
-    Attributes:
-        changes: How often one was stored.
-    """
+    """The curve files of one robot, by name in any case."""
 
     def __init__(self) -> None:
-        self.changes = 0
         self._files: dict[str, FreeCurve] = {}
 
     def store(self, name: str, curve: FreeCurve) -> None:
         """Store a curve; one of the same name is replaced."""
         self._files[name.lower()] = curve
-        self.changes += 1
 
     def get(self, name: str) -> FreeCurve:
         """Return a curve.
@@ -265,7 +259,7 @@ class CurveLeg(WayLeg):
         return flange_of(self.model, self.end if share >= 1 else tip, self.offset)
 
 
-def when(leg: WayLeg | TiltedLeg, share: float) -> int:
+def when(leg: RampedLeg, share: float) -> int:
     """Return how many ns after the start of a leg a share of its way is behind."""
     low_ns, high_ns = 0, leg.duration_ns
     while leg.ramp is not None and high_ns - low_ns > 1:

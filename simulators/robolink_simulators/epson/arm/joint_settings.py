@@ -162,7 +162,6 @@ class JointOrigins:
         offsets: Hofs of each joint in pulses.
         reference: CalPls of each joint, ``None`` before it was given.
         order: MCordr: the joints of each step of MCal as bits.
-        changes: How often something of it was changed.
     """
 
     def __init__(self, pulses_per_unit: Sequence[float]) -> None:
@@ -170,28 +169,12 @@ class JointOrigins:
         self.offsets: tuple[int, ...] = (0,) * len(self._scales)
         self.reference: tuple[int, ...] | None = None
         self.order = joint_order(len(self._scales))
-        self.changes = 0
 
     @property
     def errors(self) -> tuple[float, ...]:
         """How far each joint really stands from where the controller says, in degrees or mm."""
         joints = zip(self.offsets, self._scales, strict=True)
         return tuple(-offset / scale for offset, scale in joints)
-
-    def offset_by(self, offsets: Sequence[int]) -> None:
-        """Take other offsets."""
-        self.offsets = tuple(offsets)
-        self.changes += 1
-
-    def refer_to(self, pulses: Sequence[int]) -> None:
-        """Keep the right pulses of the place where joints are calibrated (CalPls)."""
-        self.reference = tuple(pulses)
-        self.changes += 1
-
-    def move_in(self, order: Sequence[int]) -> None:
-        """Keep the order of MCal."""
-        self.order = tuple(order)
-        self.changes += 1
 
     def to_state(self) -> dict[str, object]:
         """Return what survives power-off, ready for JSON."""
@@ -215,7 +198,6 @@ class JointOrigins:
                 raise ValueError(name)
         self.offsets, self.order = held["offsets"] or self.offsets, held["order"] or self.order
         self.reference = held["reference"]
-        self.changes += 1
 
 
 Ends = tuple[float, float]
@@ -232,14 +214,12 @@ class JointRanges:
 
     Attributes:
         ends: Those in force.
-        changes: How often they were changed.
     """
 
     def __init__(self, own: Iterable[Ends], pulses_per_unit: Sequence[float]) -> None:
         self._own = tuple(own)
         self._scales = pulses_per_unit
         self.ends = self._own
-        self.changes = 0
 
     def pulses(self) -> list[int]:
         """Return low and high of each joint in turn."""
@@ -265,7 +245,6 @@ class JointRanges:
             own[1] if high == highest else high / scale,
         )
         self.ends = (*self.ends[: joint - 1], ends, *self.ends[joint:])
-        self.changes += 1
 
     def to_state(self) -> list[list[float]]:
         """Return what survives power-off, ready for JSON."""
@@ -280,4 +259,3 @@ class JointRanges:
         if not isinstance(state, list) or len(state) != len(self._own):
             raise ValueError(state)
         self.ends = tuple((float(low), float(high)) for low, high in state)
-        self.changes += 1

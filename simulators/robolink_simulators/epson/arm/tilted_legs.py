@@ -17,7 +17,6 @@ from itertools import pairwise
 from typing import Protocol
 
 from robolink.model import Pose, ToolOffset
-from robolink.timing import NS_PER_S
 from robolink_simulators.cell.frames import (
     Frame,
     Matrix,
@@ -41,11 +40,10 @@ from robolink_simulators.epson.arm.robot_settings import SingularSurroundings
 from robolink_simulators.epson.arm.robots import Joints, RobotModel
 from robolink_simulators.epson.arm.six_axes import singular_stretches
 from robolink_simulators.epson.arm.trajectory import (
-    BrakedRamp,
     Leg,
     LinePace,
     Ramp,
-    TimeLaw,
+    RampedLeg,
     plan_move,
 )
 from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
@@ -120,25 +118,18 @@ class _HeldCourse:
 
 
 @dataclass(frozen=True, slots=True)
-class TiltedLeg:
+class TiltedLeg(RampedLeg):
     """A leg along a course.
 
     Attributes:
         course: Where the flange goes.
         knots: The joints at even shares of it, both ends included.
-        ramp: How the share grows with time, ``None`` for a leg that stays.
         detours: Numbers of the knots between which it goes from joint to joint instead.
     """
 
     course: TiltedCourse
     knots: tuple[Joints, ...]
-    ramp: TimeLaw | None
     detours: tuple[tuple[int, int], ...] = ()
-
-    @property
-    def duration_ns(self) -> int:
-        """How long it takes."""
-        return 0 if self.ramp is None else math.ceil(self.ramp.duration_s * NS_PER_S)
 
     def joints_at(self, elapsed_ns: int) -> Joints:
         """Return the joints that long after the start."""
@@ -161,17 +152,6 @@ class TiltedLeg:
 
     def _off_course(self, at: float) -> bool:
         return any(first <= at < last for first, last in self.detours)
-
-    def braked(self, elapsed_ns: int) -> "TiltedLeg":
-        """Return the same leg, left to come to rest."""
-        if not isinstance(self.ramp, Ramp):
-            return self
-        return replace(self, ramp=BrakedRamp(self.ramp, elapsed_ns / NS_PER_S))
-
-    def _share_at(self, elapsed_ns: int) -> float:
-        if self.ramp is None:
-            return 1.0
-        return self.ramp.share_at(min(elapsed_ns, self.duration_ns) / NS_PER_S)
 
 
 def plan_line(
@@ -344,7 +324,7 @@ def plan_course(
         rate, accel = pace.turn_deg_s / angle_deg, pace.turn_deg_s2 / angle_deg
         decel = accel
     else:
-        return TiltedLeg(course, (near,), None)
+        return TiltedLeg(None, course, (near,))
     detours = (
         singular_stretches(model, knots, rate, avoiding) if avoiding and model.six_axes else ()
     )
@@ -356,7 +336,7 @@ def plan_course(
             RefusalKind.JOINT_TOO_FAST, "A joint would be too fast near a singularity"
         )
     ramp = Ramp.fastest(min(rate, fastest), accel, decel)
-    return TiltedLeg(course, tuple(knots), ramp, detours)
+    return TiltedLeg(ramp, course, tuple(knots), detours)
 
 
 def _from_joint_to_joint(first: Joints, last: Joints, steps: int) -> list[Joints]:

@@ -139,31 +139,38 @@ class Leg(Protocol):
         """Return the same leg, left that long after its start to come to rest."""
 
 
-def _duration_ns(ramp: TimeLaw | None) -> int:
-    return 0 if ramp is None else math.ceil(ramp.duration_s * NS_PER_S)
-
-
-def _share(ramp: TimeLaw | None, elapsed_ns: int) -> float:
-    return 1.0 if ramp is None else ramp.share_at(elapsed_ns / NS_PER_S)
-
-
-def _braked(ramp: TimeLaw | None, elapsed_ns: int) -> TimeLaw | None:
-    return BrakedRamp(ramp, elapsed_ns / NS_PER_S) if isinstance(ramp, Ramp) else ramp
-
-
 @dataclass(frozen=True, slots=True)
-class JointLeg:
-    """Straight in joint space; all joints start and stop together."""
+class RampedLeg:
+    """What the legs share that one time law leads along their way.
 
-    model: RobotModel
-    start: Joints
-    end: Joints
+    Attributes:
+        ramp: How the share of the way grows with time, ``None`` for a leg that stays.
+    """
+
     ramp: TimeLaw | None
 
     @property
     def duration_ns(self) -> int:
         """How long it takes."""
-        return _duration_ns(self.ramp)
+        return 0 if self.ramp is None else math.ceil(self.ramp.duration_s * NS_PER_S)
+
+    def braked(self, elapsed_ns: int) -> Self:
+        """Return the same leg, left to come to rest."""
+        if not isinstance(self.ramp, Ramp):
+            return self
+        return replace(self, ramp=BrakedRamp(self.ramp, elapsed_ns / NS_PER_S))
+
+    def _share_at(self, elapsed_ns: int) -> float:
+        return 1.0 if self.ramp is None else self.ramp.share_at(elapsed_ns / NS_PER_S)
+
+
+@dataclass(frozen=True, slots=True)
+class JointLeg(RampedLeg):
+    """Straight in joint space; all joints start and stop together."""
+
+    model: RobotModel
+    start: Joints
+    end: Joints
 
     def flange_at(self, elapsed_ns: int) -> Pose:
         """Return the pose of the flange that long after the start."""
@@ -171,19 +178,15 @@ class JointLeg:
 
     def joints_at(self, elapsed_ns: int) -> Joints:
         """Return the joints that long after the start."""
-        share = _share(self.ramp, elapsed_ns)
+        share = self._share_at(elapsed_ns)
         if share >= 1:
             return self.end
         pairs = zip(self.start, self.end, strict=True)
         return Joints(*(a + (b - a) * share for a, b in pairs))
 
-    def braked(self, elapsed_ns: int) -> "JointLeg":
-        """Return the same leg, left to come to rest."""
-        return replace(self, ramp=_braked(self.ramp, elapsed_ns))
-
 
 @dataclass(frozen=True, slots=True)
-class LineLeg:
+class LineLeg(RampedLeg):
     """The tool's tip on a straight line, U turning evenly along it, of a SCARA."""
 
     model: RobotModel
@@ -192,24 +195,14 @@ class LineLeg:
     offset: ToolOffset | None
     hand: Hand
     posture: Posture | None
-    ramp: TimeLaw | None
-
-    @property
-    def duration_ns(self) -> int:
-        """How long it takes."""
-        return _duration_ns(self.ramp)
 
     def joints_at(self, elapsed_ns: int) -> Joints:
         """Return the joints that long after the start."""
-        return self.joints_after(_share(self.ramp, min(elapsed_ns, self.duration_ns)))
-
-    def braked(self, elapsed_ns: int) -> "LineLeg":
-        """Return the same leg, left to come to rest."""
-        return replace(self, ramp=_braked(self.ramp, elapsed_ns))
+        return self.joints_after(self._share_at(elapsed_ns))
 
     def flange_at(self, elapsed_ns: int) -> Pose:
         """Return the pose of the flange that long after the start."""
-        return self._flange_after(_share(self.ramp, min(elapsed_ns, self.duration_ns)))
+        return self._flange_after(self._share_at(elapsed_ns))
 
     def joints_after(self, share: float) -> Joints:
         """Return the joints after a share of the line."""
@@ -250,13 +243,13 @@ def plan_go(
     shares = [abs(d) / top for d, top in zip(deltas, model.top_speed, strict=True)]
     longest = max(shares)
     if longest < _STILL:
-        return JointLeg(model, start, end, None)
+        return JointLeg(None, model, start, end)
     rate = pace.speed_percent / 100 / longest
     if pace.tip_limit_mm_s is not None:
         rate = min(rate, pace.tip_limit_mm_s / _tip_travel_bound(model, deltas, radius_mm))
     accel_unit = 1 / (100 * FULL_SPEED_AFTER_S * longest)
     rise, fall = pace.accel_percent * accel_unit, pace.decel_percent * accel_unit
-    return JointLeg(model, start, end, Ramp.fastest(rate, rise, fall))
+    return JointLeg(Ramp.fastest(rate, rise, fall), model, start, end)
 
 
 def _tip_travel_bound(model: RobotModel, deltas: list[float], radius_mm: float) -> float:
@@ -306,7 +299,7 @@ def plan_move(
     elif turn_deg > _STILL:
         accel = pace.turn_deg_s2 / turn_deg
         ramp = Ramp.fastest(pace.turn_deg_s / turn_deg, accel, accel)
-    leg = LineLeg(model, start, end, offset, hand, posture_of(model, near), ramp)
+    leg = LineLeg(ramp, model, start, end, offset, hand, posture_of(model, near))
     steps = math.ceil(min(length_mm / _CHECK_EVERY_MM + turn_deg / _CHECK_EVERY_DEG, _MOST_CHECKS))
     for step in (steps, *range(1, steps)):
         joints = leg.joints_after(step / steps if steps else 1.0)

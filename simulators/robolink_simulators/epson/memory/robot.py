@@ -3,7 +3,7 @@
 import random
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Protocol
+from typing import Final, Protocol
 
 from robolink.model import Hand, Pose, Posture, ToolOffset
 from robolink_simulators.cell.frames import Frame
@@ -79,24 +79,9 @@ class KeptDefinitions:
         self.base = base
         self.origins = origins
 
-    @property
-    def changes(self) -> int:
-        """How often something of it was changed."""
-        parts = (self.arches, self.arms, self.areas, self.curves, self.limits)
-        return sum(part.changes for part in (*parts, self.ranges, self.base, self.origins))
-
     def to_state(self) -> dict[str, object]:
         """Return what survives power-off, ready for JSON."""
-        return {
-            "arches": self.arches.to_state(),
-            "arms": self.arms.to_state(),
-            "areas": self.areas.to_state(),
-            "curves": self.curves.to_state(),
-            "limits": self.limits.to_state(),
-            "ranges": self.ranges.to_state(),
-            "base": self.base.to_state(),
-            "origins": self.origins.to_state(),
-        }
+        return {name: getattr(self, name).to_state() for name in _KEPT}
 
     def restore(self, state: Mapping[str, object]) -> None:
         """Take over what :meth:`to_state` returned.
@@ -104,18 +89,15 @@ class KeptDefinitions:
         Raises:
             KeyError, TypeError, ValueError: It is something else.
         """
-        self.arches.restore(state["arches"])
-        self.arms.restore(state["arms"])
-        if "areas" in state:  # a file of before there were any
-            self.areas.restore(state["areas"])
-        self.curves.restore(state["curves"])
-        self.limits.restore(state["limits"])
-        if "ranges" in state:
-            self.ranges.restore(state["ranges"])
-        if "base" in state:
-            self.base.restore(state["base"])
-        if "origins" in state:
-            self.origins.restore(state["origins"])
+        for name in _KEPT:
+            if name in state or name in _KEPT_FROM_THE_START:
+                getattr(self, name).restore(state[name])
+
+
+_KEPT_FROM_THE_START: Final = ("arches", "arms", "curves", "limits")
+"""What no file lacks."""
+
+_KEPT: Final = ("arches", "arms", "areas", "curves", "limits", "ranges", "base", "origins")
 
 
 class ReservedMotion(Protocol):
@@ -266,7 +248,7 @@ class DrivenRobot:
         rows = zip(self.arm.joints, origins.offsets, offsets, scales, strict=True)
         joints = Joints(*(at + (new - old) / scale for at, old, new, scale in rows))
         self.arm.tell_elsewhere(joints)
-        origins.offset_by(offsets)
+        origins.offsets = tuple(offsets)
         self.arm.origin_errors = origins.errors
 
     @property

@@ -52,13 +52,6 @@ def shown_reply(reply: bytes) -> str:
     return "***" if mistyped else text
 
 
-class Client(Protocol):
-    """A connection that may log in."""
-
-    def cut(self) -> None:
-        """End the connection from the controller's side."""
-
-
 class ClientSlot:
     """The one place for a logged-in client, watched by the remote time-out.
 
@@ -81,14 +74,14 @@ class ClientSlot:
         self._timeout_ns = round(remote_timeout_s * NS_PER_S)
         self._wire_time = wire_time
         self._heard_ns: int | None = None
-        self.client: Client | None = None
+        self.client: EpsonServerLink | None = None
 
-    def admit(self, client: Client, now_ns: int) -> None:
+    def admit(self, client: "EpsonServerLink", now_ns: int) -> None:
         """Log a client in."""
         self.client = client
         self.heard(now_ns)
 
-    def hears(self, link: Client, *, cuts: bool) -> bool:
+    def hears(self, link: "EpsonServerLink", *, cuts: bool) -> bool:
         """Tell whether a connection is listened to; whoever comes second may be cut off."""
         if self.client in (None, link):
             return True
@@ -121,7 +114,7 @@ class ClientSlot:
             return None
         return self._wire_time.simulated_at(self._heard_ns + self._timeout_ns)
 
-    def overdue(self, now_ns: int, *, unfinished: bool) -> tuple[bool, Client | None]:
+    def overdue(self, now_ns: int, *, unfinished: bool) -> "tuple[bool, EpsonServerLink | None]":
         """Return whether the silence has lasted too long, and whose it was; its place is free."""
         self.settle(unfinished=unfinished)
         deadline = self.deadline(unfinished=unfinished)
@@ -130,13 +123,6 @@ class ClientSlot:
         client = self.client
         self.free()
         return True, client
-
-
-class Answering(Protocol):
-    """Takes the answer to the client, if it is still there."""
-
-    def answer(self, exchange: "PendingRequest", event: Reply | Refusal) -> None:
-        """Let the answer leave."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +139,7 @@ class PendingRequest:
     number: int
     name: str
     faults: tuple[Fault, ...]
-    link: Answering
+    link: "EpsonServerLink"
 
     def reply(self, *fields: str) -> None:
         """Answer with fields, ``0`` when there are none."""

@@ -6,9 +6,8 @@ Source: docs/reference/epson.md 1.1, 1.2.
 """
 
 from abc import ABC
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import partial
-from typing import Protocol
 
 from robolink.protocols import NEED_DATA, Role
 from robolink.protocols.epson_binary import Dialect, EpsonBinaryCodec
@@ -19,7 +18,7 @@ from robolink.protocols.epson_text import (
     Request,
     find_command,
 )
-from robolink_simulators.device.hosted import HostedDevice
+from robolink_simulators.device.hosted import HostedDevice, PlannedActs
 from robolink_simulators.epson.condition import Condition, RequestRefused, Task
 from robolink_simulators.epson.flash import Flash
 from robolink_simulators.epson.options import EpsonOptions
@@ -35,22 +34,8 @@ from robolink_simulators.epson.remote.link import (
 from robolink_simulators.faults import Departure, Fault, FaultAction, FaultPlan, LinkKind
 
 
-class Carrier(Protocol):
-    """The link that a request came over."""
-
-    @property
-    def dialect(self) -> Dialect | None:
-        """How its frames are written; ``None`` for Remote Ethernet."""
-
-    def cut(self) -> None:
-        """End it."""
-
-    def stall(self, event: Request | BadRequest, seconds: float) -> None:
-        """Let nothing pass for a while, and the request after that."""
-
-
 def arriving(
-    link: Carrier,
+    link: EpsonServerLink,
     event: Request | BadRequest,
     faults: Sequence[Fault],
     plan: FaultPlan,
@@ -135,16 +120,6 @@ def _on_the_wire(event: Request | BadRequest) -> bytes:
     return ",".join((f"${event.name}", *event.parameters)).encode("latin-1", "replace")
 
 
-class PlannedMishaps(Protocol):
-    """What goes wrong around the controller, at once or later."""
-
-    def strike(self, faults: Sequence[Fault], now_ns: int) -> None:
-        """Do what is due now, and note what comes later."""
-
-    def plan(self, now_ns: int, seconds: float, act: Callable[[], None]) -> None:
-        """Have something done some time from now."""
-
-
 class RequestService(HostedDevice, ABC):
     """Implements :class:`~robolink_simulators.epson.remote.link.RequestHandler`.
 
@@ -164,7 +139,7 @@ class RequestService(HostedDevice, ABC):
     _slot: ClientSlot
     _desk: CommandDesk
     _window: SpelWindow
-    _mishaps: PlannedMishaps
+    _mishaps: PlannedActs
     _flash: Flash
     _settled_ns: int
     """Until when all is done, -1 after anything that may have changed what comes."""

@@ -374,7 +374,7 @@ class StatementExecution:
     def refuse(self, refusal: SpelRefusal) -> None:
         """End the line with the number that the options give for a refusal."""
         session = self._evaluator.session
-        session.memory.last_error = getattr(session.options.numbers, refusal.kind)
+        session.memory.last_error = getattr(session.options.numbers, refusal.kind.option)
         self._fail(SpelError(session.memory.last_error, refusal.text))
 
     def _run(self, statement: Statement) -> None:

@@ -5,6 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum
 
+from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
+
 
 @dataclass(frozen=True, slots=True)
 class Literal:
@@ -154,6 +156,17 @@ class KeywordStatement:
     name: str
     arguments: tuple[Expression, ...]
     open_ended: bool
+
+    def taking(self, *counts: int) -> "tuple[Expression, ...]":
+        """Return the arguments, where there are as many as the keyword takes."""
+        if len(self.arguments) not in counts:
+            raise self.miscounted()
+        return self.arguments
+
+    def miscounted(self) -> SpelRefusal:
+        """Return the refusal of so many arguments."""
+        text = f"{self.name} does not take {len(self.arguments)} arguments here"
+        return SpelRefusal(RefusalKind.SYNTAX, text)
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,62 +3,70 @@
 from typing import Final
 from urllib.parse import urlencode
 
-from robolink.interrupts import ClosedAtExit
 from robolink_simulators.cell.clock import ScaledClock
-from robolink_simulators.faults import LinkKind
-from robolink_simulators.hosting.addresses import cannot_listen, require_loopback
-from robolink_simulators.hosting.fieldbus.modbus_server import ModbusServerThread, SerialLine
-from robolink_simulators.hosting.fieldbus.plc_registers import PlcRegisters
-from robolink_simulators.hosting.streams.serial_host import (
-    PTY_LINE,
-    SerialCable,
-    no_pseudo_terminal,
-)
+from robolink_simulators.hosting.fieldbus.mailbox_frames import MailboxFrames
+from robolink_simulators.hosting.streams.serial_host import PTY_LINE, LineHost, no_pseudo_terminal
+from robolink_simulators.hosting.streams.tcp_host import TcpHost
 from robolink_simulators.softmotion.mailbox.options import MailboxOptions
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 _DEFAULT_UNIT: Final = 1
 
 
-class ModbusHost(ClosedAtExit):
-    """A Modbus server in front of a simulated PLC; a context manager.
-
-    Args:
-        simulator: The PLC.
-        server: Serves its registers.
-        url: Where clients connect to.
-        cable: The serial cable between them, if any.
-    """
+class ModbusTcpHost(TcpHost):
+    """A PLC at a TCP port."""
 
     def __init__(
         self,
         simulator: SoftMotionSimulator,
-        server: ModbusServerThread,
-        url: str,
-        cable: SerialCable | None = None,
+        address: tuple[str, int],
+        clock: ScaledClock,
+        *,
+        allow_remote: bool,
     ) -> None:
-        self._simulator = simulator
-        self._server = server
-        self._cable = cable
-        self._seen = server.ends
-        self.url = url
-        simulator.watchers.append(self._look)
+        self._frames = MailboxFrames(simulator, clock)
+        super().__init__(
+            self._frames,
+            "softmotion+modbus-tcp",
+            address,
+            clock=clock,
+            lock=simulator.lock,
+            allow_remote=allow_remote,
+        )
+        self.url = self.url_at(address[0]) + _query(_client_options(simulator.options.mailbox))
+        self.present(simulator, self.url)
+        simulator.url = simulator.url or self.url
 
-    def close(self) -> None:
-        """Stop serving. Idempotent."""
-        if self._look in self._simulator.watchers:
-            self._simulator.watchers.remove(self._look)
-            if self._simulator.url == self.url:
-                self._simulator.url = ""
-            self._server.close()
-            if self._cable is not None:
-                self._cable.close()
+    def wake(self) -> None:
+        """Have the PLC looked at again; any thread may call it."""
+        with self._lock:
+            self._frames.look()
+        super().wake()
 
-    def _look(self) -> None:
-        """Cut connections when the PLC was started anew or its cable pulled; a line has none."""
-        if self._cable is None and self._seen != self._server.ends:
-            self._server.cut()
-        self._seen = self._server.ends
+
+class ModbusLineHost(LineHost):
+    """A PLC at the far end of a serial cable.
+
+    Attributes:
+        url: Where clients connect to, with what they must be told.
+    """
+
+    def __init__(
+        self, simulator: SoftMotionSimulator, clock: ScaledClock, *, unit: int, baud: int
+    ) -> None:
+        frames = MailboxFrames(simulator, clock, unit=unit)
+        super().__init__(frames, clock=clock, lock=simulator.lock, baud=baud)
+        options = {**PTY_LINE, **_client_options(simulator.options.mailbox)}
+        if baud:
+            options["baud"] = str(baud)
+        if unit != _DEFAULT_UNIT:
+            options["unit"] = str(unit)
+        self.url = f"softmotion+modbus-rtu://{self.cable.near}{_query(options)}"
+        self.present(simulator, self.url)
+        simulator.url = simulator.url or self.url
+
+
+ModbusHost = ModbusTcpHost | ModbusLineHost
 
 
 def serve_modbus_tcp(
@@ -68,7 +76,7 @@ def serve_modbus_tcp(
     *,
     clock: ScaledClock | None = None,
     allow_remote: bool = False,
-) -> ModbusHost:
+) -> ModbusTcpHost:
     """Serve a PLC over Modbus TCP; every unit is answered.
 
     Args:
@@ -82,17 +90,8 @@ def serve_modbus_tcp(
         ConfigError: The address is not loopback and ``allow_remote`` is off.
         ConnectError: The port is taken, or the address is not this machine's.
     """
-    require_loopback(host, allow_remote=allow_remote)
-    clock = _presented(simulator, clock)
-    try:
-        server = ModbusServerThread(PlcRegisters(simulator, clock), clock, (host, port))
-    except (OSError, OverflowError) as error:
-        raise cannot_listen(host, port, error) from error
-    shown = f"[{host}]" if ":" in host else host
-    options = _client_options(simulator.options.mailbox)
-    url = f"softmotion+modbus-tcp://{shown}:{server.port}{_query(options)}"
-    simulator.url = simulator.url or url
-    return ModbusHost(simulator, server, url)
+    clock = clock or ScaledClock()
+    return ModbusTcpHost(simulator, (host, port), clock, allow_remote=allow_remote)
 
 
 def serve_modbus_rtu(
@@ -101,7 +100,7 @@ def serve_modbus_rtu(
     unit: int = _DEFAULT_UNIT,
     baud: int = 0,
     clock: ScaledClock | None = None,
-) -> ModbusHost:
+) -> ModbusLineHost:
     """Serve a PLC over Modbus RTU on a pseudo terminal; other units are not answered.
 
     Args:
@@ -113,28 +112,10 @@ def serve_modbus_rtu(
     Raises:
         ConnectError: This system has no pseudo terminals.
     """
-    clock = _presented(simulator, clock)
     try:
-        cable = SerialCable(baud)
-        port = SerialLine(cable.far, unit)
-        registers = PlcRegisters(simulator, clock, LinkKind.MODBUS_RTU)
-        server = ModbusServerThread(registers, clock, port)
+        return ModbusLineHost(simulator, clock or ScaledClock(), unit=unit, baud=baud)
     except (ImportError, AttributeError, OSError) as error:
         raise no_pseudo_terminal(error) from error
-    options = {**PTY_LINE, **_client_options(simulator.options.mailbox)}
-    if baud:
-        options["baud"] = str(baud)
-    if unit != _DEFAULT_UNIT:
-        options["unit"] = str(unit)
-    url = f"softmotion+modbus-rtu://{cable.near}{_query(options)}"
-    simulator.url = simulator.url or url
-    return ModbusHost(simulator, server, url, cable)
-
-
-def _presented(simulator: SoftMotionSimulator, clock: ScaledClock | None) -> ScaledClock:
-    clock = clock or ScaledClock()
-    simulator.keep_time(clock)
-    return clock
 
 
 def _client_options(options: MailboxOptions) -> dict[str, str]:

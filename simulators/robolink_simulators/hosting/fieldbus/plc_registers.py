@@ -16,7 +16,7 @@ from robolink_simulators.softmotion.mailbox.image import (
 )
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
-_WORD_BITS: Final = 16
+WORD_BITS: Final = 16
 
 
 class PlcRegisters:
@@ -84,19 +84,27 @@ class PlcRegisters:
                     served = self._simulator.write(start - place.start, part, now_ns, self._link)
             return served
 
-    def switch(self, coil: int, bits: Sequence[bool]) -> ServedAccess:
+    def switch(self, coil: int, bits: Sequence[int]) -> ServedAccess:
         """Serve a client that writes coils, and with them bits of holding registers."""
         with self._simulator.lock:
-            first, last = coil // _WORD_BITS, (coil + len(bits) - 1) // _WORD_BITS
+            first, last = coil // WORD_BITS, (coil + len(bits) - 1) // WORD_BITS
             words = self.peek(Bank.HOLDING, first, last - first + 1)
-            for number, bit in enumerate(bits, coil - first * _WORD_BITS):
-                mask = 1 << number % _WORD_BITS
-                word = words[number // _WORD_BITS]
-                words[number // _WORD_BITS] = word | mask if bit else word & ~mask
+            for number, bit in enumerate(bits, coil - first * WORD_BITS):
+                mask = 1 << number % WORD_BITS
+                word = words[number // WORD_BITS]
+                words[number // WORD_BITS] = word | mask if bit else word & ~mask
             return self.write(first, words)
 
+    def read_bits(self, bank: Bank, address: int, count: int) -> ServedAccess:
+        """Serve a client that reads coils or discrete inputs, which are bits of registers."""
+        first, last = address // WORD_BITS, (address + count - 1) // WORD_BITS
+        served = self.read(bank, first, last - first + 1)
+        places = range(address - first * WORD_BITS, address - first * WORD_BITS + count)
+        bits = (served.words[at // WORD_BITS] >> at % WORD_BITS & 1 for at in places)
+        return replace(served, words=tuple(bits))
+
     def peek(self, bank: Bank, address: int, count: int) -> list[int]:
-        """Return registers as part of another exchange, a read-back for example."""
+        """Return registers as part of another exchange."""
         with self._simulator.lock:
             plc = self._simulator.plc
             words = self._plain[bank][address : address + count]

@@ -3,30 +3,16 @@
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, TypeVar
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.timing import Clock
 from robolink.transport import LinkUrl
 from robolink_simulators.cell.clock import ManualClock
-from robolink_simulators.device.wire_time import WireClock
+from robolink_simulators.device.hosted import HostedDevice
 
-
-class Hosted(Protocol):
-    """What the simulators of all kinds have in common."""
-
-    url: str
-
-    @property
-    def now_ns(self) -> int:
-        """The instant last given."""
-
-    def keep_time(self, clock: WireClock) -> None:
-        """Take the present time from a clock."""
-
-
-Simulator = TypeVar("Simulator", bound=Hosted)
+Simulator = TypeVar("Simulator", bound=HostedDevice)
 
 
 @dataclass(frozen=True, slots=True)

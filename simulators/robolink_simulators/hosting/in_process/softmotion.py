@@ -12,8 +12,11 @@ from robolink_simulators.hosting.in_process.mailbox_link import InProcessMailbox
 from robolink_simulators.hosting.in_process.named import NamedSimulators, seed_from_text
 from robolink_simulators.option_values import require_known
 from robolink_simulators.softmotion.catalogue import parameter_names
-from robolink_simulators.softmotion.mailbox.option_text import option_names, options_from_text
-from robolink_simulators.softmotion.mailbox.parameters import parameters_from_text
+from robolink_simulators.softmotion.mailbox.option_text import (
+    option_names,
+    options_from_text,
+    parameters_from_text,
+)
 from robolink_simulators.softmotion.mailbox.simulator import (
     DEFAULT_KINEMATICS,
     SoftMotionSimulator,

@@ -6,9 +6,12 @@ from robolink.protocols.epson_binary import Dialect
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import serial_dialect
-from robolink_simulators.epson.remote.link import EpsonServerLink
 from robolink_simulators.epson.spel.parser import prepare
-from robolink_simulators.hosting.streams.serial_host import LineHost, no_pseudo_terminal
+from robolink_simulators.hosting.streams.serial_host import (
+    DeviceOnLine,
+    LineHost,
+    no_pseudo_terminal,
+)
 from robolink_simulators.hosting.streams.tcp_host import TcpHost as TcpHost
 
 _SHOWN_BAUD = 115_200
@@ -37,19 +40,6 @@ def serve_serial(
         raise no_pseudo_terminal(error) from error
 
 
-class SerialFace:
-    """A controller as its serial port shows it; see ``hosting.addresses.WireDevice``."""
-
-    def __init__(self, simulator: EpsonSimulator) -> None:
-        self._simulator = simulator
-        self.advance = simulator.advance
-        self.next_change = simulator.next_change
-
-    def connect(self, now_ns: int) -> EpsonServerLink:
-        """Listen at the port."""
-        return self._simulator.connect_serial(now_ns)
-
-
 class EpsonLineHost(LineHost):
     """A controller at the far end of a serial cable.
 
@@ -58,23 +48,13 @@ class EpsonLineHost(LineHost):
     """
 
     def __init__(self, simulator: EpsonSimulator, *, clock: ScaledClock, baud: int) -> None:
-        face = SerialFace(simulator)
+        face = DeviceOnLine(simulator, simulator.connect_serial)
         super().__init__(face, clock=clock, lock=simulator.lock, baud=baud)
         prepare()
-        self._simulator = simulator
         options = {"baud": str(baud or _SHOWN_BAUD), **_told(serial_dialect(simulator.options))}
         self.url = f"epson+serial://{self.cable.near}?{urlencode(options)}"
         simulator.url = simulator.url or self.url
-        simulator.keep_time(clock)
-        simulator.watchers.append(self.wake)
-
-    def close(self) -> None:
-        """Stop serving and unplug the cable. Idempotent."""
-        super().close()
-        if self.wake in self._simulator.watchers:
-            self._simulator.watchers.remove(self.wake)
-            if self._simulator.url == self.url:
-                self._simulator.url = ""
+        self.present(simulator, self.url)
 
 
 def _told(dialect: Dialect) -> dict[str, str]:
@@ -137,14 +117,5 @@ class _EpsonHost(TcpHost):
             allow_remote=allow_remote,
         )
         prepare()
-        self._simulator = simulator
         simulator.url = self.url
-        simulator.keep_time(clock)
-        simulator.watchers.append(self.wake)
-
-    def close(self) -> None:
-        """Stop serving and close every connection. Idempotent."""
-        super().close()
-        if self.wake in self._simulator.watchers:
-            self._simulator.watchers.remove(self.wake)
-            self._simulator.url = ""
+        self.present(simulator, self.url)

@@ -6,13 +6,14 @@ import select
 import selectors
 import threading
 import time
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from typing import Final
 
 from robolink.errors import ConnectError
 from robolink.messages import tr
 from robolink_simulators.cell.clock import ScaledClock
-from robolink_simulators.hosting.addresses import WireDevice
+from robolink_simulators.hosting.addresses import DeviceLink, WireDevice
 from robolink_simulators.hosting.streams.wire_host import WireHost
 
 PTY_LINE: Final = {"baud": "115200", "parity": "none"}
@@ -77,6 +78,20 @@ def no_pseudo_terminal(error: Exception) -> ConnectError:
         tr("The simulator cannot open a pseudo terminal: {cause}.", cause=error),
         remedy=tr("Serve over TCP; pseudo terminals exist on Unix only."),
     )
+
+
+class DeviceOnLine:
+    """A device as a serial line shows it; see ``hosting.addresses.WireDevice``.
+
+    Args:
+        device: What is served.
+        connect: Listens at the line.
+    """
+
+    def __init__(self, device: WireDevice, connect: Callable[[int], DeviceLink]) -> None:
+        self.connect = connect
+        self.advance = device.advance
+        self.next_change = device.next_change
 
 
 class LineHost(WireHost):

@@ -133,18 +133,14 @@ class TcpHost(WireHost):
         self._scheme = scheme
         self._connections: dict[int, Connection] = {}
         self._address = self._listener.getsockname()[:2]
+        self.url = self.url_at(self._address[0])
         super().__init__(device, clock=clock, lock=lock)
         self.start()
 
-    @property
-    def url(self) -> str:
-        """Where clients connect to."""
-        host, port = self._address
-        return (
-            f"{self._scheme}://[{host}]:{port}"
-            if ":" in host
-            else f"{self._scheme}://{host}:{port}"
-        )
+    def url_at(self, host: str) -> str:
+        """Return the URL of a client that knows the host by a name."""
+        shown = f"[{host}]" if ":" in host else host
+        return f"{self._scheme}://{shown}:{self._address[1]}"
 
     @property
     def connections(self) -> int:

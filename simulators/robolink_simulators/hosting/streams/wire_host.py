@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from robolink.interrupts import ClosedAtExit
 from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.device.hosted import HostedDevice
 from robolink_simulators.hosting.addresses import WireDevice
 from robolink_simulators.hosting.streams.serving_loop import (
     Served,
@@ -28,12 +29,14 @@ class WireHost(ClosedAtExit):
         lock: Held while the device is touched.
 
     Attributes:
+        url: Where a client finds the device.
         stopping: Whether it is served no more.
         due_s: See ``LoopHost``.
         queued_s: See ``LoopHost``.
     """
 
     _loop: ServingLoop
+    url: str
 
     def __init__(
         self, device: WireDevice, *, clock: ScaledClock, lock: AbstractContextManager[object]
@@ -46,10 +49,22 @@ class WireHost(ClosedAtExit):
         self.stopping = False
         self.due_s: float | None = None
         self.queued_s: float | None = None
+        self._presented: tuple[HostedDevice, str] | None = None
 
     def start(self) -> None:
         """Begin to serve."""
         self._loop = serve_beside_others(self)
+
+    def present(self, simulator: HostedDevice, url: str = "") -> None:
+        """Let a simulator keep the time of this host, and wake it after an act past the wire.
+
+        Args:
+            simulator: What is served.
+            url: What it says of itself no more when this host is closed.
+        """
+        self._presented = simulator, url
+        simulator.keep_time(self._clock)
+        simulator.watchers.append(self.wake)
 
     def wake(self) -> None:
         """Have the device looked at again; any thread may call it."""
@@ -61,6 +76,11 @@ class WireHost(ClosedAtExit):
         """Stop serving and close what is open. Idempotent."""
         self.stopping = True
         self._loop.leave(self)
+        if self._presented is not None:
+            (simulator, url), self._presented = self._presented, None
+            simulator.watchers.remove(self.wake)
+            if simulator.url == url:
+                simulator.url = ""
 
     def begin(self, loop: ServingLoop) -> None:
         """See ``LoopHost.begin``."""

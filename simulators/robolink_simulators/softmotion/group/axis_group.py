@@ -14,6 +14,22 @@ from robolink_simulators.softmotion.group.condition import (
     SmcGroupState,
 )
 from robolink_simulators.softmotion.group.core import GroupCore, block
+from robolink_simulators.softmotion.group.jog import JogCommand, JogMotion
+from robolink_simulators.softmotion.group.movement import (
+    EdgeWatch,
+    Movement,
+    SmcBufferMode,
+    ToolInForce,
+)
+from robolink_simulators.softmotion.group.paths import (
+    Dynamics,
+    Path,
+    Planner,
+    Position,
+    Target,
+    axes_for_tcp,
+)
+from robolink_simulators.softmotion.group.profile import Pace
 from robolink_simulators.softmotion.kinematics.kinematics import (
     ANY_CONFIGURATION,
     AxisValues,
@@ -23,22 +39,6 @@ from robolink_simulators.softmotion.kinematics.kinematics import (
     CoordSystem,
     KinematicsModel,
 )
-from robolink_simulators.softmotion.motion.jog import JogCommand, JogMotion
-from robolink_simulators.softmotion.motion.movement import (
-    EdgeWatch,
-    Movement,
-    SmcBufferMode,
-    ToolInForce,
-)
-from robolink_simulators.softmotion.motion.paths import (
-    Dynamics,
-    Path,
-    Planner,
-    Position,
-    Target,
-    axes_for_tcp,
-)
-from robolink_simulators.softmotion.motion.profile import Pace
 from robolink_simulators.softmotion.signals import DigitalOutputs
 from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind, Overruled
 

@@ -7,17 +7,17 @@ from typing import Concatenate, ParamSpec, TypeVar
 from robolink_simulators.cell.frames import Frame
 from robolink_simulators.device.wire_record import MotionLog
 from robolink_simulators.softmotion.function_blocks import BlockExecution
+from robolink_simulators.softmotion.group.axes import ASSUMED_LIMITS, Axis, AxisLimits
 from robolink_simulators.softmotion.group.condition import GroupStatus, SmcGroupState
+from robolink_simulators.softmotion.group.motion import GroupMotion
+from robolink_simulators.softmotion.group.movement import ToolInForce
+from robolink_simulators.softmotion.group.paths import require_inside
 from robolink_simulators.softmotion.group.state_machine import StateMachine
 from robolink_simulators.softmotion.kinematics.kinematics import (
     AxisValues,
     CoordinateTransforms,
     KinematicsModel,
 )
-from robolink_simulators.softmotion.motion.axes import ASSUMED_LIMITS, Axis, AxisLimits
-from robolink_simulators.softmotion.motion.motion import GroupMotion
-from robolink_simulators.softmotion.motion.movement import ToolInForce
-from robolink_simulators.softmotion.motion.paths import require_inside
 from robolink_simulators.softmotion.options import GroupOptions
 from robolink_simulators.softmotion.signals import DigitalInputs, DigitalOutputs
 from robolink_simulators.softmotion.smc_errors import BlockRefused, Overruled

@@ -3,9 +3,9 @@
 from collections.abc import Callable
 
 from robolink_simulators.softmotion.function_blocks import BlockExecution
+from robolink_simulators.softmotion.group.axes import Axis
 from robolink_simulators.softmotion.group.condition import SmcGroupState
-from robolink_simulators.softmotion.motion.axes import Axis
-from robolink_simulators.softmotion.motion.motion import GroupMotion
+from robolink_simulators.softmotion.group.motion import GroupMotion
 from robolink_simulators.softmotion.options import GroupOptions
 from robolink_simulators.softmotion.smc_errors import (
     BlockRefused,

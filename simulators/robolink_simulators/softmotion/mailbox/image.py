@@ -23,9 +23,9 @@ from robolink.protocols.mailbox import (
     WordType,
     crc16,
 )
+from robolink_simulators.softmotion.group.paths import Dynamics
 from robolink_simulators.softmotion.kinematics.kinematics import CoordRef
 from robolink_simulators.softmotion.mailbox.options import MailboxOptions
-from robolink_simulators.softmotion.motion.paths import Dynamics
 
 _UM_PER_MM = 1000.0
 

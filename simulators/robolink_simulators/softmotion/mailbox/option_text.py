@@ -67,3 +67,22 @@ def _require_positive(name: str, value: float) -> None:
             tr("The option {name} cannot be {value!r}.", name=name, value=value),
             remedy=tr("Give a number above 0, up to {most}.", most=_LONGEST_CYCLE_US),
         )
+
+
+def parameters_from_text(pairs: Mapping[str, str]) -> dict[str, float]:
+    """Return the parameters as numbers; names and ranges are checked where a machine is made.
+
+    Raises:
+        ConfigError: A value is no decimal number.
+    """
+    return {name: _number(name, text) for name, text in pairs.items()}
+
+
+def _number(name: str, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError as error:
+        raise ConfigError(
+            tr("The parameter {name} cannot be {value!r}.", name=name, value=text),
+            remedy=tr("Give a decimal number, for example {name}=250.5.", name=name),
+        ) from error

@@ -24,11 +24,11 @@ from robolink.protocols.mailbox import (
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
 from robolink_simulators.softmotion.group.condition import GroupStatus
 from robolink_simulators.softmotion.kinematics.kinematics import CoordRef, CoordSystem
-from robolink_simulators.softmotion.mailbox.commands.jobs import Job
-from robolink_simulators.softmotion.mailbox.commands.tools import ToolDesk
 from robolink_simulators.softmotion.mailbox.image import UserUnits, arranged
+from robolink_simulators.softmotion.mailbox.jobs import Job
 from robolink_simulators.softmotion.mailbox.program import MailboxProgram
 from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
+from robolink_simulators.softmotion.mailbox.tool_commands import ToolDesk
 
 HEAD: Final = RESPONSE.before("boot_id")
 """The beginning of the response block, as far as it tells how a command is getting on."""

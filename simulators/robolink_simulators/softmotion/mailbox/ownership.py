@@ -5,7 +5,7 @@ from typing import Final
 from robolink.protocols.mailbox import Answer, Command, ErrorClass, next_number
 from robolink.timing import NS_PER_S
 from robolink_simulators.device.wire_time import WireTime
-from robolink_simulators.softmotion.mailbox.commands.results import Rejected
+from robolink_simulators.softmotion.mailbox.jobs import Rejected
 from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
 
 SILENCE_NS: Final = 10 * NS_PER_S

@@ -1,6 +1,6 @@
 """What a person or the rest of the machine does to a simulated PLC, past the wire."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
 
 from robolink.messages import tr
@@ -194,13 +194,6 @@ class PlcMishaps(PlannedActs):
             PlcFaultAction.ESTOP: panel.press_estop,
             PlcFaultAction.WITHDRAW_PERMIT: panel.withdraw_permit,
         }
-
-    def strike(self, faults: Sequence[PlcFault], now_ns: int) -> None:
-        """Plan what faults say about the PLC."""
-        for fault in faults:
-            act = self._act_of(fault)
-            if act is not None:
-                self.plan(now_ns, fault.seconds, act)
 
     def plan(self, now_ns: int, seconds: float, act: Act) -> None:
         """Have something done some time from now, not before the request is carried out."""

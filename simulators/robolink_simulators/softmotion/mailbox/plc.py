@@ -18,13 +18,13 @@ from robolink_simulators.softmotion.catalogue import MachineModel
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
 from robolink_simulators.softmotion.group.condition import SmcGroupState
 from robolink_simulators.softmotion.kinematics.kinematics import CoordRef
-from robolink_simulators.softmotion.mailbox.commands.tools import ToolDesk
 from robolink_simulators.softmotion.mailbox.exchange import Inbox
 from robolink_simulators.softmotion.mailbox.image import UserUnits
 from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
 from robolink_simulators.softmotion.mailbox.outbox import HEAD, Outbox
 from robolink_simulators.softmotion.mailbox.program import MailboxProgram
 from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
+from robolink_simulators.softmotion.mailbox.tool_commands import ToolDesk
 
 _PRESET_SLOT: Final = 1
 

@@ -23,20 +23,22 @@ from robolink.protocols.mailbox import (
 from robolink_simulators.device.wire_time import WireTime
 from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
-from robolink_simulators.softmotion.mailbox.commands.jobs import Job, Jobs, SignalDesk
-from robolink_simulators.softmotion.mailbox.commands.motion import MotionDesk
-from robolink_simulators.softmotion.mailbox.commands.results import (
-    CommandResult,
-    Handler,
-    Rejected,
-    ok,
-)
-from robolink_simulators.softmotion.mailbox.commands.tools import ToolDesk
 from robolink_simulators.softmotion.mailbox.exchange import Inbox
 from robolink_simulators.softmotion.mailbox.image import UserUnits
+from robolink_simulators.softmotion.mailbox.jobs import (
+    CommandResult,
+    Handler,
+    Job,
+    Jobs,
+    Rejected,
+    SignalDesk,
+    ok,
+)
+from robolink_simulators.softmotion.mailbox.motion_commands import MotionDesk
 from robolink_simulators.softmotion.mailbox.options import MailboxOptions
 from robolink_simulators.softmotion.mailbox.ownership import MailboxOwnership
 from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
+from robolink_simulators.softmotion.mailbox.tool_commands import ToolDesk
 from robolink_simulators.softmotion.mailbox.watchdogs import ClientWatch
 
 _ANYTIME: Final = frozenset({Opcode.STOP, Opcode.HALT})

@@ -1,14 +1,11 @@
 """What a PLC keeps over a restart: its number, the tool slots, and two counters."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
 from robolink import ambient
-from robolink.errors import ConfigError
-from robolink.files.named import read_named
 from robolink.messages import tr
 from robolink.protocols.mailbox import (
     SLOTS,
@@ -18,7 +15,7 @@ from robolink.protocols.mailbox import (
     encode_slot,
     next_number,
 )
-from robolink_simulators.state_files import StateFile, StateNotKeptError
+from robolink_simulators.state_files import StateFile
 
 SCHEMA: Final = "robolink/plc-state/1"
 
@@ -105,7 +102,7 @@ def _slot(held: Mapping[str, Any]) -> Slot:
     return slot
 
 
-class RetainedFile:
+class RetainedFile(StateFile):
     """Keeps retained memory in a file.
 
     Args:
@@ -115,52 +112,22 @@ class RetainedFile:
     """
 
     def __init__(self, path: Path | None, memory: RetainedMemory, machine: str) -> None:
-        self._file = StateFile(path)
+        super().__init__(path)
         self._memory = memory
         self._machine = machine
-        self._written: dict[str, object] | None = None
 
-    @property
-    def failure(self) -> StateNotKeptError | None:
-        """Why something could not be kept; ``None`` as long as all was."""
-        return self._file.failure
+    def _document(self) -> dict[str, object]:
+        return {"schema": SCHEMA, "machine": self._machine, "memory": self._memory.to_state()}
 
-    def restore(self) -> bool:
-        """Fill the memory from the file; False when there is none.
+    def _take(self, document: Any) -> bool:  # noqa: ANN401 - whatever the file holds
+        if document["schema"] != SCHEMA or document["machine"] != self._machine:
+            raise ValueError(document["machine"])
+        self._memory.restore(document["memory"])
+        return False  # it starts, and counts that
 
-        Raises:
-            ConfigError: The file cannot be read or is not of this machine.
-        """
-        path = self._file.path
-        if path is None or not path.exists():
-            return False
-        try:
-            document = json.loads(read_named(path))
-            if document["schema"] != SCHEMA or document["machine"] != self._machine:
-                raise ValueError(document["machine"])
-            self._memory.restore(document["memory"])
-        except (OSError, AttributeError, KeyError, RecursionError, TypeError, ValueError) as error:
-            raise ConfigError(
-                tr(
-                    "{path} is not a saved state of a simulated PLC with {machine}.",
-                    path=path,
-                    machine=self._machine,
-                ),
-                remedy=tr("Name another file, or delete this one to start afresh."),
-            ) from error
-        return True
-
-    def save_changes(self) -> None:
-        """Write the file if something changed since it was written last.
-
-        Raises:
-            StateNotKeptError: It cannot be written.
-        """
-        if self._file.path is None:
-            return
-        state = self._memory.to_state()
-        if state == self._written:
-            return
-        document = {"schema": SCHEMA, "machine": self._machine, "memory": state}
-        self._file.save(document)
-        self._written = state
+    def _foreign(self, path: Path) -> str:
+        return tr(
+            "{path} is not a saved state of a simulated PLC with {machine}.",
+            path=path,
+            machine=self._machine,
+        )

@@ -10,15 +10,15 @@ from typing import Any, Final
 from robolink_simulators.softmotion.function_blocks import BlockExecution
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
 from robolink_simulators.softmotion.group.condition import ReadToolMode, SmcGroupState
+from robolink_simulators.softmotion.group.jog import JogCommand
+from robolink_simulators.softmotion.group.movement import SmcBufferMode
+from robolink_simulators.softmotion.group.paths import Dynamics, Target
 from robolink_simulators.softmotion.kinematics.kinematics import (
     CoordRef,
     CoordSystem,
     KinematicsModel,
 )
 from robolink_simulators.softmotion.mailbox.image import UserUnits
-from robolink_simulators.softmotion.motion.jog import JogCommand
-from robolink_simulators.softmotion.motion.movement import SmcBufferMode
-from robolink_simulators.softmotion.motion.paths import Dynamics, Target
 from robolink_simulators.softmotion.program.foreign_types import (
     AXIS_GROUP,
     BUFFER_MODE,

@@ -15,7 +15,7 @@ from robolink_simulators.epson.remote.link import shown_request
 from robolink_simulators.faults import Fault, FaultAction
 from robolink_simulators.hosting.addresses import WireDevice
 from robolink_simulators.hosting.in_process.transport import LinePort
-from robolink_simulators.hosting.streams.epson import SerialFace
+from robolink_simulators.hosting.streams.serial_host import DeviceOnLine
 
 from robolink.controllers import open_epson
 from robolink.controllers.epson.line import EpsonLine, text_line
@@ -320,7 +320,7 @@ class EpsonSerialPlant(EpsonPlant):
 
     def __init__(self, clock: ManualClock, tap: WireTap, seed: int) -> None:
         super().__init__(clock, tap, seed)
-        self._port = LinePort(SerialFace(self.simulator))
+        self._port = LinePort(DeviceOnLine(self.simulator, self.simulator.connect_serial))
         self._line = BentLine()
         self._dialect = serial_dialect(self.simulator.options)
 

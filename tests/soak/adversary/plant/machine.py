@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Final, Protocol
 
-from robolink_simulators.assist.port import InProcessEyes
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.frames import Frame
 from robolink_simulators.cell.world_parameters import WorldParameters
+from robolink_simulators.control.assist import InProcessEyes
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.plc.device import PlcSimulator
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Final, cast
 
-from robolink_cli.commands.companions.companion_files import companion_texts
+from robolink_cli.commands.companions.spel import companion_texts
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.workplace import exchanged
 from robolink_simulators.cell.world_parameters import WorldParameters

@@ -10,9 +10,9 @@ from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.faults import Fault, FaultAction
 from robolink_simulators.hosting.in_process.transport import LinePort
+from robolink_simulators.hosting.modbus_frames import decode
 from robolink_simulators.plc.device import PlcSimulator
-from robolink_simulators.plc.frames import decode
-from robolink_simulators.plc.serving import PlcOnLine
+from robolink_simulators.plc.serving import plc_on_line
 
 from robolink.controllers.plc_map.controller import PlcMapController
 from robolink.model import Controller, OutcomeLog, ToolOffset
@@ -110,7 +110,7 @@ class RegisterMapPlant(PlantMachine):
     def __init__(self, clock: ManualClock, tap: WireTap, seed: int) -> None:
         super().__init__(clock, tap)
         self._simulator = PlcSimulator(_register_map(), unit=_UNIT, seed=seed)
-        self._port = LinePort(PlcOnLine(self._simulator))
+        self._port = LinePort(plc_on_line(self._simulator))
         self._line = BentLine()
         self._open: dict[int, ModbusClient] = {}
 

@@ -10,7 +10,6 @@ from robolink_simulators.cell.frames import Frame
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.faults import PlcFault, PlcFaultAction
 from robolink_simulators.faults.fieldbus import Order
-from robolink_simulators.hosting.in_process.canopen_bus import SteppedCan
 from robolink_simulators.hosting.in_process.mailbox_link import InProcessMailboxLink
 from robolink_simulators.hosting.in_process.transport import LinePort
 from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
@@ -31,7 +30,7 @@ from robolink.transport.modbus.rtu import RtuExchange, RtuLine
 from robolink.transport.modbus.tcp import TcpExchange
 from tests.soak.adversary.computer import VirtualProcess
 from tests.soak.adversary.history import CountedActs, Disturbance, Hindrance
-from tests.soak.adversary.plant.lines import BentLine, BentTransport, MailboxFrames
+from tests.soak.adversary.plant.lines import BentLine, BentTransport, TimedFrames
 from tests.soak.adversary.plant.machine import (
     USUAL_TOOL,
     MachineState,
@@ -39,6 +38,7 @@ from tests.soak.adversary.plant.machine import (
     WireTap,
 )
 from tests.soak.adversary.plant.mailbox_tap import TappedMailboxLink, another_clients
+from tests.soak.adversary.plant.stepped_can import SteppedCan
 
 _TOKEN: Final = 0x50C0_0001
 _PATIENCE_NS: Final = 60_000_000
@@ -386,7 +386,7 @@ class ModbusTcpPlant(SoftMotionPlant):
 
     def __init__(self, clock: ManualClock, tap: WireTap, seed: int) -> None:
         super().__init__(clock, tap, seed)
-        self._device = MailboxFrames(self.simulator, clock, unit=_UNIT, baud=self.baud)
+        self._device = TimedFrames(self.simulator, clock, unit=_UNIT, baud=self.baud)
 
     def link(self) -> MailboxLink:
         """Open a connection of one's own."""

@@ -9,7 +9,6 @@ from robolink_simulators.epson.arm.kinematics import frame_of
 
 from robolink.controllers.controller_core import ControllerCore
 from robolink.model import Motion, Pose, ToolOffset, ToolReceipt, WorkBox
-from tests.soak.adversary.call_watch import SeenStates
 from tests.soak.adversary.computer import VirtualProcess
 from tests.soak.adversary.plant.machine import MachineState, SentKind, SentRequest
 from tests.soak.adversary.rules.grounds import Grounds
@@ -144,11 +143,37 @@ class StopRules:
         )
 
 
+class SeenStates:
+    """What the machine has held since each call began, event by event."""
+
+    def __init__(self) -> None:
+        self._seen: list[MachineState] = []
+        self._since: dict[int, int] = {}
+
+    def note(self, state: MachineState) -> None:
+        """Note what it holds, where that is something else than before."""
+        if not self._seen or self._seen[-1] != state:
+            self._seen.append(state)
+
+    def begin(self, process: VirtualProcess) -> None:
+        """Let a call of a process begin now."""
+        self._since[process.number] = max(0, len(self._seen) - 1)
+
+    def since(self, process: VirtualProcess) -> list[MachineState]:
+        """Return what it has held since the last call of a process began."""
+        return self._seen[self._since.get(process.number, 0) :]
+
+    def forget(self) -> None:
+        """Begin anew."""
+        self._seen.clear()
+        self._since.clear()
+
+
 _RULE: Final = "ContractHolds"
 
 
 class ContractRules:
-    """Implements :class:`tests.soak.adversary.call_watch.Promises`.
+    """Judges what a call has returned; :mod:`tests.soak.adversary.call_watch` tells it.
 
     Args:
         grounds: What the rules rest on.

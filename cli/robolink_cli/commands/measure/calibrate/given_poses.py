@@ -23,18 +23,16 @@ from robolink.model import Controller
 from robolink.procedures import MeasurementContext, PoseMethod
 from robolink.transaction import Order, earlier_corrections
 from robolink_cli.access.warnings import note_change
-from robolink_cli.commands.measure.calibrate.listener import CalibrationListener
-from robolink_cli.commands.measure.calibrate.request import CalibrationRequest
-from robolink_cli.commands.measure.calibrate.stations import remark_on_pin
-from robolink_cli.console.render import note, say
+from robolink_cli.commands.measure.calibrate.live import CalibrationListener
+from robolink_cli.commands.measure.calibrate.request import CalibrationRequest, remark_on_pin
+from robolink_cli.console.render import emit, json_is_on, note, say
 from robolink_cli.options.impact import impact_payload, show_impact
 from robolink_cli.options.pose_source import PoseSource
 from robolink_cli.options.report import ReportDraft, reporting
 from robolink_cli.prompts.operator import terminal
 from robolink_cli.prompts.questions import agree, on_terminal
-from robolink_cli.session.context import CliContext
-from robolink_cli.session.opening import open_controller
-from robolink_cli.session.ordering import ordered, show_done, with_order
+from robolink_cli.session.connection import open_controller
+from robolink_cli.session.order import ordered, show_done, with_order
 from robolink_cli.views.fit import judged_payload, report_payload
 
 
@@ -128,9 +126,9 @@ def calibrate_from_poses(
         else:
             payload = _calibrate(controller, frame, source, method_for(controller), order)
     if frame.dry_run:
-        _show_dry_run(frame.context, payload)
+        _show_dry_run(payload)
     else:
-        frame.context.emit("calibration", with_order(payload, order), lambda: None)
+        emit("calibration", with_order(payload, order), lambda: None)
 
 
 def _calibrate(
@@ -205,7 +203,7 @@ def _dry_run(
     plan = frame.tool_plan(given, controller, verify=False)
     result, _ = assessed_in_cell(controller, plan, plan.named(given.found.result))
     proposal = Proposal(frame.tool, before, result)
-    if not frame.context.json:
+    if not json_is_on():
         listener.proposed([proposal])
     frame.criteria.judge_fit(proposal.result)
     if refusal := frame.criteria.over_by_defaults(proposal.result, tool=frame.tool):
@@ -226,7 +224,7 @@ def _extra(source: PoseSource, listener: _PosesListener) -> dict[str, object]:
     }
 
 
-def _show_dry_run(context: CliContext, payload: Mapping[str, object]) -> None:
+def _show_dry_run(payload: Mapping[str, object]) -> None:
     requests = payload["requests"]
     assert isinstance(requests, list)  # noqa: S101 - made by _dry_run
 
@@ -237,7 +235,7 @@ def _show_dry_run(context: CliContext, payload: Mapping[str, object]) -> None:
         else:
             say(tr("Dry run; the value is stored already, nothing would be sent."))
 
-    context.emit("dry-run", payload, show)
+    emit("dry-run", payload, show)
 
 
 def _agree_to_write(tool: int, *, yes: bool) -> None:

@@ -4,10 +4,12 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 from robolink.backup import keep_first_backup
-from robolink.calibration import known_doubts
+from robolink.calibration import Impact, VerifyResult, known_doubts
 from robolink.calibration_run import (
+    AcceptanceCriteria,
     ChangePlan,
     ChangeReport,
+    Listener,
     NozzleChange,
     Proposal,
     preview,
@@ -16,29 +18,79 @@ from robolink.calibration_run import (
 )
 from robolink.messages import tr
 from robolink.methods import find_method
-from robolink.model import Controller
+from robolink.model import Controller, Pose, ToolReceipt
 from robolink.procedures import TipSource
 from robolink.transaction import Order, earlier_corrections
 from robolink_cli.access.warnings import note_change
-from robolink_cli.commands.measure.calibrate.listener import CalibrationListener
-from robolink_cli.commands.measure.calibrate.request import CalibrationRequest
-from robolink_cli.commands.measure.calibrate.stations import remark_on_pin
-from robolink_cli.console.render import note
-from robolink_cli.options.impact import ImpactRequest, impact_payload, show_impact
+from robolink_cli.commands.measure.calibrate.request import CalibrationRequest, remark_on_pin
+from robolink_cli.console.render import emit, note
+from robolink_cli.options.impact import ImpactRequest, impact_payload, judge, show_impact
 from robolink_cli.options.report import ReportDraft, reporting
+from robolink_cli.prompts.current_desk import current_desk
 from robolink_cli.prompts.operator import operator_at
-from robolink_cli.prompts.present import present_desk
 from robolink_cli.session.check_before_start import agree_to_procedure
+from robolink_cli.session.connection import open_controller
 from robolink_cli.session.context import guided_if_alone
-from robolink_cli.session.opening import open_controller
-from robolink_cli.session.ordering import ordered, show_done, with_order
+from robolink_cli.session.order import ordered, show_done, with_order
 from robolink_cli.views.fit import (
     report_payload,
     show_course,
     show_plan,
+    show_proposal,
     show_report,
+    show_verdicts,
+    steps_payload,
+    tell_written,
 )
-from robolink_cli.views.planned_steps import steps_payload
+
+
+class CalibrationListener(Listener):
+    """Shows a calibration as it goes, and collects it for a report.
+
+    Attributes:
+        impact: What the change means for taught points, once it was proposed.
+    """
+
+    def __init__(
+        self, draft: ReportDraft, criteria: AcceptanceCriteria, impact: ImpactRequest | None
+    ) -> None:
+        self._draft = draft
+        self._criteria = criteria
+        self._request = impact
+        self._points: dict[int, Pose | None] | None = None
+        self.impact: Impact | None = None
+
+    def read_points(self, controller: Controller) -> None:
+        """Read the taught points on which the change is to be judged."""
+        if self._request is not None:
+            self._points = self._request.read(controller)
+
+    def wrote(self, receipt: ToolReceipt) -> None:
+        """Note it for the report, and tell whoever is guided."""
+        tell_written(receipt)
+        self._draft.note_result(receipt)
+
+    def verified(self, tool: int, result: VerifyResult) -> None:  # noqa: ARG002 - one tool only
+        """Note it for the report."""
+        self._draft.note_result(result)
+
+    def note_proved(self, done: ChangeReport) -> None:
+        """Note the statement that stands after the turn test, a wider one included."""
+        for report in done.tools:
+            if report.verification is not None:
+                self._draft.note_result(report.verification)
+
+    def propose(self, proposal: Proposal, *, source: str, warnings: tuple[str, ...]) -> None:
+        """Show the proposal, the verdict, and what it means for taught points."""
+        self.impact = judge(self._points, old=proposal.before, new=proposal.offset)
+        desk = current_desk()
+        if desk is not None and self.impact is not None:
+            from robolink_cli.wizard.happenings import TaughtPoints
+
+            desk.regard(TaughtPoints(self.impact))
+        self._draft.propose(proposal, source=source, warnings=warnings, impact=self.impact)
+        show_proposal(proposal)
+        show_verdicts(self._criteria.verdicts(proposal))
 
 
 class _LiveListener(CalibrationListener):
@@ -97,9 +149,9 @@ def _calibrate(frame: CalibrationRequest, source: Callable[[Controller], TipSour
         else:
             payload = _measure(controller, frame, frame.plan(source(controller), controller), order)
     if frame.dry_run:
-        context.emit("dry-run", payload, lambda: show_plan(payload))
+        emit("dry-run", payload, lambda: show_plan(payload))
     else:
-        context.emit("calibration", with_order(payload, order), lambda: None)
+        emit("calibration", with_order(payload, order), lambda: None)
 
 
 def _measure(
@@ -167,7 +219,7 @@ def _change(
         report = change.run()
         listener.note_proved(report)
     # Now, because Ctrl-C may come before the logout is answered.
-    desk = present_desk()
+    desk = current_desk()
     if desk is None:
         show_report(report.tools[0])
     else:

@@ -18,12 +18,60 @@ from robolink.methods import (
     parameter_problems,
 )
 from robolink.stations import StationKind
-from robolink_cli.commands.measure.calibrate.options import calibration_options, sigma_option
-from robolink_cli.commands.measure.calibrate.request import CalibrationRequest
+from robolink_cli.access.cell import with_cell_limits
+from robolink_cli.commands.measure.calibrate.request import LENGTH, CalibrationRequest, request_from
 from robolink_cli.commands.measure.calibrate.values import as_typed, is_repeated, type_of
 from robolink_cli.options.consent import MotionOption, motion_option
+from robolink_cli.options.declaration import declared_options
 from robolink_cli.options.pose_source import PoseSource, pose_source_options, taught_points_option
-from robolink_cli.session.completing import complete_station
+from robolink_cli.session.completion import complete_station
+from robolink_cli.session.context import CliContext, controller_options
+
+_CELL_KEYS: Final = {
+    "lift_mm": "lift_mm",
+    "clearance_mm": "clearance_mm",
+    "speed_mm_s": "speed_mm_s",
+    "box_mm": "box_mm",
+    "max_change_mm": "max_change_mm",
+    "tolerance_mm": "drift_tolerance_mm",
+    "rms_mm": "rms_tolerance_mm",
+    "residual_mm": "residual_tolerance_mm",
+    "interval_mm": "interval_tolerance_mm",
+}
+"""Option to key in the cell file."""
+
+
+def calibration_options(function: Callable[..., None]) -> Callable[..., int | None]:
+    """Add the options of the frame; the method gets a ``CalibrationRequest`` and its own.
+
+    Limits that nobody typed are taken from the cell, for the method's own options too.
+    """
+
+    def framed(context: CliContext, **given: Any) -> None:  # noqa: ANN401 - click passes the options by name
+        options = with_cell_limits(
+            context.cell, given, {o: k for o, k in _CELL_KEYS.items() if o in given}
+        )
+        framing = request_from.__annotations__.keys() & options
+        frame = request_from(context, **{name: options.pop(name) for name in framing})
+        function(frame, **options)
+
+    add: Callable[..., Callable[..., int | None]] = declared_options(request_from)
+    return add(controller_options(framed))
+
+
+def sigma_option(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Add ``--sigma``."""
+    command: Callable[..., Any] = click.option(
+        "--sigma",
+        "sigma_mm",
+        type=LENGTH,
+        metavar="MM",
+        help=declared(
+            "Standard deviation of one coordinate of one measurement, where it is known."
+        ),
+    )(function)
+    return command
+
 
 _METAVARS: Final = {"mm": "MM", "degrees": "DEG", "mm/s": "MM_S"}
 
@@ -58,7 +106,7 @@ def command_of(method: AnyMethod) -> click.Command:
         poses: PoseSource | None = None,
         **given: Any,  # noqa: ANN401 - click passes the options by name
     ) -> None:
-        from robolink_cli.commands.measure.calibrate.measuring import calibrate_with
+        from robolink_cli.commands.measure.calibrate.method_run import calibrate_with
 
         check = _check(method, frame, sigma_mm=sigma_mm, poses=poses)
         chosen = _parameters(method, given, check)

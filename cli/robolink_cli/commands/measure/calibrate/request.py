@@ -9,23 +9,30 @@ from click.core import ParameterSource
 from robolink.config import USUAL_CHANGE_MM
 from robolink.errors import ConfigError, ReservedToolError, ToolIndexError
 from robolink.messages import tr
+from robolink.model import Controller, EntryKind
+from robolink.stations import (
+    Station,
+    StationKind,
+    find_station,
+    find_stations,
+    require_base_of,
+)
 from robolink_cli.console.numbers import NumberInside
+from robolink_cli.console.render import note
 from robolink_cli.options.consent import DryRun, MotionOption, Plain, Yes
 from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.impact import ImpactFile, ImpactPoints, ImpactRequest, impact_request
 from robolink_cli.options.report import ForceReport, ReportPath, ReportRequest, report_request
-from robolink_cli.session.completing import complete_tool
+from robolink_cli.session.completion import complete_tool
 from robolink_cli.session.context import CliContext
 from robolink_cli.session.operator_identity import Lot, Nozzle
-from robolink_cli.session.ordering import OrderId, require_no_dry_run
+from robolink_cli.session.order import OrderId, require_no_dry_run
 
 if TYPE_CHECKING:
     from robolink.calibration import RowFact
     from robolink.calibration_run import AcceptanceCriteria, ChangePlan, Limits, ToolPlan
     from robolink.methods import LengthRule
-    from robolink.model import Controller
     from robolink.procedures import TipSource
-    from robolink.stations import Station
 
 
 LENGTH: Final = NumberInside(min=0, min_open=True)
@@ -108,15 +115,11 @@ class CalibrationRequest:
 
     def _stated(self) -> "Station | None":
         """Return the station as the cell file has it, if it does."""
-        from robolink.stations import find_stations
-
         return find_stations(self.context.cell, ()).get(self.context.station)
 
     def _rows(self, controller: "Controller") -> "dict[str, RowFact]":
         """Return what the cell file states of the rows of the budget."""
         from robolink.accuracy import stated_rows
-        from robolink.model import EntryKind
-        from robolink.stations import find_stations
 
         cell, name = self.context.cell, self.context.station
         entries = controller.outcomes.recorded(kinds=(EntryKind.STATION,)) if name else ()
@@ -288,4 +291,52 @@ def _refuse_to_show_nothing(impact: ImpactRequest | None, report: ReportRequest 
             remedy=tr(
                 "Leave {option} out, or use 'robolink tool impact' with an offset.", option=given
             ),
+        )
+
+
+def station_at(
+    frame: CalibrationRequest, controller: Controller, kind: StationKind, *, stated: bool = False
+) -> Station:
+    """Return the station that the frame names, and say what there is to know about it.
+
+    Args:
+        frame: What was asked for.
+        controller: The controller, connected.
+        kind: What it has to be.
+        stated: Whether the command says where it is, whatever is on record.
+
+    Raises:
+        ConfigError: There is none of that name, or it is something else.
+        NotReadyError: It was learnt in another base.
+    """
+    entries = controller.outcomes.recorded(kinds=(EntryKind.STATION,))
+    station = find_station(frame.context.cell, entries, frame.context.station, kind=kind)
+    if not stated:
+        require_base_of(controller, station)
+    remark = station.remark()
+    if remark:
+        note(tr("Warning: {remark}", remark=remark))
+    return station
+
+
+def remark_on_pin(frame: CalibrationRequest, controller: Controller) -> None:
+    """Say what there is to know about the pin that a calibration names.
+
+    A name that nobody knows yet is no mistake: the calibration finds the pin.
+
+    Raises:
+        ConfigError: The station of that name is no pin.
+        NotReadyError: It was learnt in another base.
+    """
+    if not frame.pin or not frame.finds_pin:
+        return
+    entries = controller.outcomes.recorded(kinds=(EntryKind.STATION,))
+    if frame.pin in find_stations(frame.context.cell, entries):
+        station_at(frame, controller, StationKind.PIN)
+    else:
+        note(
+            tr(
+                "Station {station} is not known yet: a full calibration there finds it.",
+                station=frame.pin,
+            )
         )

@@ -1,16 +1,21 @@
-"""Reading a case: every value knows its path, and nothing is read past unknown names."""
+"""What stands in a case: every value knows its path, and no unknown name is passed over."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from typing import Final, TypeVar
+from functools import cache
+from inspect import Parameter, Signature, signature
+from typing import Any, Final, Literal, TypeVar, cast, get_args, get_origin
 
-from robolink.calibration import ACCURACY_ROWS, AccuracyFacts, RowFact
+from robolink import calibration as cal
 from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
-from robolink.model import Hand, Pose, ToolOffset
+from robolink.model import Hand, Pose, ToolOffset, WorkBox
 
 EULER: Final = "R=Rz(U)Ry(V)Rx(W)"
+
+Payload = dict[str, object]
+"""The answer to a case, plain values under the names of the shared cases."""
 
 T = TypeVar("T")
 
@@ -38,9 +43,7 @@ class KnownFrames:
         """Return a pose as one of the flange in the base, as far as the values are known."""
         if not (self.tools or self.local_frames):
             return pose
-        from robolink.calibration import flange_poses
-
-        return flange_poses([pose], tools=self.tools, local_frames=self.local_frames)[0]
+        return cal.flange_poses([pose], tools=self.tools, local_frames=self.local_frames)[0]
 
 
 class Node:
@@ -69,10 +72,6 @@ class Node:
     def is_object(self, name: str) -> bool:
         """Tell whether an object stands under ``name``; elsewhere the name may mean another."""
         return isinstance(self._value.get(name), dict)
-
-    def items(self, name: str) -> Iterator[tuple[object, str]]:
-        """Yield what stands in the list under ``name``, each with its path."""
-        return self._items(name)
 
     def at(self, name: str) -> str:
         """Return the path of ``name`` in this object."""
@@ -132,17 +131,76 @@ class Node:
             raise unusable(self.at(name), tr("a whole number is expected here"))
         return int(value)
 
+    def flag(self, name: str) -> bool:
+        """Return whether true stands under ``name``; null is false."""
+        value = self.raw(name)
+        if not isinstance(value, (bool, type(None))):
+            raise unusable(self.at(name), tr("true or false is expected here"))
+        return bool(value)
+
     def child(self, name: str) -> "Node":
         """Return the object under ``name``."""
         return Node(self.raw(name), self.at(name), self.frames)
 
+    def items(self, name: str) -> Iterator[tuple[object, str]]:
+        """Yield what stands in the list under ``name``, each with its path."""
+        value = self.raw(name)
+        if not isinstance(value, list):
+            raise unusable(self.at(name), tr("a list is expected here"))
+        for index, item in enumerate(value):
+            yield item, f"{self.at(name)}[{index}]"
+
     def children(self, name: str) -> list["Node"]:
         """Return the objects of the list under ``name``."""
-        return [Node(value, path, self.frames) for value, path in self._items(name)]
+        return [Node(value, path, self.frames) for value, path in self.items(name)]
 
     def numbers(self, name: str) -> list[float]:
         """Return the numbers of the list under ``name``."""
-        return [finite(value, path) for value, path in self._items(name)]
+        return [finite(value, path) for value, path in self.items(name)]
+
+    def each(self, name: str, kind: type[T]) -> list[T]:
+        """Return the objects of the list under ``name``, as :data:`_READERS` reads them."""
+        return [cast("T", _READERS[kind](child)) for child in self.children(name)]
+
+    def call(self, function: "Callable[..., T]", names: str, **known: object) -> T:
+        """Return what a function answers to what stands under these names.
+
+        Each is read as the annotation of its parameter says; where it is missing, the parameter
+        keeps its default. A parameter ``z_mm`` or ``v_deg`` may be called ``z`` or ``v``.
+
+        Args:
+            function: A solver, or a class of values.
+            names: Those of the file, in the order in which they are read.
+            **known: Further arguments.
+
+        Raises:
+            CalibrationError: As the function says; ``non_finite``.
+            ConfigError: Something is missing, or is no such value; names the path.
+        """
+        parameters = _signature(function).parameters
+        for name in names.split():
+            full = next(n for n in (name, f"{name}_mm", f"{name}_deg") if n in parameters)
+            if name in self or parameters[full].default is Parameter.empty:
+                known[full] = self._value_of(name, parameters[full].annotation)
+        return function(**known)
+
+    def made(self, kind: "Callable[..., T]", names: str, **known: object) -> T:
+        """Return what :meth:`call` makes of this object, in which no other name may stand."""
+        found = self.call(kind, names, **known)
+        self.finish()
+        return found
+
+    def _value_of(self, name: str, kind: Any) -> object:  # noqa: ANN401 - whatever annotates
+        """Return what stands under ``name`` as a value of a type, or of a type or ``None``."""
+        parts = get_args(kind)
+        if type(None) in parts:
+            return self._value_of(name, parts[0])
+        if get_origin(kind) is Literal:
+            return self.text(name, *parts)
+        if parts:
+            return tuple(self.numbers(name)) if parts[0] is float else self.each(name, parts[0])
+        plain = {float: self.number, int: self.whole, bool: self.flag}.get(kind)
+        return plain(name) if plain else _READERS[kind](self.child(name))
 
     def finish(self) -> None:
         """Refuse what nobody asked for.
@@ -154,12 +212,10 @@ class Node:
         if unknown:
             raise unusable(self.at(unknown[0]), tr("this name is not known here"))
 
-    def _items(self, name: str) -> Iterator[tuple[object, str]]:
-        value = self.raw(name)
-        if not isinstance(value, list):
-            raise unusable(self.at(name), tr("a list is expected here"))
-        for index, item in enumerate(value):
-            yield item, f"{self.at(name)}[{index}]"
+
+@cache
+def _signature(function: "Callable[..., object]") -> Signature:
+    return signature(function, eval_str=True)
 
 
 def finite(value: object, path: str) -> float:
@@ -201,15 +257,15 @@ def read_pose(node: Node) -> Pose:
     return node.frames.flange(pose)
 
 
-def read_facts(node: Node) -> AccuracyFacts:
+def read_facts(node: Node) -> cal.AccuracyFacts:
     """Return what a case states of the rows of its budget.
 
     Each row is a positive half width by its key; ``months`` says how long ago the station was
     learnt, ``by_contact`` whether an input showed each touch.
     """
     rows = {
-        key: RowFact(_positive(node, key), "stated", told=tr("stated in the case"))
-        for key in ACCURACY_ROWS
+        key: cal.RowFact(_positive(node, key), "stated", told=tr("stated in the case"))
+        for key in cal.ACCURACY_ROWS
         if key in node
     }
     months = node.optional("months", node.number)
@@ -219,7 +275,7 @@ def read_facts(node: Node) -> AccuracyFacts:
     if not isinstance(by_contact, bool):
         raise unusable(node.at("by_contact"), tr("true or false is expected here"))
     node.finish()
-    return AccuracyFacts(rows=rows, months=months, by_contact=by_contact)
+    return cal.AccuracyFacts(rows=rows, months=months, by_contact=by_contact)
 
 
 def _positive(node: Node, name: str) -> float:
@@ -253,9 +309,7 @@ def _angles_deg(node: Node) -> tuple[float, float, float]:
         raise unusable(node.path, tr("the quaternion's length is not 1"))
     import numpy as np
 
-    from robolink.calibration import quaternion_rotations, uvw_deg
-
-    return uvw_deg(quaternion_rotations(np.array([quaternion]))[0])
+    return cal.uvw_deg(cal.quaternion_rotations(np.array([quaternion]))[0])
 
 
 def read_poses(node: Node, name: str = "poses") -> list[Pose]:
@@ -265,16 +319,76 @@ def read_poses(node: Node, name: str = "poses") -> list[Pose]:
 
 def read_offset(node: Node) -> ToolOffset:
     """Return a tool offset; what is not given is 0."""
-    offset = ToolOffset(*(node.number_or(name, 0.0) for name in "xyzuvw"))
-    node.finish()
-    return offset
+    return node.made(ToolOffset, "x y z u v w")
 
 
-def read_point(node: Node) -> tuple[float, float]:
-    """Return x and y in mm."""
-    point = (node.number("x"), node.number("y"))
+def read_place(node: Node, axes: str = "") -> tuple[float, ...]:
+    """Return the coordinates of a place on these axes, mm; else x, y and, if it is given, z."""
+    place = tuple(map(node.number, axes or ("xyz" if "z" in node else "xy")))
     node.finish()
-    return point
+    return place
+
+
+def read_sighting(node: Node) -> cal.Sighting:
+    """Return where a camera saw a tip or a mark; other names may stand beside ``flange``."""
+    return cal.Sighting(read_pose(node.child("flange")), *read_place(node.child("tip")))
+
+
+def _fiducial(node: Node) -> cal.Sighting:
+    sighting = read_sighting(node)
+    node.finish()
+    return sighting
+
+
+def _pixel(node: Node) -> cal.PixelSighting:
+    px, py = node.number("px"), node.number("py")
+    return cal.PixelSighting(read_pose(node), px, py)
+
+
+def _camera(node: Node) -> cal.CameraModel:
+    matrix, origin = node.numbers("mm_per_px_matrix"), node.numbers("camera_origin")
+    node.finish()
+    if len(matrix) != 4 or len(origin) != 2:
+        raise unusable(node.path, tr("the matrix has four numbers, the origin two"))
+    a, b, c, d = matrix
+    return cal.CameraModel(((a, b), (c, d)), (origin[0], origin[1]))
+
+
+def _plane(node: Node) -> cal.TouchedPlane:
+    normal, distance = node.numbers("normal"), node.number("distance_mm")
+    node.finish()
+    if len(normal) != 3 or not any(normal):
+        raise unusable(node.at("normal"), tr("three numbers are expected here, not all of them 0"))
+    return cal.TouchedPlane((normal[0], normal[1], normal[2]), distance)
+
+
+def _crossing(node: Node) -> cal.Crossing:
+    beam = node.whole("beam")
+    if beam not in (1, 2):
+        raise unusable(node.at("beam"), tr("the beams are numbered 1 and 2"))
+    return node.made(cal.Crossing, "entry exit", beam=beam - 1)
+
+
+def _record(kind: "Callable[..., object]", names: str) -> "Callable[[Node], object]":
+    return lambda node: node.made(kind, names)
+
+
+_READERS: Final["Mapping[object, Callable[[Node], object]]"] = {
+    Pose: read_pose,
+    ToolOffset: read_offset,
+    WorkBox: _record(WorkBox, "x_min_mm x_max_mm y_min_mm y_max_mm z_min_mm z_max_mm"),
+    cal.Beam: _record(cal.Beam, "x y direction_deg sigma_mm direction_sigma_deg correlation"),
+    cal.CameraModel: _camera,
+    cal.Crossing: _crossing,
+    cal.JointTouch: _record(cal.JointTouch, "pin tool flange"),
+    cal.PixelSighting: _pixel,
+    cal.ShaftSeen: _record(cal.ShaftSeen, "crossings above_mm deeper_mm"),
+    cal.Sighting: _fiducial,
+    cal.Standoff: _record(cal.Standoff, "x y z"),
+    cal.Touch: _record(cal.Touch, "z speed_mm_s"),
+    cal.TouchedPlane: _plane,
+}
+"""How an object of the file is read, by what a solver takes in its place."""
 
 
 def unusable(path: str, why: str) -> ConfigError:

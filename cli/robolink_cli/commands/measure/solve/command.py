@@ -55,8 +55,12 @@ def solve(
     angles degrees. Or, with --method, it is any file of poses. The exit code is 7 when a case
     gives no trustworthy result, or one whose residuals are beyond tolerance.
     """
-    from robolink_cli.commands.measure.solve.pose_table import table_case
-    from robolink_cli.commands.measure.solve.solving import exit_code, load, solve_document
+    from robolink_cli.commands.measure.solve.answer import (
+        exit_code,
+        load,
+        solve_document,
+        table_case,
+    )
     from robolink_cli.views.solve import show_case
 
     if method is not None:

@@ -1,25 +1,24 @@
-"""What ``solve`` takes of poses on one point, and of a budget of uncertainty."""
+"""What ``solve`` takes of poses: on one point, to prove an offset with, and none yet."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final
 
 from robolink import calibration as cal
 from robolink.calibration import CalibrationResult
 from robolink.messages import tr
-from robolink.model import Pose, ToolOffset
+from robolink.model import Pose, ToolOffset, json_fields
 from robolink_cli.commands.measure.solve.case import (
     EULER,
     Node,
+    Payload,
     read_offset,
+    read_place,
     read_pose,
     read_poses,
     unusable,
 )
 from robolink_cli.views.solve import result_payload
-
-Payload = dict[str, object]
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,6 +84,57 @@ def pivot(node: Node) -> Payload:
 def pivot_robust(node: Node) -> Payload:
     """The same, with a search for outliers."""
     return _robust(node, cal.solve_pivot, turning=False)
+
+
+def six_point(node: Node) -> Payload:
+    """A pivot and two ways along the tool's axes."""
+    result = node.call(cal.solve_six_point, "second_is pivot_poses along_x second start sigma_mm")
+    return result_payload(result) | json_fields(result, "off_square_deg")
+
+
+def tool_axis(node: Node) -> Payload:
+    """Two touches along one axis of the tool."""
+    axis = node.call(cal.solve_tool_axis, "first second sigma_mm")
+    return json_fields(axis, "direction", "tilt_deg", "sigma_deg")
+
+
+def joint(node: Node) -> Payload:
+    """Several tools on one pin, or one tool on several pins."""
+    result = node.call(cal.solve_joint, "touches sigma_mm")
+    tools = {str(tool): result_payload(found) for tool, found in result.tools.items()}
+    first = next(iter(result.tools.values()))
+    return {
+        "codes": list(first.warnings),
+        "tools": tools,
+        "pins": {str(pin): list(place) for pin, place in result.pins_mm.items()},
+    }
+
+
+def verify(node: Node) -> Payload:
+    """Flange poses on one point, with the offset that is to be proved."""
+    result = node.call(cal.verify_drift, "poses offset tolerance_mm")
+    return {
+        "codes": [*result.warnings, *([] if result.passed else ["large_drift"])],
+        **json_fields(result, "passed", "max_drift_mm", "tolerance_mm"),
+        "drifts": [json_fields(drift, "u_deg", "distance_mm") for drift in result.drifts],
+    }
+
+
+def suggest_poses(node: Node) -> Payload:
+    """The poses that tell the most."""
+    plan = node.call(
+        cal.suggest_poses,
+        "taken",
+        point_mm=read_place(node.child("point"), "xyz"),
+        count=node.whole("count"),
+        guess=read_offset(node.child("guess")),
+        limits=node.call(cal.PoseLimits, "u_min_deg u_max_deg tilt_deg box"),
+    )
+    return {
+        "poses": [dict(zip("xyzuvw", pose.coordinates(), strict=True)) for pose in plan.poses],
+        # JSON has no infinity: after the first pose nothing is known yet.
+        "sigma_gains": [None if gain == float("inf") else gain for gain in plan.sigma_gains],
+    }
 
 
 def uncertainty_budget(node: Node) -> Payload:
@@ -219,15 +269,3 @@ def _standard_uncertainty(node: Node, shape: str) -> float | None:
             size = math.prod([abs(node.number(factor)) for factor in factors])
             return node.number(stated) * turned * size / divisor
     return None
-
-
-POSE_METHODS: Final[Mapping[str, Callable[[Node], Payload]]] = {
-    "two_pose": two_pose,
-    "two_pose_general": two_pose,
-    "n_angle": n_angle,
-    "n_angle_robust": n_angle_robust,
-    "pivot": pivot,
-    "pivot_robust": pivot_robust,
-    "uncertainty_budget": uncertainty_budget,
-}
-"""Methods by the names that the shared cases use."""

@@ -171,22 +171,10 @@ _WHOLE: Final[dict[str, Callable[[int, int], int]]] = {
     "+": operator.add,
     "-": operator.sub,
     "*": operator.mul,
-    "and": operator.and_,
-    "or": operator.or_,
-    "xor": operator.xor,
-    "mask": operator.and_,
+    **_BITS,
 }
 _OF_ANY_ROBOT: Final = frozenset({"insidebox", "insideplane"})
 """Functions that take All for the number of a robot."""
-
-_JUDGED: Final[dict[str, Callable[[int, int], bool]]] = {
-    "=": operator.eq,
-    "<>": operator.ne,
-    "<": operator.lt,
-    ">": operator.gt,
-    "<=": operator.le,
-    ">=": operator.ge,
-}
 
 
 class Scope(Protocol):
@@ -252,7 +240,7 @@ def _point_or_operation(label: str, expression: Binary, scope: Scope) -> Run:
 
 def _binary(sign: str, left: Run, right: Run) -> Run:
     """Apply an operator; two whole numbers, the usual case, take a short way to the same."""
-    whole, judged = _WHOLE.get(sign), _JUDGED.get(sign)
+    whole, judged = _WHOLE.get(sign), _COMPARE.get(sign)
     if judged is not None:
 
         def compare(t: Surroundings) -> Value:
@@ -298,14 +286,11 @@ def _named(name: str, arguments: tuple[Expression, ...] | None, scope: Scope) ->
         counts, plain = PLAIN_FUNCTIONS[name]
         check_count(name, given, counts)
         return lambda t: checked(plain([run(t) for run in inner]))
-    if name in MACHINE_FUNCTIONS:
-        counts, function = MACHINE_FUNCTIONS[name]
-        check_count(name, given, counts)
-        return lambda t: checked(function(t.session, [run(t) for run in inner]))
-    if name in STATE_FUNCTIONS:
-        counts, state = STATE_FUNCTIONS[name]
-        check_count(name, given, counts)
-        return lambda t: checked(state(t.session, [run(t) for run in inner]))
+    for functions in (MACHINE_FUNCTIONS, STATE_FUNCTIONS):
+        if name in functions:
+            counts, function = functions[name]
+            check_count(name, given, counts)
+            return lambda t: checked(function(t.session, [run(t) for run in inner]))
     return scope.unknown(name, arguments)
 
 

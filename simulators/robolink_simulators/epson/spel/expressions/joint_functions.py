@@ -71,7 +71,7 @@ def _joints(session: Session, arguments: Arguments) -> Joints:
 
 
 def _joint_point(machine: Machine, joints: Joints) -> Point:
-    return machine.point_at(machine.tip_at(joints))
+    return machine.robot.point_at(machine.robot.tip_at(joints))
 
 
 def of_angles(session: Session, arguments: Arguments) -> Point:
@@ -109,13 +109,13 @@ def _angles(session: Session, arguments: Arguments) -> Arguments:
 
 def joint_of_point(session: Session, arguments: Arguments) -> Value:
     """PAgl: one joint value of a point."""
-    return _item(session.machine.joints_for(as_point(arguments[0])), arguments[1])
+    return _item(session.machine.robot.joints_for(as_point(arguments[0])), arguments[1])
 
 
 def pulses_of_point(session: Session, arguments: Arguments) -> Value:
     """PPls: the pulses of one joint of a point."""
     machine = session.machine
-    return _item(pulses_of(machine, machine.joints_for(as_point(arguments[0]))), arguments[1])
+    return _item(pulses_of(machine, machine.robot.joints_for(as_point(arguments[0]))), arguments[1])
 
 
 def _item(values: Sequence[int | float], number: Value) -> Value:
@@ -141,7 +141,7 @@ def least_motion(
     if not 1 <= flag <= _HIGHEST_LJM:
         raise out_of_range(f"LJM flag {flag}")
     model, near = machine.model, machine.arm.joints if near is None else near
-    flange = flange_of(model, machine.pose_of(target), machine.offset)
+    flange = flange_of(model, machine.robot.pose_of(target), machine.offset)
     start = _standing(machine, target, near)
     other_wrist = (target.posture or PLAIN).wrist is not wrist_of(start)
     found, failure = list[Joints](), OutOfReach("No turn of the wrist reaches that point")
@@ -163,7 +163,7 @@ def _standing(machine: Machine, target: Point, near: Joints) -> Joints:
     """Return joints near those given, with the hand, elbow and wrist of the target."""
     posture, there = target.posture or PLAIN, posture_of(machine.model, near) or PLAIN
     same = (target.hand, posture.elbow) == (hand_of(machine.model, near), there.elbow)
-    return near if same else machine.solved(target)
+    return near if same else machine.robot.solved(target)
 
 
 def _inside(model: RobotModel, joints: Joints) -> list[Joints]:
@@ -194,10 +194,10 @@ def with_least_motion(session: Session, arguments: Arguments) -> Point:
     if not machine.model.six_axes:
         return target
     near = None
-    if len(arguments) > 1 and as_point(arguments[1]) != machine.here():
-        near = machine.joints_for(as_point(arguments[1]))
+    if len(arguments) > 1 and as_point(arguments[1]) != machine.robot.here():
+        near = machine.robot.joints_for(as_point(arguments[1]))
     flag = as_integer(arguments[2]) if len(arguments) > 2 else 1
-    return machine.flagged(target, least_motion(machine, target, flag, near))
+    return machine.robot.flagged(target, least_motion(machine, target, flag, near))
 
 
 def _hand(session: Session, arguments: Arguments) -> Value:

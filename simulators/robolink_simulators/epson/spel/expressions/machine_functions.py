@@ -91,7 +91,7 @@ def _word(bank: BitBank, arguments: Arguments) -> int:
 
 def _reachable(session: Session, arguments: Arguments) -> Value:
     try:
-        joints = session.machine.joints_for(as_point(arguments[0]))
+        joints = session.machine.robot.joints_for(as_point(arguments[0]))
     except OutOfReach:
         return False
     return not outside_limits_mm(session, forward(session.machine.model, joints))
@@ -319,7 +319,7 @@ def _on_pallet(session: Session, arguments: Arguments) -> Point:
 
 
 def _here(session: Session, _: Arguments) -> Point:
-    return session.machine.here()
+    return session.machine.robot.here()
 
 
 def _old_here(session: Session, arguments: Arguments) -> Point:
@@ -330,7 +330,7 @@ def _old_here(session: Session, arguments: Arguments) -> Point:
 
 def _real_position(session: Session, _: Arguments) -> Point:
     noise_mm = session.options.real_pos_noise_mm
-    return session.machine.point_at(session.machine.real_tip(session.rng, noise_mm))
+    return session.machine.robot.point_at(session.machine.robot.real_tip(session.rng, noise_mm))
 
 
 def _found_position(session: Session, _: Arguments) -> Point:

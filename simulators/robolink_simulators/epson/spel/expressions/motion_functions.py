@@ -112,7 +112,7 @@ def _time_to(session: Session, arguments: Sequence[Value]) -> Value:
     offset = machine.tools.get(tool)
     if offset is None and tool:
         raise SpelRefusal(RefusalKind.TOOL_UNDEFINED, f"Tool {tool} is not defined")
-    flange = flange_of(machine.model, machine.pose_of(target), offset)
+    flange = flange_of(machine.model, machine.robot.pose_of(target), offset)
     try:
         joints = inverse(machine.model, flange, target.hand, target.posture)
     except OutOfReach:
@@ -124,7 +124,7 @@ def _time_to(session: Session, arguments: Sequence[Value]) -> Value:
 def _short_enough(session: Session, arguments: Sequence[Value]) -> Value:
     """Tell whether PTPBoost counts for the motion from here to a point."""
     machine = session.machine
-    joints = machine.joints_for(as_point(arguments[0]))
+    joints = machine.robot.joints_for(as_point(arguments[0]))
     return is_short(go_leg(machine, machine.arm.joints, joints))
 
 
@@ -139,7 +139,7 @@ _AXES: Final = 3
 
 
 def _frames(session: Session, points: Sequence[Value]) -> tuple[Frame, Frame]:
-    one, other = (frame_of(session.machine.pose_of(as_point(point))) for point in points)
+    one, other = (frame_of(session.machine.robot.pose_of(as_point(point))) for point in points)
     return one, other
 
 
@@ -174,7 +174,7 @@ def turn_deg(machine: Machine, start: Pose, end: Pose) -> float:
 def _may_turn(session: Session, arguments: Sequence[Value]) -> Value:
     """ROTOK([reference, ]target): whether ROT may stand: the tool turns on the way (documented)."""
     machine = session.machine
-    *before, after = (machine.pose_of(as_point(argument)) for argument in arguments)
+    *before, after = (machine.robot.pose_of(as_point(argument)) for argument in arguments)
     start = before[0] if before else machine.tip()
     return turn_deg(machine, start, after) > LEAST_TURN_DEG
 

@@ -137,7 +137,7 @@ def evaluated(emitter: Emitter, arguments: Sequence[Expression], slot: int) -> O
                     finish(t, running.execution.error.number, "")
                     return
         except SpelRefusal as refusal:
-            finish(t, getattr(t.session.options.numbers, refusal.kind), "")
+            finish(t, getattr(t.session.options.numbers, refusal.kind.option), "")
             return
         finish(t, 0, said)
 

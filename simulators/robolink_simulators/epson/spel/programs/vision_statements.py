@@ -197,7 +197,7 @@ def _calibrating(t: SpelTask, name: str, poses: tuple[Pose, ...]) -> Iterator[Ta
         t.now_ns += _SETTLING_NS
         machine.advance(t.now_ns)
         pixels.append(vision.target())
-        x_mm, y_mm, *_ = machine.here().coordinates
+        x_mm, y_mm, *_ = machine.robot.here().coordinates
         places.append((x_mm, y_mm))
     vision.calibrate(name, pixels, places)
 

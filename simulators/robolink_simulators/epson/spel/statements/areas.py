@@ -17,7 +17,7 @@ from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.epson.spel.expressions.evaluator import Evaluator
 from robolink_simulators.epson.spel.expressions.print_format import CRLF
 from robolink_simulators.epson.spel.expressions.setting_functions import outside_limits_mm
-from robolink_simulators.epson.spel.expressions.values import Number, as_integer, out_of_range
+from robolink_simulators.epson.spel.expressions.values import Number, out_of_range
 from robolink_simulators.epson.spel.session import Session
 from robolink_simulators.epson.spel.statements.coordinate_systems import coordinates_of_points
 from robolink_simulators.epson.spel.tree import (
@@ -45,7 +45,7 @@ def _box(evaluator: Evaluator, command: KeywordStatement) -> str:
         robot = machine.numbered(int(values.pop(0)))
     shows_on = bool(values.pop()) if len(values) == _WITH_LOGIC else True
     if len(values) != _SPANS:
-        raise _miscounted(command)
+        raise command.miscounted()
     frame = 0 if local is None else evaluator.integer(local)
     robot.locals.get(frame)
     x, y, z = (_span(*map(float, values[at : at + 2])) for at in range(0, _SPANS, 2))
@@ -103,12 +103,12 @@ def _plane(evaluator: Evaluator, command: KeywordStatement) -> str:
         points.insert(0, evaluator.point_of(arguments.pop()))
     asked = [evaluator.integer(argument) for argument in arguments]
     if len(asked) > 2 or (not asked and points):
-        raise _miscounted(command)
+        raise command.miscounted()
     if not points:
         return _listing(machine, asked, _planes)
     robot = machine.numbered(asked[1]) if len(asked) > 1 else machine.robot
     if len(points) not in _POINTS:
-        raise _miscounted(command)
+        raise command.miscounted()
     places = [robot.locals.to_base(point).coordinates for point in points]
     place = places[0] if len(places) == 1 else coordinates_of_points(*places)
     robot.kept.areas.planes.set(asked[0], CheckPlane(place))
@@ -117,18 +117,11 @@ def _plane(evaluator: Evaluator, command: KeywordStatement) -> str:
 
 def _clear(evaluator: Evaluator, command: KeywordStatement) -> str:
     """BoxClr or PlaneClr n[, robot]."""
-    if not 1 <= len(command.arguments) <= 2:
-        raise _miscounted(command)
-    number, *robots = (as_integer(evaluator.value(a)) for a in command.arguments)
+    number, *robots = (evaluator.integer(a) for a in command.taking(1, 2))
     machine = evaluator.session.machine
     areas = (machine.numbered(robots[0]) if robots else machine.robot).kept.areas
     (areas.boxes if command.name == "boxclr" else areas.planes).clear(number)
     return ""
-
-
-def _miscounted(command: KeywordStatement) -> SpelRefusal:
-    text = f"{command.name} does not take {len(command.arguments)} arguments here"
-    return SpelRefusal(RefusalKind.SYNTAX, text)
 
 
 AREA_STATEMENTS: Final[dict[str, Callable[[Evaluator, KeywordStatement], str]]] = {

@@ -272,7 +272,7 @@ class Watch:
             machine.till_met = True
             machine.robot.guard.coming = None
             return machine.arm.brake(instant_ns)
-        machine.found = machine.here()
+        machine.found = machine.robot.here()
         return None
 
     @property

@@ -169,11 +169,6 @@ _LEVEL_DEG: Final = 1e-6
 _WORDS: Final = frozenset({"l", "r", "x", "y", "baseu"})
 
 
-def _miscounted(command: KeywordStatement) -> SpelRefusal:
-    text = f"{command.name} does not take {len(command.arguments)} arguments here"
-    return SpelRefusal(RefusalKind.SYNTAX, text)
-
-
 def _words(arguments: list[Expression]) -> set[str]:
     """Take the words off the end of the arguments: L, R, X, Y, BaseU."""
     words = set[str]()
@@ -187,7 +182,7 @@ def _local(evaluator: Evaluator, command: KeywordStatement) -> str:
     arguments = list(command.arguments)
     words = _words(arguments)
     if not arguments:
-        raise _miscounted(command)
+        raise command.miscounted()
     number, locals_ = evaluator.integer(arguments.pop(0)), evaluator.session.machine.locals
     if not arguments:
         # The layout is not shown anywhere: as ArmSet prints (assumed).
@@ -214,7 +209,7 @@ def _made(
             places = [machine.locals.to_base(evaluator.point_of(p)).coordinates for p in given]
             return Local(*coordinates_of_points(*places, along_x="y" not in words))
     if words or len(given) not in (1, 4, 6):
-        raise _miscounted(command)
+        raise command.miscounted()
     return Local(*point_argument(evaluator, tuple(given)).coordinates)
 
 
@@ -224,14 +219,9 @@ def _pair(evaluator: Evaluator, pair: PointPair) -> Pair:
 
 
 def _clear_local(evaluator: Evaluator, command: KeywordStatement) -> str:
-    evaluator.session.machine.locals.clear(_only(evaluator, command))
+    (number,) = command.taking(1)
+    evaluator.session.machine.locals.clear(evaluator.integer(number))
     return ""
-
-
-def _only(evaluator: Evaluator, command: KeywordStatement) -> int:
-    if len(command.arguments) != 1:
-        raise _miscounted(command)
-    return evaluator.integer(command.arguments[0])
 
 
 def _pallet(evaluator: Evaluator, command: KeywordStatement) -> str:
@@ -243,9 +233,7 @@ def _pallet(evaluator: Evaluator, command: KeywordStatement) -> str:
     if not command.arguments:
         sizes = ((n, pallet.columns, pallet.rows) for n, pallet in pallets.all().items())
         return "".join(f"Pallet {n}: {columns}, {rows}{CRLF}" for n, columns, rows in sizes)
-    if len(command.arguments) not in (6, 7):
-        raise _miscounted(command)
-    number, *corners, columns, rows = command.arguments
+    number, *corners, columns, rows = command.taking(6, 7)
     points = [evaluator.point_of(corner) for corner in corners]
     counts = (evaluator.integer(columns), evaluator.integer(rows))
     outside = command.name == "pallet outside"
@@ -254,7 +242,8 @@ def _pallet(evaluator: Evaluator, command: KeywordStatement) -> str:
 
 
 def _clear_pallet(evaluator: Evaluator, command: KeywordStatement) -> str:
-    evaluator.session.machine.pallets.clear(_only(evaluator, command))
+    (number,) = command.taking(1)
+    evaluator.session.machine.pallets.clear(evaluator.integer(number))
     return ""
 
 

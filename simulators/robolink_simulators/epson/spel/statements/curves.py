@@ -82,7 +82,7 @@ def arc(evaluator: Evaluator, motion: MotionStatement) -> Leg:
     """
     machine = evaluator.session.machine
     given = [worth_of(evaluator, target) for target in motion.targets]
-    points = [machine.pose_of(one) for one in given if isinstance(one, Point)]
+    points = [machine.robot.pose_of(one) for one in given if isinstance(one, Point)]
     numbers = [one for one in given if not isinstance(one, Point)]
     in_order = all(isinstance(one, Point) for one in given[: len(points)])
     start, space = machine.tip(), motion.verb == "arc3"
@@ -180,7 +180,7 @@ def passing(evaluator: Evaluator, motion: MotionStatement, points: Sequence[Poin
         Refusal: A point is out of reach.
     """
     machine = evaluator.session.machine
-    joints = [machine.arm.joints, *(machine.joints_for(point) for point in points)]
+    joints = [machine.arm.joints, *(machine.robot.joints_for(point) for point in points)]
     legs: list[Leg] = [go_leg(machine, a, b) for a, b in pairwise(joints)]
     ends_ns = [0, *accumulate(leg.duration_ns for leg in legs)]
     passed = 0
@@ -395,6 +395,6 @@ def _listed(
 
 
 def _place(machine: Machine, point: Point) -> Place:
-    pose = machine.pose_of(point)
+    pose = machine.robot.pose_of(point)
     require_same_posture(machine.model, machine.arm.joints, pose)
     return pose.coordinates() if machine.model.six_axes else pose.coordinates()[:4]

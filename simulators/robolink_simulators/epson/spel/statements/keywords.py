@@ -40,7 +40,7 @@ from robolink_simulators.epson.spel.statements.points import POINT_STATEMENTS, p
 from robolink_simulators.epson.spel.statements.ports_and_bits import BIT_STATEMENTS, set_latch
 from robolink_simulators.epson.spel.statements.robot import ROBOT_SETTINGS
 from robolink_simulators.epson.spel.statements.settings import SETTINGS, SYSTEM_COMMANDS, accel
-from robolink_simulators.epson.spel.tree import Expression, KeywordStatement, Name
+from robolink_simulators.epson.spel.tree import KeywordStatement, Name
 
 LATCH_SETTING_NS: Final = 40_000_000
 """How long SetLatch takes (documented, p. 721)."""
@@ -88,17 +88,8 @@ def run_command(evaluator: Evaluator, command: KeywordStatement) -> StatementOut
     return _HANDLERS[command.name](evaluator, command)
 
 
-def _expect(command: KeywordStatement, *counts: int) -> tuple[Expression, ...]:
-    if len(command.arguments) not in counts:
-        raise SpelRefusal(
-            RefusalKind.SYNTAX,
-            f"{command.name} does not take {len(command.arguments)} arguments here",
-        )
-    return command.arguments
-
-
 def _tlset(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
-    session, arguments = evaluator.session, _expect(command, 0, 1, 2, 5, 7)
+    session, arguments = evaluator.session, command.taking(0, 1, 2, 5, 7)
     tools = session.machine.tools
     if len(arguments) <= 1:
         shown = tools.defined()
@@ -121,7 +112,7 @@ def _wrapped(angle_deg: float) -> float:
 
 
 def _tlclr(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
-    (tool,) = _expect(command, 1)
+    (tool,) = command.taking(1)
     session = evaluator.session
     in_force = session.options.clear_selected_tool
     session.machine.tools.clear(evaluator.integer(tool), in_force=in_force)
@@ -129,7 +120,7 @@ def _tlclr(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
 
 
 def _tool(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
-    arguments, tools = _expect(command, 0, 1), evaluator.session.machine.tools
+    arguments, tools = command.taking(0, 1), evaluator.session.machine.tools
     if not arguments:
         # Bare Tool prints the number alone (seen: a client reads it as an integer).
         return StatementOutcome(number_text(tools.selected) + CRLF)
@@ -138,10 +129,10 @@ def _tool(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
 
 
 def _where(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
-    arguments, session = _expect(command, 0, 1), evaluator.session
+    arguments, session = command.taking(0, 1), evaluator.session
     machine = session.machine
     local = evaluator.integer(arguments[0]) if arguments else 0
-    here = machine.locals.convert(machine.here(), local)
+    here = machine.locals.convert(machine.robot.here(), local)
     joints = machine.arm.joints
     printed = PrintedWhere(here.coordinates, tuple(joints), tuple(pulses_of(machine, joints)))
     linear = machine.model.linear_joints
@@ -151,7 +142,7 @@ def _where(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
 
 def _switch(command: KeywordStatement, evaluator: Evaluator, *, on: bool) -> StatementOutcome:
     """Switch a bit, for a time if one stands there (documented, docs/reference/spel.md 8)."""
-    arguments, machine = _expect(command, 1, 2, 3), evaluator.session.machine
+    arguments, machine = command.taking(1, 2, 3), evaluator.session.machine
     bank = machine.memory if command.name.startswith("mem") else machine.outputs
     number = evaluator.integer(arguments[0])
     if len(arguments) == 1:
@@ -180,7 +171,7 @@ def _off(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
 
 def _port(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     """Set a byte or a word of outputs or memory bits."""
-    at, value = (evaluator.integer(argument) for argument in _expect(command, 2))
+    at, value = (evaluator.integer(argument) for argument in command.taking(2))
     machine = evaluator.session.machine
     bank = machine.memory if command.name.startswith("mem") else machine.outputs
     if not command.name.endswith("w"):
@@ -195,7 +186,7 @@ def _port(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
 
 def _wait_limit(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     memory = evaluator.session.memory
-    arguments = _expect(command, 0, 1)
+    arguments = command.taking(0, 1)
     if not arguments:
         return StatementOutcome(number_text(memory.wait_limit_s) + CRLF)
     memory.wait_limit_s = int(seconds_of(evaluator, arguments[0]))
@@ -204,7 +195,7 @@ def _wait_limit(evaluator: Evaluator, command: KeywordStatement) -> StatementOut
 
 def _keep_condition(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     """Set the condition that a bare Till, Find or Sense stands for, or show it."""
-    memory, arguments = evaluator.session.memory, _expect(command, 0, 1)
+    memory, arguments = evaluator.session.memory, command.taking(0, 1)
     if not arguments:
         return StatementOutcome(shown_condition(getattr(memory, command.name)) + CRLF)
     if not is_condition(arguments[0]):
@@ -218,7 +209,7 @@ def _pulse(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     model = evaluator.session.machine.model
     if len(command.arguments) in JOINT_COUNTS - {model.axes}:
         raise another_robot(model)
-    arguments = _expect(command, 0, model.axes)
+    arguments = command.taking(0, model.axes)
     if not arguments:
         return StatementOutcome(_line_of_where(evaluator, 2))
     machine = evaluator.session.machine
@@ -229,7 +220,7 @@ def _pulse(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
 
 def _home(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     """Go to the home position, the joints in the order of Hordr."""
-    _expect(command, 0)
+    command.taking(0)
     machine = evaluator.session.machine
     home = machine.settings.home_pulses
     if home is None:
@@ -252,7 +243,7 @@ def _partly(start: Joints, end: Joints, moved: int) -> Joints:
 
 def _turn_joint(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     """Move one joint by some degrees or mm (JTran), or by some pulses (PTran)."""
-    joint, by = _expect(command, 2)
+    joint, by = command.taking(2)
     machine, number = evaluator.session.machine, evaluator.integer(joint)
     if not 1 <= number <= machine.model.axes:
         raise out_of_range(f"There is no joint {number}")
@@ -267,20 +258,20 @@ def _turn_joint(evaluator: Evaluator, command: KeywordStatement) -> StatementOut
 
 def _clock(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     """Show the date, or the time of day; neither can be set (documented)."""
-    _expect(command, 0)
+    command.taking(0)
     layout = "%Y/%m/%d" if command.name == "date" else "%H:%M:%S"
     return StatementOutcome(clock_of(evaluator.session).strftime(layout) + CRLF)
 
 
 def _hours(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     """Show the hours of operation (documented); they begin with the simulation (assumed)."""
-    _expect(command, 0)
+    command.taking(0)
     return StatementOutcome(number_text(hours_of(evaluator.session)) + CRLF)
 
 
 def _await_position(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
     """Wait until the robot stands (WaitPos)."""
-    _expect(command, 0)
+    command.taking(0)
     arm = evaluator.session.machine.arm
     return StatementOutcome(duration_ns=max(0, (arm.next_change() or arm.now_ns) - arm.now_ns))
 
@@ -297,7 +288,7 @@ def _leg_of_joints(evaluator: Evaluator, joints: Joints) -> Leg:
 
 
 def _joint(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
-    _expect(command, 0)
+    command.taking(0)
     return StatementOutcome(_line_of_where(evaluator, 1))
 
 
@@ -316,7 +307,7 @@ def _reset(evaluator: Evaluator, command: KeywordStatement) -> StatementOutcome:
         session.condition.reset_error()
         session.machine.reset_motion_parameters()
         return StatementOutcome()
-    _expect(command, 0)
+    command.taking(0)
     session.machine.reset_motion_parameters()
     if session.options.reset_outputs_off:
         session.machine.clear_outputs()

@@ -84,7 +84,7 @@ def rest_of_way(machine: Machine, leg: Leg) -> Leg:
     end = leg.joints_at(leg.duration_ns)
     if isinstance(leg, JointLeg | ArchedLeg):
         return go_leg(machine, machine.arm.joints, end)
-    return line_leg(machine, machine.tip(), machine.tip_at(end), near=machine.arm.joints)
+    return line_leg(machine, machine.tip(), machine.robot.tip_at(end), near=machine.arm.joints)
 
 
 def _sync(evaluator: Evaluator, command: KeywordStatement) -> str:
@@ -149,7 +149,7 @@ def jump(
     if limz_mm is not None:
         local, base = machine.locals.get(point.local), machine.kept.base
         height_mm = limz_mm + local.z_mm + base.coordinates[2]
-    start, end = machine.arm.joints, machine.joints_for(point)
+    start, end = machine.arm.joints, machine.robot.joints_for(point)
     for joints, what in ((start, "The motion starts"), (end, "The target lies")):
         if joints.j3_mm > height_mm + machine.robot.drives.get("limzmargin")[0]:
             raise SpelRefusal(RefusalKind.ABOVE_LIMZ, f"{what} above LimZ")
@@ -172,7 +172,7 @@ def jump3(machine: Machine, points: tuple[Point, Point, Point]) -> list[Leg]:
     Raises:
         Refusal: A point is out of reach.
     """
-    depart, approach, end = (machine.pose_of(point) for point in points)
+    depart, approach, end = (machine.robot.pose_of(point) for point in points)
     there = _joints(machine, approach)
     first = line_leg(machine, machine.tip(), depart, near=machine.arm.joints)
     return [
@@ -260,13 +260,13 @@ def _planned(evaluator: Evaluator, motion: MotionStatement) -> list[Leg]:
         case verb:
             target = _TARGETS[verb](machine, points[0])
             if "ecp" in motion.options.words:
-                return [held_leg(machine, machine.pose_of(target))]
+                return [held_leg(machine, machine.robot.pose_of(target))]
             if verb.endswith("move"):
                 return [_line(machine, target, rot="rot" in motion.options.words)]
             ljm_holds = "ljm" in motion.options.words or machine.robot.drives.is_on("autoljm")
             least = machine.model.six_axes and (verb != "go" or ljm_holds)
             if not least:
-                return [go_leg(machine, machine.arm.joints, machine.joints_for(target))]
+                return [go_leg(machine, machine.arm.joints, machine.robot.joints_for(target))]
             ljm = motion.options.ljm
             flag = 1 if ljm is None else evaluator.integer(ljm)
             return [go_leg(machine, machine.arm.joints, least_motion(machine, target, flag))]
@@ -331,7 +331,7 @@ def _absolute(_: Machine, point: Point) -> Point:
 
 def _in_tool(machine: Machine, point: Point) -> Point:
     """Shift along the axes of the selected tool; the hand stays (documented)."""
-    tip = machine.here()
+    tip = machine.robot.here()
     if machine.model.six_axes:
         there = frame_at(tip.coordinates) @ frame_at(point.coordinates)
         return replace(tip, coordinates=coordinates_of_frame(there))
@@ -347,7 +347,7 @@ def _in_local(machine: Machine, point: Point) -> Point:
 
     That six axes turn about the axes of that local is assumed.
     """
-    here = machine.locals.convert(machine.here(), point.local)
+    here = machine.locals.convert(machine.robot.here(), point.local)
     if not machine.model.six_axes:
         return here.plus(point)
     seen, by = frame_at(here.coordinates), frame_at(point.coordinates)
@@ -373,7 +373,7 @@ def _line(machine: Machine, target: Point, *, rot: bool) -> Leg:
             turns over a distance (both documented, docs/reference/spel.md 7.1; their numbers are
             not).
     """
-    end, tip = machine.pose_of(target), machine.tip()
+    end, tip = machine.robot.pose_of(target), machine.tip()
     travels = math.dist(end.coordinates()[:3], tip.coordinates()[:3]) > _SAME_MM
     turns = turn_deg(machine, tip, end) > LEAST_TURN_DEG
     if turns and not travels and not rot:

@@ -6,7 +6,6 @@ Source: docs/reference/spel.md 5.
 from collections.abc import Callable
 from typing import Final
 
-from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 from robolink_simulators.epson.memory.points import HIGHEST_POINT, Point
 from robolink_simulators.epson.spel.expressions.evaluator import Evaluator
 from robolink_simulators.epson.spel.expressions.joint_functions import (
@@ -21,15 +20,6 @@ from robolink_simulators.epson.spel.expressions.values import as_number, as_text
 from robolink_simulators.epson.spel.tree import Expression, KeywordStatement
 
 
-def _expect(command: KeywordStatement, *counts: int) -> tuple[Expression, ...]:
-    if len(command.arguments) not in counts:
-        raise SpelRefusal(
-            RefusalKind.SYNTAX,
-            f"{command.name} does not take {len(command.arguments)} arguments here",
-        )
-    return command.arguments
-
-
 def point_argument(evaluator: Evaluator, arguments: tuple[Expression, ...]) -> Point:
     """Return a point, or the old list of bare numbers (docs/reference/spel.md 5.1).
 
@@ -42,14 +32,14 @@ def point_argument(evaluator: Evaluator, arguments: tuple[Expression, ...]) -> P
 
 
 def _here(evaluator: Evaluator, command: KeywordStatement) -> str:
-    (target,) = _expect(command, 1)
+    (target,) = command.taking(1)
     machine = evaluator.session.machine
-    machine.points.store(evaluator.stored_number(target), machine.here())
+    machine.points.store(evaluator.stored_number(target), machine.robot.here())
     return ""
 
 
 def _plist(evaluator: Evaluator, command: KeywordStatement) -> str:
-    arguments = _expect(command, 1) if command.open_ended else _expect(command, 0, 1, 2)
+    arguments = command.taking(1) if command.open_ended else command.taking(0, 1, 2)
     numbers = [evaluator.integer(argument) for argument in arguments]
     first = numbers[0] if numbers else 0
     last = first if len(numbers) == 1 else HIGHEST_POINT
@@ -64,13 +54,13 @@ def _plist(evaluator: Evaluator, command: KeywordStatement) -> str:
 
 
 def _pdel(evaluator: Evaluator, command: KeywordStatement) -> str:
-    numbers = [evaluator.integer(argument) for argument in _expect(command, 1, 2)]
+    numbers = [evaluator.integer(argument) for argument in command.taking(1, 2)]
     evaluator.session.machine.points.delete(numbers[0], numbers[-1])
     return ""
 
 
 def _label(evaluator: Evaluator, command: KeywordStatement) -> str:
-    number, name = _expect(command, 2)
+    number, name = command.taking(2)
     points = evaluator.session.machine.points
     points.label(evaluator.point_number(number), as_text(evaluator.value(name)))
     return ""
@@ -78,7 +68,7 @@ def _label(evaluator: Evaluator, command: KeywordStatement) -> str:
 
 def _describe(evaluator: Evaluator, command: KeywordStatement) -> str:
     """PDescription p, text."""
-    point, text = _expect(command, 2)
+    point, text = command.taking(2)
     number = evaluator.point_number(point)
     evaluator.session.machine.points.describe(number, as_text(evaluator.value(text)))
     return ""
@@ -89,7 +79,7 @@ def _flag(evaluator: Evaluator, command: KeywordStatement) -> str:
 
     That a number alone is shown is assumed; a sample is missing (docs/reference/spel.md 5.1).
     """
-    arguments, session = _expect(command, 0, 1, 2), evaluator.session
+    arguments, session = command.taking(0, 1, 2), evaluator.session
     singular = _SINGULAR_ANGLES.get(command.name)
     if singular is not None:
         require_singular_angle(session.machine.model, singular)
@@ -114,7 +104,7 @@ def _control_point(evaluator: Evaluator, command: KeywordStatement) -> str:
 
     Flags and local of the point do not count (assumed).
     """
-    arguments = _expect(command, 0, 1, 2, 5, 7)
+    arguments = command.taking(0, 1, 2, 5, 7)
     control_points = evaluator.session.machine.control_points
     if len(arguments) < 2:
         numbers = map(evaluator.integer, arguments) if arguments else control_points.numbers()
@@ -126,13 +116,13 @@ def _control_point(evaluator: Evaluator, command: KeywordStatement) -> str:
 
 
 def _no_control_point(evaluator: Evaluator, command: KeywordStatement) -> str:
-    (number,) = _expect(command, 1)
+    (number,) = command.taking(1)
     evaluator.session.machine.control_points.clear(evaluator.integer(number))
     return ""
 
 
 def _clear_points(evaluator: Evaluator, command: KeywordStatement) -> str:
-    _expect(command, 0)
+    command.taking(0)
     evaluator.session.machine.points.clear()
     return ""
 

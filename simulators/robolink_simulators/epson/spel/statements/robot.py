@@ -35,9 +35,11 @@ from robolink_simulators.epson.spel.statements.settings import (
     ARCH_SETTINGS,
     DRIVE_STATEMENTS,
     TORQUE_STATEMENTS,
+    Numbers,
+    Setting,
+    expect,
+    setting,
 )
-
-Numbers = Sequence[Number]
 
 
 def _one_a_joint(machine: Machine, word: str, values: Numbers) -> list[int]:
@@ -53,22 +55,17 @@ def _listed(values: Sequence[int]) -> str:
     return ", ".join(map(str, values)) + CRLF
 
 
-def _offsets(machine: Machine, values: Numbers) -> str:
+@setting(lambda machine: _listed(machine.kept.origins.offsets))
+def _offsets(machine: Machine, values: Numbers) -> None:
     """Set or list Hofs."""
-    if not values:
-        return _listed(machine.kept.origins.offsets)
     _require_rest(machine)
     machine.robot.offset_origins(_one_a_joint(machine, "Hofs", values))
-    return ""
 
 
-def _reference(machine: Machine, values: Numbers) -> str:
+@setting(lambda machine: _listed(machine.kept.origins.reference or (0,) * machine.model.axes))
+def _reference(machine: Machine, values: Numbers) -> None:
     """Set or list CalPls; what it lists before it was set is not documented: 0 (assumed)."""
-    origins = machine.kept.origins
-    if not values:
-        return _listed(origins.reference or (0,) * machine.model.axes)
-    origins.refer_to(_one_a_joint(machine, "CalPls", values))
-    return ""
+    machine.kept.origins.reference = tuple(_one_a_joint(machine, "CalPls", values))
 
 
 def _calibrate(machine: Machine, values: Numbers) -> str:
@@ -105,16 +102,18 @@ def _find_origins(_: Machine, values: Numbers) -> str:
     return ""
 
 
-def _order(machine: Machine, values: Numbers) -> str:
+@setting(lambda machine: _listed(machine.kept.origins.order))
+def _order(machine: Machine, values: Numbers) -> None:
     """Set or list MCordr."""
-    if not values:
-        return _listed(machine.kept.origins.order)
-    order = _one_a_joint(machine, "MCordr", values)
-    highest = (1 << machine.model.axes) - 1
+    machine.kept.origins.order = _steps(machine, "MCordr", values)
+
+
+def _steps(machine: Machine, word: str, values: Numbers) -> tuple[int, ...]:
+    """Return which joints move in each step, a bit for each joint."""
+    order, highest = _one_a_joint(machine, word, values), (1 << machine.model.axes) - 1
     if any(not 0 <= step <= highest for step in order):
         raise out_of_range(f"Allowed are 0 to {highest}")
-    machine.kept.origins.move_in(order)
-    return ""
+    return tuple(order)
 
 
 def _forget_home(machine: Machine, values: Numbers) -> str:
@@ -160,11 +159,10 @@ ORIGIN_STATEMENTS: Final[dict[str, Callable[[Machine, Numbers], str]]] = {
 _JRANGE_VALUES: Final = 3
 
 
-def _range(machine: Machine, values: Sequence[Number]) -> str:
+@setting(lambda machine: _listed(machine.kept.ranges.pulses()))
+def _range(machine: Machine, values: Numbers) -> None:
     """Hold every joint to low and high, or list those in force."""
     robot, axes = machine.robot, machine.model.axes
-    if not values:
-        return ", ".join(map(str, robot.kept.ranges.pulses())) + CRLF
     if len(values) in {2 * count for count in JOINT_COUNTS - {axes}}:
         raise another_robot(machine.model)
     if len(values) != 2 * axes:
@@ -178,7 +176,6 @@ def _range(machine: Machine, values: Sequence[Number]) -> str:
         robot.kept.ranges.restore(before)
         raise
     robot.hold_to_ranges()
-    return ""
 
 
 def _of_one_joint(machine: Machine, values: Sequence[Number]) -> str:
@@ -192,39 +189,15 @@ def _of_one_joint(machine: Machine, values: Sequence[Number]) -> str:
     return ""
 
 
-def _home_order(machine: Machine, values: Sequence[Number]) -> str:
+@setting(lambda machine: _listed(machine.settings.home_order))
+def _home_order(machine: Machine, values: Numbers) -> None:
     """Set which joints Home moves in each step, a bit for each joint, or list that."""
-    settings, axes = machine.settings, machine.model.axes
-    if not values:
-        return ", ".join(map(str, settings.home_order)) + CRLF
-    if len(values) in JOINT_COUNTS - {axes}:
-        raise another_robot(machine.model)
-    if len(values) != axes:
-        raise SpelRefusal(RefusalKind.SYNTAX, f"Hordr takes {axes} values")
-    if any(not 0 <= value < 1 << axes for value in values):
-        raise out_of_range(f"Allowed are 0 to {(1 << axes) - 1}")
-    settings.home_order = tuple(map(int, values))
-    return ""
+    machine.settings.home_order = _steps(machine, "Hordr", values)
 
-
-RANGE_STATEMENTS: Final[dict[str, Callable[[Machine, Sequence[Number]], str]]] = {
-    "range": _range,
-    "jrange": _of_one_joint,
-    "hordr": _home_order,
-}
-"""Keyword to what sets or shows it."""
-
-
-Setting = Callable[[Machine, Numbers], str]
 
 _HIGHEST_FINE: Final = 65535
 _HEAVIEST_KG: Final = 20.0
 """Assumed; per model in the reference, where too much is an error."""
-
-
-def _expect(values: Numbers, *counts: int) -> None:
-    if len(values) not in counts:
-        raise SpelRefusal(RefusalKind.SYNTAX, f"{len(values)} values, not one of {counts}")
 
 
 def _within(value: Number, low: float, high: float) -> float:
@@ -233,30 +206,24 @@ def _within(value: Number, low: float, high: float) -> float:
     return float(value)
 
 
-def _weight(machine: Machine, values: Numbers) -> str:
-    settings = machine.settings
-    _expect(values, 0, 1, 2)
-    if not values:
-        return f"{settings.weight_kg:.3f}, {settings.weight_at_mm:.3f}" + CRLF
-    settings.weight_kg = _within(values[0], 0, _HEAVIEST_KG)
-    if len(values) > 1:
-        settings.weight_at_mm = _within(values[1], 0, 10_000)
-    return ""
+def _load(load: str, most: float, distance: str) -> Setting:
+    """Return Weight or Inertia: a load, and how far out it is."""
 
+    def show(machine: Machine) -> str:
+        shown = (getattr(machine.settings, name) for name in (load, distance))
+        return ", ".join(f"{value:.3f}" for value in shown) + CRLF
 
-def _inertia(machine: Machine, values: Numbers) -> str:
-    settings = machine.settings
-    _expect(values, 0, 1, 2)
-    if not values:
-        return f"{settings.inertia_kg_m2:.3f}, {settings.eccentricity_mm:.3f}" + CRLF
-    settings.inertia_kg_m2 = _within(values[0], 0, 10)
-    if len(values) > 1:
-        settings.eccentricity_mm = _within(values[1], 0, 10_000)
-    return ""
+    @setting(show, 1, 2)
+    def put(machine: Machine, values: Numbers) -> None:
+        setattr(machine.settings, load, _within(values[0], 0, most))
+        if len(values) > 1:
+            setattr(machine.settings, distance, _within(values[1], 0, 10_000))
+
+    return put
 
 
 def _fine(machine: Machine, values: Numbers) -> str:
-    _expect(values, 0, machine.model.axes)
+    expect(values, 0, machine.model.axes)
     if not values:
         return ", ".join(map(str, machine.settings.fine_pulses)) + CRLF
     machine.settings.fine_pulses = tuple(int(_within(value, 0, _HIGHEST_FINE)) for value in values)
@@ -265,20 +232,14 @@ def _fine(machine: Machine, values: Numbers) -> str:
     return ""
 
 
-def _speed_factor(machine: Machine, values: Numbers) -> str:
-    _expect(values, 0, 1)
-    if not values:
-        return number_text(machine.settings.speed_factor) + CRLF
+@setting(lambda machine: number_text(machine.settings.speed_factor) + CRLF, 1)
+def _speed_factor(machine: Machine, values: Numbers) -> None:
     machine.settings.speed_factor = int(_within(values[0], 1, 100))
-    return ""
 
 
-def _continuous_path(machine: Machine, values: Numbers) -> str:
-    _expect(values, 0, 1)
-    if not values:
-        return number_text(int(machine.settings.continuous_path)) + CRLF
+@setting(lambda machine: number_text(int(machine.settings.continuous_path)) + CRLF, 1)
+def _continuous_path(machine: Machine, values: Numbers) -> None:
     machine.settings.continuous_path = bool(values[0])
-    return ""
 
 
 def _joints(machine: Machine, values: Numbers) -> set[int]:
@@ -309,7 +270,7 @@ def _lock(machine: Machine, values: Numbers) -> str:
 def _home_set(machine: Machine, values: Numbers) -> str:
     if len(values) in JOINT_COUNTS - {machine.model.axes}:
         raise another_robot(machine.model)
-    _expect(values, 0, machine.model.axes)
+    expect(values, 0, machine.model.axes)
     home = machine.settings.home_pulses
     if values:
         machine.settings.home_pulses = tuple(map(int, values))
@@ -319,19 +280,16 @@ def _home_set(machine: Machine, values: Numbers) -> str:
     return "".join(f"{a} {b}{CRLF}" for a, b in zip(home[::2], home[1::2], strict=True))
 
 
-def _control_point(machine: Machine, values: Numbers) -> str:
-    _expect(values, 0, 1)
-    if not values:
-        return number_text(machine.control_points.selected) + CRLF
+@setting(lambda machine: number_text(machine.control_points.selected) + CRLF, 1)
+def _control_point(machine: Machine, values: Numbers) -> None:
     machine.control_points.select(int(values[0]))
-    return ""
 
 
 def _avoid_singularity(machine: Machine, values: Numbers) -> str:
     """Set or show AvoidSingularity; 5 is for another kind of robot (documented: 4002)."""
     if machine.model.mechanism is Mechanism.SCARA:
         raise another_robot(machine.model)
-    _expect(values, 0, 1)
+    expect(values, 0, 1)
     if not values:
         return number_text(machine.settings.avoid_singularity) + CRLF
     machine.settings.avoid_singularity = int(_within(values[0], 0, 4))
@@ -345,7 +303,7 @@ def _surroundings(name: str, most: float) -> Setting:
     def choose(machine: Machine, values: Numbers) -> str:
         if machine.model.mechanism is Mechanism.SCARA:
             raise another_robot(machine.model)
-        _expect(values, 0, 1)
+        expect(values, 0, 1)
         settings = machine.settings
         if not values:
             return number_text(getattr(settings.surroundings, name)) + CRLF
@@ -361,11 +319,13 @@ ROBOT_SETTINGS: Final[dict[str, Setting]] = {
     **ARM_SETTINGS,
     **LIMIT_SETTINGS,
     **DRIVE_STATEMENTS,
-    **RANGE_STATEMENTS,
     **TORQUE_STATEMENTS,
     **ORIGIN_STATEMENTS,
-    "weight": _weight,
-    "inertia": _inertia,
+    "range": _range,
+    "jrange": _of_one_joint,
+    "hordr": _home_order,
+    "weight": _load("weight_kg", _HEAVIEST_KG, "weight_at_mm"),
+    "inertia": _load("inertia_kg_m2", 10, "eccentricity_mm"),
     "fine": _fine,
     "speedfactor": _speed_factor,
     "cp": _continuous_path,

@@ -60,9 +60,34 @@ HIGHEST_ACCEL_R: Final = 5000.0
 """AccelR in degrees/s2 (docs/reference/spel.md 7.2)."""
 
 
-def _expect(values: Numbers, *counts: int) -> None:
+def expect(values: Numbers, *counts: int) -> None:
+    """Refuse another number of values."""
     if len(values) not in counts:
         raise SpelRefusal(RefusalKind.SYNTAX, f"{len(values)} values, not one of {counts}")
+
+
+def setting(
+    show: Callable[[Machine], str], *counts: int
+) -> Callable[[Callable[[Machine, Numbers], None]], Setting]:
+    """Make the statement of what sets a setting: without values it shows it.
+
+    Args:
+        show: What it shows.
+        counts: How many values set it; none if what sets it counts them itself.
+    """
+
+    def statement(put: Callable[[Machine, Numbers], None]) -> Setting:
+        def choose(machine: Machine, values: Numbers) -> str:
+            if counts:
+                expect(values, 0, *counts)
+            if not values:
+                return show(machine)
+            put(machine, values)
+            return ""
+
+        return choose
+
+    return statement
 
 
 def _checked(values: Numbers, low: float, high: float) -> list[float]:
@@ -88,27 +113,21 @@ def _rows(machine: Machine, values: Numbers) -> str:
     return "".join(line + CRLF for line in lines)
 
 
-def _speed(machine: Machine, values: Numbers) -> str:
-    _expect(values, 0, 1, 3)
-    if not values:
-        return _rows(machine, machine.parameters.speed)
+@setting(lambda machine: _rows(machine, machine.parameters.speed), 1, 3)
+def _speed(machine: Machine, values: Numbers) -> None:
     travel, depart, approach = map(int, _filled(_checked(values, 1, 100), 3))
     machine.parameters.speed = (travel, depart, approach)
-    return ""
 
 
-def _speed_s(machine: Machine, values: Numbers) -> str:
-    _expect(values, 0, 1, 3)
-    if not values:
-        return _rows(machine, machine.parameters.speed_s)
+@setting(lambda machine: _rows(machine, machine.parameters.speed_s), 1, 3)
+def _speed_s(machine: Machine, values: Numbers) -> None:
     travel, depart, approach = _filled(_checked(values, 0.1, HIGHEST_SPEED_S), 3)
     machine.parameters.speed_s = (travel, depart, approach)
-    return ""
 
 
 def accel(machine: Machine, values: Numbers, highest: int) -> str:
     """Set or show Accel; the highest value is AccelMax's."""
-    _expect(values, 0, 2, 6)
+    expect(values, 0, 2, 6)
     if not values:
         return _rows(machine, machine.parameters.accel)
     a, b, c, d, e, f = map(int, _filled(_checked(values, 1, highest), 6))
@@ -116,40 +135,31 @@ def accel(machine: Machine, values: Numbers, highest: int) -> str:
     return ""
 
 
-def _accel_s(machine: Machine, values: Numbers) -> str:
-    _expect(values, 0, 1, 2, 6)
-    if not values:
-        return _rows(machine, machine.parameters.accel_s)
+@setting(lambda machine: _rows(machine, machine.parameters.accel_s), 1, 2, 6)
+def _accel_s(machine: Machine, values: Numbers) -> None:
     a, b, c, d, e, f = _filled(_checked(values, 0.1, HIGHEST_ACCEL_S), 6)
     machine.parameters.accel_s = (a, b, c, d, e, f)
-    return ""
 
 
 def _shown(value: Number) -> str:
     return number_text(value) + CRLF
 
 
-def _speed_r(machine: Machine, values: Numbers) -> str:
-    _expect(values, 0, 1)
-    if not values:
-        return _shown(machine.parameters.speed_r)
+@setting(lambda machine: _shown(machine.parameters.speed_r), 1)
+def _speed_r(machine: Machine, values: Numbers) -> None:
     (machine.parameters.speed_r,) = _checked(values, 0.1, HIGHEST_SPEED_R)
-    return ""
 
 
-def _accel_r(machine: Machine, values: Numbers) -> str:
-    _expect(values, 0, 1, 2)
-    if not values:
-        return _shown(machine.parameters.accel_r)
+@setting(lambda machine: _shown(machine.parameters.accel_r), 1, 2)
+def _accel_r(machine: Machine, values: Numbers) -> None:
     # One value rules both ends of a turn here; the slower of two is taken.
     machine.parameters.accel_r = min(_checked(values, 0.1, HIGHEST_ACCEL_R))
-    return ""
 
 
 def _limz(machine: Machine, values: Numbers) -> str:
     if machine.model.six_axes:
         raise SpelRefusal(RefusalKind.OTHER_ROBOT, "A six-axis robot has no LimZ")
-    _expect(values, 0, 1)
+    expect(values, 0, 1)
     if not values:
         return _shown(machine.parameters.limz_mm)
     low, high = machine.model.ranges[2]
@@ -157,28 +167,19 @@ def _limz(machine: Machine, values: Numbers) -> str:
     return ""
 
 
-def _motor(machine: Machine, values: Numbers) -> str:
-    _expect(values, 0, 1)
-    if not values:
-        return _shown(int(machine.motors_on))
+@setting(lambda machine: _shown(int(machine.motors_on)), 1)
+def _motor(machine: Machine, values: Numbers) -> None:
     machine.switch_motors(bool(values[0]))
-    return ""
 
 
-def _power(machine: Machine, values: Numbers) -> str:
-    _expect(values, 0, 1)
-    if not values:
-        return _shown(int(machine.power_high))
+@setting(lambda machine: _shown(int(machine.power_high)), 1)
+def _power(machine: Machine, values: Numbers) -> None:
     machine.power_high = bool(values[0])
-    return ""
 
 
-def _robot(machine: Machine, values: Numbers) -> str:
-    _expect(values, 0, 1)
-    if not values:
-        return _shown(machine.robot_number)
+@setting(lambda machine: _shown(machine.robot_number), 1)
+def _robot(machine: Machine, values: Numbers) -> None:
     machine.choose(int(values[0]))
-    return ""
 
 
 SETTINGS: Final[dict[str, Setting]] = {

@@ -178,7 +178,9 @@ class TaskSteps:
         if isinstance(refusal, RaisedError):
             self._fail(task, refusal.number, refusal.text)
         else:
-            self._fail(task, getattr(self._session.options.numbers, refusal.kind), refusal.text)
+            self._fail(
+                task, getattr(self._session.options.numbers, refusal.kind.option), refusal.text
+            )
 
     def _fail(self, task: SpelTask, number: int, text: str, robot: int = 0) -> None:
         task.waiting = None

@@ -1,1 +1,0 @@
-"""sim run: many simulated controllers of all kinds, from a file."""

@@ -1,0 +1,51 @@
+"""The desk at which the person of this process sits, while a wizard shows it."""
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from typing import Any, Protocol
+
+from robolink.runner import Question
+
+
+class AskingDesk(Protocol):
+    """Where a wizard's questions arrive; a :class:`~robolink.runner.GuidedOperator`.
+
+    Attributes:
+        glance: Looks at the controller while a person is asked.
+    """
+
+    glance: Callable[[], Any]
+
+    def tell(self, text: str) -> None:
+        """Show something that needs no answer."""
+
+    def regard(self, subject: object) -> None:
+        """Take what comes next to be about ``subject``."""
+
+    def ask(self, question: str, kind: Question) -> None:
+        """Ask."""
+
+    def following(self, look: Callable[[], Any]) -> AbstractContextManager[None]:
+        """Look at the controller while it moves, for the block."""
+
+    def poll(self, wait_s: float) -> str | None:
+        """Return the answer, ``None`` if none came within ``wait_s``."""
+
+
+_desk: AskingDesk | None = None
+
+
+def current_desk() -> AskingDesk | None:
+    """Return the desk, ``None`` where questions are plain lines."""
+    return _desk
+
+
+@contextmanager
+def sitting_at(desk: AskingDesk) -> Iterator[None]:
+    """Have every question of this process asked at ``desk``, for the block."""
+    global _desk  # noqa: PLW0603 - a process has one terminal, and one person at it
+    before, _desk = _desk, desk
+    try:
+        yield
+    finally:
+        _desk = before

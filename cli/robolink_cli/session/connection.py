@@ -1,0 +1,274 @@
+"""One controller for one command: connected, what others left said, closed in order."""
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import click
+
+import robolink
+from robolink.errors import ConfigError, ControllerError, OutcomeUnknownError, RobolinkError
+from robolink.interrupts import EndedBy, ended_by
+from robolink.messages import joined, tr
+from robolink.standing import UNTOUCHED, Standing, note_standing, standing_after
+from robolink_cli.access.cell import require_expected_robot
+from robolink_cli.access.record import recording
+from robolink_cli.access.warnings import note_at_work, note_unsettled
+from robolink_cli.console.exit_codes import is_cut_off
+from robolink_cli.console.render import json_is_on, note
+from robolink_cli.prompts.questions import WATCHED, asked, on_terminal
+from robolink_cli.session.context import CliContext
+from robolink_cli.session.motion_consent import CELL, REACHED
+from robolink_cli.session.operator_identity import signature_of
+from robolink_cli.session.stop_listener import (
+    listening_for_stop,
+    remember_address,
+    watched_at_desk,
+)
+
+if TYPE_CHECKING:
+    from robolink.config import Expected
+    from robolink.model import ChangeLimits, Controller, Marker, Secret
+
+
+@contextmanager
+def open_controller(
+    context: CliContext,
+    *,
+    quiet: bool = False,
+    looks: bool = False,
+    calms: bool = False,
+    changes: bool = False,
+    leaves: bool = False,
+    usual_change_mm: float | None = None,
+    job: str = "",
+) -> "Iterator[Controller]":
+    """Connect to the controller and, unless ``quiet``, say what was left unfinished there.
+
+    Args:
+        context: What the command was told.
+        quiet: Whether the command itself deals with what was left unfinished.
+        looks: Whether it only looks, so that no file keeps it back: without a journal if it
+            must, and whatever robot the cell file names.
+        calms: Whether it calms, so that it goes on as one that looks, and asks nothing.
+        changes: Whether it may change something, so that a badge is asked for where the cell
+            names people.
+        leaves: Whether what it begins is settled by a later connection of the same command, so
+            that nothing is said about it where all went well.
+        usual_change_mm: How far a write may take a tip where the cell file does not say it; by
+            default what is usual.
+        job: What is to be done, where a person would look, measure or answer for it before
+            anything is sent: refused at once while something earlier is unsettled.
+
+    Raises:
+        ConfigError: No controller is named, the URL or password file is wrong, or the robot is
+            not the cell's.
+        ConnectError: It is not reached.
+        LoginRefusedError: Wrong or missing password.
+        OutcomeUnknownError: Something earlier is unsettled, and there is a ``job``.
+        StoppedError: A stop came, at the end or before.
+    """
+    url = context.require_url()
+    unhindered = looks or calms
+    if context.doubt is not None and not unhindered:
+        raise context.doubt
+    password = password_of(context)
+    signature = replace(
+        signature_of(context.operator, context.expected, changes=changes),
+        nozzle=context.nozzle,
+        lot=context.lot,
+        station=context.station,
+    )
+    with (
+        _only_what_was_touched(always=changes),
+        recording(context.record, url.partition("?")[0]) as trace,
+        robolink.connect(
+            url,
+            password=password,
+            timeout_s=context.timeout_s,
+            remote_timeout_s=context.remote_timeout_s,
+            trace=trace,
+            signature=signature,
+            limits=_limits_of(context, usual_change_mm),
+            glance=unhindered,
+            tell=note,
+        ) as controller,
+        controller.latch.ending(tr("The command")),
+    ):
+        click.get_current_context().meta.update(
+            {WATCHED: controller, REACHED: url, CELL: context.expected}
+        )
+        remember_address(context)
+        with (
+            watched_at_desk(controller),
+            listening_for_stop(controller, context, looks=unhindered),
+            _saying_what_is_left(
+                controller, context, quiet=quiet, looks=looks, calms=calms, leaves=leaves
+            ),
+        ):
+            if job:
+                controller.require_settled(job)
+            yield controller
+    if not looks:
+        # A stop that came while the connection was closed: nobody may take this for a success.
+        with controller.ledger.telling():
+            controller.latch.require_open(tr("The command"))
+
+
+def _limits_of(context: CliContext, usual_change_mm: float | None) -> "ChangeLimits | None":
+    """Return how far a write may take a tip, by the cell file; a URL alone says nothing."""
+    if context.cell is None:
+        return None
+    if usual_change_mm is None:
+        return context.cell.limits()
+    return context.cell.limits(usual_mm=usual_change_mm)
+
+
+@contextmanager
+def _saying_what_is_left(
+    controller: "Controller",
+    context: CliContext,
+    *,
+    quiet: bool,
+    looks: bool,
+    calms: bool,
+    leaves: bool,
+) -> Iterator[None]:
+    """Say before the work what others left on the controller, and after it what this left.
+
+    Raises:
+        RobolinkError: The journal or the robot is not as the command needs it.
+    """
+    named = context.expected.cell if context.expected else context.require_url()
+    lenient = looks or calms
+    trouble = controller.outcomes.trouble
+    if trouble is not None and not lenient:
+        raise trouble
+    found = _open_markers(controller, lenient=lenient)
+    for remark in controller.outcomes.remarks:
+        note(remark)
+    beside = not quiet and note_at_work(controller.outcomes, named)
+    if not (quiet or beside):
+        note_unsettled(controller, found, named)
+    if context.expected and not calms:
+        _check_robot(controller, context.expected, looks=looks)
+    if found and not (quiet or calms or beside):
+        _offer_to_restore(controller, found)
+    told = True
+    try:
+        yield
+        told = not leaves
+    except KeyboardInterrupt:
+        # The last line says which tool is selected: as it is now, not as it was once.
+        with suppress(RobolinkError):
+            controller.tools.selected()
+        _record_for_nobody(controller)
+        raise
+    finally:
+        left = _open_markers(controller, lenient=lenient)
+        known = {marker.operation for marker in (found if told else left)}
+        note_unsettled(controller, [m for m in left if m.operation not in known], named)
+        if trouble is not None:
+            # After the work: nothing that the journal has to say stands before it.
+            note(joined(" ", (trouble.what, _unrecorded())))
+
+
+def _record_for_nobody(controller: "Controller") -> None:
+    """Put what stands on record where a command was ended because nobody reads it any more."""
+    from robolink.model import EntryKind, NewEntry, describe_standing
+
+    by, standing = ended_by(), controller.ledger.standing()
+    if by not in (EndedBy.HUNG_UP, EndedBy.OUTPUT_CLOSED) or standing.untouched:
+        return
+    details = {"ended_by": str(by)}
+    entry = NewEntry(EntryKind.DECISION, verdict=describe_standing(standing), details=details)
+    # What cannot be recorded is said, and is no other end.
+    with suppress(ConfigError, OutcomeUnknownError):
+        controller.outcomes.append(entry)
+
+
+@contextmanager
+def _only_what_was_touched(*, always: bool) -> Iterator[None]:
+    """Let an error tell what stands on the controller, if the command might have changed it.
+
+    Whoever ended a command is told in any case; but not that nobody reads what it only showed.
+    """
+    try:
+        yield
+    except BaseException as error:
+        ended = isinstance(error, KeyboardInterrupt)
+        if ended and standing_after(error) is UNTOUCHED:
+            # It came before the controller was reached, or at the logout.
+            watched = click.get_current_context().meta.get(WATCHED)
+            note_standing(error, watched.ledger.standing() if watched else Standing())
+        told = always or (ended and not is_cut_off(error))
+        if not told and standing_after(error).untouched:
+            note_standing(error, UNTOUCHED)
+        raise
+
+
+def password_of(context: CliContext) -> "Secret | None":
+    """Find the controller's password in the places that may hold it.
+
+    Raises:
+        ConfigError: The password file is wrong.
+    """
+    from robolink.transport import parse_url
+    from robolink_cli.access.password import find_password
+
+    settings = context.cell.settings if context.cell else context.reach
+    return find_password(
+        parse_url(context.require_url()).identity,
+        password_file=context.password_file,
+        cell_file=settings.password_file if settings else None,
+        cell_variable=settings.password_env if settings else None,
+    )
+
+
+def _check_robot(controller: "Controller", cell: "Expected", *, looks: bool) -> None:
+    try:
+        require_expected_robot(controller, cell)
+    except ConfigError as error:
+        if not looks:
+            raise
+        note(str(error))
+
+
+def _unrecorded() -> str:
+    return tr(
+        "So unfinished jobs may not show, and nothing can be changed until the journal is repaired."
+    )
+
+
+def _open_markers(controller: "Controller", *, lenient: bool) -> "tuple[Marker, ...]":
+    """Return what is unsettled; a journal that broke meanwhile keeps nobody from looking."""
+    from robolink.errors import JournalError
+
+    try:
+        return controller.outcomes.open_markers()
+    except JournalError as error:
+        if not lenient:
+            raise
+        note(error.what)
+        return ()
+
+
+def _offer_to_restore(controller: "Controller", markers: "Iterable[Marker]") -> None:
+    """Ask whether a tool that an unfinished procedure left selected is to be changed back.
+
+    That comes before anything else is done. A no changes nothing and the command goes on. Nothing
+    is asked of a script, nor where the controller is not in a state to be told anything.
+    """
+    if json_is_on() or not on_terminal():
+        return
+    from robolink.model import MarkerKind
+
+    for marker in markers:
+        if marker.kind is not MarkerKind.SELECTION:
+            continue
+        with suppress(ControllerError):
+            finding = controller.resolver.examine(marker)
+            if finding.action and asked(tr("{action}. Do this now?", action=finding.action)):
+                controller.resolver.settle(finding)
+                note(tr("Done, and read back."))

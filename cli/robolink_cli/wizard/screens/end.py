@@ -1,0 +1,201 @@
+"""Screens (h) and (i): what stands at the end, shown as the last screen and kept as lines."""
+
+from collections.abc import Iterator
+
+from robolink.calibration import (
+    proved_statements,
+    turn_test_headline,
+    turn_test_sentences,
+)
+from robolink.calibration_run import ChangeReport, ToolReport, next_steps
+from robolink.errors import (
+    CalibrationError,
+    DeclinedError,
+    OutcomeUnknownError,
+    RobolinkError,
+    VerifyError,
+)
+from robolink.messages import joined, tr
+from robolink.model import PersonRole, describe_offset, describe_standing
+from robolink.standing import UNTOUCHED, standing_after
+from robolink_cli.access.warnings import way_back
+from robolink_cli.console.exit_codes import next_of, was_refused
+from robolink_cli.console.render import next_lines
+from robolink_cli.wizard.happenings import WizardCommand
+from robolink_cli.wizard.screens.layout import Screen, title_row
+from robolink_cli.wizard.screens.touch import touch_title
+from robolink_cli.wizard.state import CheckSubject, ChoiceSubject, LastScreen, WizardState
+
+
+def done_lines(state: WizardState, report: ChangeReport) -> list[str]:
+    """Return what was reached."""
+    needle = state.header.needle
+    lines = [line for one in report.tools for line in _tool_lines(one, needle)]
+    record = tr(
+        'Record: change {id}. To read it: robolink -c "{cell}" journal report {id}',
+        cell=state.header.cell,
+        id=report.change[:8],
+    )
+    lines.append(record)
+    if any(one.receipt is not None for one in report.tools):
+        if report.role != PersonRole.OPERATOR:
+            back = tr(
+                'To take it back: robolink -c "{cell}" undo {id}',
+                cell=state.header.cell,
+                id=report.change[:8],
+            )
+            lines.append(back)
+        lines.append(tr("Run the first part slowly and look at it."))
+    for one in report.tools:
+        if one.receipt is not None:
+            steps = next_steps(one.proposal.result, one.proposal.tool)
+            lines += next_lines(steps, state.header.cell)
+    return lines
+
+
+def _tool_lines(report: ToolReport, needle: str) -> list[str]:
+    proposal, proof = report.proposal, report.verification
+    if report.receipt is None:
+        return [tr("Tool {t} is measured. Nothing was written.", t=proposal.tool)]
+    value = describe_offset(proposal.offset)
+    tested = proof is not None and (proof.judgement is None or proof.judgement.good)
+    if proof is None:
+        said = tr("Tool {t} is measured and written, not tested.", t=proposal.tool)
+    elif not tested:
+        said = tr(
+            "Tool {t} is measured and written; its turn test leaves a doubt.", t=proposal.tool
+        )
+    elif needle:
+        said = tr(
+            "Needle {id} on tool {t} is measured, written and tested.", id=needle, t=proposal.tool
+        )
+    else:
+        said = tr("Tool {t} is measured, written and tested.", t=proposal.tool)
+    lines = [said, tr("On the controller: tool {t} = {value}", t=proposal.tool, value=value)]
+    lines += proved_statements(proposal.result, proof)
+    if proof is not None:
+        lines.append(turn_test_headline(proof))
+        lines += turn_test_sentences(proof.judgement, proposal.result)
+    return lines
+
+
+def ended_of(state: WizardState, error: BaseException | None, at_s: float) -> LastScreen | None:
+    """Return the last screen; ``None`` for an end that is told by lines alone.
+
+    Args:
+        state: The last one.
+        error: What ended the work, ``None`` where it was carried out.
+        at_s: When.
+    """
+    if error is None:
+        if state.report is None:
+            return None
+        lines = done_lines(state, state.report)
+        done = tr("DONE")
+        return LastScreen(True, tuple(lines), (_head(state, done), *lines), at_s, done)
+    begun = state.subject is not None
+    left = isinstance(error, DeclinedError) and isinstance(
+        state.subject, (ChoiceSubject, CheckSubject)
+    )
+    if not begun or left or state.free_jog is not None or not isinstance(error, RobolinkError):
+        return None
+    headed = _headed(state, error)
+    kept = (_head(state, headed), *_where(state), *_next(state, error))
+    said = tuple(stopped_lines(state, error))
+    return LastScreen(False, said, kept, at_s, headed, again=not _is_blocked(error))
+
+
+def stopped_lines(state: WizardState, error: RobolinkError) -> list[str]:
+    """Return why it ended, where, what stands on the controller, and the one command to go on."""
+    standing = standing_after(error)
+    blocked = _is_blocked(error)
+    stands = "" if standing is UNTOUCHED else describe_standing(standing, settles=not blocked)
+    # What stands says best that nothing was written.
+    remedy = "" if error.remedy in stands else error.remedy
+    typed = state.header.command.split()
+    texts = (next_of(one, error, standing, typed) for one in (error.what, remedy, stands))
+    said = [one for one in texts if one]
+    return [*_where(state), *said, "", *_next(state, error)]
+
+
+def kept_lines(state: WizardState, error: BaseException | None) -> list[str]:
+    """Return what stays on the terminal when no last screen was shown."""
+    if error is None:
+        return []
+    if state.subject is None:
+        return []
+    return [_head(state, _headed(state, error)), *_where(state)]
+
+
+def ended_screen(state: WizardState, ended: LastScreen) -> Screen:
+    """Return the last screen."""
+    if ended.done:
+        keys: tuple[tuple[str, str], ...] = (("5", tr("Finish")), *_offered(state))
+    else:
+        again = (("5", tr("Start again")),) if ended.again else ()
+        keys = (*again, ("0", tr("Leave")))
+    return Screen(title_row(state, ended.headed), ended.lines, keys, message=state.message)
+
+
+def _offered(state: WizardState) -> Iterator[tuple[str, str]]:
+    if WizardCommand.SHOW_REPORT in state.offers:
+        yield ".", tr("Show the report")
+    if WizardCommand.NEXT_TOOL in state.offers:
+        yield "+", tr("Next tool")
+
+
+def told_end(state: WizardState) -> str:
+    """Return what can be typed at the end of a job that was carried out."""
+    words = []
+    if WizardCommand.SHOW_REPORT in state.offers:
+        words.append(tr("report = show the report."))
+    if WizardCommand.NEXT_TOOL in state.offers:
+        words.append(tr("next = next tool."))
+    return joined(" ", (*words, tr("finish = leave.")))
+
+
+def _head(state: WizardState, ended: str) -> str:
+    return f"{state.header.cell}   {state.header.job}   {ended}"
+
+
+def _headed(state: WizardState, error: BaseException) -> str:
+    """Return whether a job was stopped, or was refused before anything happened."""
+    measured = state.touch is not None or isinstance(error, (CalibrationError, VerifyError))
+    if was_refused(error) and not measured and standing_after(error).untouched:
+        return tr("NOT STARTED")
+    return tr("STOPPED")
+
+
+def _is_blocked(error: RobolinkError) -> bool:
+    """Tell whether the robot takes nothing but ``recover``, and what comes before it."""
+    return standing_after(error).left_open or isinstance(error, OutcomeUnknownError)
+
+
+def _where(state: WizardState) -> list[str]:
+    touch = state.touch
+    if touch is None or not touch.number:
+        return []
+    return [tr("It ended here: {touch}.", touch=touch_title(touch))]
+
+
+def _next(state: WizardState, error: RobolinkError) -> list[str]:
+    """Return what to go on with, where it is known; a blocked robot takes nothing else.
+
+    What was refused would be refused again, so it is proposed only where a person, or what was
+    measured, ended it.
+    """
+    standing = standing_after(error)
+    if _is_blocked(error):
+        back = way_back(state.header.cell, reset_first=standing.reset_first)
+        line = tr("Next: {command}", command=back)
+        return [next_of(line, error, standing, state.header.command.split())]
+    if isinstance(error, VerifyError) and error.next_commands:
+        return [
+            tr("Next: {command}", command=f'robolink -c "{state.header.cell}" {command}')
+            for command in error.next_commands
+        ]
+    measured = isinstance(error, (CalibrationError, VerifyError)) and state.touch is not None
+    command = state.header.command
+    if not command or (was_refused(error) and not measured):
+        return []
+    return [tr("Next: {command}", command=command)]

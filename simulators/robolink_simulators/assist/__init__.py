@@ -1,1 +1,0 @@
-"""The assist port: the hands, eyes and truth of a served simulator."""

@@ -1,1 +1,0 @@
-"""The commands of the mailbox program, by what they are about."""

@@ -1,1 +1,0 @@
-"""Movements of a simulated axis group: planned, queued, jogged, followed in time."""

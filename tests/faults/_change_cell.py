@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 from queue import SimpleQueue
-from typing import Any, ClassVar, Literal, TypeVar
+from typing import Any, ClassVar, Final, Literal, TypeVar, get_args
 
 import pytest
 from robolink_cli import main
@@ -32,8 +32,9 @@ from robolink.transaction import changed_since
 from tests._patience import PATIENCE_S
 from tests.faults._change_process import OLD, PROGRAMS, CommitStep, ProgramProcess, acknowledged
 from tests.faults._recipe_instants import Instants, exchanges_and_commits
-from tests.faults._steps import MOMENTS, Moment
 
+Moment = Literal["before it is carried out", "before its answer leaves"]
+MOMENTS: Final[tuple[Moment, Moment]] = get_args(Moment)
 EpsonWire = Literal["sim", "tcp", "serial"]
 
 _names = count()

@@ -195,7 +195,7 @@ class RecipeCell(ABC):
         ):
             patch.setattr(sys, "stdin", (_Terminal if asks else io.StringIO)())
             # A run is taken again, up to each of its instants: the same one.
-            patch.setattr("robolink.procedures.pin_touches.fresh_seed", lambda: 7)
+            patch.setattr("robolink.procedures.witnessed_touches.fresh_seed", lambda: 7)
             patch.setattr(self.clock, "on_wait", lambda: seen.pass_by("wait"))
             code = main.run(["-c", self.url, *words])
         return Ended(code, out.getvalue(), err.getvalue())

@@ -13,14 +13,14 @@ from robolink_simulators.control.assist import open_eyes
 
 from robolink.model import EntryKind, MarkerKind
 from tests.faults import _recipe_instants
-from tests.faults._recipe_instants import Instants
-from tests.faults._what_stands import COMMANDS, Disturbed, commits
+from tests.faults._recipe_instants import EVERYTHING, Instants
+from tests.faults._what_stands import COMMANDS, Disturbed
+from tests.faults._worlds import Worlds
 from tests.faults.test_recover_guides import cell, kinds
 
 __all__ = ["cell"]
 
-ANSWERS = 396  # of the controller, in a whole turn test
-TAKEN_OVER = ("--take-over", "its process is gone")
+EVERY_ANSWER = 33  # of about 396 of the controller in a whole turn test
 MOVED = re.compile(r'\$Execute,"(Go|Move) ')
 
 
@@ -82,27 +82,13 @@ class Desk(_operator.AssistedOperator):
         return "2" if len(self.asked) == 1 else super().poll(wait_s)
 
 
-class Killed(Instants):
-    """From one instant on nothing reaches the controller or the journal: the process is gone."""
-
-    def __init__(self, cell, matches):
-        super().__init__()
-        self.dead, self._cell, self._matches = False, cell, matches
-
-    def pass_by(self, kind, what=""):
-        super().pass_by(kind, what)
-        if not self.dead and self._matches(kind, what, self.passed):
-            self.dead = True
-            self._cell.simulator.panel.cut_link()
-
-
-def killed_at(cell, matches):
-    instants = Killed(cell, matches)
-    with commits(lambda _number: instants.dead):
-        ended, _ = new_chosen(cell, instants=instants)
-    assert instants.dead
-    cell.clock.sleep(60.0)
-    return ended
+def killed_at(cell, dies, check):
+    """Let the program of the turn test die where it is told to, and check what it leaves."""
+    assert cell.run("recover", "--dry-run").code == 6
+    worlds = Worlds(lambda at: dies(at, worlds.passed))
+    worlds.explore(lambda: new_chosen(cell, instants=worlds), check)
+    assert worlds.came_at
+    assert worlds.told == []
 
 
 def verified(cell):
@@ -115,30 +101,37 @@ def moves_asked(passed):
     return sum(bool(MOVED.match(one.what)) for one in passed if one.kind == "request")
 
 
-def coming_down(kind, what, passed):
+def coming_down(at, passed):
     """The middle of the first way down to the pin that the robot goes by itself."""
     downs = [one for one in passed if one.kind == "request" and "Move XY" in one.what]
-    return kind == "wait" and len(downs) > 4
+    waits = (
+        [one for one in passed[passed.index(downs[4]) :] if one.kind == "wait"] if downs[4:] else []
+    )
+    return waits == [at]
 
 
 def test_killed_in_the_turn_test_nothing_is_lost_and_the_next_one_keeps_the_value(cell):
     new = cell.tools()[1]
-    assert killed_at(cell, coming_down).code != 0
-    assert MarkerKind.CHANGE in kinds(cell)
-    assert verified(cell) == []
-    written = len(cell.writes())
-    # Nobody there: it stays as it was, and nothing moves.
-    asked = cell.moves_asked()
-    assert cell.run("recover", "--dry-run").code == 6
-    assert cell.moves_asked() == asked
-    ended, questions = new_chosen(cell, *TAKEN_OVER)
-    assert ended.code == 0, ended.err
-    assert "will move by itself to test tool 1" in questions[0]
-    assert questions[1] == "Jog the tip onto the pin."
-    assert len(questions) == 4
-    assert (cell.tools()[1], len(cell.writes()) - written) == (new, 0)
-    assert (cell.open_markers(), cell.selected, verified(cell)) == ((), 1, [True])
-    assert cell.settings() == cell.settings_before
+
+    def check():
+        cell.come_to_rest()
+        assert MarkerKind.CHANGE in kinds(cell)
+        assert verified(cell) == []
+        written = len(cell.writes())
+        # Nobody there: it stays as it was, and nothing moves.
+        asked = cell.moves_asked()
+        assert cell.run("recover", "--dry-run").code == 6
+        assert cell.moves_asked() == asked
+        ended, questions = new_chosen(cell)
+        assert ended.code == 0, ended.err
+        assert "will move by itself to test tool 1" in questions[0]
+        assert questions[1] == "Jog the tip onto the pin."
+        assert len(questions) == 4
+        assert (cell.tools()[1], len(cell.writes()) - written) == (new, 0)
+        assert (cell.open_markers(), cell.selected, verified(cell)) == ((), 1, [True])
+        assert cell.settings() == cell.settings_before
+
+    killed_at(cell, coming_down, check)
 
 
 def test_a_tip_that_is_elsewhere_gets_the_old_value_back_with_one_write(cell):
@@ -203,7 +196,7 @@ def test_what_stops_the_robot_in_the_test_leaves_no_unproved_value_in_use(cell, 
     class Presses(Instants):
         def pass_by(self, kind, what=""):
             super().pass_by(kind, what)
-            if not pressed and coming_down(kind, what, self.passed):
+            if not pressed and coming_down(self.passed[-1], self.passed):
                 pressed.append(moves_asked(self.passed))
                 cell.disturb(how)
 
@@ -222,24 +215,24 @@ def test_what_stops_the_robot_in_the_test_leaves_no_unproved_value_in_use(cell, 
 
 
 @pytest.mark.soak
-@pytest.mark.parametrize("part", range(12))
-def test_killed_anywhere_in_it_the_change_is_open_or_proved(cell, part):
-    at = 2 + part * ANSWERS // 12
+def test_killed_anywhere_in_it_the_change_is_open_or_proved(cell):
+    def check():
+        cell.come_to_rest()
+        assert cell.changed() == {1}
+        if MarkerKind.CHANGE not in kinds(cell):
+            assert verified(cell) == [True]
+            return
+        written = len(cell.writes())
+        ended, _ = new_chosen(cell)
+        assert ended.code == 0, ended.err
+        assert (cell.changed(), cell.open_markers(), verified(cell)[-1]) == ({1}, (), True)
+        assert len(cell.writes()) == written
 
-    def there(kind, _what, passed):
-        return kind == "answer" and sum(one.kind == "answer" for one in passed) == at
+    def dies(at, _passed):
+        every = 1 if EVERYTHING else EVERY_ANSWER
+        return at.kind == "commit" or (at.kind == "answer" and at.number % every == 2 % every)
 
-    killed_at(cell, there)
-    assert cell.changed() == {1}
-    if MarkerKind.CHANGE not in kinds(cell):
-        assert verified(cell) == [True]
-        assert part == 11, "only at its end"
-        return
-    written = len(cell.writes())
-    ended, _ = new_chosen(cell, *TAKEN_OVER)
-    assert ended.code == 0, ended.err
-    assert (cell.changed(), cell.open_markers(), verified(cell)[-1]) == ({1}, (), True)
-    assert len(cell.writes()) == written
+    killed_at(cell, dies, check)
 
 
 def test_off_a_terminal_the_new_value_is_kept_on_a_word_and_nothing_moves(cell):

@@ -6,6 +6,7 @@ Rows F59 and F60 of the catalogue.
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import count
 
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
@@ -14,13 +15,14 @@ from robolink_simulators.hosting.streams.epson import serve_tcp
 
 import robolink
 from robolink.errors import OutcomeUnknownError
-from robolink.journal import open_journal
 from robolink.model import EntryKind, MotionProfile, ToolOffset, Verdict, WorkBox
 from robolink.protocols.mailbox import to_frame
 from robolink.transaction import recover
 from tests.contract._softmotion_cell import served
-from tests.faults._nozzle_cell import MOVE, OLD_TIP, NozzleCell, served_cell
-from tests.faults._steps import MOMENTS, Step, disturbed
+from tests.faults import _killed_calibrations as calibrations
+from tests.faults._epson_recipe_cell import EpsonRecipeCell
+from tests.faults._nozzle_cell import MOVE
+from tests.faults._worlds import Worlds
 
 NEW = ToolOffset(12.25, -3.5, -20.0)
 THIRD = ToolOffset(15.5, 1.25, -21.0)
@@ -100,28 +102,39 @@ def test_f59_a_third_value_is_a_conflict_that_blocks_motion_until_a_person_decid
 
 @pytest.mark.soak
 @pytest.mark.fault("F60")
-def test_f60_a_calibration_that_was_cut_short_begins_again_at_its_first_step(tmp_path, monkeypatch):
-    with served_cell(tmp_path / "whole", monkeypatch) as cell:
-        assert cell.run(*cell.calibration).code == 0
-        touches, requests = touches_of(cell), cell.requests
-    moves = [number for number, text in enumerate(requests, start=1) if MOVE.match(text)]
-    cut = Step(moves[4], MOMENTS[1], requests[moves[4] - 1])
-    with served_cell(tmp_path / "cut", monkeypatch) as cell:
-        disturbed(cell, cut, lambda client: client.kill())
-        cell.wait_at_rest()
-        assert cell.tool_1 == OLD_TIP
-        asked = cell.moves_requested
-        assert cell.run(*cell.calibration).code == 6  # the movement in doubt comes first
-        recovered = cell.run("recover", "--yes")
-        assert recovered.code == 0, recovered.err
-        assert cell.moves_requested == asked == 5
-        again = cell.run(*cell.calibration)
-        assert again.code == 0, again.err
-        assert touches_of(cell) == touches
+def test_f60_a_calibration_that_was_cut_short_begins_again_at_its_first_step():
+    whole = EpsonRecipeCell((1,))
+    assert whole.run(*calibrations.words(whole)).code == 0
+    touches = touches_of(whole)
+    whole.close()
+    cell, answered = EpsonRecipeCell((1,)), count(1)
+    calibrations.meet(cell)
+    worlds = Worlds(
+        lambda at: at.kind == "answer" and bool(MOVE.match(at.what)) and next(answered) == 5
+    )
+    worlds.explore(
+        lambda: cell.run(*calibrations.words(cell), instants=worlds),
+        lambda: check_begins_again(cell, touches),
+    )
+    cell.close()
+    assert len(worlds.came_at) == 1
+    assert worlds.told == []
 
 
-def touches_of(cell: NozzleCell) -> list[int]:
+def check_begins_again(cell: EpsonRecipeCell, touches: list[int]) -> None:
+    cell.come_to_rest()
+    assert cell.changed() == set()
+    asked = cell.moves_asked()
+    assert cell.run(*calibrations.words(cell)).code == 6  # the movement in doubt comes first
+    recovered = cell.run("recover", "--yes")
+    assert recovered.code == 0, recovered.err
+    assert cell.moves_asked() == asked == 5
+    again = cell.run(*calibrations.words(cell))
+    assert again.code == 0, again.err
+    assert touches_of(cell) == touches
+
+
+def touches_of(cell: EpsonRecipeCell) -> list[int]:
     """Return how many poses each measurement on record is made of."""
-    kinds = (EntryKind.CALIBRATION,)
-    measured = open_journal().log(cell.url).recorded(kinds=kinds)
+    measured = cell.journal.entries(kinds=(EntryKind.CALIBRATION,))
     return [len(entry.details["poses"]) for entry in measured]  # type: ignore[arg-type]

@@ -1,6 +1,5 @@
 """Solving a case, or a file of them, without any robot."""
 
-import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Final, cast
@@ -9,6 +8,7 @@ from robolink.calibration import AccuracyFacts, CalibrationResult, assessed
 from robolink.errors import CalibrationError, ConfigError
 from robolink.files.named import read_named
 from robolink.messages import tr
+from robolink.model import json_value
 from robolink.pose_tables import ReadingChoices, TabledPose
 from robolink.pose_tables import read_poses as tabled_poses
 from robolink_cli.commands.measure.solve import (
@@ -147,7 +147,8 @@ def solve_case(node: Node) -> dict[str, object]:
     found = _with_accuracy(found, facts or AccuracyFacts())
     codes = found.pop("codes", [])
     status = found.pop("status", "warn" if codes else "ok")
-    return head | {"status": status, "codes": codes} | _json_numbers(found)
+    plain: dict[str, object] = json_value(found)
+    return head | {"status": status, "codes": codes} | plain
 
 
 def _with_accuracy(found: Mapping[str, object], facts: AccuracyFacts) -> dict[str, object]:
@@ -188,19 +189,6 @@ def _refusal(error: CalibrationError, method: str, given: Node) -> dict[str, obj
 
         refusal["sigma_gain_per_axis"] = planar_sigma_gain(read_poses(given))
     return refusal
-
-
-def _json_numbers(found: dict[str, object]) -> dict[str, object]:
-    """Return the values with null for what JSON has no number for."""
-    return {name: _json_number(value) for name, value in found.items()}
-
-
-def _json_number(value: object) -> object:
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, dict):
-        return {name: _json_number(item) for name, item in value.items()}
-    return [_json_number(item) for item in value] if isinstance(value, list) else value
 
 
 def _check_units(node: Node) -> None:

@@ -19,7 +19,7 @@ def test_json_is_one_document_and_text_goes_to_stderr(command, capsys, arguments
     def act(context):
         render.say("for people")
         render.table("poses", ["x_mm"], [["1.000"]])
-        context.emit("status", {"x_mm": 1.0, "word": "°"}, lambda: render.say("never"))
+        render.emit("status", {"x_mm": 1.0, "word": "°"}, lambda: render.say("never"))
 
     command(act)
     assert main.run(arguments) == 0
@@ -40,7 +40,7 @@ def test_a_column_of_numbers_stands_to_the_right_and_one_of_versions_to_the_left
 
 
 def test_without_json_text_goes_to_stdout(command, capsys):
-    command(lambda context: context.emit("status", {}, lambda: render.say("for people")))
+    command(lambda _: render.emit("status", {}, lambda: render.say("for people")))
     assert main.run(["status"]) == 0
     assert capsys.readouterr().out == "for people\n"
 
@@ -53,7 +53,7 @@ def test_a_command_without_controller_takes_json_on_both_sides(command, capsys):
 
 
 def test_a_dry_run_shows_the_requests(command, capsys):
-    command(lambda context: context.show_requests(["$Stop", "$Reset"]))
+    command(lambda _: render.show_requests(["$Stop", "$Reset"]))
     assert main.run(["status"]) == 0
     assert capsys.readouterr().out == "$Stop\n$Reset\n"
     assert main.run(["status", "--json"]) == 0
@@ -63,7 +63,7 @@ def test_a_dry_run_shows_the_requests(command, capsys):
 
 def test_an_error_after_the_result_replaces_it(command, capsys):
     def act(context):
-        context.emit("status", {"state": "ready"}, lambda: None)
+        render.emit("status", {"state": "ready"}, lambda: None)
         raise errors.TransportBrokenError("The cable is cut.")
 
     command(act)

@@ -22,7 +22,6 @@ robot = "机器人 é"
 COMMANDS = {
     ("--help",): 0,
     ("calibrate", "two-pose", "--help"): 0,
-    ("demo", "--speed", "20"): 0,
     ("-c", "三号线", "status"): 0,
     ("-c", "三号线", "status", "--json"): 0,
     ("-c", "三号线", "where"): 0,
@@ -70,15 +69,11 @@ def environment(tmp_path, encoding):
 
 @pytest.mark.parametrize("encoding", ["ascii", pytest.param("cp1252", marks=LONG), "cp936"])
 def test_no_command_and_no_error_fails_for_want_of_a_character(tmp_path, encoding):
-    # The demonstration takes long, and no console has fewer characters than this one.
-    commands = {
-        words: code for words, code in COMMANDS.items() if words[0] != "demo" or encoding == "ascii"
-    }
     codes = tmp_path / "codes.json"
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM],
         env=environment(tmp_path, encoding)
-        | {"COMMAND_LINES": json.dumps([*commands]), "CODES": str(codes)},
+        | {"COMMAND_LINES": json.dumps([*COMMANDS]), "CODES": str(codes)},
         cwd=tmp_path,
         stdin=subprocess.DEVNULL,
         capture_output=True,
@@ -86,8 +81,8 @@ def test_no_command_and_no_error_fails_for_want_of_a_character(tmp_path, encodin
         check=False,
     )
     assert done.returncode == 0, done.stderr
-    ended = dict(zip(commands, json.loads(codes.read_text()), strict=True))
-    assert ended == commands
+    ended = dict(zip(COMMANDS, json.loads(codes.read_text()), strict=True))
+    assert ended == COMMANDS
     shown = (done.stdout + done.stderr).decode(encoding)  # raises if it is something else
     assert "Traceback" not in shown
     known = "三号线" if encoding == "cp936" else r"\u4e09\u53f7\u7ebf"

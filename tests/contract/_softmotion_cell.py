@@ -131,13 +131,14 @@ def served(backend: str, simulator: SoftMotionSimulator | None = None) -> Iterat
             unregister(name)
         return
     clock = SkippingClock()
-    with _hosted(backend, simulator, ScaledClock(base=clock)) as host:
+    with hosted(backend, simulator, ScaledClock(base=clock)) as host:
         yield PlcCell(host.url, simulator, clock)
 
 
-def _hosted(
+def hosted(
     backend: str, simulator: SoftMotionSimulator, clock: ScaledClock
 ) -> AbstractContextManager[Any]:
+    """Serve a PLC on one of the links that are no simulated ones."""
     if backend == "modbus-tcp":
         return serve_modbus_tcp(simulator, clock=clock)
     if backend == "modbus-rtu":

@@ -1,33 +1,42 @@
-"""A served cell with two tools, programs that are killed while they change them, recovery."""
+"""A cell with two tools, programs that are killed while they change them, recovery.
+
+It is served, for programs that are processes of their own, or lives in this process.
+"""
 
 import contextlib
 import io
 import re
 import threading
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from queue import SimpleQueue
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal, TypeVar
 
 import pytest
 from robolink_cli import main
 from robolink_simulators.cell.clock import ManualClock, ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
+from robolink_simulators.hosting.in_process import epson
 from robolink_simulators.hosting.streams.epson import serve_serial, serve_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
-from robolink.journal import Journal, open_journal
+from robolink.journal import Journal, memory_journal, open_journal
 from robolink.model import EntryKind, MarkerKind, ToolOffset
 from robolink.transaction import changed_since
 from tests._patience import PATIENCE_S
-from tests.faults._change_process import OLD, CommitStep, ProgramProcess, acknowledged
+from tests.faults._change_process import OLD, PROGRAMS, CommitStep, ProgramProcess, acknowledged
+from tests.faults._recipe_instants import Instants, exchanges_and_commits
 from tests.faults._steps import MOMENTS, Moment
 
+EpsonWire = Literal["sim", "tcp", "serial"]
+
+_names = count()
 _WRITE = re.compile(r'\$Execute,"TLSet (\d+), XY')
 
 
@@ -51,6 +60,7 @@ class ChangeCell(ABC):
 
     Attributes:
         matters: What requests begin with that take ownership, select or write.
+        skip: Lets some seconds pass at once, where the clock can do that.
     """
 
     matters: ClassVar[re.Pattern[str]]
@@ -61,7 +71,11 @@ class ChangeCell(ABC):
         self.simulator = simulator
         self.url = url
         self.folder = folder
-        self.journal: Journal = open_journal(str(folder / "journal.db"))
+        self.skip: Callable[[float], None] = lambda _seconds: None
+        in_memory = "+sim://" in url
+        self.journal: Journal = (
+            memory_journal(url) if in_memory else open_journal(str(folder / "journal.db"))
+        )
 
     @property
     @abstractmethod
@@ -110,6 +124,14 @@ class ChangeCell(ABC):
         ]
         return [*wire, *durable]
 
+    def run(self, program: str, instants: Instants) -> None:
+        """Run a program in this process, with all its instants seen."""
+        with exchanges_and_commits(self.simulator, instants):
+            # Its time stands still: no sign of life comes between the transactions.
+            log = self.journal.log(self.url, clock=ManualClock())
+            with robolink.connect(self.url, outcomes=log) as controller:
+                PROGRAMS[program](controller)
+
     def kill(self, program: str, step: Step) -> None:
         """Run a program and kill it at ``step``."""
         if isinstance(step, CommitStep):
@@ -120,6 +142,10 @@ class ChangeCell(ABC):
 
     def recover(self) -> str:
         """Run ``robolink recover`` and return what it said; nothing may be left."""
+        return self.command("recover")
+
+    def command(self, *words: str) -> str:
+        """Run a command that ends well, and return what it said."""
         said = io.StringIO()
         with (
             pytest.MonkeyPatch.context() as environment,
@@ -128,7 +154,7 @@ class ChangeCell(ABC):
         ):
             environment.setenv("ROBOLINK_JOURNAL", str(self.folder / "journal.db"))
             environment.setenv("ROBOLINK_STATE_DIR", str(self.folder))
-            code = main.run(["-c", self.url, "recover"])
+            code = main.run(["-c", self.url, *words])
         assert code == 0, said.getvalue()
         return said.getvalue()
 
@@ -190,6 +216,9 @@ class ChangeCell(ABC):
         return client
 
 
+Cell = TypeVar("Cell", bound=ChangeCell)
+
+
 class EpsonChangeCell(ChangeCell):
     """An EPSON controller.
 
@@ -235,21 +264,41 @@ def change_cell(
     folder: Path,
     kind: type[EpsonSimulator] = EpsonSimulator,
     *,
-    serial: bool = False,
+    wire: EpsonWire = "tcp",
     **habits: Any,
 ) -> Iterator[EpsonChangeCell]:
-    """Serve a cell with a journal of its own, over TCP or on a pseudo terminal."""
+    """Have a cell with a journal of its own, served over TCP or on a pseudo terminal, or not."""
     folder.mkdir(parents=True)
     options = EpsonOptions(**{"remote_timeout_s": 0, "login_timeout_s": 0, **habits})
     simulator = kind(seed=1, options=options)
     for tool, offset in OLD.items():
         simulator.machine.tools.set(tool, offset)
     simulator.machine.tools.flash_writes = 0
-    serve = serve_serial if serial else serve_tcp
-    with serve(simulator, clock=ScaledClock(200.0)) as host:
-        cell = EpsonChangeCell(simulator, host.url, folder)
-        cell.meet()
+    with _epson_at(wire, simulator) as url, kept(EpsonChangeCell(simulator, url, folder)) as cell:
+        if wire == "sim":
+            cell.skip = epson.clock_of(url.partition("://")[2]).sleep
+        yield cell
+
+
+@contextmanager
+def kept(cell: Cell) -> Iterator[Cell]:
+    """Have the journal of a cell, which knows the controller already."""
+    cell.meet()
+    try:
+        yield cell
+    finally:
+        cell.journal.close()
+
+
+@contextmanager
+def _epson_at(wire: EpsonWire, simulator: EpsonSimulator) -> Iterator[str]:
+    if wire == "sim":
+        name = f"changes-{next(_names)}"
         try:
-            yield cell
+            yield epson.register(name, simulator)
         finally:
-            cell.journal.close()
+            epson.unregister(name)
+        return
+    serve = serve_serial if wire == "serial" else serve_tcp
+    with serve(simulator, clock=ScaledClock(200.0)) as host:
+        yield host.url

@@ -1,28 +1,10 @@
 """What must be true whenever a tool change was killed, on every kind of controller."""
 
-import os
-
 from robolink.model import ToolOffset
-from tests.faults._change_cell import ChangeCell, Step
-from tests.faults._change_process import NEW, OLD, CommitStep
+from tests.faults._change_cell import ChangeCell
+from tests.faults._change_process import NEW, OLD
 
 NOTHING_LEFT = "Nothing is left unfinished on this controller."
-
-
-def chosen(cell: ChangeCell, steps: list[Step], *, every: int = 1) -> list[Step]:
-    """Return the steps at which to kill: all of them, or without the switch a sample.
-
-    Args:
-        cell: Where; it knows which exchanges matter.
-        steps: All of them.
-        every: Of what matters, one in so many makes the sample.
-    """
-    if os.environ.get("ROBOLINK_ALL_KILL_POINTS") == "1":
-        return steps
-    matters = [
-        step for step in steps if isinstance(step, CommitStep) or cell.matters.match(step.request)
-    ]
-    return matters[::every]
 
 
 def right_values(program: str, cell: ChangeCell, written: list[int]) -> dict[int, ToolOffset]:
@@ -42,11 +24,16 @@ def check_recovered(cell: ChangeCell, program: str, written: list[int]) -> None:
     cell.check_all_is_settled()
 
 
-def check_killed_change(cell: ChangeCell, program: str, step: Step) -> None:
-    """Kill a change at a step, look, recover twice, and look again."""
-    cell.kill(program, step)
+def check_killed_change(cell: ChangeCell, program: str) -> None:
+    """Look at what a killed change left, recover twice, and look again."""
+    cell.act()
     written = cell.writes()
     assert len(set(written)) == len(written)
+    check_recovers(cell, program, written)
+
+
+def check_recovers(cell: ChangeCell, program: str, written: list[int]) -> None:
+    """Whatever was killed: what it left is told, and a recovery ends it."""
     cell.check_what_was_acknowledged_is_there()
     cell.check_the_selected_tool_is_right_or_named()
     cell.recover()

@@ -33,7 +33,7 @@ OLD_TIP = STORED
 """What tool 1 holds before the nozzle change."""
 
 MOVE = re.compile(r'\$Execute,"(Move|Go) ')
-_EXPECTED = re.compile(
+OF_A_CALIBRATION = re.compile(
     r'\$Execute,"(Tool [01]|TLSet 1, XY\(.*\)|Power (Low|High)|SpeedS? [\d., ]+'
     r'|(Move|Go) XY\(.*\).*)"|\$Abort'
 )
@@ -117,9 +117,9 @@ class NozzleCell:
         """Tool 1 holds the old or the measured value, written once at most; the rest stands."""
         machine = self.simulator.machine
         asked = changes(self.requests)
-        strange = [text for text in asked if not _EXPECTED.fullmatch(text)]
+        strange = [text for text in asked if not OF_A_CALIBRATION.fullmatch(text)]
         assert not strange, strange
-        written = [ToolOffset(*_numbers(text)) for text in asked if "TLSet" in text]
+        written = [ToolOffset(*numbers(text)) for text in asked if "TLSet" in text]
         assert machine.flash_writes == len(written) <= 2
         assert self.tool_1 == (written[-1] if written else OLD_TIP)
         assert self._all_but_tool_1() == self._others
@@ -157,6 +157,6 @@ def served_cell(
         yield cell
 
 
-def _numbers(statement: str) -> list[float]:
+def numbers(statement: str) -> list[float]:
     inside = statement.partition("(")[2].partition(")")[0]
     return [float(number) for number in inside.split(",")]

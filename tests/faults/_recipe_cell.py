@@ -18,7 +18,12 @@ from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.journal import Journal, memory_journal
 from robolink.model import Marker, ToolOffset
-from tests.faults._recipe_instants import Instants, WatchedClock, questions_and_commits
+from tests.faults._recipe_instants import (
+    Instants,
+    WatchedClock,
+    exchanges_and_commits,
+    questions,
+)
 
 _names = count()
 
@@ -184,14 +189,13 @@ class RecipeCell(ABC):
         with (
             contextlib.redirect_stdout(out),
             contextlib.redirect_stderr(err),
-            questions_and_commits(seen),
+            questions(seen),
+            exchanges_and_commits(simulator, seen),
             pytest.MonkeyPatch.context() as patch,
         ):
             patch.setattr(sys, "stdin", (_Terminal if asks else io.StringIO)())
             # A run is taken again, up to each of its instants: the same one.
             patch.setattr("robolink.procedures.pin_touches.fresh_seed", lambda: 7)
-            patch.setattr(simulator, "on_request", lambda _, text: seen.pass_by("request", text))
-            patch.setattr(simulator, "on_reply", lambda _, text: seen.pass_by("answer", text))
             patch.setattr(self.clock, "on_wait", lambda: seen.pass_by("wait"))
             code = main.run(["-c", self.url, *words])
         return Ended(code, out.getvalue(), err.getvalue())

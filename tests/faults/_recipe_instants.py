@@ -3,8 +3,8 @@
 A run is one process on one clock that stands still until somebody waits, so that its instants
 are the same each time: each exchange (before it is carried out, and before its answer leaves),
 the middle of each wait of the driver (a movement is waited on in such waits), each question to
-the person, and each durable transaction of the journal. Questions and transactions lie between
-exchanges, where Ctrl-C is not held back.
+the person, and each durable transaction of the journal (before it, and once it counts). Questions
+and transactions lie between exchanges, where Ctrl-C is not held back.
 """
 
 import os
@@ -19,9 +19,13 @@ from typing import Final, Literal
 import pytest
 from robolink_cli.prompts import operator as _operator
 from robolink_simulators.cell.clock import ManualClock
+from robolink_simulators.device.hosted import HostedDevice
 
 from robolink.journal.store.store import Store, Tables
 from robolink.runner import Question
+
+EVERYTHING: Final = os.environ.get("ROBOLINK_ALL_KILL_POINTS") == "1"
+"""Whether something comes in at all instants, not at a sample of them."""
 
 Kind = Literal["request", "answer", "wait", "question", "commit"]
 _EVERY: Final = 97
@@ -32,7 +36,10 @@ _TURNS: Final = 12
 
 @dataclass(frozen=True)
 class Instant:
-    """One of them: the ``number``-th of its kind, and what went on."""
+    """One of them: the ``number``-th of its kind, and what went on.
+
+    Of an answer that is its request, of a commit whether it counts already.
+    """
 
     kind: Kind
     number: int
@@ -109,26 +116,48 @@ class Person:
 
 
 @contextmanager
-def questions_and_commits(instants: Instants) -> Iterator[Person]:
-    """Let ``instants`` see the questions and the journal; yields who sits at the terminal."""
+def questions(instants: Instants) -> Iterator[Person]:
+    """Let ``instants`` see the questions; yields who sits at the terminal."""
     person = Person(instants)
-    poll, write = _operator.AssistedOperator.poll, Store.write
+    poll = _operator.AssistedOperator.poll
 
     def polled(operator: _operator.AssistedOperator, wait_s: float) -> str | None:
         instants.pass_by("question", "the recipe's, or where the tip is")
         return poll(operator, wait_s)
 
-    @contextmanager
-    def written(store: Store, consequence: str = "") -> Iterator[Tables]:
-        with write(store, consequence) as tables:
-            yield tables
-        instants.pass_by("commit")
-
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(_operator, "terminal", lambda: person)
         patch.setattr(_operator.AssistedOperator, "poll", polled)
-        patch.setattr(Store, "write", written)
         yield person
+
+
+@contextmanager
+def exchanges_and_commits(simulator: HostedDevice, instants: Instants) -> Iterator[None]:
+    """Let ``instants`` see what goes to a simulator and what is stored in a journal."""
+    write = Store.write
+    asked: dict[int, str] = {}
+
+    def hear(number: int, text: str) -> None:
+        asked[number] = text
+        instants.pass_by("request", text)
+
+    def answer(number: int, _text: str) -> None:
+        instants.pass_by("answer", asked.get(number, ""))
+
+    @contextmanager
+    def written(store: Store, consequence: str = "") -> Iterator[Tables]:
+        instants.pass_by("commit", "before")
+        with write(store, consequence) as tables:
+            yield tables
+        instants.pass_by("commit", "after")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(simulator, "on_request", hear)
+        patch.setattr(
+            simulator, "on_reply", lambda n, _: instants.pass_by("answer", asked.get(n, ""))
+        )
+        patch.setattr(Store, "write", written)
+        yield
 
 
 def chosen(instants: Sequence[Instant], matters: re.Pattern[str], turn: int) -> list[Instant]:
@@ -139,7 +168,7 @@ def chosen(instants: Sequence[Instant], matters: re.Pattern[str], turn: int) -> 
         matters: What is worth more than one instant in so many.
         turn: Which of several samples that complement each other.
     """
-    if os.environ.get("ROBOLINK_ALL_KILL_POINTS") == "1":
+    if EVERYTHING:
         return list(instants)
     worth = [i for n, i in enumerate(instants) if n % _EVERY == 0 or matters.match(i.what)]
     return worth[turn % _TURNS :: _TURNS]

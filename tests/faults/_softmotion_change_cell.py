@@ -1,21 +1,24 @@
-"""A PLC served over Modbus TCP with two tools, to be changed by programs that are killed."""
+"""A PLC with two tools, to be changed by programs that are killed."""
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
 from typing import Final
 
 from robolink_simulators.cell.clock import ScaledClock
-from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
+from robolink_simulators.hosting.in_process import softmotion
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 from robolink_simulators.softmotion.mailbox.plc import Plc
 
 from robolink.model import ToolOffset
 from robolink.protocols.mailbox import Six, from_frame, to_frame
-from tests.faults._change_cell import ChangeCell
+from tests.contract._softmotion_cell import hosted
+from tests.faults._change_cell import ChangeCell, kept
 from tests.faults._change_process import OLD
 
+_names = count()
 _UNIT_UM: Final = 1000.0
 _CYCLES_S: Final = 0.05
 """In this time the mailbox program has looked, and what it was told is done."""
@@ -39,7 +42,6 @@ class PlcChangeCell(ChangeCell):
 
     Attributes:
         executed: Slot and tool of each write that the PLC carried out.
-        skip: Lets some seconds pass at once, where the clock can do that.
     """
 
     matters = re.compile("write_command ")
@@ -49,7 +51,6 @@ class PlcChangeCell(ChangeCell):
         self._plc = simulator.plc
         self._acting = simulator.acting
         self.executed: list[tuple[int, Six]] = []
-        self.skip: Callable[[float], None] = lambda _seconds: None
         define = self._plc.memory.define
         define(2, to_frame(OLD[2].components(), unit_um=_UNIT_UM), "nozzle")
 
@@ -99,23 +100,39 @@ class PlcChangeCell(ChangeCell):
 
 
 @contextmanager
-def plc_change_cell(folder: Path, clock: ScaledClock | None = None) -> Iterator[PlcChangeCell]:
-    """Serve a PLC that holds ``OLD``, with a journal of its own.
+def plc_change_cell(
+    folder: Path, clock: ScaledClock | None = None, *, wire: str = "modbus-tcp"
+) -> Iterator[PlcChangeCell]:
+    """Have a PLC that holds ``OLD``, with a journal of its own.
 
     Args:
         folder: Where the journal is kept.
         clock: The simulated time; by default so fast that nobody owns the mailbox for long.
+        wire: On which of the links of ``BACKENDS``.
     """
     folder.mkdir(parents=True)
     simulator = SoftMotionSimulator(seed=1)
-    with serve_modbus_tcp(simulator, clock=clock or _HastenedSilence(_SPEED)) as host:
-        cell = PlcChangeCell(simulator, host.url, folder)
+    hastened = clock or _HastenedSilence(_SPEED)
+    with _plc_at(wire, simulator, hastened) as url:
+        cell = PlcChangeCell(simulator, url, folder)
+        if wire == "sim":
+            cell.skip = softmotion.clock_of(url.partition("://")[2]).sleep
         assert cell.tools == OLD
-        cell.meet()
-        try:
+        with kept(cell):
             yield cell
+
+
+@contextmanager
+def _plc_at(wire: str, simulator: SoftMotionSimulator, clock: ScaledClock) -> Iterator[str]:
+    if wire == "sim":
+        name = f"changes-{next(_names)}"
+        try:
+            yield softmotion.register(name, simulator)
         finally:
-            cell.journal.close()
+            softmotion.unregister(name)
+        return
+    with hosted(wire, simulator, clock) as host:
+        yield host.url
 
 
 def _offset(tool: Six) -> ToolOffset:

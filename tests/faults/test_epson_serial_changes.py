@@ -1,7 +1,7 @@
-"""Whole tool changes over Remote RS232 on a pseudo terminal: killed, stopped, disturbed.
+"""Whole tool changes over Remote RS232 on a pseudo terminal: stopped, disturbed.
 
-As ``test_transaction_kill_points`` does it over TCP. A few points of each are taken by default,
-all of them with ``ROBOLINK_ALL_KILL_POINTS=1``; ``pytest -s`` shows how many.
+Where they are killed stands in ``test_killed``. A few stops are taken by default, all of them with
+``ROBOLINK_ALL_KILL_POINTS=1``; ``pytest -s`` shows how many.
 """
 
 import os
@@ -15,43 +15,15 @@ import robolink
 from robolink.errors import RobolinkError
 from robolink.model import MarkerKind
 from robolink.transaction import Wanted, change_tools
-from tests.faults._change_cell import EpsonChangeCell, Step, WireStep, change_cell
+from tests.faults._change_cell import EpsonChangeCell, change_cell
 from tests.faults._change_process import NEW, OLD
-from tests.faults._kill_points import NOTHING_LEFT, check_killed_change
-from tests.faults._steps import MOMENTS
+from tests.faults._kill_points import NOTHING_LEFT
 from tests.faults._stop_placements import Placement, Placements
 
 pytestmark = pytest.mark.timeout(3600)
 
 EVERYTHING = os.environ.get("ROBOLINK_ALL_KILL_POINTS") == "1"
-WRITE = '$Execute,"TLSet 1,'
 _FEW_STOPS = 2
-
-
-def is_write(step: Step, moment: str) -> bool:
-    return isinstance(step, WireStep) and step.moment == moment and step.request.startswith(WRITE)
-
-
-@pytest.mark.parametrize(
-    "program", ["one tool", pytest.param("two tools, verified", marks=pytest.mark.soak)]
-)
-@pytest.mark.fault("F57", "F58")
-def test_f57_f58_a_change_on_a_serial_line_killed_at_each_step_is_recovered(tmp_path, program):
-    with change_cell(tmp_path / "whole", serial=True) as cell:
-        all_steps = cell.steps_of(program)
-        assert cell.tools[1] == NEW[1]
-        assert NOTHING_LEFT in cell.recover()
-    # The write that the controller carries out and nobody hears of is the hardest.
-    steps = all_steps if EVERYTHING else [s for s in all_steps if is_write(s, MOMENTS[1])]
-    assert steps
-    for number, step in enumerate(steps):
-        with change_cell(tmp_path / str(number), serial=True) as cell:
-            try:
-                check_killed_change(cell, program, step)
-            except AssertionError as error:
-                error.add_note(f"killed at {step}")
-                raise
-    print(f"RS232, {program}: {len(steps)} kill points of {len(all_steps)}")  # noqa: T201 - for pytest -s
 
 
 def change(cell: EpsonChangeCell, placements: Placements | None = None) -> RobolinkError | None:
@@ -69,7 +41,7 @@ def change(cell: EpsonChangeCell, placements: Placements | None = None) -> Robol
 
 
 def check_stopped(folder, at: Placement) -> None:
-    with change_cell(folder, serial=True) as cell:
+    with change_cell(folder, wire="serial") as cell:
         at_rest: list[int] = []
         placements = Placements(at, lambda: at_rest.append(len(cell.writes())))
         error = change(cell, placements)
@@ -87,7 +59,7 @@ def check_stopped(folder, at: Placement) -> None:
 
 def test_a_stop_at_each_point_of_a_change_on_a_serial_line_ends_it(tmp_path):
     whole = Placements()
-    with change_cell(tmp_path / "whole", serial=True) as cell:
+    with change_cell(tmp_path / "whole", wire="serial") as cell:
         assert change(cell, whole) is None
         assert cell.tools == {**OLD, 1: NEW[1]}
     points = list(whole.distinct)
@@ -113,7 +85,7 @@ USUAL = (FaultAction.DROP_REPLY, FaultAction.GARBLE_REPLY)
     [pytest.param(a, marks=() if a in USUAL else pytest.mark.soak, id=a.name) for a in POSSIBLE],
 )
 def test_each_fault_of_a_serial_line_at_the_write_ends_old_or_new_and_is_told(tmp_path, action):
-    with change_cell(tmp_path / "cell", serial=True) as cell:
+    with change_cell(tmp_path / "cell", wire="serial") as cell:
         cell.epson.faults.add(Fault(action, match="TLSet 1,", seconds=20.0))
         error = change(cell)
         assert cell.epson.faults.fired, "it did not happen"

@@ -2,30 +2,27 @@
 
 Until the verification has passed, an interrupted change ends with the old value in tool 1: it
 was not written, or it is written back, and that is said. From then on the new value is kept.
-Steps are taken as in the test of kill points; ``ROBOLINK_ALL_KILL_POINTS=1`` takes all.
+A fixed sample of them is taken; ``ROBOLINK_ALL_KILL_POINTS=1`` takes all.
 """
 
 import json
-import math
+import re
 import signal
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from queue import SimpleQueue
 
 import pytest
-from robolink_cli.prompts.operator import AssistedOperator
-from robolink_simulators.control.assist import InProcessEyes
-from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.in_process.epson import register, unregister
 
-import robolink
-from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
 from robolink.interrupts import InterruptGate
-from robolink.journal import JournalOutcomeLog, memory_journal
-from robolink.model import describe_offset
+from robolink.model import ToolOffset, describe_offset
 from tests._patience import PATIENCE_S
+from tests.faults import _killed_calibrations as calibrations
 from tests.faults._client_process import ClientProcess
-from tests.faults._nozzle_cell import MOVE, OLD_TIP, NozzleCell, served_cell
-from tests.faults._steps import SHARES, Step, disturbed, steps_of
+from tests.faults._epson_recipe_cell import EpsonRecipeCell
+from tests.faults._nozzle_cell import MOVE, OLD_TIP, served_cell
+from tests.faults._recipe_cell import Ended
+from tests.faults._recipe_instants import Instant, Instants
+from tests.faults._worlds import Worlds
 
 pytestmark = pytest.mark.timeout(3600)
 
@@ -37,57 +34,80 @@ WAYS = tuple(CODES)
 
 
 @pytest.fixture(scope="module")
-def requests(tmp_path_factory):
-    """What a nozzle change asks of the controller when nothing disturbs it."""
-    with pytest.MonkeyPatch.context() as monkeypatch:
-        with served_cell(tmp_path_factory.mktemp("whole") / "cell", monkeypatch) as cell:
-            client = cell.calibrate()
-            assert client.exit_code() == 0, client.err
-            return cell.requests
+def last_pose():
+    """The running number of the request after which the proof is judged, in an undisturbed run."""
+    cell, whole = EpsonRecipeCell((1,)), Instants()
+    assert cell.run(*calibrations.words(cell), "--json", instants=whole).code == 0
+    cell.close()
+    return [at.number for at in whole.passed if at.kind == "request" and at.what == POSE][-1]
 
 
-def check(cell: NozzleCell, step: Step, *, verified: bool) -> None:
-    way = WAYS[step.number % len(WAYS)]
-    client = disturbed(cell, step, lambda client: client.signal(way))
-    code = client.exit_code()
-    assert code == CODES[way], client.err
-    document = json.loads(client.out)
-    assert document["exit_code"] == code
-    assert document["error"]["ended_by"] == way.name
-    check_last_line(cell, client.err.splitlines()[-1])
-    assert not cell.simulator.status_flags().running, "the robot still moves"
-    assert cell.requests.count("$Abort") <= 1
-    cell.check_nothing_else_was_written()
-    cell.check_settings_are_those_of_before()
-    assert cell.open_markers() == (), client.err
-    if verified:
-        assert cell.tool_1 != OLD_TIP
-        kept = ("Tool 1 keeps the new value", "Tool 1 is written and read back")
-        assert any(sentence in client.err for sentence in kept), client.err
-    else:
-        assert cell.tool_1 == OLD_TIP, client.err
-    if cell.simulator.machine.flash_writes == 2:
-        assert "The old value of tool 1 is back" in client.err
+@dataclass
+class Ending:
+    """One of the ways to end a command, which comes in between once.
+
+    Attributes:
+        begun: How many movements had begun by then, or were asked for just then.
+        asked: How many requests had come in.
+        kind: Of the instant.
+    """
+
+    cell: EpsonRecipeCell
+    way: signal.Signals = signal.SIGINT
+    begun: int = -1
+    asked: int = -1
+    kind: str = ""
+
+    def __call__(self, at: Instant) -> None:
+        """Let it come."""
+        self.kind, self.way = at.kind, WAYS[at.number % len(WAYS)]
+        self.begun = self.cell.moves_begun + (at.kind == "request")
+        self.asked = len(self.cell.requests())
+        signal.raise_signal(self.way)
+
+    def check(self, ended: Ended, last_pose: int) -> None:
+        """What is true once the command has ended: verified it is kept, and else taken back."""
+        cell = self.cell
+        assert ended.code == CODES[self.way], ended.err
+        document = json.loads(ended.out)
+        assert document["exit_code"] == ended.code
+        assert document["error"]["ended_by"] == self.way.name
+        writes = len(cell.writes())
+        held = cell.tools()[1]
+        assert held is not None
+        check_last_line(ended.err, cell.moves_begun, (cell.before[1], held), writes, cell.selected)
+        assert not cell.moving, "the robot still moves"
+        assert cell.moves_begun <= self.begun
+        assert cell.stops_asked() <= 1
+        calibrations.check_nothing_else_was_written(cell)
+        assert (cell.selected, cell.settings()) == (1, cell.settings_before)
+        assert cell.open_markers() == (), ended.err
+        kept = re.search("Tool 1 keeps the new value|Tool 1 is written and read back", ended.err)
+        # A transaction may lie on either side of the verdict, which follows the last pose.
+        assert self.kind == "commit" or bool(kept) is (self.asked > last_pose), ended.err
+        assert cell.changed() == ({1} if kept else set()), ended.err
+        if writes == 2:
+            assert "The old value of tool 1 is back" in ended.err
 
 
-def check_last_line(cell: NozzleCell, line: str) -> None:
+def check_last_line(
+    err: str, moved: int, held: tuple[ToolOffset, ToolOffset], writes: int, selected: int
+) -> None:
     """It says what stands, what was written and what is selected, as it is past the wire."""
-    moved = cell.simulator.machine.arm.moves_started
+    line, (old, now) = err.splitlines()[-1], held
     assert line.startswith("Every movement has ended. " if moved else "Nothing was moved. "), line
-    holds = describe_offset(cell.tool_1)
-    if cell.tool_1 != OLD_TIP:
-        written = f"Tool 1 now holds {holds}; before, it held {describe_offset(OLD_TIP)}."
-    elif cell.simulator.machine.flash_writes:
-        written = f"Tool 1 holds {holds}, as before."
+    if now != old:
+        written = (
+            f"Tool 1 now holds {describe_offset(now)}; before, it held {describe_offset(old)}."
+        )
+    elif writes:
+        written = f"Tool 1 holds {describe_offset(now)}, as before."
     else:
         written = "Nothing was written."
     assert written in line
     # Before it was read once, nobody claims to know it.
-    selected = (
-        f"Tool {cell.selected_tool} is selected.",
-        "It was not read which tool is selected.",
-    )
-    assert line.endswith(selected)
+    known = (f"Tool {selected} is selected.", "It was not read which tool is selected.")
+    assert line.endswith(known)
 
 
 @pytest.mark.fault("F24")
@@ -119,103 +139,32 @@ def test_a_second_signal_during_the_cleaning_up_breaks_nothing(tmp_path, monkeyp
         assert sent == ["SIGTERM", "SIGINT", "SIGHUP"]
         assert cell.open_markers() == (), client.err
         cell.check_settings_are_those_of_before()
-        check_last_line(cell, client.err.splitlines()[-1])
+        machine = cell.simulator.machine
+        assert cell.tool_1 is not None
+        held = (OLD_TIP, cell.tool_1)
+        moved, writes = machine.arm.moves_started, machine.flash_writes
+        check_last_line(client.err, moved, held, writes, cell.selected_tool)
+
+
+EVERY_COMMIT = 3
+SHARES = 8
+"""Into so many tests the instants are dealt, so that several workers can share them."""
 
 
 @pytest.mark.fault("F24")
 @pytest.mark.parametrize("share", range(SHARES))
-def test_ctrl_c_at_each_step_leaves_no_tool_selected_that_is_not_the_cell_s_own(
-    tmp_path, monkeypatch, requests, share
-):
-    poses = [number for number, text in enumerate(requests, start=1) if text == POSE]
-    steps = steps_of(requests, share)
-    for step in steps:
-        folder = tmp_path / f"{step.number}-{step.moment[:10]}"
-        with served_cell(folder, monkeypatch) as cell:
-            try:
-                check(cell, step, verified=step.number > poses[-1])
-            except AssertionError as error:
-                error.add_note(f"interrupted at {step}")
-                raise
-    print(f"{len(steps)} steps of {2 * len(requests)}")  # noqa: T201 - for pytest -s
-
-
-class InterruptingLog:
-    """Presses Ctrl-C just after the change number ``at`` of the journal.
-
-    Attributes:
-        changes: How many there were so far.
-        begun: How many movements had begun at Ctrl-C.
-    """
-
-    def __init__(self, at: float, simulator: EpsonSimulator) -> None:
-        self.changes = 0
-        self.begun = 0
-        self._simulator = simulator
-        self._at = at
-        self._log: JournalOutcomeLog = memory_journal(f"interrupted-{at}").log("interrupted")
-
-    def __getattr__(self, name):
-        return getattr(self._log, name)
-
-    def begin(self, marker):
-        self._log.begin(marker)
-        self._changed()
-
-    def clear(self, operation, *entries):
-        self._log.clear(operation, *entries)
-        self._changed()
-
-    def append(self, *entries):
-        self._log.append(*entries)
-        self._changed()
-
-    def _changed(self) -> None:
-        self.changes += 1
-        if self.changes == self._at:
-            self.begun = self._simulator.machine.arm.moves_started
-            signal.raise_signal(signal.SIGINT)
-
-
-@dataclass
-class Change:
-    """A nozzle change in this process, and what was said during it."""
-
-    simulator: EpsonSimulator = field(default_factory=lambda: EpsonSimulator(seed=1))
-    said: list[str] = field(default_factory=list)
-
-    def run(self, outcomes: InterruptingLog) -> None:
-        with robolink.connect(register("interrupted", self.simulator), outcomes=outcomes) as robot:
-            operator = AssistedOperator.with_eyes(
-                InProcessEyes(self.simulator), self.said.append, clock=robot.clock
-            )
-            plan = ChangePlan((ToolPlan(1),), ask_before_write=False)
-            NozzleChange(robot, plan, operator=operator).run()
-
-
-@pytest.mark.parametrize("every", [3, pytest.param(1, marks=pytest.mark.soak)])
-def test_ctrl_c_while_a_marker_is_written_or_cleared_leaves_none_open_and_nothing_moves(every):
-    whole = Change()
-    undisturbed = InterruptingLog(math.inf, whole.simulator)
-    try:
-        whole.run(undisturbed)
-    finally:
-        unregister("interrupted")
-    for at in range(1, undisturbed.changes + 1, every):
-        change = Change()
-        outcomes = InterruptingLog(at, change.simulator)
-        with pytest.raises(KeyboardInterrupt):
-            try:
-                change.run(outcomes)
-            finally:
-                unregister("interrupted")
-        machine = change.simulator.machine
-        assert outcomes.open_markers() == (), at
-        assert machine.tools.selected == 1, at
-        assert not change.simulator.status_flags().running, at
-        assert machine.arm.moves_started == outcomes.begun, at
-        kept = "Tool 1 keeps the new value." in change.said
-        assert (machine.tools.get(1) == OLD_TIP) is not kept, at
+def test_ctrl_c_at_each_step_leaves_no_tool_selected_that_is_not_the_cell_s_own(last_pose, share):
+    cell = EpsonRecipeCell((1,))
+    ending = Ending(cell)
+    worlds = Worlds(calibrations.Dealt(share, SHARES, every_commit=EVERY_COMMIT), ending)
+    ended = worlds.explore_ends(
+        lambda: cell.run(*calibrations.words(cell), "--json", instants=worlds),
+        lambda ended: ending.check(ended, last_pose),
+    )
+    cell.close()
+    assert ended.code == 0, ended.err
+    assert worlds.told == []
+    print(f"{len(worlds.came_at)} steps of {len(worlds.passed)}")  # noqa: T201 - for pytest -s
 
 
 def test_ctrl_c_waits_for_the_outermost_of_two_operations():

@@ -11,11 +11,13 @@ inner ones of rows of polls. ``pytest -s`` shows how many.
 """
 
 import re
+from functools import partial
 from typing import Final
 
 import pytest
 
-from tests.faults._recipe_cases import CASES, Case
+from tests.faults._recipe_cases import CASES
+from tests.faults._recipe_cell import Ended
 from tests.faults._recipe_ends import (
     Disturbance,
     check_interrupted,
@@ -23,6 +25,7 @@ from tests.faults._recipe_ends import (
     check_stopped,
 )
 from tests.faults._recipe_instants import Instant, Instants, chosen, without_inner_polls
+from tests.faults._worlds import Worlds
 
 pytestmark = pytest.mark.timeout(7200)
 
@@ -62,16 +65,14 @@ def instants(tmp_path_factory):
     return of
 
 
-def check(case: Case, how: str, at: Instant, folder) -> None:
-    with case.cell() as cell:
-        disturbance = Disturbance(cell, how)
-        ended = case.run(cell, folder, Instants(at, disturbance))
-        assert disturbance.came, "the instant was not reached"
-        if how == CTRL_C:
-            check_interrupted(cell, ended, disturbance)
-        else:
-            check_stopped(cell, ended, disturbance)
-            check_put_right(cell, disturbance, offered=bool(at.number % 2))
+def check(worlds: Worlds, disturbance: Disturbance, ended: Ended) -> None:
+    cell = disturbance.cell
+    assert disturbance.came, "the instant was not reached"
+    if disturbance.how == CTRL_C:
+        check_interrupted(cell, ended, disturbance)
+    else:
+        check_stopped(cell, ended, disturbance)
+        check_put_right(cell, disturbance, offered=bool(worlds.came_at[-1].number % 2))
 
 
 @pytest.mark.fault("F21", "F22", "F24")
@@ -85,10 +86,14 @@ def test_f21_f22_f24_a_disturbed_run_leaves_all_or_nothing_and_says_what(
     if how != CTRL_C:
         whole = [instant for instant in whole if not SHOWS_LATER.match(str(instant))]
     steps = chosen(whole, MATTERS, turn=TESTS.index((name, how)))
-    for step in steps:
-        try:
-            check(case, how, step, tmp_path)
-        except AssertionError as error:
-            error.add_note(f"disturbed at {step}")
-            raise
+    numbers = {(step.kind, step.number) for step in steps}
+    with case.cell() as cell:
+        disturbance = Disturbance(cell, how)
+        worlds = Worlds(lambda at: (at.kind, at.number) in numbers, lambda _at: disturbance())
+        ended = worlds.explore_ends(
+            lambda: case.run(cell, tmp_path, worlds), partial(check, worlds, disturbance)
+        )
+    assert ended.code == 0, ended.err
+    assert worlds.told == []
+    assert len(worlds.came_at) == len(steps)
     print(f"{name}, {how}: {len(steps)} instants of {len(whole)}")  # noqa: T201 - for pytest -s

@@ -18,7 +18,7 @@ import pytest
 from robolink.model import MarkerKind
 from tests.faults._recipe_cases import CASES, Case
 from tests.faults._recipe_cell import Ended, RecipeCell
-from tests.faults._recipe_ends import kept
+from tests.faults._recipe_ends import check_markers_are_named, kept
 from tests.faults._recipe_instants import Instants
 from tests.faults._stop_placements import Placement, Placements
 
@@ -81,8 +81,7 @@ def check_nothing_went_on(cell: RecipeCell, ended: Ended, rest: AtRest) -> None:
 
 def check_said(cell: RecipeCell, ended: Ended) -> None:
     """Whatever could not be put back is named, and one command after the reset puts it right."""
-    for marker in cell.open_markers():
-        assert marker.request in ended.err, (marker, ended.err)
+    check_markers_are_named(cell.open_markers(), ended)
     if cell.selected != 1 or cell.open_markers():
         assert cell.run("reset").code == 0
         if cell.run("recover").code:

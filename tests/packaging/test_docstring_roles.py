@@ -31,13 +31,15 @@ class Role(NamedTuple):
 
 
 def modules() -> Iterator[tuple[str, ast.Module]]:
-    """Yield every module of the three packages by its dotted name."""
+    """Yield every module that has a role, by its dotted name; others would show nothing."""
     for package in PACKAGES:
         top = (ROOT / package).parent
         for path in sorted((ROOT / package).rglob("*.py")):
             parts = path.relative_to(top).with_suffix("").parts
             name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-            yield name, ast.parse(path.read_text(encoding="utf-8"))
+            text = path.read_text(encoding="utf-8")
+            if ROLE.search(text):
+                yield name, ast.parse(text)
 
 
 def texts(node: ast.AST, owners: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], str]]:
@@ -125,7 +127,7 @@ def leads_somewhere(role: Role, trees: dict[str, ast.Module]) -> bool:
 
 @cache
 def trees() -> dict[str, ast.Module]:
-    """Return every module; not at import, where each process of the suite would read them all."""
+    """Return these modules; not at import, where each process of the suite would read them all."""
     return dict(modules())
 
 

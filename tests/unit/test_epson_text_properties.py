@@ -101,7 +101,7 @@ def test_any_requests_cut_in_any_way_arrive_as_they_were_sent(data, sent, termin
 
 
 @pytest.mark.fault("F05", "F06")
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(st.data(), st.lists(ANSWERS, max_size=6), TERMINATORS)
 def test_any_answers_cut_in_any_way_arrive_as_they_were_sent(data, sent, terminator):
     device = EpsonTextCodec(Role.DEVICE, terminator=terminator)
@@ -141,7 +141,7 @@ def outcome(role: Role, parts: list[bytes]) -> tuple[list[Event], bool]:
     return events, False
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=150, deadline=None)
 @given(st.data(), NOISE, st.sampled_from(Role))
 def test_noise_raises_nothing_else_and_reads_the_same_however_it_is_cut(data, noise, role):
     whole = outcome(role, [noise] if noise else [])

@@ -52,7 +52,7 @@ def test_the_inverse_finds_the_joints_that_the_forward_kinematics_came_from(plac
     assert found == pytest.approx(joints, abs=1e-6)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(placements(), st.sampled_from(Hand))
 def test_both_hands_bring_the_flange_to_the_same_pose(placement, hand):
     model, joints = placement

@@ -21,6 +21,8 @@ from pymodbus.pdu.bit_message import (
 from pymodbus.pdu.register_message import (
     ReadHoldingRegistersResponse,
     ReadInputRegistersResponse,
+    ReadWriteMultipleRegistersRequest,
+    ReadWriteMultipleRegistersResponse,
     WriteMultipleRegistersResponse,
     WriteSingleRegisterResponse,
 )
@@ -57,6 +59,10 @@ _WRITE: Final = {
     15: RegisterTable.COIL,
     16: RegisterTable.HOLDING,
 }
+_WRITE_AND_READ: Final = 23
+_KNOWN: Final = {*_READ, *_WRITE, _WRITE_AND_READ}
+_MOST_WRITTEN: Final = {5: 1, 6: 1, 15: 1968, 16: 123, _WRITE_AND_READ: 121}
+"""What one request may write, by function (Modbus Application Protocol V1.1b3, section 6)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +77,11 @@ class PlcRequest:
         address: First address.
         count: Registers or bits.
         values: What is written; ``None`` for a read.
+        then_read: First address and count of the registers that function 23 reads after it has
+            written; ``None`` for every other function. It is the one that not every PLC has, so
+            ``table`` is ``None`` with it too: who serves it asks for this first.
+        illegal: Whether it asks for more than one request may, or brings another number of
+            values than it says; exception 3 answers that.
     """
 
     number: int
@@ -80,6 +91,8 @@ class PlcRequest:
     address: int = 0
     count: int = 0
     values: tuple[int, ...] | None = None
+    then_read: tuple[int, int] | None = None
+    illegal: bool = False
 
     @property
     def words(self) -> str:
@@ -130,16 +143,24 @@ class Frames(ABC):
 
     def _request(self, number: int, unit: int, payload: bytes) -> PlcRequest:
         function = payload[0]
-        pdu = self._framer.decoder.decode(payload)
-        if pdu is None or function not in _READ | _WRITE:
+        if function not in _KNOWN:
             return PlcRequest(number, unit, function, None)
+        pdu = self._framer.decoder.decode(payload)
+        if pdu is None:  # pymodbus makes nothing of a count that may not be
+            return PlcRequest(number, unit, function, None, illegal=True)
         if function in _READ:
             return PlcRequest(number, unit, function, _READ[function], pdu.address, pdu.count)
-        table = _WRITE[function]
-        bits = pdu.bits[: 1 if function == 5 else pdu.count]
-        values = bits if table is RegisterTable.COIL else pdu.registers
-        written = tuple(int(value) for value in values)
-        return PlcRequest(number, unit, function, table, pdu.address, len(written), written)
+        table = _WRITE.get(function)
+        if isinstance(pdu, ReadWriteMultipleRegistersRequest):
+            read = (pdu.read_address, pdu.read_count)
+            address, said, brought = pdu.write_address, pdu.write_count, pdu.write_registers
+        else:
+            read, address = None, pdu.address
+            said = pdu.count if function in (15, 16) else 1
+            brought = pdu.bits[:said] if table is RegisterTable.COIL else pdu.registers
+        values = tuple(int(value) for value in brought)
+        illegal = len(values) != said or not 1 <= said <= _MOST_WRITTEN[function]
+        return PlcRequest(number, unit, function, table, address, said, values, read, illegal)
 
     def _packed(self, request: PlcRequest, pdu: ModbusPDU) -> bytes:
         payload = bytes([pdu.function_code]) + pdu.encode()
@@ -195,7 +216,7 @@ class LineFrames(Frames):
     def _end(self) -> int:
         """Return where the frame ends, which its function says; 0 while that is not known."""
         kind = self._framer.decoder.lookupPduClass(self._buffer)
-        if kind is None or self._buffer[1] not in _READ | _WRITE:
+        if kind is None or self._buffer[1] not in _KNOWN:
             return len(self._buffer)
         return kind.calculateRtuFrameSize(self._buffer)
 
@@ -248,6 +269,8 @@ def _pdu(request: PlcRequest, found: Sequence[int]) -> ModbusPDU:
             return WriteSingleRegisterResponse(address=address, registers=values)
         case 15:
             return WriteMultipleCoilsResponse(address=address, count=len(values))
+        case 23:
+            return ReadWriteMultipleRegistersResponse(registers=list(found))
         case _:
             return WriteMultipleRegistersResponse(address=address, count=len(values))
 

@@ -323,6 +323,8 @@ class PlcSimulator(HostedDevice):
     def _answer(self, request: PlcRequest, frames: Frames, *, ignored: bool) -> bytes:
         if request.unit != self.unit:
             return frames.refusal(request, NO_SUCH_UNIT)
+        if request.illegal:
+            return frames.refusal(request, ILLEGAL_VALUE)
         if request.table is None or request.function == _SEVERAL_COILS:
             return frames.refusal(request, ILLEGAL_FUNCTION)
         words = request.table in (RegisterTable.HOLDING, RegisterTable.INPUT)

@@ -1,6 +1,7 @@
 """The registers of a simulated PLC behind Modbus frames: requests in, answers out, each in time."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Final
 
 from robolink.register_maps import RegisterTable
@@ -12,6 +13,7 @@ from robolink_simulators.hosting.fieldbus.plc_registers import WORD_BITS, PlcReg
 from robolink_simulators.hosting.modbus_frames import (
     ILLEGAL_ADDRESS,
     ILLEGAL_FUNCTION,
+    ILLEGAL_VALUE,
     Frames,
     LineFrames,
     PlcRequest,
@@ -177,6 +179,9 @@ class MailboxFramesLink:
     def _carried_out(self, request: PlcRequest) -> ServedAccess:
         registers, address, values = self._device.registers, request.address, request.values
         bits = request.table in (RegisterTable.COIL, RegisterTable.DISCRETE)
+        if values is not None and request.then_read is not None:
+            served = registers.write(address, values)
+            return replace(served, words=tuple(registers.peek(Bank.HOLDING, *request.then_read)))
         if values is not None:
             return registers.switch(address, values) if bits else registers.write(address, values)
         read = registers.read_bits if bits else registers.read
@@ -209,7 +214,11 @@ class MailboxFramesLink:
 
 def _refusal(request: PlcRequest) -> int:
     """Return the code of a request that cannot be served; 0 if it can."""
-    if request.table is None:
+    if request.illegal:
+        return ILLEGAL_VALUE
+    if request.then_read is not None and sum(request.then_read) > REGISTERS:
+        return ILLEGAL_ADDRESS
+    if request.table is None and request.then_read is None:
         return ILLEGAL_FUNCTION
     bits = request.table in (RegisterTable.COIL, RegisterTable.DISCRETE)
     most = REGISTERS * WORD_BITS if bits else REGISTERS

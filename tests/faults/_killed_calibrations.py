@@ -1,0 +1,122 @@
+"""A whole ``robolink calibrate two-pose`` that was killed on its way.
+
+Nothing is written that was not asked, the next command says that Tool 0 is still selected and names
+the old tool, and ``recover`` puts it back.
+"""
+
+import re
+from typing import Final
+
+from robolink.model import EntryKind, ToolOffset
+from tests.faults._epson_recipe_cell import EpsonRecipeCell
+from tests.faults._nozzle_cell import OF_A_CALIBRATION, numbers
+from tests.faults._recipe_instants import EVERYTHING, Instant
+from tests.faults._requests import changes
+
+_EVERY: Final = 48
+"""Of all other exchanges, every 48th makes the sample."""
+
+_MATTERS: Final = re.compile(r'\$(Log|Execute,"Tool \d)')
+"""Logs in or out, or selects."""
+
+_MOVES: Final = re.compile(r'\$Execute,"(Move |Go )')
+_EVERY_MOVE: Final = 7
+"""Of the moments of movements, most of which are the jogs of one touch, every seventh."""
+
+_WRITES: Final = re.compile(r'\$Execute,"TLSet \d')
+
+
+class Dealt:
+    """Chooses the instants of a share: all of them, or without the switch a fixed sample.
+
+    The sample has both moments of a write, and of other exchanges one.
+
+    Args:
+        share: Which one, from 0.
+        shares: Into how many they are dealt.
+        every_commit: Of the durable transactions of the journal, before and after which something
+            may come, one in so many belongs to the sample; 0 for none.
+    """
+
+    def __init__(self, share: int, shares: int, *, every_commit: int = 0) -> None:
+        self._share, self._shares = share, shares
+        self._every_commit = every_commit
+        self._moves = 0
+        self._chosen = 0
+
+    def __call__(self, at: Instant) -> bool:
+        """Whether something comes in between there."""
+        if at.kind not in ("request", "answer", "commit") or not self._in_sample(at):
+            return False
+        self._chosen += 1
+        return self._chosen % self._shares == self._share
+
+    def _in_sample(self, at: Instant) -> bool:
+        if EVERYTHING or _WRITES.match(at.what):
+            return True
+        if at.kind == "commit":
+            return bool(self._every_commit) and at.number % self._every_commit == 1
+        if _MOVES.match(at.what):
+            self._moves += 1
+            return self._moves % _EVERY_MOVE == 1
+        moment = ("request", "answer")[at.number % 2]
+        return at.kind == moment and (bool(_MATTERS.match(at.what)) or at.number % _EVERY == 1)
+
+
+def words(cell: EpsonRecipeCell) -> tuple[str, ...]:
+    """Return the command of the whole nozzle change."""
+    return ("calibrate", "two-pose", "--tool", "1", "--yes", "--assist", cell.url)
+
+
+def meet(cell: EpsonRecipeCell) -> None:
+    """Load what the commands of a check need, once for all of them."""
+    for command in (("status",), ("recover", "--yes")):
+        assert (done := cell.run(*command)).code == 0, done.err
+
+
+def check_killed(cell: EpsonRecipeCell) -> None:
+    """Look at what it left, recover, and go on."""
+    cell.come_to_rest()
+    moves_begun = cell.moves_begun
+    check_nothing_else_was_written(cell)
+    assert len(cell.writes()) <= 1
+    check_the_next_command_says_what_is_selected(cell)
+    check_recover_puts_the_cell_s_own_tool_back(cell)
+    assert cell.moves_begun == moves_begun
+    cell.check_motion_is_allowed()
+    assert cell.moves_begun == moves_begun + 1
+
+
+def check_nothing_else_was_written(cell: EpsonRecipeCell) -> None:
+    """Tool 1 holds the old or the measured value, written once at most; the rest stands."""
+    asked = changes(cell.requests())
+    strange = [text for text in asked if not OF_A_CALIBRATION.fullmatch(text)]
+    assert not strange, strange
+    written = [ToolOffset(*numbers(text)) for text in asked if "TLSet" in text]
+    assert len(cell.writes()) == len(written) <= 2
+    assert cell.tools() == {**cell.before, 1: written[-1] if written else cell.before[1]}
+    assert cell.outputs() == cell.outputs_before
+    assert cell.moves_begun <= cell.moves_asked()
+
+
+def check_the_next_command_says_what_is_selected(cell: EpsonRecipeCell) -> None:
+    """What is in force is named beside what it was, and how it is put back."""
+    markers = cell.open_markers()
+    shown = cell.run("status")
+    assert shown.code == 0, shown.err
+    if cell.selected != 1:
+        assert "Tool 0 is selected now; it was tool 1 before" in shown.err
+        assert "This puts tool 1 back, with the earlier power mode and speed" in shown.err
+    assert shown.err.count(f'robolink -c "{cell.url}" recover') == len(markers)
+    assert cell.open_markers() == markers
+
+
+def check_recover_puts_the_cell_s_own_tool_back(cell: EpsonRecipeCell) -> None:
+    """Tool, power and speed are those of before, and what nobody verified is taken back."""
+    recovered = cell.run("recover", "--yes")
+    assert recovered.code == 0, recovered.err
+    assert (cell.selected, cell.settings()) == (1, cell.settings_before)
+    assert cell.open_markers() == ()
+    check_nothing_else_was_written(cell)
+    kept = list(cell.journal.entries(kinds=(EntryKind.DONE,)))
+    assert (not cell.changed()) is not bool(kept), "what nobody verified is taken back"

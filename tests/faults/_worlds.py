@@ -1,0 +1,170 @@
+"""One run, and the many worlds in which something came in between: each in a fork of this process.
+
+The run, its simulator and its journal are in this process. At an instant it forks, and in the child
+something happens there that does not happen in the parent: the program is killed, or somebody
+presses Ctrl-C or the emergency stop. What must be true then is checked in the child, while the run
+in the parent waits for its end. So one run serves all instants, and none starts a process.
+
+Where the program is killed nothing of it goes on, not even to clean up: its connection is gone, its
+process has ended for whoever asks the system, and the controller carries out what it was given.
+"""
+
+import os
+import traceback
+from collections import Counter
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any, Final, Protocol, TypeVar
+
+import pytest
+from robolink_simulators.hosting.in_process.mailbox_link import InProcessMailboxLink
+from robolink_simulators.hosting.in_process.transport import InProcessTransport
+
+from robolink import interrupts
+from robolink.journal import _lease_view
+from tests.faults._recipe_instants import Instant, Instants, Kind
+
+Ended = TypeVar("Ended")
+
+_OF_A_PROGRAM: Final[dict[type, tuple[str, ...]]] = {
+    InProcessTransport: ("send", "receive", "receive_waiting", "wait_readable", "close"),
+    InProcessMailboxLink: ("_exchange", "close"),
+}
+"""What a program does to its connection. It gets no further once it is dead."""
+
+
+class _Connection(Protocol):
+    def close(self) -> None: ...
+
+
+class Worlds(Instants):
+    """Sees the instants of a run, and lets something come in between at some of them.
+
+    Attributes:
+        came_at: Where it came.
+        told: What was wrong in those worlds, and where it came there.
+
+    Args:
+        comes: Whether it comes at an instant.
+        happens: What comes; without it the program is killed, at an exchange or at a commit.
+    """
+
+    def __init__(
+        self, comes: Callable[[Instant], bool], happens: Callable[[Instant], None] | None = None
+    ) -> None:
+        super().__init__()
+        self.came_at: list[Instant] = []
+        self.told: list[str] = []
+        self._comes = comes
+        self._happens = happens
+        self._check: Callable[[], None] = lambda: None
+        self._asked = Counter[str]()
+        self._connection: _Connection | None = None
+        self._tells_to = -1
+        self._dead = False
+
+    @property
+    def in_between(self) -> bool:
+        """Whether this is a world in which it came."""
+        return self._tells_to >= 0
+
+    def pass_by(self, kind: Kind, what: str = "") -> None:
+        """Let one go by, or let it come."""
+        if not self.in_between:
+            super().pass_by(kind, what)
+            at = self.passed[-1]
+            self._asked[f"{kind} {what}"] += 1
+            if self._comes(at) and self._fork():
+                self._dead = self._happens is None
+                if self._happens is not None:
+                    self._happens(at)
+        if self._dead and kind in ("commit", "question"):
+            self._leave()
+
+    def explore(self, run: Callable[[], Ended], check: Callable[[], None]) -> Ended:
+        """Run, with the program killed at its instants; return how it ended undisturbed.
+
+        Args:
+            run: The program.
+            check: What must be true in a world in which it was killed.
+        """
+        self._check = check
+        with self._deadly():
+            return self._run(run, lambda _ended: pytest.fail("the dead program came to its end"))
+
+    def explore_ends(self, run: Callable[[], Ended], check: Callable[[Ended], None]) -> Ended:
+        """Run to the end in every world; return how it ended undisturbed.
+
+        Args:
+            run: The program.
+            check: What must be true of the end of one in which something came in between.
+        """
+        return self._run(run, check)
+
+    def _run(self, run: Callable[[], Ended], check: Callable[[Ended], None]) -> Ended:
+        try:
+            ended = run()
+            if self.in_between:
+                check(ended)
+        except BaseException:
+            if not self.in_between:
+                raise
+            self._tell()
+        if self.in_between:
+            os._exit(0)
+        return ended
+
+    @contextmanager
+    def _deadly(self) -> Iterator[None]:
+        with pytest.MonkeyPatch.context() as patch:
+            for kind, names in _OF_A_PROGRAM.items():
+                for name in names:
+                    patch.setattr(kind, name, self._until_death(getattr(kind, name)))
+            yield
+
+    def _until_death(self, act: Callable[..., object]) -> Callable[..., object]:
+        def acted(connection: Any, *arguments: Any, **named: Any) -> object:
+            self._connection = connection
+            try:
+                return act(connection, *arguments, **named)
+            finally:
+                if self._dead:
+                    self._leave()
+
+        return acted
+
+    def _fork(self) -> bool:
+        """Return whether this is the child."""
+        at = self.passed[-1]
+        nth = self._asked[f"{at.kind} {at.what}"]
+        self.came_at.append(at)
+        reading, writing = os.pipe()
+        if child := os.fork():
+            os.close(writing)
+            with os.fdopen(reading, encoding="utf-8") as told:
+                said = told.read()
+            _, status = os.waitpid(child, 0)
+            if said or status:
+                self.told.append(f"at {at.kind} {nth} of {at.what}: {said or status}")
+            return False
+        os.close(reading)
+        self._tells_to = writing
+        return True
+
+    def _leave(self) -> None:
+        """Be the world without the program: look at it, and end."""
+        self._dead = False
+        ended, program = _lease_view._has_ended, os.getppid()
+        try:
+            _lease_view._has_ended = lambda pid, start: pid == program or ended(pid, start)
+            interrupts._handler = interrupts._Handler()
+            if self._connection is not None:
+                self._connection.close()
+            self._check()
+        except BaseException:
+            self._tell()
+        finally:
+            os._exit(0)
+
+    def _tell(self) -> None:
+        os.write(self._tells_to, traceback.format_exc().encode()[-4000:])

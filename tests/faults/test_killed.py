@@ -1,0 +1,272 @@
+"""A program killed anywhere: old or proved, what is in doubt is told, and ``recover`` ends it.
+
+Each act is a row. Its program runs once against a simulator of this process and dies at its
+instants: before a request is carried out (which it is all the same), before an answer leaves, and
+before and after each durable transaction of the journal. By default a sample is taken: the
+transactions, and what logs in or out, selects, starts or writes. ``ROBOLINK_ALL_KILL_POINTS=1``
+takes all; ``pytest -s`` shows how many.
+
+That a real process dies like that is shown at four instants on each kind of line: SIGKILL before
+and after the write of a tool, and before and after the transaction that ends it is durable. There
+what was acknowledged must be in the journal's file.
+"""
+
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from functools import partial
+from pathlib import Path
+from typing import Final
+
+import pytest
+
+from tests.faults import _killed_calibrations as calibrations
+from tests.faults import _killed_looks as looks
+from tests.faults import _killed_orders as orders
+from tests.faults._change_cell import ChangeCell, Step, WireStep, change_cell
+from tests.faults._change_process import NEW, OLD, CommitStep
+from tests.faults._epson_recipe_cell import EpsonRecipeCell
+from tests.faults._kill_points import (
+    NOTHING_LEFT,
+    check_killed_change,
+    check_recovered,
+    check_recovers,
+)
+from tests.faults._recipe_instants import EVERYTHING, Instant
+from tests.faults._softmotion_change_cell import plc_change_cell
+from tests.faults._worlds import Worlds
+
+pytestmark = pytest.mark.timeout(3600)
+
+SOAK: Final = pytest.mark.soak
+KINDS: Final[dict[str, Callable[[Path], AbstractContextManager[ChangeCell]]]] = {
+    "EPSON": partial(change_cell, wire="sim"),
+    "PLC": partial(plc_change_cell, wire="sim"),
+}
+LINES: Final[dict[str, Callable[[Path], AbstractContextManager[ChangeCell]]]] = {
+    "EPSON over TCP": partial(change_cell, wire="tcp"),
+    "EPSON over RS232": partial(change_cell, wire="serial"),
+    "PLC over Modbus TCP": partial(plc_change_cell, wire="modbus-tcp"),
+    "PLC over Modbus RTU": partial(plc_change_cell, wire="modbus-rtu"),
+    "PLC over CANopen": partial(plc_change_cell, wire="can-multicast"),
+}
+
+
+class Sample:
+    """Chooses the instants at which a program dies: all, or without the switch a part.
+
+    Args:
+        matters: Whether an instant belongs to the sample.
+        every: Of those, one in so many is taken.
+    """
+
+    def __init__(self, matters: Callable[[Instant], bool], *, every: int = 1) -> None:
+        self._matters = matters
+        self._every = every
+        self._seen = 0
+
+    def __call__(self, at: Instant) -> bool:
+        """Whether it dies there."""
+        if at.kind not in ("request", "answer", "commit"):
+            return False
+        if EVERYTHING:
+            return True
+        self._seen += (matters := self._matters(at))
+        return matters and self._seen % self._every == 1 % self._every
+
+
+def matters_to(cell: ChangeCell, at: Instant) -> bool:
+    return at.kind == "commit" or cell.matters.match(at.what) is not None
+
+
+def die(cell: ChangeCell, program: str, sample: Sample, check: Callable[[], None]) -> None:
+    """Run a program, let it die at the instants of a sample, and check what it leaves."""
+    worlds = Worlds(sample)
+    worlds.explore(lambda: cell.run(program, worlds), check)
+    assert worlds.told == []
+    print(f"{program}: {len(worlds.came_at)} kill points of {len(worlds.passed)}")  # noqa: T201 - for pytest -s
+
+
+@pytest.mark.parametrize(
+    ("kind", "program"),
+    [
+        ("EPSON", "one tool"),
+        pytest.param("EPSON", "two tools", marks=SOAK),  # on a PLC in every run of the suite
+        ("EPSON", "two tools, verified"),
+        pytest.param("PLC", "one tool", marks=SOAK),
+        ("PLC", "two tools"),
+        pytest.param("PLC", "two tools, verified", marks=SOAK),
+    ],
+)
+@pytest.mark.fault("F57", "F58")
+def test_f57_f58_a_change_killed_anywhere_is_recovered_as_a_whole(tmp_path, kind, program):
+    with KINDS[kind](tmp_path / "cell") as cell:
+        assert NOTHING_LEFT in cell.recover()
+        sample = Sample(partial(matters_to, cell))
+        die(cell, program, sample, partial(check_killed_change, cell, program))
+        assert cell.tools == (NEW if program != "one tool" else {**OLD, 1: NEW[1]})
+        assert NOTHING_LEFT in cell.recover()
+
+
+# Where a change was killed, whose recovery is killed in turn: before the first answer of the
+# second kind after the first kind leaves. And which tools were written by then.
+WRITE_1, WRITE_2 = '$Execute,"TLSet 1,', '$Execute,"TLSet 2,'
+LIST, LOOK = '$Execute,"TLSet"', "$GetStatus"
+ON_PLC = "write_command WRITE_TOOL"
+LEFT: Final[dict[str, tuple[str, str, str, str, list[int]]]] = {
+    "a write whose answer was lost": ("EPSON", "one tool", WRITE_1, WRITE_1, [1]),
+    "one tool of two": ("EPSON", "two tools", WRITE_1, LIST, [1]),
+    "the second of two in doubt": ("EPSON", "two tools", WRITE_2, WRITE_2, [1, 2]),
+    "two that nobody verified": ("EPSON", "two tools, verified", WRITE_2, LOOK, [1, 2]),
+    "two, in doubt and not verified": ("EPSON", "two tools, verified", WRITE_2, WRITE_2, [1, 2]),
+    "one slot of two": ("PLC", "two tools", ON_PLC, ON_PLC, [1]),
+}
+
+
+class Left:
+    """Chooses the one instant: the first answer of the second kind after the first kind."""
+
+    def __init__(self, first: str, second: str) -> None:
+        self._path = [first] if first == second else [first, second]
+
+    def __call__(self, at: Instant) -> bool:
+        """Whether this is it."""
+        if not self._path or at.kind != "answer" or not at.what.startswith(self._path[0]):
+            return False
+        del self._path[0]
+        return not self._path
+
+
+@pytest.mark.parametrize("left", LEFT)
+@pytest.mark.fault("F80")
+def test_f80_a_recovery_killed_anywhere_may_be_run_again(tmp_path, left):
+    kind, program, *path, expected = LEFT[left]
+    with KINDS[kind](tmp_path / "cell") as cell:
+        assert NOTHING_LEFT in cell.recover()
+
+        def recover() -> None:
+            cell.act()
+            written = cell.writes()
+            assert written == expected
+            sample = Sample(partial(matters_to, cell), every=4)
+            die(cell, "recover", sample, partial(check_killed_recovery, cell, program, written))
+            check_recovered(cell, program, written)
+
+        worlds = Worlds(Left(*path))
+        worlds.explore(lambda: cell.run(program, worlds), recover)
+        assert worlds.told == []
+        assert len(worlds.came_at) == 1
+
+
+def check_killed_recovery(cell: ChangeCell, program: str, written: list[int]) -> None:
+    cell.act()
+    check_recovers(cell, program, written)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("program", "whole"),
+    [
+        ("one tool, ordered", False),
+        pytest.param("one tool, ordered", True, marks=SOAK),
+        pytest.param("two tools, ordered", True, marks=SOAK),
+    ],
+)
+@pytest.mark.fault("F79")
+def test_f79_an_order_killed_anywhere_and_delivered_again_is_carried_out_once(
+    tmp_path, kind, program, whole
+):
+    with KINDS[kind](tmp_path / "cell") as cell:
+        assert NOTHING_LEFT in cell.recover()
+        sample = Sample(lambda at: whole or matters_to(cell, at), every=1 if whole else 4)
+        die(cell, program, sample, partial(orders.check_killed_order, cell, program))
+
+
+def test_a_look_killed_anywhere_is_never_taken_for_a_later_one(tmp_path):
+    with change_cell(tmp_path / "cell", wire="sim") as cell:
+        assert NOTHING_LEFT in cell.recover()
+        looks.furnish(cell)
+        sample = Sample(lambda at: at.what.startswith("$Start"))
+        die(cell, "look", sample, partial(looks.check_killed_look, cell))
+        assert (cell.tools, cell.selected) == (OLD, 1)
+
+
+CALIBRATION_SHARES: Final = 4
+"""Into so many tests the instants of a whole run are dealt, so that workers can share them."""
+
+
+@pytest.mark.parametrize("share", range(CALIBRATION_SHARES))
+@pytest.mark.fault("F60")
+def test_f60_a_calibration_killed_anywhere_leaves_the_old_or_the_new_value(share):
+    cell = EpsonRecipeCell((1,))
+    worlds = Worlds(calibrations.Dealt(share, CALIBRATION_SHARES))
+    calibrations.meet(cell)
+    ended = worlds.explore(
+        lambda: cell.run(*calibrations.words(cell), instants=worlds),
+        partial(calibrations.check_killed, cell),
+    )
+    cell.close()
+    assert ended.code == 0, ended.err
+    assert worlds.told == []
+    print(f"calibrate: {len(worlds.came_at)} kill points of {len(worlds.passed)}")  # noqa: T201 - for pytest -s
+
+
+ORDER_SHARES: Final = 16
+"""Of a whole ordered change; each takes about 14 s of CPU."""
+
+
+def at_the_write(at: Instant) -> bool:
+    return at.kind == "request" and at.what.startswith(WRITE_1)
+
+
+@pytest.mark.parametrize(
+    "dies",
+    [
+        pytest.param(at_the_write, id="at its write"),
+        *(
+            pytest.param(lambda at, share=share: at.number % ORDER_SHARES == share, marks=SOAK)
+            for share in range(ORDER_SHARES)
+        ),
+    ],
+)
+@pytest.mark.fault("F79")
+def test_f79_a_change_killed_anywhere_and_delivered_again_is_made_once(tmp_path, dies):
+    cell = EpsonRecipeCell((1,))
+    words = orders.words(cell, tmp_path)
+    worlds = Worlds(lambda at: at.kind in ("request", "answer", "commit") and dies(at))
+    calibrations.meet(cell)
+    ended = worlds.explore(
+        lambda: cell.run(*words, instants=worlds),
+        partial(orders.check_delivered_again, cell, words),
+    )
+    cell.close()
+    assert ended.code == 0, ended.err
+    assert worlds.came_at
+    assert worlds.told == []
+    print(f"{len(worlds.came_at)} kill points of {len(worlds.passed)}")  # noqa: T201 - for pytest -s
+
+
+def four_of(steps: list[Step]) -> list[Step]:
+    """Return the write of tool 1, before and after, and so the commit that ends the change."""
+    wire = [s for s in steps if isinstance(s, WireStep) and s.request.startswith((WRITE_1, ON_PLC))]
+    durable = [step for step in steps if isinstance(step, CommitStep)]
+    return [*wire[:2], *durable[-4:-2]]  # the last one gives the lease up
+
+
+@pytest.mark.parametrize(
+    "line",
+    [pytest.param(name, marks=SOAK if name[-3:] in ("RTU", "pen") else ()) for name in LINES],
+)
+@pytest.mark.fault("F57", "F58")
+def test_f57_f58_a_process_killed_at_four_instants_is_recovered_on_every_line(tmp_path, line):
+    with LINES[line](tmp_path / "whole") as cell:
+        steps = four_of(cell.steps_of("one tool"))
+        assert cell.tools == {**OLD, 1: NEW[1]}
+    assert len(steps) == 4
+    for number, step in enumerate(steps):
+        with LINES[line](tmp_path / str(number)) as cell:
+            cell.kill("one tool", step)
+            try:
+                check_killed_change(cell, "one tool")
+            except AssertionError as error:
+                error.add_note(f"killed at {step}")
+                raise

@@ -47,10 +47,10 @@ from robolink.procedures import (
     Place,
     ProofBasis,
     camera_error_of,
-    look_again,
     nearest_first,
     proof_angles,
 )
+from robolink.procedures.camera_looks import look_again
 from robolink.runner import Procedure
 from robolink.sensing import sensor_name
 from robolink.stations import CameraStation, StationKind

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from robolink.procedures.camera_drive import Place as Place
     from robolink.procedures.camera_looks import NO_ERROR as NO_ERROR
     from robolink.procedures.camera_looks import CameraSamples as CameraSamples
-    from robolink.procedures.camera_looks import look_again as look_again
     from robolink.procedures.camera_looks import nearest_first as nearest_first
     from robolink.procedures.camera_looks import seen_drift as seen_drift
     from robolink.procedures.camera_looks import verify_by_looking as verify_by_looking
@@ -94,9 +93,7 @@ else:
             "camera_drive": (
                 "CameraDrive HALF_ROUND_DEG LEAST_BESIDE_MM LookPlan Place TWO_ANGLES_DEG"
             ),
-            "camera_looks": (
-                "CameraSamples NO_ERROR look_again nearest_first seen_drift verify_by_looking"
-            ),
+            "camera_looks": ("CameraSamples NO_ERROR nearest_first seen_drift verify_by_looking"),
             "kept_proof": "KeepsProof KeptProof PlacedProof ProofBasis ProvesAgain",
             "pin_proof": (
                 "DriftProof MOST_MORE TurnTest contact_pose drift_uncertainty_mm verify_by_turning"

@@ -129,6 +129,9 @@ def pytest_collection_modifyitems(config, items):
         # The process that prints the table of faults sees reports, not items.
         rows = {row for mark in item.iter_markers("fault") for row in mark.args}
         item.user_properties += [("fault", row) for row in sorted(rows)]
+        if item.get_closest_marker("soak") and not item.get_closest_marker("timeout"):
+            # It is there for its length, and nobody waits for it.
+            item.add_marker(pytest.mark.timeout(900))
     if "soak" in config.option.markexpr:
         return
     left_out = [item for item in items if item.get_closest_marker("soak")]

@@ -12,7 +12,9 @@ import pytest
 
 import robolink
 from robolink import ToolOffset
+from robolink.controllers import PlcMapController
 from robolink.errors import OutcomeUnknownError
+from robolink.testing import confirm_whole_map
 
 LOST = 'schema = "robolink/faults/1"\nlink = "{link}"\n[[fault]]\naction = "drop_reply"\n'
 
@@ -40,9 +42,16 @@ def served(*arguments):
             process.terminate()
 
 
+def compare_the_map(controller):
+    """Put on record that a map was compared: before that nothing is written by it."""
+    if isinstance(controller, PlcMapController):
+        confirm_whole_map(controller)
+
+
 def lose_an_answer(document):
     """Write a tool whose answer is lost, and return who was written to."""
     with robolink.connect(document["url"], timeout_s=3.0) as controller:
+        compare_the_map(controller)
         with pytest.raises(OutcomeUnknownError):
             controller.tools.write(2, ToolOffset(1, 2, 3), expected=robolink.ANY)
         assert controller.outcomes.open_markers()
@@ -51,6 +60,7 @@ def lose_an_answer(document):
 
 def starts_clean(document):
     with robolink.connect(document["url"]) as controller:
+        compare_the_map(controller)
         assert not controller.outcomes.open_markers()
         controller.tools.write(2, ToolOffset(1, 2, 3), expected=robolink.ANY)
         return controller.outcomes.identity

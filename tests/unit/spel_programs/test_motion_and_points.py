@@ -1,6 +1,7 @@
 """Points, labels, tools and motion of programs, and names of a project."""
 
 import random
+import re
 
 import pytest
 from robolink_simulators.epson.arm.robots import find_robot
@@ -8,9 +9,9 @@ from robolink_simulators.epson.machine import Machine
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.epson.spel import Interpreter
 
-from robolink.model import Hand
-
 # Points, labels, tools and motion of programs. Pages are those of the language reference.
+from robolink.errors import ConfigError
+from robolink.model import Hand
 
 PTS = """ENVT0100,LM:,DS:,CS:,MA:,EI:
 sVersion="2.0.0"
@@ -63,6 +64,13 @@ def test_points_come_from_files_with_their_labels(cell):
         points=["robot1.pts"],
     )
     assert made.run() == ["200.5 2 0", "1"]
+
+
+@pytest.mark.parametrize("key", ["nUndefined", "nLocal", "rX"])
+def test_a_point_with_a_number_that_is_none_is_refused_by_its_number(cell, key):
+    broken = re.sub(rf"\t{key}=.*", f"\t{key}=", PTS)
+    with pytest.raises(ConfigError, match=r"Point [45] of .*robot1.pts cannot be read"):
+        cell(main("Print 1"), files={"robot1.pts": broken}, points=["robot1.pts"])
 
 
 def test_points_are_saved_loaded_and_merged_in_the_controller(cell):

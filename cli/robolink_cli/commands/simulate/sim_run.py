@@ -252,8 +252,9 @@ def _tell_end(document: str, messages: str) -> None:
     if json_is_on() or not document.startswith("{"):
         hand_over(document.rstrip("\n"))
         return
-    *_, last = document.splitlines()  # the line of who listens may stand before it
-    error = json.loads(last).get("error")
+    if document.startswith(_READY):  # the line of who listens may stand before it
+        _, _, document = document.partition("\n")
+    error = json.loads(document).get("error") if document.strip() else None
     if error is not None:  # without one it was told to end, or the system ended it
         show(f"robolink: {error['what']}\n  {error['remedy']}", beside=True)
 

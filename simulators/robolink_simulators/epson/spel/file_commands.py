@@ -117,14 +117,14 @@ def read_points(path: Path, encoding: str | None = None) -> tuple[dict[int, Poin
             continue
         try:
             number = int(pairs["nNumber"])
-            point = _point(pairs)
+            point, undefined = _point(pairs), int(pairs.get("nUndefined", "0"))
         except (KeyError, ValueError) as error:
             raise _not_understood(path, str(pairs.get("nNumber", "?"))) from error
         if not 0 <= number <= HIGHEST_POINT or not 0 <= point.local <= HIGHEST_LOCAL:
             raise _not_understood(path, str(number))
         if pairs.get("sLabel"):
             labels[pairs["sLabel"]] = number
-        if not int(pairs.get("nUndefined", "0")) & _UNDEFINED_AXES:
+        if not undefined & _UNDEFINED_AXES:
             points[number] = point
     return points, labels
 

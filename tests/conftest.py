@@ -120,6 +120,12 @@ def documents_fit_their_schemas():
         pytest.fail("\n".join(DOCUMENTS.wrong[:9]), pytrace=False)
 
 
+def pytest_itemcollected(item):
+    """Give what is there for its length 15 minutes, where it asks for no other limit."""
+    if item.get_closest_marker("soak") and not item.get_closest_marker("timeout"):
+        item.add_marker(pytest.mark.timeout(900))
+
+
 def pytest_collection_modifyitems(config, items):
     """Leave out what ``make soak`` is for, unless the command line speaks of it."""
     # A test is asked for by its name, so a name may hold no address in memory.
@@ -129,9 +135,6 @@ def pytest_collection_modifyitems(config, items):
         # The process that prints the table of faults sees reports, not items.
         rows = {row for mark in item.iter_markers("fault") for row in mark.args}
         item.user_properties += [("fault", row) for row in sorted(rows)]
-        if item.get_closest_marker("soak") and not item.get_closest_marker("timeout"):
-            # It is there for its length, and nobody waits for it.
-            item.add_marker(pytest.mark.timeout(900))
     if "soak" in config.option.markexpr:
         return
     left_out = [item for item in items if item.get_closest_marker("soak")]

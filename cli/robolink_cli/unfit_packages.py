@@ -11,7 +11,7 @@ from contextlib import suppress
 from typing import Final
 
 from robolink.messages import joined, tr
-from robolink_cli.commands.computer.doctor import Level, Remark, check_versions
+from robolink_cli.commands.computer.checkup import Level, Remark, check_versions
 from robolink_cli.console.language import speaking_for
 from robolink_cli.console.output import tolerate_any_console, visible
 
@@ -92,7 +92,7 @@ def answer_without_click(arguments: Sequence[str], error: Exception) -> int:
 def _examined(*, as_json: bool) -> int:
     from dataclasses import asdict
 
-    from robolink_cli.commands.computer.doctor import check_up, in_words
+    from robolink_cli.commands.computer.checkup import check_up, in_words
 
     remarks = check_up()
     if as_json:

@@ -8,8 +8,8 @@ from types import ModuleType, SimpleNamespace
 
 import pytest
 from robolink_cli import main
-from robolink_cli.commands.computer import doctor
-from robolink_cli.commands.computer.doctor import (
+from robolink_cli.commands.computer import checkup
+from robolink_cli.commands.computer.checkup import (
     Level,
     check_name,
     check_versions,
@@ -176,21 +176,21 @@ def test_another_robolink_on_the_import_path_is_named(monkeypatch, tmp_path, nam
 def test_a_state_folder_that_cannot_be_made_is_bad(monkeypatch, tmp_path):
     (tmp_path / "file").touch()
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "file" / "state"))
-    (remark,) = doctor.check_state_folder()
+    (remark,) = checkup.check_state_folder()
     assert remark.level is Level.BAD
     assert "ROBOLINK_STATE_DIR" in remark.remedy
 
 
 def test_a_state_folder_that_is_read_only_is_bad(monkeypatch):
     monkeypatch.setattr(os, "access", lambda *arguments: False)
-    assert levels(doctor.check_state_folder()) == [("state", Level.BAD)]
+    assert levels(checkup.check_state_folder()) == [("state", Level.BAD)]
 
 
 def test_a_state_folder_that_others_may_change_is_told(tmp_path):
     folder = tmp_path / "state" / "backups"
     folder.mkdir(parents=True)
     folder.chmod(0o770)
-    (remark,) = doctor.check_state_folder()
+    (remark,) = checkup.check_state_folder()
     assert remark.level is Level.WARN
     assert f"chmod go-w {folder}" in remark.remedy
 
@@ -199,15 +199,15 @@ def test_cell_files_are_checked(tmp_path):
     path = tmp_path / "robolink.toml"
     path.write_text(f'[cells.a]\nurl = "{IDENTITY}"\n')
     path.chmod(0o644)
-    assert levels(doctor.check_cell_files()) == [("cells", Level.OK)] * 2
+    assert levels(checkup.check_cell_files()) == [("cells", Level.OK)] * 2
     path.chmod(0o646)
-    assert levels(doctor.check_cell_files())[0] == ("cells", Level.WARN)
+    assert levels(checkup.check_cell_files())[0] == ("cells", Level.WARN)
     path.write_text("[cells.a]\nurl = 3\nrobot = 3\n")
-    remark = next(doctor.check_cell_files())
+    remark = next(checkup.check_cell_files())
     assert remark.level is Level.BAD
     assert remark.what.endswith(": 2.")
     path.write_text("[")
-    assert levels(doctor.check_cell_files())[0] == ("cells", Level.BAD)
+    assert levels(checkup.check_cell_files())[0] == ("cells", Level.BAD)
 
 
 class Fail:
@@ -224,7 +224,7 @@ def test_the_keyring_is_looked_at(monkeypatch, ring, level):
     monkeypatch.setattr(backends, "fail", Fail, raising=False)
     monkeypatch.setitem(sys.modules, "keyring", keyring)
     monkeypatch.setitem(sys.modules, "keyring.backends", backends)
-    (found,) = doctor.check_keyring()
+    (found,) = checkup.check_keyring()
     assert found.level is level
 
 
@@ -235,8 +235,8 @@ def test_a_serial_port_that_may_not_be_used_names_its_group(monkeypatch):
         SerialPort("/dev/ttyUSB0", "adapter", "", "dialout", usable=False),
         SerialPort("COM3", "", "", "", usable=True),
     ]
-    monkeypatch.setattr(doctor, "serial_ports", lambda: ports)
-    closed, usable = doctor.check_serial_ports()
+    monkeypatch.setattr(checkup, "serial_ports", lambda: ports)
+    closed, usable = checkup.check_serial_ports()
     assert (closed.level, usable.level) == (Level.WARN, Level.OK)
     assert "usermod -aG dialout" in closed.remedy
 
@@ -259,7 +259,7 @@ def test_a_journal_that_makes_no_sense_is_bad(tmp_path, monkeypatch, content):
     journal = tmp_path / "broken.db"
     journal.write_text(content)
     monkeypatch.setenv("ROBOLINK_JOURNAL", str(journal))
-    (remark,) = doctor.check_journal()
+    (remark,) = checkup.check_journal()
     assert remark.level is Level.BAD
     assert str(journal) in remark.what
 

@@ -1,7 +1,7 @@
 """A journal on a network share is refused before it is opened; looking and stopping go on."""
 
 import pytest
-from robolink_cli.commands.computer.doctor import Level, check_journal
+from robolink_cli.commands.computer.checkup import Level, check_journal
 
 from robolink.errors import JournalError
 from robolink.journal import _places, open_journal

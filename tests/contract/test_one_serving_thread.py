@@ -59,7 +59,7 @@ def test_forty_controllers_need_one_thread_and_each_answers_its_own_client(hosts
     for number, client in enumerate(clients):
         assert client.ask(b"$SetIO,%d,1" % number) == b"#SetIO,0\r\n"
     for number, host in enumerate(hosts):
-        outputs = host._simulator.machine.outputs
+        outputs = host._device.machine.outputs
         assert [at for at in range(40) if outputs.get(at)] == [number]
 
 
@@ -71,7 +71,7 @@ def test_a_hook_that_raises_ends_its_own_controller_and_no_other(hosts, asking, 
     def fail(_number, _text):
         raise RuntimeError("of a test")
 
-    hosts[0]._simulator.on_request = fail
+    hosts[0]._device.on_request = fail
     assert broken.ask(b"$Login,") in (b"#Login,0\r\n", b"")
     assert sound.ask(b"$Login,") == b"#Login,0\r\n"
     with pytest.raises(ConnectionRefusedError):
@@ -125,9 +125,9 @@ def asked_at_once(asking):
 
         for client in (held, *others):
             client.ask(b"$Login,")
-        hosts[0]._simulator.on_request = hold
+        hosts[0]._device.on_request = hold
         for host in hosts[1:]:
-            host._simulator.on_request = look
+            host._device.on_request = look
         held.socket.sendall(b"$GetStatus\r\n")
         assert holding.wait(20)
         for client in others:

@@ -402,7 +402,7 @@ def test_a_list_that_does_not_confirm_what_was_expected_is_not_believed(
     cell, controller_as_asked, monkeypatch, listing
 ):
     controller_as_asked.tools.write(2, NEW[2], expected=OLD[2])
-    monkeypatch.setattr(controller_as_asked.tools, "_listing", lambda: listing)
+    monkeypatch.setattr("robolink.controllers.epson.tools._listing", lambda _window: listing)
     cell.simulator.log.clear()
     controller_as_asked.tools.write(1, NEW[1], expected=OLD[1])
     assert asked(cell) == [*ONE_BY_ONE, *WRITTEN]

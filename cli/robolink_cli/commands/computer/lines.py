@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from robolink.errors import ConfigError, ConnectError, TransportError
 from robolink.messages import tr
-from robolink_cli.console.render import say
 
 if TYPE_CHECKING:
     from robolink.controllers.epson.verify import LineProbe
@@ -123,6 +122,7 @@ def ask_lines(urls: Sequence[str], timeout_s: float) -> list[AskedLine]:
 def show_lines(asked: Sequence[AskedLine]) -> None:
     """Say what was found at each line, and every byte that was sent."""
     from robolink.controllers.epson.verify import AtTheLine
+    from robolink_cli.console.render import say  # doctor reads ports where click is broken
 
     found = {
         AtTheLine.CONTROLLER: tr("an EPSON controller answers by Remote RS232"),

@@ -21,7 +21,7 @@ def ports() -> int:
 
     Ends with 1 when the system or a cell file could not be asked; what could be is shown.
     """
-    from robolink_cli.commands.computer.doctor import tried
+    from robolink_cli.commands.computer.checkup import tried
     from robolink_cli.commands.computer.lines import devices_of_cells, ports_unknown, serial_ports
 
     problems: list[str] = []

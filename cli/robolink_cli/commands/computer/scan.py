@@ -52,7 +52,7 @@ def scan(
     and tell the status. That changes and moves nothing on an EPSON controller; do not name a line
     with a device on it that these five bytes could harm.
     """
-    from robolink_cli.commands.computer.doctor import tried
+    from robolink_cli.commands.computer.checkup import tried
     from robolink_cli.commands.computer.lines import (
         as_json,
         ask_lines,

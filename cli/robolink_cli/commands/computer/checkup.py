@@ -1,0 +1,414 @@
+"""The checks of ``doctor``: this computer and its packages, never a controller."""
+
+import os
+import re
+import sys
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import partial
+from importlib import metadata
+from pathlib import Path
+from typing import Final, NamedTuple, TypeVar
+
+import robolink
+from robolink.errors import ConfigError
+from robolink.files.durable import state_folder
+from robolink.messages import declared, spoken, tr
+from robolink.timing import local_label
+from robolink_cli.commands.computer.lines import serial_ports
+from robolink_cli.console.tables import padded
+
+FoundT = TypeVar("FoundT")
+
+
+class Level(StrEnum):
+    """How bad it is; only BAD keeps robolink from working."""
+
+    OK = declared("ok")
+    WARN = declared("warn")
+    BAD = declared("bad")
+
+
+@dataclass(frozen=True, slots=True)
+class Remark:
+    """What was looked at and found.
+
+    Attributes:
+        subject: Short name of what was looked at; the same in every language.
+        level: How bad it is.
+        what: What was found.
+        remedy: What to do; empty when nothing has to be done.
+    """
+
+    subject: str
+    level: Level
+    what: str
+    remedy: str = ""
+
+
+def guarded(subject: str, look: Callable[[], Iterable[Remark]]) -> Iterator[Remark]:
+    """Yield what a look finds; if it breaks off, one more remark says why.
+
+    A driver, a keyring service or a package's metadata may fail in any way of its own, and whoever
+    runs ``doctor`` needs the other looks then more than ever.
+
+    Args:
+        subject: Short name of what is looked at.
+        look: Finds it out.
+    """
+    try:
+        yield from look()
+    except Exception as error:
+        yield Remark(
+            subject,
+            Level.WARN,
+            tr("this could not be looked at ({error}).", error=failure(error)),
+            tr("The other lines still count."),
+        )
+
+
+def tried(
+    look: Callable[[], FoundT], problem: Callable[[str], str], problems: list[str]
+) -> FoundT | None:
+    """Return what a look finds, ``None`` if it breaks off.
+
+    Args:
+        look: Finds it out.
+        problem: Makes the sentence for why it did not.
+        problems: Takes that sentence.
+    """
+    try:
+        return look()
+    except Exception as error:
+        problems.append(problem(failure(error)))
+        return None
+
+
+def failure(error: Exception) -> str:
+    """Return what a failed look ended with, in one line."""
+    return " ".join(f"{type(error).__name__}: {error}".split()).rstrip(":")
+
+
+_REQUIREMENT: Final = re.compile(
+    r"(?P<name>[\w.-]+)\s*(\[[^]]*])?\s*\(?(?P<range>[^;()]*)\)?"
+    r"(;.*extra\s*==\s*['\"](?P<extra>[^'\"]+)['\"].*)?"
+)
+_DEVELOPMENT: Final = frozenset({"dev", "docs"})
+
+
+class Requirement(NamedTuple):
+    """A package, the versions of it that will do, and the extra that asks for it."""
+
+    name: str
+    versions: str
+    extra: str | None
+
+
+def requirement(text: str) -> Requirement:
+    """Read one line of a package's metadata.
+
+    Raises:
+        ValueError: It is no requirement, or depends on something else than an extra.
+    """
+    match = _REQUIREMENT.fullmatch(text)
+    if match is None:
+        raise ValueError(text)
+    return Requirement(match["name"], match["range"].strip(), match["extra"])
+
+
+def fits(version: str, versions: str) -> bool:
+    """Tell whether a version lies in a range such as ``>=8.1,<9``; numbers only.
+
+    Raises:
+        ValueError: The range uses an operator that robolink does not.
+    """
+    found = _numbers(version)
+    for part in filter(None, (part.strip() for part in versions.split(","))):
+        match = re.fullmatch(r"(>=|<=|==|!=|<|>)\s*([\d.]+)", part)
+        if match is None:
+            raise ValueError(versions)
+        operator, limit = match[1], _numbers(match[2])
+        kept = {
+            ">=": found >= limit,
+            "<=": found <= limit,
+            "==": found == limit,
+            "!=": found != limit,
+            "<": found < limit,
+            ">": found > limit,
+        }[operator]
+        if not kept:
+            return False
+    return True
+
+
+def check_versions() -> Iterator[Remark]:
+    """Compare Python and every package with what robolink's own metadata ask for."""
+    try:
+        own = metadata.distribution("robolink")
+    except metadata.PackageNotFoundError:
+        yield Remark(
+            "robolink",
+            Level.WARN,
+            tr("it runs from a folder and is not installed, so versions were not compared."),
+            tr("Run: python -m pip install robolink"),
+        )
+        return
+    yield _python(own.metadata["Requires-Python"])
+    for text in own.requires or ():
+        yield from guarded(text, partial(_required, text))
+
+
+def check_name() -> Iterator[Remark]:
+    """Look for anything else that calls itself ``robolink``."""
+    own = Path(robolink.__file__).parent
+    others = sorted(set(metadata.packages_distributions().get("robolink", ())) - {"robolink"})
+    for other in others:
+        yield Remark(
+            "name",
+            Level.BAD,
+            tr("the package {other} brings a 'robolink' of its own.", other=other),
+            tr(
+                "Keep the two apart: install this robolink in an environment of its own, and "
+                "uninstall {other} here.",
+                other=other,
+            ),
+        )
+    shadows = [path for path in _homes() if path.resolve() != own.resolve()]
+    for path in shadows:
+        yield Remark(
+            "name",
+            Level.WARN,
+            tr("{path} would be imported as robolink elsewhere.", path=path),
+            tr("Rename or remove it; robolink itself runs from {own}.", own=own),
+        )
+    if not others and not shadows:
+        yield Remark("name", Level.OK, tr("nothing else calls itself robolink."))
+
+
+def _homes() -> Iterator[Path]:
+    for folder in dict.fromkeys(sys.path):
+        base = Path(folder)
+        if (base / "robolink" / "__init__.py").is_file():
+            yield base / "robolink"
+        if (base / "robolink.py").is_file():
+            yield base / "robolink.py"
+
+
+def _python(versions: str) -> Remark:
+    version = ".".join(str(number) for number in sys.version_info[:3])
+    if fits(version, versions):
+        return Remark("python", Level.OK, version)
+    return Remark(
+        "python",
+        Level.BAD,
+        tr("{version} is installed, {versions} is needed.", version=version, versions=versions),
+        tr("Install robolink with a newer Python."),
+    )
+
+
+def _required(text: str) -> Iterator[Remark]:
+    wanted = requirement(text)
+    if wanted.extra not in _DEVELOPMENT:
+        yield _package(wanted)
+
+
+def _package(wanted: Requirement) -> Remark:
+    ask = f"{wanted.name}{wanted.versions}"
+    install = tr("Run: python -m pip install '{ask}'", ask=ask)
+    try:
+        version = metadata.version(wanted.name)
+    except metadata.PackageNotFoundError:
+        if wanted.extra:
+            return Remark(wanted.name, Level.OK, tr("not installed; it is optional."))
+        return Remark(wanted.name, Level.BAD, tr("is not installed."), install)
+    if fits(version, wanted.versions):
+        return Remark(wanted.name, Level.OK, version)
+    level = Level.WARN if wanted.extra else Level.BAD
+    what = tr(
+        "{version} is installed, {versions} is needed.", version=version, versions=wanted.versions
+    )
+    return Remark(wanted.name, level, what, install)
+
+
+def _numbers(version: str) -> tuple[int, ...]:
+    """Return the release numbers, trailing zeros left out: 8.0 is 8."""
+    match = re.match(r"\d+(\.\d+)*", version)
+    numbers = [int(number) for number in match[0].split(".")] if match else []
+    while numbers and numbers[-1] == 0:
+        numbers.pop()
+    return tuple(numbers)
+
+
+def check_up() -> list[Remark]:
+    """Return everything that was looked at, what is worst first."""
+    looks: dict[str, Callable[[], Iterable[Remark]]] = {
+        "packages": check_versions,
+        "name": check_name,
+        "state": check_state_folder,
+        "cells": check_cell_files,
+        "keyring": check_keyring,
+        "serial": check_serial_ports,
+        "lines": check_lines_of_cells,
+        "journal": check_journal,
+    }
+    found = [remark for subject, look in looks.items() for remark in guarded(subject, look)]
+    return sorted(found, key=lambda remark: list(Level).index(remark.level), reverse=True)
+
+
+def in_words(remarks: Sequence[Remark]) -> Iterator[str]:
+    """Yield the lines that a person reads, the verdict last."""
+    for remark in remarks:
+        yield f"{padded(spoken(remark.level), 4)}  {remark.subject}: {remark.what}"
+        if remark.remedy:
+            yield f"      {remark.remedy}"
+    if any(remark.level is Level.BAD for remark in remarks):
+        yield tr("Something is wrong; see the first lines.")
+    else:
+        yield tr("No problem was found.")
+
+
+def check_state_folder() -> Iterator[Remark]:
+    """See whether backups can be kept; without one nothing is ever written."""
+    folder = state_folder("backups")
+    # On Windows not even the drive need be there.
+    above = (path for path in (folder, *folder.parents) if path.exists())
+    existing = next(above, Path(folder.anchor))
+    if not (existing.is_dir() and os.access(existing, os.W_OK | os.X_OK)):
+        yield Remark(
+            "state",
+            Level.BAD,
+            tr("backups cannot be kept in {folder}.", folder=folder),
+            tr("Make {path} writable, or name another folder: ROBOLINK_STATE_DIR.", path=existing),
+        )
+    elif folder.exists() and _others_may(folder, 0o022):
+        yield Remark(
+            "state",
+            Level.WARN,
+            tr("others may change the backups in {folder}.", folder=folder),
+            tr("Run: chmod go-w {folder}", folder=folder),
+        )
+    else:
+        yield Remark("state", Level.OK, str(folder))
+
+
+def check_cell_files() -> Iterator[Remark]:
+    """Check each cell file, and who may change the addresses in it."""
+    from robolink.config import cell_names, check_file, config_files
+
+    files = [file.path for file in config_files() if file.present]
+    for path in files:
+        try:
+            problems = check_file(path)
+        except ConfigError as error:
+            yield Remark("cells", Level.BAD, error.what, error.remedy)
+            continue
+        if problems:
+            yield Remark(
+                "cells",
+                Level.BAD,
+                tr("Errors in {path}: {count}.", path=path, count=len(problems)),
+                tr("Run: robolink cell validate"),
+            )
+        elif _others_may(path, 0o002):
+            yield Remark(
+                "cells",
+                Level.WARN,
+                tr("anybody may change {path}, and with it where commands go.", path=path),
+                tr("Run: chmod o-w {path}", path=path),
+            )
+        else:
+            yield Remark("cells", Level.OK, str(path))
+    if files:
+        yield Remark("cells", Level.OK, tr("cells: {names}.", names=", ".join(cell_names())))
+    else:
+        yield Remark("cells", Level.OK, tr("there is no cell file; -c takes a URL."))
+
+
+def check_keyring() -> Iterator[Remark]:
+    """See whether passwords can be kept in the system's keyring."""
+    other = tr("A password can come from --password-file or ROBOLINK_PASSWORD.")
+    try:
+        import keyring
+        from keyring.backends import fail
+    except ImportError:
+        yield Remark("keyring", Level.OK, tr("not installed; it is optional."), other)
+        return
+    found = keyring.get_keyring()
+    if isinstance(found, fail.Keyring):
+        yield Remark("keyring", Level.WARN, tr("this computer has no keyring service."), other)
+    else:
+        yield Remark("keyring", Level.OK, type(found).__module__)
+
+
+def check_serial_ports() -> Iterator[Remark]:
+    """See whether the serial ports may be used."""
+    ports = serial_ports()
+    for port in ports:
+        if port.usable:
+            yield Remark("serial", Level.OK, f"{port.device} {port.description}".rstrip())
+        else:
+            yield Remark(
+                "serial",
+                Level.WARN,
+                tr("you may not use {device}.", device=port.device),
+                tr(
+                    "Run: sudo usermod -aG {group} $USER, then log in again.",
+                    group=port.group or "dialout",
+                ),
+            )
+    if not ports:
+        yield Remark("serial", Level.OK, tr("there is no serial port."))
+
+
+def check_lines_of_cells() -> Iterator[Remark]:
+    """See whether the ports that cells name are there."""
+    from robolink_cli.commands.computer.lines import devices_of_cells
+
+    known = [port.device for port in serial_ports()]
+    for device, names in devices_of_cells().items():
+        if not Path(device).exists() and device not in known:
+            yield Remark(
+                "serial",
+                Level.WARN,
+                tr("{device} of {cells} is not there.", device=device, cells=", ".join(names)),
+                tr("Plug the adapter in; 'robolink cell ports' lists those that are there."),
+            )
+
+
+def check_journal() -> Iterator[Remark]:
+    """List what was begun on any controller and is not proved finished."""
+    from robolink.journal import default_location, may_exist, open_journal
+    from robolink.model import begun_in_words
+
+    try:
+        if not may_exist(default_location()):
+            yield Remark("journal", Level.OK, tr("nothing was recorded yet."))
+            return
+        journal = open_journal(read_only=True)
+        unsettled = journal.open_markers()
+    except ConfigError as error:
+        yield Remark("journal", Level.BAD, error.what, error.remedy)
+        return
+    yield Remark("journal", Level.OK, journal.location)
+    for identity, marker in unsettled:
+        where = next(iter(journal.addresses_of(identity)), identity)
+        yield Remark(
+            "unsettled",
+            Level.WARN,
+            tr(
+                "{identity}, since {when}: {request}",
+                identity=identity,
+                when=local_label(marker.begun_at),
+                request=begun_in_words(marker),
+            ),
+            journal.log(identity).at_work()
+            or tr('Run: robolink -c "{where}" recover', where=where),
+        )
+    if not unsettled:
+        yield Remark("unsettled", Level.OK, tr("nothing was left unfinished."))
+
+
+def _others_may(path: Path, bits: int) -> bool:
+    # Windows keeps access in lists, not in these bits.
+    return os.name == "posix" and bool(path.stat().st_mode & bits)

@@ -94,7 +94,7 @@ __all__ = [
 ]
 
 if TYPE_CHECKING:  # what no command needs before something stands on a controller
-    from robolink.standing import Standing
+    from robolink.controller_outcome import ControllerOutcome
 
 
 class RobolinkError(Exception):
@@ -119,7 +119,7 @@ class RobolinkError(Exception):
         raw: bytes = b"",
     ) -> None:
         super().__init__(what)
-        self._standing: Standing | None = None
+        self._standing: ControllerOutcome | None = None
         self.what = what
         self.remedy = remedy
         self.controller = controller
@@ -135,7 +135,7 @@ class RobolinkError(Exception):
         self.request = self.request or request
 
     @property
-    def controller_state(self) -> "Standing":
+    def controller_state(self) -> "ControllerOutcome":
         """What stands on the controller now, of what was done to it in the block that this ended.
 
         That is a write, a change, a procedure or a whole connection, whichever was the outermost
@@ -143,13 +143,13 @@ class RobolinkError(Exception):
         """
         if self._standing is not None:
             return self._standing
-        from robolink.standing import UNTOUCHED
+        from robolink.controller_outcome import UNTOUCHED
 
         return UNTOUCHED
 
     @controller_state.setter
-    def controller_state(self, standing: "Standing") -> None:
-        self._standing = standing
+    def controller_state(self, outcome: "ControllerOutcome") -> None:
+        self._standing = outcome
 
 
 class Concerning:

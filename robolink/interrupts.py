@@ -27,7 +27,7 @@ from enum import StrEnum
 from types import FrameType, TracebackType
 from typing import Final, Self
 
-from robolink import ambient
+from robolink import runtime
 
 __all__ = [
     "EndedBy",
@@ -158,7 +158,7 @@ class _Handler:
         a closed output, must not break the cleaning up after the first.
         """
         if self._commands:
-            now_s = ambient.monotonic_ns() / 1e9
+            now_s = runtime.monotonic_ns() / 1e9
             if self.ended_by is not None and now_s - self._ended_s < _PATIENCE_S:
                 return
             self.ended_by, self._ended_s = self.ended_by or by, now_s

@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import Enum, auto
 
-from robolink import ambient
+from robolink import runtime
 from robolink.errors import Concerning, ControllerError, StoppedError, UnclearAnswerError
 from robolink.messages import tr
 
@@ -58,7 +58,7 @@ class StopLatch:
         self._controller = controller
         self._closed = False
         self._closings = 0
-        self._stops = ambient.waiting_room()
+        self._stops = runtime.waiting_room()
         self._under_way = 0
         self._permits = threading.local()
         self._put_back: set[int] = set()

@@ -7,7 +7,7 @@ monotonic time. Wall time appears in records only, as a label.
 from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple, Protocol, Self, runtime_checkable
 
-from robolink import ambient
+from robolink import runtime
 
 __all__ = [
     "Clock",
@@ -53,12 +53,12 @@ class SystemClock:
 
     def now_ns(self) -> int:
         """Return the machine's monotonic time in nanoseconds."""
-        return ambient.monotonic_ns()
+        return runtime.monotonic_ns()
 
     def sleep(self, seconds: float) -> None:
         """Block the calling thread."""
         if seconds > 0:
-            ambient.sleep(seconds)
+            runtime.sleep(seconds)
 
 
 class Deadline(NamedTuple):
@@ -85,7 +85,7 @@ class Deadline(NamedTuple):
 
 def wall_label() -> str:
     """Return the wall-clock time, ISO 8601 UTC, as a label for people."""
-    return _label(int(ambient.wall_s()))
+    return _label(int(runtime.wall_s()))
 
 
 @lru_cache(maxsize=1)
@@ -99,7 +99,7 @@ def wall_time() -> "datetime":
     """Return the wall-clock time in UTC, which may jump: for labels and due days only."""
     from datetime import UTC, datetime  # as above
 
-    return datetime.fromtimestamp(ambient.wall_s(), UTC)
+    return datetime.fromtimestamp(runtime.wall_s(), UTC)
 
 
 def local_label(at: str) -> str:

@@ -12,7 +12,7 @@ import click
 from robolink import __version__
 from robolink.interrupts import Interrupted, one_ending
 from robolink.messages import declared, spoken
-from robolink.ways import speaking
+from robolink.remedy_words import speaking
 from robolink_cli.command_map import RENAMED, SECTIONS, SHORT_NAMES
 from robolink_cli.console.closed_window import closing_in_order
 from robolink_cli.console.help_pages import in_language

@@ -16,7 +16,7 @@ from robolink.model import (
 )
 from robolink.timing import wall_label
 from robolink.version import VERSION
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 TOOLS: Final = range(1, 16)
 """The tools that a controller can define (docs/reference/epson.md 3.1); a backup names every
@@ -117,7 +117,7 @@ class ComparisonTolerance:
         if not (0 <= self.length_mm < float("inf") and 0 <= self.angle_deg < float("inf")):
             raise ConfigError(
                 tr("A tolerance must be a number, 0 or more."),
-                remedy=tr("For example {tolerance}.", tolerance=way(Way.LENGTH_TOLERANCE)),
+                remedy=tr("For example {tolerance}.", tolerance=remedy_word(RemedyWord.LENGTH_TOLERANCE)),
             )
 
 

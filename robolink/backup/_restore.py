@@ -14,7 +14,7 @@ from robolink.errors import (
 )
 from robolink.messages import joined, tr
 from robolink.model import ControllerFacts, ToolOffset, ToolReceipt, ToolTable
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,7 +227,7 @@ def _check_selection(plan: RestorePlan, now: ToolState) -> None:
                 tool=plan.select,
             ),
             remedy=tr(
-                "Restore that tool too, or leave {selected} out.", selected=way(Way.SELECTED_TOO)
+                "Restore that tool too, or leave {selected} out.", selected=remedy_word(RemedyWord.SELECTED_TOO)
             ),
         )
     in_force = now.selected if plan.select is None else plan.select
@@ -240,8 +240,8 @@ def _check_selection(plan: RestorePlan, now: ToolState) -> None:
             remedy=tr(
                 "Nothing was written. Select another tool first, add {selected}, or "
                 "name the other tools with {tools}.",
-                selected=way(Way.SELECTED_TOO),
-                tools=way(Way.TOOLS),
+                selected=remedy_word(RemedyWord.SELECTED_TOO),
+                tools=remedy_word(RemedyWord.TOOLS),
             ),
         )
 
@@ -252,7 +252,7 @@ def _another(cause: str) -> ConfigError:
         remedy=tr(
             "Check that this is the right controller and the right file. If the "
             "backup is meant for this controller all the same, {other}.",
-            other=way(Way.OTHER_CONTROLLER),
+            other=remedy_word(RemedyWord.OTHER_CONTROLLER),
         ),
     )
 

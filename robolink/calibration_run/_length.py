@@ -38,7 +38,7 @@ from robolink.model import (
 from robolink.procedures import MeasurementContext
 from robolink.runner import Ask, StepDone, TouchSubject
 from robolink.stations import AGREEING_MM, Station, StationKind, stations_on_record
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 _UNKNOWN_SIGMA_MM: Final = 0.05
 """Scatter of one touch by a person, where neither residuals nor anybody tells it."""
@@ -96,9 +96,9 @@ def known_height(
     Example:
         >>> from robolink.calibration_run import known_height
         >>> from robolink.stations import Station, StationKind
-        >>> from robolink.testing import MemoryController
+        >>> from robolink.controllers import SimpleController
         >>> pin = Station(id="PIN-07", kind=StationKind.PIN).at(310, 95, -40, sigma_mm=0.02)
-        >>> known_height(MemoryController(), tool=1, pin="PIN-07", stated=pin).place_mm
+        >>> known_height(SimpleController(), tool=1, pin="PIN-07", stated=pin).place_mm
         (310, 95, -40)
     """
     if not pin:
@@ -361,7 +361,7 @@ def _undecided(tool: int, told: LengthChange) -> CalibrationError:
         remedy=tr(
             "Nothing was written. Say beforehand whether Z follows the heights or is kept "
             "({decide}), or run it where somebody can be asked.",
-            decide=way(Way.LENGTH),
+            decide=remedy_word(RemedyWord.LENGTH),
         ),
     )
 

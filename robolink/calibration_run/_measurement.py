@@ -24,7 +24,7 @@ from robolink.model import Controller, NewEntry, Pose, ToolOffset, says_it_is_si
 from robolink.procedures import MeasurementContext, TouchesFurther, touches_of
 from robolink.runner import AGAIN, BACK, MORE, Ask, Look, Seek, StepDone, TouchedAt
 from robolink.stations import stations_on_record
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 
 def accuracy_facts(
@@ -343,6 +343,6 @@ def _name_another_way(error: CalibrationError) -> None:
     another = tr(
         "If it has failed: 'robolink calibrate two-pose' measures by touch, or with poses that "
         "you type ({poses}).",
-        poses=way(Way.GIVEN_POSES),
+        poses=remedy_word(RemedyWord.GIVEN_POSES),
     )
     error.remedy = joined(" ", (error.remedy, another))

@@ -84,14 +84,14 @@ class NozzleChange:
         >>> from robolink.methods import PointsSource
         >>> from robolink.model import Pose, ToolOffset
         >>> from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
-        >>> from robolink.testing import MemoryController, MemoryMachine
+        >>> from robolink.controllers import SimpleController, SimpleMachine
         >>> class Nobody:  # implements robolink.Operator
         ...     def tell(self, text): ...
         >>> touches = [Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)]
         >>> tool = ToolPlan(1, source=PointsSource(lambda: touches), verify=False)
         >>> plan = ChangePlan((tool,), ask_before_write=False)
-        >>> machine = MemoryMachine({1: ToolOffset(12, -3.5, -20)})
-        >>> with MemoryController(machine) as controller:
+        >>> machine = SimpleMachine({1: ToolOffset(12, -3.5, -20)})
+        >>> with SimpleController(machine) as controller:
         ...     report = NozzleChange(controller, plan, operator=Nobody()).run()
         >>> round(machine.read(1).y_mm, 3)
         -4.0

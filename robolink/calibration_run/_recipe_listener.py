@@ -196,12 +196,12 @@ def ask_prompt(context: MeasurementContext, prompt: "Prompt", tool: int | None =
         >>> from robolink.procedures import MeasurementContext
         >>> from robolink.recipe import Prompt
         >>> from robolink.calibration_run._recipe_listener import ask_prompt
-        >>> from robolink.testing import MemoryController
+        >>> from robolink.controllers import SimpleController
         >>> class Person:  # implements robolink.Operator
         ...     def ask(self, question, kind): ...
         ...     def poll(self, wait_s):
         ...         return "N-0815"
-        >>> with MemoryController() as controller:
+        >>> with SimpleController() as controller:
         ...     settings = Limits().settings
         ...     context = MeasurementContext(controller, Person(), start=None, settings=settings)
         ...     ask_prompt(context, Prompt(at="start", text="Which nozzle?", answer="nozzle"))

@@ -38,7 +38,7 @@ from robolink.pose_tables import ReadingChoices
 from robolink.procedures import TipSource
 from robolink.stations import Station, StationKind
 from robolink.timing import local_label
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 if TYPE_CHECKING:
     from robolink.recipe import Recipe, Tool
@@ -83,7 +83,7 @@ def plan_of(
         interval_mm=tolerances.interval_mm,
         drift_tolerance_mm=tolerances.drift_mm,
         accepted_change_mm=accepted_change_mm,
-        accepted_with=way(Way.ACCEPT_JUMP),
+        accepted_with=remedy_word(RemedyWord.ACCEPT_JUMP),
         unattended=not ask_before_write,
         stated=frozenset(("rms_mm", "max_residual_mm", "interval_mm")),
     )
@@ -321,7 +321,7 @@ def find_reference(controller: Controller, tool: int, station: str) -> Reference
             "The tool is not what the reference left. Put the value of the reference back, "
             "or take a new reference with {reference} and the nozzle for which the stored "
             "value is right.",
-            reference=way(Way.REFERENCE),
+            reference=remedy_word(RemedyWord.REFERENCE),
         ),
     )
 
@@ -464,7 +464,7 @@ def _height(
                 "The reference of {at} does not say how high the contact was.",
                 at=local_label(reference.at),
             ),
-            remedy=tr("Take a new reference with {reference}.", reference=way(Way.REFERENCE)),
+            remedy=tr("Take a new reference with {reference}.", reference=remedy_word(RemedyWord.REFERENCE)),
         )
     return offset.z_mm - (height - reference.contact_z_mm)
 

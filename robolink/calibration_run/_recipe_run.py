@@ -27,7 +27,7 @@ from robolink.recipe import Answers, beyond
 from robolink.runner import Operator
 from robolink.stations import Station, find_stations, require_base_of, stations_on_record
 from robolink.transaction import ChangedSince, Order, changed_since, earlier_corrections
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 if TYPE_CHECKING:
     from robolink.recipe import LoadedRecipe, Recipe
@@ -291,8 +291,8 @@ class RecipeRun:
                 tr("A change this large needs an engineer."),
                 remedy=tr(
                     "Nothing was moved. Give {operator}, or leave {accept_jump} out.",
-                    operator=way(Way.OPERATOR),
-                    accept_jump=way(Way.ACCEPT_JUMP),
+                    operator=remedy_word(RemedyWord.OPERATOR),
+                    accept_jump=remedy_word(RemedyWord.ACCEPT_JUMP),
                 ),
             )
 

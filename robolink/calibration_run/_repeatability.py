@@ -134,8 +134,8 @@ def touching_as_recorded(controller: Controller, plan: TouchPlan, pin: str) -> T
     Example:
         >>> from robolink.calibration_run import touching_as_recorded
         >>> from robolink.procedures import TouchPlan
-        >>> from robolink.testing import MemoryController
-        >>> controller = MemoryController()  # of whose record nothing is told
+        >>> from robolink.controllers import SimpleController
+        >>> controller = SimpleController()  # of whose record nothing is told
         >>> touching_as_recorded(controller, TouchPlan(), "PIN-07").sigma_z_mm is None
         False
         >>> touching_as_recorded(controller, TouchPlan(sigma_z_mm=0.004), "PIN-07").sigma_z_mm

@@ -15,7 +15,7 @@ from robolink.methods import KEPT
 from robolink.model import Controller, EntryKind, NewEntry
 from robolink.procedures import FindsStation
 from robolink.stations import Station, base_now, find_stations, station_entry, stations_on_record
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 
 def check_stations(controller: Controller, proposals: Proposals) -> Proposals:
@@ -162,7 +162,7 @@ def _refusal(station: str, shift: StationShift) -> CalibrationError:
         remedy=tr(
             "Nothing was written. Fasten the pin, find it again with a full calibration "
             "({calibrate}), then touch it with each tool.",
-            calibrate=way(Way.CALIBRATE_AT, station=station),
+            calibrate=remedy_word(RemedyWord.CALIBRATE_AT, station=station),
         ),
     )
 

@@ -258,7 +258,7 @@ def conclude_turn_test(
         >>> from robolink.calibration import Drift, TurnClaim, VerifyResult
         >>> from robolink.errors import VerifyError
         >>> from robolink.calibration_run import conclude_turn_test
-        >>> from robolink.testing import MemoryController
+        >>> from robolink.controllers import SimpleController
         >>> claim = TurnClaim(
         ...     look_sigma_mm=0.003,
         ...     offset_sigma_mm=0.003,
@@ -269,7 +269,7 @@ def conclude_turn_test(
         ... )
         >>> shown = VerifyResult((Drift(180, 0.101, 0),), tolerance_mm=0.2)
         >>> try:
-        ...     conclude_turn_test(MemoryController(), 1, shown, claim=claim)
+        ...     conclude_turn_test(SimpleController(), 1, shown, claim=claim)
         ... except VerifyError as error:
         ...     print(error.code)
         proof_contradicts_accuracy

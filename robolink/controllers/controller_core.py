@@ -31,7 +31,7 @@ from robolink.model import (
     ToolTable,
     VariableTable,
 )
-from robolink.standing import note_standing
+from robolink.controller_outcome import note_outcome
 
 _STOPS_S: Final = 5.0
 """Longest wait, at the end, for stops that are under way in other threads."""
@@ -60,8 +60,8 @@ class ControllerCore(DriverPart, ABC):
         >>> from robolink.controllers import ControllerCore
         >>> from robolink.journal import memory_journal
         >>> from robolink.model import Capabilities, ControllerStatus
-        >>> from robolink.testing import MemoryController, MemoryMachine
-        >>> from robolink.testing.memory_controller import MemoryLink
+        >>> from robolink.controllers import SimpleController, SimpleMachine
+        >>> from robolink.controllers.simple_controller import SimpleLink
         >>> from robolink.timing import SystemClock
         >>> class Acme(ControllerCore):  # with the tools of another, for the example
         ...     groups, exchanges = (), 0
@@ -69,8 +69,8 @@ class ControllerCore(DriverPart, ABC):
         ...         return ControllerStatus(remote=True, ready=True)
         ...     def _close_link(self): ...
         >>> url, able = "acme+usb://core-example", Capabilities(tool_write=True)
-        >>> link = MemoryLink(MemoryMachine(), url, memory_journal(url).log(url), SystemClock())
-        >>> with Acme(link, capabilities=able, tools=MemoryController().tools) as controller:
+        >>> link = SimpleLink(SimpleMachine(), url, memory_journal(url).log(url), SystemClock())
+        >>> with Acme(link, capabilities=able, tools=SimpleController().tools) as controller:
         ...     controller.status().ready, controller.capabilities.motion
         (True, False)
     """
@@ -262,7 +262,7 @@ class ControllerCore(DriverPart, ABC):
             pass  # the link is going away in any case; markers keep what is in doubt
         except BaseException as error:
             # Ctrl-C while taking leave: the work is done, and what it left is to be told.
-            note_standing(error, self.ledger.standing())
+            note_outcome(error, self.ledger.outcome())
             raise
         finally:
             self._closed = True
@@ -280,4 +280,4 @@ class ControllerCore(DriverPart, ABC):
     ) -> None:
         self.close()
         if error is not None:
-            note_standing(error, self.ledger.standing())
+            note_outcome(error, self.ledger.outcome())

@@ -31,7 +31,7 @@ from functools import cached_property, wraps
 from types import FunctionType
 from typing import Any, Final, Generic, TypeVar
 
-from robolink import ambient
+from robolink import runtime
 from robolink.controllers.markers import MarkerStore, ProcedureLock
 from robolink.errors import (
     Concerning,
@@ -72,7 +72,7 @@ class SignsOfLife:
             first = not self._inside
             self._inside.append(here)
             if first:
-                self._end = ambient.regularly(EVERY_S, self._one, "signs of life")
+                self._end = runtime.regularly(EVERY_S, self._one, "signs of life")
         try:
             yield
         finally:

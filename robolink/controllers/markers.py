@@ -23,7 +23,7 @@ from robolink.errors import (
 )
 from robolink.messages import tr
 from robolink.model import Ledger, Marker, MarkerKind, NewEntry, OutcomeLog, new_operation
-from robolink.standing import note_standing
+from robolink.controller_outcome import note_outcome
 from robolink.stop_latch import StopLatch
 from robolink.timing import local_label, wall_label
 
@@ -346,5 +346,5 @@ class MarkerStore:
             request=request,
             raw=error.raw,
         )
-        note_standing(doubt, self.ledger.standing())
+        note_outcome(doubt, self.ledger.outcome())
         return doubt

@@ -23,7 +23,7 @@ from robolink.model import (
     Verdict,
 )
 from robolink.timing import local_label
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 
 class Preserver:
@@ -40,12 +40,12 @@ class Preserver:
         >>> from robolink import ToolOffset
         >>> from robolink.controllers import Preserver
         >>> from robolink.journal import memory_journal
-        >>> from robolink.testing import MemoryController, MemoryMachine
-        >>> from robolink.testing.memory_controller import MemoryLink
+        >>> from robolink.controllers import SimpleController, SimpleMachine
+        >>> from robolink.controllers.simple_controller import SimpleLink
         >>> from robolink.timing import SystemClock
-        >>> machine, url = MemoryMachine({1: ToolOffset(12)}, selected=1), "acme+usb://arm"
-        >>> link = MemoryLink(machine, url, memory_journal(url).log(url), SystemClock())
-        >>> tools = MemoryController(machine).tools
+        >>> machine, url = SimpleMachine({1: ToolOffset(12)}, selected=1), "acme+usb://arm"
+        >>> link = SimpleLink(machine, url, memory_journal(url).log(url), SystemClock())
+        >>> tools = SimpleController(machine).tools
         >>> with Preserver(link, tools).preserved("a trial"):
         ...     tools.select(0)
         >>> tools.selected()
@@ -152,7 +152,7 @@ def not_understood(marker: Marker) -> ConfigError:
     """Return the error for the marker of a procedure that something else has written."""
     return ConfigError(
         tr("What was left unfinished at {when} cannot be read.", when=local_label(marker.begun_at)),
-        remedy=tr("Select the right tool by hand, then {forget}.", forget=way(Way.FORGET_MARKER)),
+        remedy=tr("Select the right tool by hand, then {forget}.", forget=remedy_word(RemedyWord.FORGET_MARKER)),
     )
 
 

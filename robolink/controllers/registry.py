@@ -22,7 +22,7 @@ from importlib import import_module
 from types import MappingProxyType
 from typing import Final, Protocol, TypeVar, cast
 
-from robolink import ambient
+from robolink import runtime
 from robolink.errors import (
     ConfigError,
     ConnectError,
@@ -334,7 +334,7 @@ def connect_when_reachable(
 
 
 def _drawn(pause_s: float) -> float:
-    share: float = ambient.random_number(_BITS) / (1 << _BITS)
+    share: float = runtime.random_number(_BITS) / (1 << _BITS)
     return pause_s * (1 + share) / 2
 
 

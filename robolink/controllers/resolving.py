@@ -20,7 +20,7 @@ from robolink.model import (
     read_offset,
 )
 from robolink.timing import local_label
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 _KINDS = {
     Verdict.DONE: EntryKind.DONE,
@@ -104,12 +104,12 @@ class MarkerResolver(DriverPart):
         >>> from robolink.controllers import MarkerResolver, Preserver
         >>> from robolink.journal import memory_journal
         >>> from robolink.model import MarkerKind
-        >>> from robolink.testing import MemoryController, MemoryMachine
-        >>> from robolink.testing.memory_controller import MemoryLink
+        >>> from robolink.controllers import SimpleController, SimpleMachine
+        >>> from robolink.controllers.simple_controller import SimpleLink
         >>> from robolink.timing import SystemClock
-        >>> machine, url = MemoryMachine(), "acme+usb://resolver-example"
-        >>> link = MemoryLink(machine, url, memory_journal(url).log(url), SystemClock())
-        >>> tools = MemoryController(machine).tools
+        >>> machine, url = SimpleMachine(), "acme+usb://resolver-example"
+        >>> link = SimpleLink(machine, url, memory_journal(url).log(url), SystemClock())
+        >>> tools = SimpleController(machine).tools
         >>> resolver = MarkerResolver(link, tools, Preserver(link, tools))
         >>> left = link.markers.begin(MarkerKind.MOVE, "Go to P1", {})
         >>> resolver.examine(left).verdict.name
@@ -147,7 +147,7 @@ class MarkerResolver(DriverPart):
                 "What was left unfinished at {when} cannot be read.",
                 when=local_label(marker.begun_at),
             ),
-            remedy=tr("Look at the controller, then {forget}.", forget=way(Way.FORGET_MARKER)),
+            remedy=tr("Look at the controller, then {forget}.", forget=remedy_word(RemedyWord.FORGET_MARKER)),
         )
 
     def settle(self, finding: Finding) -> None:

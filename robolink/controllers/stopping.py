@@ -9,7 +9,7 @@ only.
 from contextlib import suppress
 from typing import TYPE_CHECKING, Final, NamedTuple
 
-from robolink import ambient
+from robolink import runtime
 from robolink.errors import (
     Concerning,
     ConnectError,
@@ -79,7 +79,7 @@ def stop_now(
     kinds = {"epson": _stop_epson, "softmotion": _stop_group, "plc": _stop_map}
     stop = kinds.get(link.kind, _stop_other)
     given = password if isinstance(password, str) else password.reveal() if password else ""
-    means = _Means(given, timeout_s, clock, trace, met, ambient.random_number(32))
+    means = _Means(given, timeout_s, clock, trace, met, runtime.random_number(32))
     for tries_left in reversed(range(_TRIES)):
         try:
             return stop(link, means)

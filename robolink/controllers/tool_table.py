@@ -39,7 +39,7 @@ from robolink.model import (
     put_right,
     refuse_operator,
 )
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 
 class ToolTableCore(DriverPart, ABC):
@@ -415,7 +415,7 @@ def require_replacement(tool: int, then_select: int | None) -> int:
             remedy=tr(
                 "Say which tool to select instead: {then_select}, 0 for the flange. "
                 "The machine's programs go on with that tool.",
-                then_select=way(Way.THEN_SELECT),
+                then_select=remedy_word(RemedyWord.THEN_SELECT),
             ),
         )
     return then_select

@@ -50,10 +50,10 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
         >>> from robolink import ToolOffset
         >>> from robolink.controllers import ToolWrite
         >>> from robolink.journal import memory_journal
-        >>> from robolink.testing import MemoryMachine
-        >>> from robolink.testing.memory_controller import MemoryLink
+        >>> from robolink.controllers import SimpleMachine
+        >>> from robolink.controllers.simple_controller import SimpleLink
         >>> from robolink.timing import SystemClock
-        >>> machine, url = MemoryMachine(), "acme+usb://write-example"
+        >>> machine, url = SimpleMachine(), "acme+usb://write-example"
         >>> class AcmeWrite(ToolWrite):
         ...     def read_before(self, expected):
         ...         return self.read_back()
@@ -61,7 +61,7 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
         ...         machine.store(self.tool, self.requested)
         ...     def read_back(self):
         ...         return machine.read(self.tool)
-        >>> link = MemoryLink(machine, url, memory_journal(url).log(url), SystemClock())
+        >>> link = SimpleLink(machine, url, memory_journal(url).log(url), SystemClock())
         >>> write = AcmeWrite(link, 2, ToolOffset(5, 6, -70), "TOOL 2", same=lambda a, b: a == b)
         >>> write.change(expected=None).before, machine.read(2).z_mm
         (None, -70)

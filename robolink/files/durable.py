@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
-from robolink import ambient
+from robolink import runtime
 
 
 def state_folder(kind: str) -> Path:
@@ -59,7 +59,7 @@ def write_whole(
         FileExistsError: It is there already and may not go.
         OSError: It cannot be written.
     """
-    draft = path.with_name(f".{ambient.random_bytes(16).hex()}.new")
+    draft = path.with_name(f".{runtime.random_bytes(16).hex()}.new")
     try:
         descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, mode)
         with open(descriptor, "wb") as file:

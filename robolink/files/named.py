@@ -10,7 +10,7 @@ from typing import Final, TextIO
 from robolink.errors import ConfigError
 from robolink.files.durable import sync_folder, write_whole
 from robolink.messages import tr
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 MOST_BYTES: Final = 4_000_000
 """No cell file, recipe, map, backup or list of poses is nearly as long."""
@@ -125,7 +125,7 @@ def _mode_of_regular(descriptor: int) -> int:
 def _taken(path: Path) -> ConfigError:
     return ConfigError(
         tr("{path} exists already; it was not overwritten.", path=path),
-        remedy=tr("Give another name, or {overwrite} to replace it.", overwrite=way(Way.OVERWRITE)),
+        remedy=tr("Give another name, or {overwrite} to replace it.", overwrite=remedy_word(RemedyWord.OVERWRITE)),
     )
 
 

@@ -15,7 +15,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
-from robolink import ambient
+from robolink import runtime
 from robolink.errors import LeaseHeldError
 from robolink.files.durable import make_folder, state_folder
 from robolink.messages import tr
@@ -71,12 +71,12 @@ class BootClock:
 
     def now_ns(self) -> int:
         """Return the nanoseconds since the system was started."""
-        return ambient.boot_ns()
+        return runtime.boot_ns()
 
     def sleep(self, seconds: float) -> None:
         """Block the calling thread."""
         if seconds > 0:
-            ambient.sleep(seconds)
+            runtime.sleep(seconds)
 
 
 def this_process(operator: str = "") -> LeaseHolder:
@@ -344,7 +344,7 @@ def run_of(client: str, here: LeaseHolder) -> ClientRun | None:
 def _outdated(folder: Path) -> Iterator[Path]:
     for path in folder.iterdir():
         with suppress(OSError):
-            if ambient.wall_s() - path.stat().st_mtime > _KEPT_S:
+            if runtime.wall_s() - path.stat().st_mtime > _KEPT_S:
                 yield path
 
 

@@ -5,7 +5,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
-from robolink import ambient
+from robolink import runtime
 from robolink.errors import JournalError, LeaseLostError, OutcomeUnknownError
 from robolink.journal._identity import Names, Naming
 from robolink.journal._journal_loss import LOST, Traces, leave_trace, traces_of
@@ -82,7 +82,7 @@ class JournalOutcomeLog:
         self._journal = journal
         self._store = store
         self._called = controller
-        self._lock = ambient.reentrant_lock()
+        self._lock = runtime.reentrant_lock()
         self._naming = Naming(store, controller)
         self._holder, self._clock = holder or this_process(), clock or BootClock()
         self._lease = Lease(store, controller, self._holder, self._clock)

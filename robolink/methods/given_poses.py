@@ -29,7 +29,7 @@ from robolink.messages import joined, tr
 from robolink.methods.two_pose import TwoTouches
 from robolink.model import AnsweredBy, Controller, PointReader, Pose, ToolOffset
 from robolink.procedures import MeasurementContext, PoseMethod, require_one_height
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 
 def were_held(context: MeasurementContext, *, stated: bool) -> bool:
@@ -49,8 +49,8 @@ def were_held(context: MeasurementContext, *, stated: bool) -> bool:
         >>> from robolink.methods.given_poses import were_held
         >>> from robolink.calibration_run import Limits
         >>> from robolink.procedures import MeasurementContext
-        >>> from robolink.testing import MemoryController
-        >>> with MemoryController() as controller:
+        >>> from robolink.controllers import SimpleController
+        >>> with SimpleController() as controller:
         ...     settings = Limits().settings
         ...     context = MeasurementContext(controller, None, start=None, settings=settings)
         ...     were_held(context, stated=True)
@@ -130,10 +130,10 @@ class PointsSource:
     Example:
         >>> from robolink.methods import PointsSource
         >>> from robolink.model import Pose, ToolOffset
-        >>> from robolink.testing import MemoryController
+        >>> from robolink.controllers import SimpleController
         >>> taught = [Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)]
         >>> source = PointsSource(lambda: taught, sentence="Points 10 and 11.", in_mm=True)
-        >>> found = source.find(MemoryController(), 1, stored=ToolOffset(12, -3.5, -20))
+        >>> found = source.find(SimpleController(), 1, stored=ToolOffset(12, -3.5, -20))
         >>> [round(length, 3) for length in found.result.offset.components()[:2]]
         [12.0, -4.0]
     """
@@ -211,10 +211,10 @@ class PointsSource:
         Example:
             >>> from robolink.methods import PointsSource
             >>> from robolink.model import Pose, ToolOffset
-            >>> from robolink.testing import MemoryController
+            >>> from robolink.controllers import SimpleController
             >>> source = PointsSource(lambda: [Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)])
             >>> stored = ToolOffset(12, -3.5, -20)
-            >>> source.find(MemoryController(), tool=1, stored=stored).result.notes[-1]
+            >>> source.find(SimpleController(), tool=1, stored=stored).result.notes[-1]
             'touches_not_witnessed'
         """
         found = self._found(controller, tool, stored)
@@ -291,14 +291,14 @@ class PointsSource:
             return tr(
                 "The poses fit tool {better} much better than tool {taught}: if they were taught "
                 "with it, give {taught_tool} {better}.",
-                taught_tool=way(Way.TAUGHT_TOOL),
+                taught_tool=remedy_word(RemedyWord.TAUGHT_TOOL),
                 better=self.found.better.tool,
                 taught=self._taught_tool,
             )
         return tr(
             "Check that all poses touched the same point and with which tool they were taught "
             "({taught_tool}).",
-            taught_tool=way(Way.TAUGHT_TOOL),
+            taught_tool=remedy_word(RemedyWord.TAUGHT_TOOL),
         )
 
 
@@ -308,7 +308,7 @@ class _UnknownTool(CalibrationError):
     def __init__(self, taught: int, alike: Sequence[ToolFit]) -> None:
         self.tools = (*sorted(fit.tool for fit in alike), taught)
         self.apart_mm = max(fit.apart_mm for fit in alike)
-        ways = [f"{way(Way.TAUGHT_TOOL)} {tool}" for tool in sorted(self.tools)]
+        ways = [f"{remedy_word(RemedyWord.TAUGHT_TOOL)} {tool}" for tool in sorted(self.tools)]
         super().__init__(
             "taught_tool_unknown",
             tr(
@@ -367,7 +367,7 @@ def _require_taught_with(tool: int, poses: Sequence[Pose]) -> None:
             remedy=tr(
                 "Name the tool that was selected with {taught_tool}; its value on "
                 "this controller is used.",
-                taught_tool=way(Way.TAUGHT_TOOL),
+                taught_tool=remedy_word(RemedyWord.TAUGHT_TOOL),
             ),
         )
 
@@ -379,7 +379,7 @@ def _require_defined(controller: Controller, tool: int) -> ToolOffset:
             tr("Tool {tool} is not defined, so no pose was taught with it.", tool=tool),
             remedy=tr(
                 "Name the tool that was selected on the pendant with {taught_tool}.",
-                taught_tool=way(Way.TAUGHT_TOOL),
+                taught_tool=remedy_word(RemedyWord.TAUGHT_TOOL),
             ),
             controller=controller.identity,
         )

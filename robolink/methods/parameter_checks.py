@@ -184,10 +184,10 @@ def source_of(
     Example:
         >>> from robolink.methods import Site, find_method, source_of
         >>> from robolink.stations import Station, StationKind
-        >>> from robolink.testing import MemoryController
+        >>> from robolink.controllers import SimpleController
         >>> method = find_method("two-pose")
         >>> pin = Station(id="PIN-07", kind=StationKind.PIN)
-        >>> site = Site(controller=MemoryController(), tool=1, station=pin)
+        >>> site = Site(controller=SimpleController(), tool=1, station=pin)
         >>> type(source_of(method, method.parameters(), site)).__name__
         'TwoPoseSource'
     """

@@ -25,7 +25,7 @@ from robolink.methods.method import (
 )
 from robolink.model import InputEdge
 from robolink.procedures import HALF_ROUND_DEG, LEAST_BESIDE_MM, LookPlan, SamplingPolicy, TouchPlan
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 if TYPE_CHECKING:
     from robolink.methods.method import Site
@@ -321,7 +321,7 @@ def camera_at(parameters: LookParameters, site: "Site") -> "tuple[str | TipSenso
             tr("It is not known which camera looks at station {id}.", id=site.station.id),
             remedy=tr(
                 "Give {sensor}, write source.sensor, or state it in the cell file.",
-                sensor=way(Way.SENSOR),
+                sensor=remedy_word(RemedyWord.SENSOR),
             ),
         )
     stated = parameters.model is not None

@@ -75,7 +75,7 @@ if TYPE_CHECKING:
     from robolink.model._kinematics import kinematics_object as kinematics_object
     from robolink.model._ledger import Account as Account
     from robolink.model._ledger import Ledger as Ledger
-    from robolink.model._ledger import describe_standing as describe_standing
+    from robolink.model._ledger import describe_outcome as describe_outcome
     from robolink.model._movement import InputEdge as InputEdge
     from robolink.model._movement import Motion as Motion
     from robolink.model._movement import MotionGroup as MotionGroup
@@ -148,7 +148,7 @@ else:
                 "OrientationSpace RotationMatrix combined_space is_custom "
                 "kinematics_class kinematics_object"
             ),
-            "_ledger": "Account Ledger describe_standing",
+            "_ledger": "Account Ledger describe_outcome",
             "_movement": (
                 "InputEdge Motion MotionGroup MotionOutcome MotionProfile MotionTerms "
                 "MotionUntilInput Path WorkBox"

@@ -12,7 +12,7 @@ from robolink.model._journal_entries import EntryKind, NewEntry
 from robolink.model._outcomes import OutcomeLog
 from robolink.model._tools import Jump, ToolOffset
 from robolink.stop_latch import StopLatch
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 
 class PersonRole(StrEnum):
@@ -75,7 +75,7 @@ def refuse_operator(outcomes: OutcomeLog, act: str) -> None:
             remedy=tr(
                 "Nothing was sent. Somebody listed as an engineer in the cell file "
                 "may do it, with {operator}.",
-                operator=way(Way.OPERATOR),
+                operator=remedy_word(RemedyWord.OPERATOR),
             ),
         )
 
@@ -182,8 +182,8 @@ class ChangeGuard:
 
         Example:
             >>> from robolink.model import ChangeLimits, ToolOffset
-            >>> from robolink.testing import MemoryController
-            >>> guard = MemoryController().change_guard
+            >>> from robolink.controllers import SimpleController
+            >>> guard = SimpleController().change_guard
             >>> guard.limits = ChangeLimits(length_mm=2)
             >>> guard.require(1, ToolOffset(x_mm=12), ToolOffset(x_mm=13.5))
         """
@@ -199,7 +199,7 @@ class ChangeGuard:
             remedy=tr(
                 "Nothing was written. Check sign and unit. If the change is real, an engineer "
                 "may accept it: {accept_change}.",
-                accept_change=way(Way.ACCEPT_CHANGE),
+                accept_change=remedy_word(RemedyWord.ACCEPT_CHANGE),
             ),
         )
 

@@ -14,7 +14,7 @@ from robolink.messages import joined, tr
 from robolink.model._outcomes import Marker, MarkerKind
 from robolink.model._status import ControllerStatus
 from robolink.model._tools import ToolOffset, describe_offset, read_offset
-from robolink.standing import Components, Standing, ToolStanding, note_standing
+from robolink.controller_outcome import Components, ControllerOutcome, ToolOutcome, note_outcome
 
 Same = Callable[[ToolOffset | None, ToolOffset | None], bool]
 
@@ -180,7 +180,7 @@ class Ledger:
         try:
             yield account
         except BaseException as error:
-            note_standing(error, self.standing(account))
+            note_outcome(error, self.outcome(account))
             raise
         finally:
             self.close(account)
@@ -191,7 +191,7 @@ class Ledger:
         try:
             yield
         except BaseException as error:
-            note_standing(error, self.standing())
+            note_outcome(error, self.outcome())
             raise
 
     def open(self) -> Account:
@@ -214,16 +214,16 @@ class Ledger:
             if not kept:
                 self._unkept.append(account)
 
-    def standing(self, account: Account | None = None) -> Standing:
+    def outcome(self, account: Account | None = None) -> ControllerOutcome:
         """Return what stands of what was done in ``account``, by default since connecting."""
         with self._lock:
             since = self._whole if account is None else account
             doubts = self._doubts.values()
             moves = [deed for deed in doubts if deed.marker.kind is MarkerKind.MOVE]
             unproved = {m.kind for m in self._open.values()} - {MarkerKind.SELECTION}
-            standing = any(map(self._stands, self._unkept))
+            stands = any(map(self._stands, self._unkept))
             others = [d for d in doubts if d not in moves and d.tool is None and not d.selects]
-            return Standing(
+            return ControllerOutcome(
                 tools={tool: self._tool(tool, before) for tool, before in since.before.items()},
                 selected=self._selected,
                 selected_before=since.selected_before,
@@ -232,15 +232,15 @@ class Ledger:
                 doubtful=tuple(deed.marker.request for deed in others),
                 moved=since.moved,
                 moving=tuple(deed.marker.request for deed in moves),
-                settled=not unproved and not standing,
-                left_open=bool(self._open) or standing,
+                settled=not unproved and not stands,
+                left_open=bool(self._open) or stands,
                 reset_first=self._seen is not None and self._seen[0].needs_reset,
             )
 
-    def _tool(self, tool: int, before: ToolOffset | None) -> ToolStanding:
+    def _tool(self, tool: int, before: ToolOffset | None) -> ToolOutcome:
         known = all(deed.tool != tool for deed in self._doubts.values())
         holds = self._holds.get(tool, before)
-        return ToolStanding(
+        return ToolOutcome(
             before=_plain(before),
             holds=_plain(holds),
             requested=_plain(self._requested.get(tool)),
@@ -270,55 +270,55 @@ def _plain(offset: ToolOffset | None) -> Components:
     return None if offset is None else offset.components()
 
 
-def describe_standing(standing: Standing, *, settles: bool = True) -> str:
+def describe_outcome(outcome: ControllerOutcome, *, settles: bool = True) -> str:
     """Return what moved, what was written, which tool is selected, and what settles the rest.
 
     It claims nothing that was not looked at.
 
     Args:
-        standing: What stands.
+        outcome: What stands.
         settles: Whether to say which command settles it; not where that is said besides.
     """
-    parts = [_movement(standing), *_writes(standing), _selection(standing)]
+    parts = [_movement(outcome), *_writes(outcome), _selection(outcome)]
     if not settles:
         return joined(" ", parts)
-    if standing.left_open and standing.reset_first:
+    if outcome.left_open and outcome.reset_first:
         parts.append(tr("Next: robolink robot reset, then robolink recover."))
-    elif standing.left_open:
+    elif outcome.left_open:
         parts.append(tr("Next: robolink recover."))
     return joined(" ", parts)
 
 
-def _movement(standing: Standing) -> str:
-    if standing.moving:
+def _movement(outcome: ControllerOutcome) -> str:
+    if outcome.moving:
         return tr(
             "The robot may still be moving; the end of this was not seen: {requests}.",
-            requests=", ".join(standing.moving),
+            requests=", ".join(outcome.moving),
         )
-    if standing.moved:
+    if outcome.moved:
         return tr("Every movement has ended.")
     return tr("Nothing was moved.")
 
 
-def _writes(standing: Standing) -> list[str]:
-    if not (standing.tools or standing.carried_out or standing.doubtful):
+def _writes(outcome: ControllerOutcome) -> list[str]:
+    if not (outcome.tools or outcome.carried_out or outcome.doubtful):
         return [tr("Nothing was written.")]
-    parts = [_tool(number, tool) for number, tool in sorted(standing.tools.items())]
-    if standing.carried_out:
+    parts = [_tool(number, tool) for number, tool in sorted(outcome.tools.items())]
+    if outcome.carried_out:
         parts.append(
-            tr("This was carried out: {requests}.", requests=", ".join(standing.carried_out))
+            tr("This was carried out: {requests}.", requests=", ".join(outcome.carried_out))
         )
-    if standing.doubtful:
+    if outcome.doubtful:
         parts.append(
             tr(
                 "This may or may not have been carried out: {requests}.",
-                requests=", ".join(standing.doubtful),
+                requests=", ".join(outcome.doubtful),
             )
         )
     return parts
 
 
-def _tool(number: int, tool: ToolStanding) -> str:
+def _tool(number: int, tool: ToolOutcome) -> str:
     before, holds = _shown(tool.before), _shown(tool.holds)
     if not tool.known:
         return tr(
@@ -337,18 +337,18 @@ def _tool(number: int, tool: ToolStanding) -> str:
     return tr("Tool {tool} holds {holds}, as before.", tool=number, holds=holds)
 
 
-def _selection(standing: Standing) -> str:
-    if not standing.selection_known:
+def _selection(outcome: ControllerOutcome) -> str:
+    if not outcome.selection_known:
         return tr("It is not proved which tool is selected now.")
-    if standing.selected is None:
+    if outcome.selected is None:
         return tr("It was not read which tool is selected.")
-    if standing.selected_another:
+    if outcome.selected_another:
         return tr(
             "Tool {now} is selected now; it was tool {tool} before.",
-            now=standing.selected,
-            tool=standing.selected_before,
+            now=outcome.selected,
+            tool=outcome.selected_before,
         )
-    return tr("Tool {tool} is selected.", tool=standing.selected)
+    return tr("Tool {tool} is selected.", tool=outcome.selected)
 
 
 def _shown(components: Components) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol
 
-from robolink import ambient
+from robolink import runtime
 from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.model._identity import Who
@@ -25,7 +25,7 @@ class MarkerKind(StrEnum):
 
 def new_operation() -> str:
     """Return a unique id for a command or a tool change."""
-    return ambient.random_bytes(16).hex()
+    return runtime.random_bytes(16).hex()
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from typing import Final
 from robolink.messages import joined, tr
 from robolink.pose_tables.orientation import rules_for
 from robolink.pose_tables.values import ColumnHead, LengthUnit, OpenQuestion
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 _UNIT_IN_COMMENT: Final = re.compile(
     r"\b(?:inch(?:es)?|met(?:er|re)s?|cm|feet|foot|radians?|rad)\b|[(\[](?:in|m)[)\]]"
@@ -39,7 +39,7 @@ def which_columns(numeric: Sequence[bool], rows: Sequence[Sequence[float]] = ())
     readings = _readings(sum(numeric), rows)
     written = "; ".join(dict.fromkeys(_placed(reading, numeric) for reading in readings))
     what = tr("it has no line that names its {count} columns", count=len(numeric))
-    columns = way(Way.COLUMNS)
+    columns = remedy_word(RemedyWord.COLUMNS)
     if not written:
         return OpenQuestion("columns", what, tr("Name each with {columns}.", columns=columns))
     remedy = tr(
@@ -97,13 +97,13 @@ def which_rotation(heads: Sequence[ColumnHead], numeric: Sequence[bool] = ()) ->
     if not readings:
         remedy = tr(
             "Add a column u with the turn about Z in degrees, or name each column with {columns}.",
-            columns=way(Way.COLUMNS),
+            columns=remedy_word(RemedyWord.COLUMNS),
         )
         return OpenQuestion("columns", what, remedy)
     remedy = tr(
         "Name each with {columns}, for example {readings}: u, v, w are EPSON's angles, qx, qy, qz, "
         "qw a quaternion, '-' skips one.",
-        columns=way(Way.COLUMNS),
+        columns=remedy_word(RemedyWord.COLUMNS),
         readings="; ".join(dict.fromkeys(readings)),
     )
     return OpenQuestion("columns", what, remedy)
@@ -143,7 +143,7 @@ def which_rule(letters: Sequence[str]) -> OpenQuestion:
     return OpenQuestion(
         "euler",
         tr("its angles {letters} may turn in several ways", letters=", ".join(letters).upper()),
-        tr("Say which with {euler}: {readings}.", euler=way(Way.EULER), readings=readings),
+        tr("Say which with {euler}: {readings}.", euler=remedy_word(RemedyWord.EULER), readings=readings),
     )
 
 
@@ -181,7 +181,7 @@ def which_angle_unit(
         tr("its angles may be degrees or radians"),
         tr(
             "Name the columns with their unit with {columns}: {names}.",
-            columns=way(Way.COLUMNS),
+            columns=remedy_word(RemedyWord.COLUMNS),
             names="; ".join(readings),
         ),
     )
@@ -196,7 +196,7 @@ def which_length(why: str, positions: Iterable[Sequence[float]]) -> OpenQuestion
         why,
         tr(
             "Say the unit with {length}: {units}.",
-            length=way(Way.LENGTH_UNIT),
+            length=remedy_word(RemedyWord.LENGTH_UNIT),
             units=joined(tr(" or "), units),
         ),
     )

@@ -14,7 +14,7 @@ from robolink.errors import CalibrationError, ConfigError, LimitError
 from robolink.messages import tr
 from robolink.model import Path, Pose, ToolOffset, WorkBox
 from robolink.runner import Move, Procedure, Seek
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 NO_OFFSET: Final = ToolOffset()
 
@@ -210,5 +210,5 @@ def _outside(name: str, start: Pose, at: Pose, reach_mm: float) -> LimitError:
             away=away_mm,
             reach=reach_mm,
         ),
-        remedy=tr("Look at what is around it, then allow more with {box}.", box=way(Way.BOX)),
+        remedy=tr("Look at what is around it, then allow more with {box}.", box=remedy_word(RemedyWord.BOX)),
     )

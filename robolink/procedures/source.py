@@ -64,10 +64,10 @@ class MeasurementContext:
         >>> from robolink.model import Pose, ToolOffset
         >>> from robolink.calibration_run import Limits
         >>> from robolink.procedures import MeasurementContext
-        >>> from robolink.testing import MemoryController
+        >>> from robolink.controllers import SimpleController
         >>> class Nobody:  # implements robolink.Operator
         ...     def tell(self, text): ...
-        >>> with MemoryController() as controller:
+        >>> with SimpleController() as controller:
         ...     start = controller.groups[0].pose()
         ...     settings = Limits(speed_mm_s=10).settings
         ...     context = MeasurementContext(controller, Nobody(), start=start, settings=settings)
@@ -128,8 +128,8 @@ class MeasurementContext:
             >>> from robolink.model import AnsweredBy
             >>> from robolink.calibration_run import Limits
             >>> from robolink.procedures import MeasurementContext
-            >>> from robolink.testing import MemoryController
-            >>> with MemoryController() as controller:
+            >>> from robolink.controllers import SimpleController
+            >>> with SimpleController() as controller:
             ...     settings = Limits().settings
             ...     context = MeasurementContext(controller, None, start=None, settings=settings)
             ...     context.ask_once("Were all axes held?", given=AnsweredBy.OPTION)
@@ -160,10 +160,10 @@ class MeasurementContext:
         Example:
             >>> from robolink.calibration_run import Limits
             >>> from robolink.procedures import MeasurementContext, approach_path, offset_z
-            >>> from robolink.testing import MemoryController
+            >>> from robolink.controllers import SimpleController
             >>> class Nobody:  # implements robolink.Operator
             ...     def tell(self, text): ...
-            >>> with MemoryController() as controller:
+            >>> with SimpleController() as controller:
             ...     here = controller.groups[0].pose()
             ...     limits = Limits()
             ...     context = MeasurementContext(
@@ -204,12 +204,12 @@ class MeasurementContext:
         Example:
             >>> from robolink.calibration_run import Limits
             >>> from robolink.procedures import MeasurementContext
-            >>> from robolink.testing import MemoryController
+            >>> from robolink.controllers import SimpleController
             >>> class Person:  # implements robolink.Operator
             ...     def ask(self, question, kind): ...
             ...     def poll(self, wait_s):
             ...         return "y"
-            >>> with MemoryController(identity="answer-example") as controller:
+            >>> with SimpleController(identity="answer-example") as controller:
             ...     settings = Limits().settings
             ...     context = MeasurementContext(
             ...         controller, Person(), start=None, settings=settings
@@ -276,11 +276,11 @@ class TipSource(Protocol):
             >>> from robolink.model import Pose, ToolOffset
             >>> from robolink.calibration_run import Limits
             >>> from robolink.procedures import MeasurementContext
-            >>> from robolink.testing import MemoryController
+            >>> from robolink.controllers import SimpleController
             >>> source = PointsSource(lambda: [Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)])
             >>> limits = Limits()
             >>> context = MeasurementContext(
-            ...     MemoryController(), None, start=None, settings=limits.settings
+            ...     SimpleController(), None, start=None, settings=limits.settings
             ... )
             >>> source.measure(context, tool=1, stored=ToolOffset(12, -3.5, -20)).measured
             ('x_mm', 'y_mm')
@@ -323,8 +323,8 @@ class MovingSource(TipSource, Protocol):
             >>> from robolink.calibration_run import Limits
             >>> from robolink.procedures import MeasurementContext
             >>> from robolink.stations import CameraStation
-            >>> from robolink.testing import MemoryController, MemoryMachine
-            >>> machine = MemoryMachine({1: ToolOffset(12, -4, -20)})
+            >>> from robolink.controllers import SimpleController, SimpleMachine
+            >>> machine = SimpleMachine({1: ToolOffset(12, -4, -20)})
             >>> class Camera:  # implements robolink.TipSensor; tool 1 is 0.3 mm off
             ...     identity, unit, resolution_px, settle_s = "camera", SpotUnit.BASE_MM, None, 0
             ...     def see(self, mark=0):
@@ -332,7 +332,7 @@ class MovingSource(TipSource, Protocol):
             >>> class Nobody:  # implements robolink.Operator
             ...     def tell(self, text): ...
             >>> source = CameraSource(Camera(), CameraStation(300, 0, 80))
-            >>> controller = MemoryController(machine)
+            >>> controller = SimpleController(machine)
             >>> start, settings = controller.groups[0].pose(), Limits().settings
             >>> context = MeasurementContext(controller, Nobody(), start=start, settings=settings)
             >>> found = source.measure(context, 1, controller.tools.read(1))

@@ -10,7 +10,7 @@ from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Final
 
-from robolink import ambient
+from robolink import runtime
 from robolink.calibration import PERSON_SIGMA_Z_MM, PROBE_SIGMA_Z_MM
 from robolink.errors import CalibrationError
 from robolink.messages import tr
@@ -65,7 +65,7 @@ class TouchPlan:
 
 def fresh_seed() -> int:
     """Return the seed of a run: nobody can know the standoffs of a run before it."""
-    return ambient.random_number(_SEED_BITS)
+    return runtime.random_number(_SEED_BITS)
 
 
 def plain_pose(pose: Pose) -> Pose:

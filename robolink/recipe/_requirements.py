@@ -10,7 +10,7 @@ from robolink.methods import PointsParameters
 from robolink.methods.pivot import LEAST_AXES
 from robolink.model import AnsweredBy, Capabilities
 from robolink.sensing import VISION_GUIDE
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 if TYPE_CHECKING:
     from robolink.recipe._recipe import Recipe
@@ -151,11 +151,11 @@ class Answers:
             if self.prepared(number, prompt) is None:
                 yield _option(number, prompt)
         if recipe.z == "kept" and not self.yes:
-            yield way(Way.YES)
+            yield remedy_word(RemedyWord.YES)
         if recipe.z == "typed":
             for tool in recipe.tools:
                 if tool.number not in self.z_mm:
-                    yield way(Way.HEIGHT, tool=tool.number)
+                    yield remedy_word(RemedyWord.HEIGHT, tool=tool.number)
 
 
 def require_answers(answers: Answers, recipe: "Recipe") -> None:
@@ -174,9 +174,9 @@ def require_answers(answers: Answers, recipe: "Recipe") -> None:
 
 def _option(number: int, prompt: "Prompt") -> str:
     if prompt.answer == "yes":
-        return way(Way.YES)
+        return remedy_word(RemedyWord.YES)
     if prompt.answer == "nozzle":
-        return way(Way.NOZZLE)
+        return remedy_word(RemedyWord.NOZZLE)
     if prompt.answer == "lot":
-        return way(Way.LOT)
-    return way(Way.ANSWER, number=number)
+        return remedy_word(RemedyWord.LOT)
+    return remedy_word(RemedyWord.ANSWER, number=number)

@@ -143,9 +143,9 @@ def save(
         >>> from pathlib import Path
         >>> from robolink import ToolOffset
         >>> from robolink.report import reports_of, save
-        >>> from robolink.testing import MemoryController
+        >>> from robolink.controllers import SimpleController
         >>> from robolink.transaction import Wanted, change_tools
-        >>> controller = MemoryController()
+        >>> controller = SimpleController()
         >>> receipts = change_tools(controller, [Wanted(3, ToolOffset(1, 2, -30), None)])
         >>> entries = tuple(reversed(list(controller.outcomes.recorded(tool=3))))
         >>> about = {"made_at": "2026-11-23T08:00:00Z", "robolink_version": "0.1.0"}

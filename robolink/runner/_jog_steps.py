@@ -8,7 +8,7 @@ from typing import Final
 from robolink.errors import ConfigError, LimitError
 from robolink.messages import tr
 from robolink.model import Path, Pose, WorkBox, angle_difference_deg, describe_pose
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +110,7 @@ def _smaller_steps(axis: str, delta: float, limit: float) -> str:
     return tr(
         "Steps of up to {limit:g} degrees are allowed. To turn by more, lifted first: {turn}.",
         limit=limit,
-        turn=way(Way.TURN, turn=delta),
+        turn=remedy_word(RemedyWord.TURN, turn=delta),
     )
 
 

@@ -65,7 +65,7 @@ from robolink.runner._steps import (
 )
 from robolink.runner._yes_no import Asking
 from robolink.sensing import median_spot, scatter_of, seen_in
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 
 def ended_by(status: ControllerStatus) -> str:
@@ -151,8 +151,8 @@ class Runner:
     Example:
         >>> from robolink.model import Path, Pose, WorkBox
         >>> from robolink.runner import Runner, RunSettings
-        >>> from robolink.testing import MemoryController
-        >>> controller, settings = MemoryController(), RunSettings(WorkBox(z_max_mm=200))
+        >>> from robolink.controllers import SimpleController
+        >>> controller, settings = SimpleController(), RunSettings(WorkBox(z_max_mm=200))
         >>> runner = Runner(controller, controller.groups[0], operator=None, settings=settings)
         >>> runner.move(Pose(300, 0, 90, 30, tool=0), Path.STRAIGHT).u_deg
         30.0
@@ -298,7 +298,7 @@ class Runner:
                 tr("A camera is needed, and none was named."),
                 remedy=tr(
                     "Name it with {sensor}, in the recipe, or in the cell file.",
-                    sensor=way(Way.SENSOR),
+                    sensor=remedy_word(RemedyWord.SENSOR),
                 ),
             )
         self._controller.clock.sleep(camera.settle_s)
@@ -399,13 +399,13 @@ class Runner:
         Example:
             >>> from robolink.model import WorkBox
             >>> from robolink.runner import Runner, RunSettings
-            >>> from robolink.testing import MemoryController
+            >>> from robolink.controllers import SimpleController
             >>> class Person:  # implements robolink.Operator
             ...     def ask(self, question, kind):
             ...         print(question)
             ...     def poll(self, wait_s):
             ...         return "more"
-            >>> controller, settings = MemoryController(), RunSettings(WorkBox())
+            >>> controller, settings = SimpleController(), RunSettings(WorkBox())
             >>> runner = Runner(controller, controller.groups[0], Person(), settings)
             >>> runner.confirm_or("Keep it?", also=("more",))
             Keep it?

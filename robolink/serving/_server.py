@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection
 from contextlib import closing, suppress
 from typing import TYPE_CHECKING, Final
 
-from robolink import ambient
+from robolink import runtime
 from robolink.errors import ConfigError, RobolinkError
 from robolink.messages import tr
 from robolink.protocols import NEED_DATA
@@ -126,7 +126,7 @@ class CallbackServer:
                             cause=trouble,
                         )
                     )
-                ambient.sleep(BEAT_S)
+                runtime.sleep(BEAT_S)
                 continue
             trouble = ""
             self._receive(link, str(peer[0]))

@@ -10,7 +10,7 @@ from robolink.messages import tr
 from robolink.model import InputEdge, SpotUnit, from_json
 from robolink.runner import SeenAt
 from robolink.stations._station import Station
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 if TYPE_CHECKING:
     from robolink.calibration import Beam, Pin
@@ -227,7 +227,7 @@ def _unknown(station: Station, what: str) -> ConfigError:
             "Make a full calibration there ({calibrate}), learn it with "
             "'robolink cell station learn "
             "{id}', or state it in the cell file.",
-            calibrate=way(Way.CALIBRATE_AT, station=station.id),
+            calibrate=remedy_word(RemedyWord.CALIBRATE_AT, station=station.id),
             id=station.id,
         ),
     )

@@ -24,7 +24,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Final, Protocol
 
-from robolink import ambient
+from robolink import runtime
 from robolink.errors import RobolinkError
 from robolink.files.durable import make_folder, state_folder
 from robolink.interrupts import ClosedAtExit
@@ -86,9 +86,9 @@ class StopListener(ClosedAtExit):
 
     Example:
         >>> from robolink.stopping import StopListener, far_end_of, holders_of
-        >>> from robolink.testing import MemoryController
+        >>> from robolink.controllers import SimpleController
         >>> url = "epson+tcp://192.168.0.1:5000"
-        >>> with MemoryController(identity=url) as controller:
+        >>> with SimpleController(identity=url) as controller:
         ...     with StopListener(controller, url, who="K. Sato, calibrating"):
         ...         [holder.who for holder in holders_of(far_end_of(url))]
         ['K. Sato, calibrating']
@@ -107,7 +107,7 @@ class StopListener(ClosedAtExit):
         self._controller = controller
         self._heard = heard
         self._seen = seen
-        token = ambient.random_bytes(16).hex()
+        token = runtime.random_bytes(16).hex()
         folder = state_folder(KIND)
         make_folder(folder)
         file = f"{os.getpid()}-{token[:8]}"

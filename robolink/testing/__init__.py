@@ -4,7 +4,7 @@ The checks are plain functions; any test framework, or none, can call them. They
 kinds of this package too (``tests/contract/test_controller_contract.py``).
 """
 
-from robolink.testing.memory_controller import MemoryController, MemoryMachine
+from robolink.testing.memory_controller import SimpleController, SimpleMachine
 from robolink.testing.motion_checks import MOVING_CHECKS, WRITING_WHILE_MOVING_CHECKS
 from robolink.testing.on_site import kept_on_site
 from robolink.testing.paper_cell import PaperCell
@@ -18,8 +18,8 @@ __all__ = [
     "CheckOutcome",
     "ContractBrokenError",
     "MOVING_CHECKS",
-    "MemoryController",
-    "MemoryMachine",
+    "SimpleController",
+    "SimpleMachine",
     "PaperCell",
     "READING_CHECKS",
     "Subject",

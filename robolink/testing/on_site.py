@@ -33,7 +33,7 @@ from robolink.model import (
     new_operation,
     plain_offset,
 )
-from robolink.standing import Standing, note_standing
+from robolink.controller_outcome import ControllerOutcome, note_outcome
 from robolink.testing.subject import another_offset
 from robolink.timing import Deadline, SystemClock
 
@@ -141,11 +141,11 @@ def kept_on_site(
         if kept is None:
             raise
         told = _without_doubt(error) if back else error
-        stands = reduce(Standing.followed_by, (ledger.standing() for ledger in ledgers), Standing())
+        stands = reduce(ControllerOutcome.followed_by, (ledger.outcome() for ledger in ledgers), ControllerOutcome())
         if kept.selected is not None:
             stands = replace(stands, selected_before=kept.selected)
         stands = replace(stands, settled=False, left_open=True)
-        note_standing(told, stands.put_back() if back else stands)
+        note_outcome(told, stands.put_back() if back else stands)
         if told is error:
             raise
         raise told from None
@@ -201,7 +201,7 @@ def _put_back(connect: Connect, kept: _Kept, tool: int | None, ledgers: list[Led
     Raises:
         OutcomeUnknownError: It could not be, and stays open for ``recover``.
     """
-    moving = any(ledger.standing().moving for ledger in ledgers)
+    moving = any(ledger.outcome().moving for ledger in ledgers)
     try:
         with _reached_again(connect) as controller, controller.uninterrupted():
             ledgers.append(controller.ledger)

@@ -61,9 +61,10 @@ class Subject:
 
         Example:
             >>> from robolink import ToolOffset
-            >>> from robolink.testing import MemoryController, MemoryMachine, Subject
-            >>> machine = MemoryMachine(tools={1: ToolOffset(12, -3.5, -20)}, selected=1)
-            >>> subject = Subject(lambda: MemoryController(machine), tool=2)
+            >>> from robolink.controllers import SimpleController, SimpleMachine
+            >>> from robolink.testing import Subject
+            >>> machine = SimpleMachine(tools={1: ToolOffset(12, -3.5, -20)}, selected=1)
+            >>> subject = Subject(lambda: SimpleController(machine), tool=2)
             >>> with subject.connect() as controller:
             ...     receipt = controller.tools.write(2, ToolOffset(1, 2, 3), expected=None)
             ...     subject.put_back(controller, before=None, selected=1)

@@ -115,9 +115,10 @@ def check_controller(subject: Subject, *, writes: bool = True, moves: bool = Tru
         ContractBrokenError: Names every promise that is broken, a line each.
 
     Example:
-        >>> from robolink.testing import MemoryController, MemoryMachine, Subject, check_controller
-        >>> machine = MemoryMachine()
-        >>> check_controller(Subject(lambda: MemoryController(machine), tool=2), moves=False)
+        >>> from robolink.controllers import SimpleController, SimpleMachine
+        >>> from robolink.testing import Subject, check_controller
+        >>> machine = SimpleMachine()
+        >>> check_controller(Subject(lambda: SimpleController(machine), tool=2), moves=False)
     """
     with subject.connect() as controller:
         able = controller.capabilities

@@ -41,7 +41,7 @@ from robolink.model import (
     plain_offset,
     tool_changed,
 )
-from robolink.standing import note_standing
+from robolink.controller_outcome import note_outcome
 from robolink.transaction._orders import Describe, Order, OrderedChange, plain_result
 from robolink.transaction._put_back import PutBack, Step, left_unverified, put_back
 
@@ -368,11 +368,11 @@ class ToolChange:
         finally:
             ledger.close(account, kept=self.kept)
             if error is not None:
-                note_standing(error, ledger.standing(account))
+                note_outcome(error, ledger.outcome(account))
 
     def _leave_open(self, error: RobolinkError) -> None:
         """Say what stands in the journal for ``recover``; nothing where no write was sent."""
-        tools = self._controller.ledger.standing(self._account).tools
+        tools = self._controller.ledger.outcome(self._account).tools
         stand = [number for number, tool in tools.items() if tool.differs or not tool.known]
         if not stand:
             return

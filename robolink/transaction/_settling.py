@@ -35,7 +35,7 @@ from robolink.model import (
 from robolink.timing import local_label
 from robolink.transaction._orders import forgotten, kept_later, order_of
 from robolink.transaction._put_back import Step, put_back
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 
 class Settler:
@@ -285,7 +285,7 @@ def _steps(marker: Marker) -> list[Step]:
                 when=local_label(marker.begun_at),
             ),
             remedy=tr(
-                "Compare the tools with a backup, then {forget}.", forget=way(Way.FORGET_MARKER)
+                "Compare the tools with a backup, then {forget}.", forget=remedy_word(RemedyWord.FORGET_MARKER)
             ),
         ) from error
 

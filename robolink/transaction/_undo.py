@@ -29,7 +29,7 @@ from robolink.model import (
 from robolink.timing import local_label
 from robolink.transaction._change import Wanted, change_tools
 from robolink.transaction._put_back import Step
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,7 +176,7 @@ def of_change(outcomes: OutcomeLog, change: str, tool: int | None) -> list[Recor
     if not done or taken_back:
         raise ConfigError(
             _nothing_to_undo(chosen, taken_back=taken_back),
-            remedy=tr("{changes} shows what can be undone.", changes=way(Way.LIST_CHANGES)),
+            remedy=tr("{changes} shows what can be undone.", changes=remedy_word(RemedyWord.LIST_CHANGES)),
         )
     return done
 
@@ -227,7 +227,7 @@ def _unreadable(entry: Recorded) -> ConfigError:
         tr("Entry {number} of the journal cannot be understood.", number=entry.number),
         remedy=tr(
             "'robolink journal verify' checks it; name an earlier value with {to}.",
-            to=way(Way.EARLIER_VALUE),
+            to=remedy_word(RemedyWord.EARLIER_VALUE),
         ),
     )
 
@@ -372,13 +372,13 @@ def _plan_to(controller: Controller, number: int, tool: int | None) -> UndoPlan:
                 "Entry {number} does not say what was read from a tool of this controller.",
                 number=number,
             ),
-            remedy=tr("{changes} shows entries that do.", changes=way(Way.LIST_CHANGES)),
+            remedy=tr("{changes} shows entries that do.", changes=remedy_word(RemedyWord.LIST_CHANGES)),
         )
     proved = tool_of(entry)
     if tool not in (None, proved):
         raise ConfigError(
             tr("Entry {number} is about tool {tool}.", number=number, tool=proved),
-            remedy=tr("Name that tool, or leave {tool} out.", tool=way(Way.TOOL)),
+            remedy=tr("Name that tool, or leave {tool} out.", tool=remedy_word(RemedyWord.TOOL)),
         )
     sentence = tr(
         "bring tool {tool} back to what entry {number} of {at} proved",

@@ -13,7 +13,7 @@ from urllib.parse import parse_qsl, urlsplit
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 _PSEUDO_TERMINAL: Final = re.compile(r"/dev/pts/\d+|/dev/ttys\d+")
 """Names that Linux and macOS give to pseudo terminals, and to no port with a cable."""
@@ -109,7 +109,7 @@ def parse_url(text: str) -> LinkUrl:
     if parts.username is not None or parts.password is not None:
         raise ConfigError(
             tr("A controller URL must not carry a user name or password."),
-            remedy=tr("Remove it, and give it like this: {password}.", password=way(Way.PASSWORD)),
+            remedy=tr("Remove it, and give it like this: {password}.", password=remedy_word(RemedyWord.PASSWORD)),
         )
     kind, plus, medium = parts.scheme.partition("+")
     if not (kind and plus and medium):
@@ -132,7 +132,7 @@ def parse_url(text: str) -> LinkUrl:
             raise ConfigError(
                 tr("A controller URL must not carry a password."),
                 remedy=tr(
-                    "Remove it, and give it like this: {password}.", password=way(Way.PASSWORD)
+                    "Remove it, and give it like this: {password}.", password=remedy_word(RemedyWord.PASSWORD)
                 ),
             )
     return LinkUrl(kind, medium, parts.hostname or "", port, parts.path, options)

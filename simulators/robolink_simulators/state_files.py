@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from robolink import ambient
+from robolink import runtime
 from robolink.errors import ConfigError
 from robolink.files.durable import sync_folder, write_whole
 from robolink.files.named import read_named
@@ -25,7 +25,7 @@ def drawn_number(origin: str = "") -> int:
     """
     if origin:
         return random.Random(f"serial {origin}").randint(1, _HIGHEST)
-    return ambient.random_number(32)
+    return runtime.random_number(32)
 
 
 def drawn_serial(origin: str = "") -> str:

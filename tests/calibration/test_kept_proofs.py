@@ -50,7 +50,8 @@ from robolink.procedures import MeasurementContext, TouchPlan
 from robolink.procedures.tilt_proof import TiltingProof
 from robolink.runner import Ask, Move, TouchedAt
 from robolink.stations import BeamStation, CameraStation, TouchStation
-from robolink.testing import MemoryController, PaperCell
+from robolink.controllers import SimpleController
+from robolink.testing import PaperCell
 from tests.calibration._simulated import refused
 from tests.calibration._surface_person import Ball, Plate
 
@@ -205,7 +206,7 @@ def kept(case, result, flange):
     aside = ASIDE | ({"u_deg": 4.0} if "u_deg" in result.measured else {})
     written = replace(found, **{name: getattr(found, name) + by for name, by in aside.items()})
     nobody: Any = None
-    with MemoryController() as controller:
+    with SimpleController() as controller:
         context = MeasurementContext(controller, nobody, start=flange, settings=Limits().settings)
         context.stands = flange
         proof = case.source.proof(

@@ -16,13 +16,12 @@ from robolink_cli import main
 import robolink
 from robolink.journal import memory_journal
 from robolink.model import Controller, EntryKind, ToolOffset
+from robolink.controllers import SimpleController, SimpleMachine
 from robolink.testing import (
     MOVING_CHECKS,
     READING_CHECKS,
     WRITING_CHECKS,
     WRITING_WHILE_MOVING_CHECKS,
-    MemoryController,
-    MemoryMachine,
     Subject,
     outcomes,
 )
@@ -98,7 +97,7 @@ def test_each_promise_is_told_how_it_was_found():
 
     def changeling() -> Controller:
         identity = f"memory+object://machine-{next(names)}"
-        return cast("Controller", MemoryController(MemoryMachine(), identity=identity))
+        return cast("Controller", SimpleController(SimpleMachine(), identity=identity))
 
     found = {one.name: one for one in outcomes(Subject(changeling))}
     assert "each connection" in found["who_it_is_is_the_same_each_time"].broken
@@ -167,26 +166,26 @@ def test_what_nobody_agreed_to_is_neither_written_nor_moved(run, simulator, told
 
 DRIVER = """
 from robolink.model import ToolOffset
-from robolink.testing import MemoryController, MemoryMachine
+from robolink.controllers import SimpleController, SimpleMachine
 
-machine = MemoryMachine()
+machine = SimpleMachine()
 
 def good():
-    return MemoryController(machine, identity="memory+object://good")
+    return SimpleController(machine, identity="memory+object://good")
 
-class Crude(MemoryMachine):
+class Crude(SimpleMachine):
     def read(self, tool):
         return {}[tool]
 
 def crude():
-    return MemoryController(Crude(), identity="memory+object://crude")
+    return SimpleController(Crude(), identity="memory+object://crude")
 
-class Deaf(MemoryMachine):
+class Deaf(SimpleMachine):
     def store(self, tool, offset):
         pass
 
 def deaf():
-    return MemoryController(Deaf(), identity="memory+object://deaf")
+    return SimpleController(Deaf(), identity="memory+object://deaf")
 """
 
 

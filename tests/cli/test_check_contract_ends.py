@@ -279,26 +279,26 @@ def test_whoever_stopped_the_checks_may_have_the_login_when_it_is_put_back(epson
 
 DRIVER = """
 import sys
-from robolink.testing import MemoryController, MemoryMachine
+from robolink.controllers import SimpleController, SimpleMachine
 
 class Speechless(Exception):
     def __str__(self):
         raise ValueError
 
-class Ends(MemoryMachine):
+class Ends(SimpleMachine):
     def read(self, tool):
         sys.exit(0)
 
-class Garbled(MemoryMachine):
+class Garbled(SimpleMachine):
     def read(self, tool):
         raise ValueError("\\x00\\ud800\\x1b[31m")
 
-class Silent(MemoryMachine):
+class Silent(SimpleMachine):
     def read(self, tool):
         raise Speechless
 
 def of(machine):
-    return lambda: MemoryController(machine, identity="memory+object://mine")
+    return lambda: SimpleController(machine, identity="memory+object://mine")
 
 ends, garbled, silent = of(Ends()), of(Garbled()), of(Silent())
 

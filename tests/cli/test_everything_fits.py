@@ -31,7 +31,7 @@ from robolink.model import json_value
 from robolink.report.pictures.control_chart import chart_drawing
 from robolink.report.pictures.plans import draw, pose_drawings
 from robolink.report.pictures.residuals import fit_drawings, order_drawings
-from robolink.testing import MemoryController
+from robolink.controllers import SimpleController
 from robolink.transaction import Wanted, change_tools
 from tests.cli.wizard.test_screens import SCREENS
 
@@ -85,7 +85,7 @@ def drift():
 
 
 def entries():
-    with MemoryController() as controller:
+    with SimpleController() as controller:
         change_tools(controller, [Wanted(3, ToolOffset(-112.5, -103.25, 280, -90), None)])
         return list(controller.outcomes.recorded(tool=3))
 

@@ -20,7 +20,7 @@ from robolink import errors
 from robolink.errors import OutcomeUnknownError
 from robolink.interrupts import EndedBy, Interrupted, InterruptGate, ended_by, one_ending
 from robolink.model import EntryKind, ToolOffset
-from robolink.standing import Standing, ToolStanding, note_standing
+from robolink.controller_outcome import ControllerOutcome, ToolOutcome, note_outcome
 from robolink.transaction import ToolChange, Wanted, change_tools
 
 # The exit codes that are documented are those of the code, and 6 comes first.
@@ -86,12 +86,12 @@ OLD, NEW = (12.0, -3.5, -20.0, 0.0, 0.0, 0.0), (12.5, -3.5, -20.0, 0.0, 0.0, 0.0
 def test_what_is_not_settled_outranks_whatever_broke_afterwards(error):
     settled = exit_codes.exit_code(error)
     assert settled != 6
-    tools = {1: ToolStanding(before=OLD, holds=NEW, requested=NEW)}
-    note_standing(error, Standing(tools=tools, settled=False, left_open=True))
+    tools = {1: ToolOutcome(before=OLD, holds=NEW, requested=NEW)}
+    note_outcome(error, ControllerOutcome(tools=tools, settled=False, left_open=True))
     assert exit_codes.exit_code(error) == 6
     body = exit_codes.error_body(error)
     assert body["controller_state"] == "changed"
-    note_standing(error, Standing(tools=tools))
+    note_outcome(error, ControllerOutcome(tools=tools))
     assert exit_codes.exit_code(error) == settled
 
 

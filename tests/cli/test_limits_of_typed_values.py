@@ -15,7 +15,7 @@ from robolink.config import find_cell
 from robolink.errors import CalibrationError, NotAllowedError
 from robolink.methods import PointsSource
 from robolink.model import ChangeLimits, Jump, PersonRole, Pose, Signature, ToolOffset
-from robolink.testing import MemoryController, MemoryMachine
+from robolink.controllers import SimpleController, SimpleMachine
 from robolink.transaction import Wanted, change_tools
 
 CELL = """
@@ -174,8 +174,8 @@ def test_a_measured_change_is_held_to_it_whatever_its_own_limit():
 
     touches = [Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)]
     plan = ToolPlan(1, source=PointsSource(lambda: touches), verify=False)  # by itself 2 mm
-    machine = MemoryMachine({1: ToolOffset(12, -3.5, -20)})
-    with MemoryController(machine) as controller:
+    machine = SimpleMachine({1: ToolOffset(12, -3.5, -20)})
+    with SimpleController(machine) as controller:
         controller.change_guard.limits = ChangeLimits(length_mm=0.4)
         change = NozzleChange(
             controller, ChangePlan((plan,), ask_before_write=False), operator=Nobody()

@@ -27,7 +27,7 @@ from robolink.errors import ControllerFaultError
 from robolink.journal import open_journal
 from robolink.messages import tr
 from robolink.model import MarkerKind
-from robolink.standing import UNTOUCHED
+from robolink.controller_outcome import UNTOUCHED
 from robolink.stopping import far_end_of, find_note, leave_note
 from tests.cli.wizard._people import HEADER
 

@@ -16,15 +16,15 @@ from tests._documents import wrong_in
 # What an installed package of another maker lets out is told as its own, not as robolink's.
 
 DRIVER = """
-from robolink.testing import MemoryController, MemoryMachine
+from robolink.controllers import SimpleController, SimpleMachine
 from acme_vendor.wire import ask
 
-class Machine(MemoryMachine):
+class Machine(SimpleMachine):
     def read(self, tool):
         return ask({"tool": tool})
 
 def opener(url, terms):
-    return MemoryController(Machine(), identity="acme+tcp://1")
+    return SimpleController(Machine(), identity="acme+tcp://1")
 """
 
 VENDOR = """

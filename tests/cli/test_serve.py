@@ -20,7 +20,7 @@ from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
 from robolink_simulators.softmotion.mailbox.options import MailboxOptions
 
-from robolink import ambient
+from robolink import runtime
 from robolink.errors import ConfigError, JournalError
 from robolink.journal import memory_journal, open_journal
 from robolink.model import EntryKind, ToolOffset, new_operation
@@ -182,7 +182,7 @@ class Failing:
 
 def test_an_error_of_the_system_does_not_end_the_listening(listening, monkeypatch):
     waits: list[float] = []
-    monkeypatch.setattr(ambient, "sleep", waits.append)
+    monkeypatch.setattr(runtime, "sleep", waits.append)
     server, told = listening()
     errors = [OSError(103, "aborted"), OSError(24, "too many files"), OSError(24, "too many files")]
     monkeypatch.setattr(server, "_listener", Failing(server._listener, errors))
@@ -227,7 +227,7 @@ def test_an_address_that_is_taken_is_told_once():
 
 
 def test_a_console_that_fails_does_not_end_the_listening(monkeypatch):
-    monkeypatch.setattr(ambient, "sleep", lambda _seconds: None)
+    monkeypatch.setattr(runtime, "sleep", lambda _seconds: None)
 
     def tell(_sentence):
         raise BrokenPipeError

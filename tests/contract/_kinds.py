@@ -24,7 +24,8 @@ from robolink.model import (
     WorkBox,
 )
 from robolink.protocols.mailbox import Kinematics
-from robolink.testing import MemoryController, MemoryMachine, Subject
+from robolink.controllers import SimpleController, SimpleMachine
+from robolink.testing import Subject
 from robolink.testing.subject import another_offset
 from robolink.transport import parse_url
 from tests.contract.third_kind import BenchServer, open_bench
@@ -148,8 +149,8 @@ def _switch_on(controller: Controller) -> None:
 @contextmanager
 def memory() -> Iterator[Kind]:
     """The controller in memory that ``robolink.testing`` ships."""
-    machine = MemoryMachine(tools={1: ToolOffset(12.0, -3.5, -20.0)})
-    yield Kind(lambda outcomes: MemoryController(machine, outcomes=outcomes))
+    machine = SimpleMachine(tools={1: ToolOffset(12.0, -3.5, -20.0)})
+    yield Kind(lambda outcomes: SimpleController(machine, outcomes=outcomes))
 
 
 @contextmanager

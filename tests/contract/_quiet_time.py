@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Protocol
 
-from robolink.ambient import Ambience
+from robolink.runtime import SystemRuntime
 
 _EVERY_S = 1.0
 
@@ -16,7 +16,7 @@ class Steps(Protocol):
     def advance(self, seconds: float) -> None: ...
 
 
-class QuietTime(Ambience):
+class QuietTime(SystemRuntime):
     """Real surroundings, in which what is done regularly is done when the test lets time pass.
 
     It is the clock of whoever waits, too: so that others go on meanwhile.
@@ -38,7 +38,7 @@ class QuietTime(Ambience):
         return len(self._acts)
 
     def regularly(self, every_s: float, act: Callable[[], None], name: str) -> Callable[[], None]:
-        """See :meth:`robolink.ambient.Ambience.regularly`."""
+        """See :meth:`robolink.runtime.SystemRuntime.regularly`."""
         assert every_s == _EVERY_S, name
         key = object()
         self._acts[key] = act

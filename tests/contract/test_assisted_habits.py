@@ -7,11 +7,11 @@ import pytest
 from robolink_cli import main
 from robolink_simulators.hosting.in_process import epson, softmotion
 
-from robolink import ambient
-from robolink.ambient import Ambience
+from robolink import runtime
+from robolink.runtime import SystemRuntime
 
 
-class SameChance(Ambience):
+class SameChance(SystemRuntime):
     """The places beside the pin are drawn alike in each run: a side is only seen in enough of
     them, and one run in eight draws others.
     """
@@ -63,7 +63,7 @@ def test_a_side_from_which_the_tip_comes_is_told_with_its_size(named, capsys, fr
     url = f"{bare}?seed=5&" + "&".join(f"world.{name}={value}" for name, value in habits.items())
     words = ("calibrate", "n-angle", "--tool", "1", "--count", "8", "--assist", bare)
     more = ("--yes", "--json", "--no-verify", "--speed", "100")
-    with ambient.replaced(SameChance()):
+    with runtime.replaced(SameChance()):
         assert main.run(["-c", url, *words, *more]) == 0
     document = json.loads(capsys.readouterr().out)
     truly_mm = 0.05 if frame == "approach" else 0.0

@@ -32,7 +32,7 @@ from robolink.protocols.epson_text import VariableType
 from robolink.protocols.mailbox.exports import program_texts
 from robolink.runner import RunSettings, ask_yes_no
 from robolink.sensing import open_sensor, seen_once
-from robolink.testing import MemoryMachine
+from robolink.controllers import SimpleMachine
 from robolink.transport import parse_url
 
 pytest_plugins = ["pytester"]
@@ -257,7 +257,7 @@ def a_panel(stack: ExitStack) -> dict[str, Any]:
 
 def an_acme_arm(stack: ExitStack) -> dict[str, Any]:
     """An arm on which a movement lasts until it was asked for three times."""
-    inner, left = MemoryMachine(tools={1: ToolOffset(12.0, -3.5, -20.0)}), [0]
+    inner, left = SimpleMachine(tools={1: ToolOffset(12.0, -3.5, -20.0)}), [0]
     done = list[str]()
 
     def start_to(target: Pose) -> None:

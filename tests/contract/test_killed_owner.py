@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 import robolink
-from robolink.ambient import replaced
+from robolink.runtime import replaced
 from robolink.errors import LeaseHeldError, StoppedError
 from robolink.files.durable import state_folder
 from robolink.journal import open_journal, this_process

@@ -10,7 +10,7 @@ from robolink.methods import TwoPoseSource
 from robolink.model import Pose, ToolOffset
 from robolink.runner import Ask, StepDone, TouchedAt, TouchSubject
 from robolink.stations import Station, StationKind
-from robolink.testing import MemoryController
+from robolink.controllers import SimpleController
 
 OLD = ToolOffset(12.0, -4.0, -20.0)
 PIN = Station(id="PIN-07", kind=StationKind.PIN).at(310, 95, -40, sigma_mm=0.02)
@@ -22,7 +22,7 @@ def told(plan=PLAN, before=OLD, higher=0.0, aside=0.0, pose=FLANGE, **subject):
     asked = TouchSubject(**{"number": 1, "total": 2, **subject})
     touch = TouchedAt.of(replace(pose, x_mm=pose.x_mm + aside, z_mm=pose.z_mm + higher))
     done = StepDone(Ask("Jog.", subject=asked), touch)
-    return told_by_first_touch(MemoryController(), plan, before, done)
+    return told_by_first_touch(SimpleController(), plan, before, done)
 
 
 def test_it_says_by_how_much_and_how_surely():

@@ -21,20 +21,19 @@ from robolink.model import (
 from robolink.procedures import MeasurementContext
 from robolink.runner import Move, Operator
 from robolink.stop_latch import CommandClass
+from robolink.controllers import SimpleController, SimpleMachine
 from robolink.testing import (
     ContractBrokenError,
-    MemoryController,
-    MemoryMachine,
     Subject,
     check_controller,
 )
-from robolink.testing.memory_controller import MemoryLink, _MemoryGroup, _MemoryTools
+from robolink.controllers.simple_controller import SimpleLink, _MemoryGroup, _MemoryTools
 from tests.contract._kinds import KINDS
 
 TOOL = 2
 
 
-class Careless(MemoryController):
+class Careless(SimpleController):
     """A driver of somebody else: its machine is an object of this process.
 
     Args:
@@ -54,7 +53,7 @@ class Careless(MemoryController):
 class WritesByItself(_MemoryTools):
     """A table that does as it is told: nothing is compared, marked, locked or read back."""
 
-    def __init__(self, link: MemoryLink, machine: MemoryMachine) -> None:
+    def __init__(self, link: SimpleLink, machine: SimpleMachine) -> None:
         super().__init__(link)
         self._machine = machine
 
@@ -89,7 +88,7 @@ class Done:
 class MovesByItself(_MemoryGroup):
     """An arm that goes wherever it is told to, whatever is in force."""
 
-    def __init__(self, link: MemoryLink, tools: _MemoryTools, machine: MemoryMachine) -> None:
+    def __init__(self, link: SimpleLink, tools: _MemoryTools, machine: SimpleMachine) -> None:
         super().__init__(link, tools)
         self._machine = machine
 
@@ -101,7 +100,7 @@ class MovesByItself(_MemoryGroup):
 class SendsPastItsWrite(_MemoryTools):
     """Builds on the bases, and sends in place of handing a write to them."""
 
-    def __init__(self, link: MemoryLink, machine: MemoryMachine) -> None:
+    def __init__(self, link: SimpleLink, machine: SimpleMachine) -> None:
         super().__init__(link)
         self._machine = machine
 
@@ -111,7 +110,7 @@ class SendsPastItsWrite(_MemoryTools):
         return ToolReceipt(tool, before, requested, requested)
 
 
-class AsksNoLatch(MemoryLink):
+class AsksNoLatch(SimpleLink):
     """A link whose exchange forgets the latch: the one thing that the bases leave to it."""
 
     @contextmanager
@@ -128,7 +127,7 @@ def broken(connect):
 
 
 def test_a_driver_that_does_as_it_is_told_is_found_out_in_each_promise():
-    machine = MemoryMachine(tools={1: ToolOffset(12.0, -3.5, -20.0)}, selected=1)
+    machine = SimpleMachine(tools={1: ToolOffset(12.0, -3.5, -20.0)}, selected=1)
     told = broken(lambda: Careless(machine, tools=WritesByItself, group=MovesByItself))
     for name, words in {
         "what_is_unsettled_blocks": "a write is refused while that is unsettled",
@@ -154,7 +153,7 @@ def test_a_driver_that_does_as_it_is_told_is_found_out_in_each_promise():
 
 
 def test_a_driver_that_sends_past_the_bases_is_found_out():
-    machine = MemoryMachine(tools={1: ToolOffset(12.0, -3.5, -20.0)}, selected=1)
+    machine = SimpleMachine(tools={1: ToolOffset(12.0, -3.5, -20.0)}, selected=1)
     told = broken(lambda: Careless(machine, tools=SendsPastItsWrite))
     assert "a write is refused while that is unsettled" in told["what_is_unsettled_blocks"]
     assert "the_flange_is_never_written" not in told  # the bases refuse that before it is asked
@@ -163,8 +162,8 @@ def test_a_driver_that_sends_past_the_bases_is_found_out():
 
 def test_a_driver_that_forgets_all_but_its_wire_is_refused_by_the_bases(monkeypatch):
     """It takes no lock, stores no marker and asks no latch; two promises are left to its link."""
-    monkeypatch.setattr("robolink.testing.memory_controller.MemoryLink", AsksNoLatch)
-    machine = MemoryMachine(tools={1: ToolOffset(12.0, -3.5, -20.0)}, selected=1)
+    monkeypatch.setattr("robolink.controllers.simple_controller.SimpleLink", AsksNoLatch)
+    machine = SimpleMachine(tools={1: ToolOffset(12.0, -3.5, -20.0)}, selected=1)
     told = broken(lambda: Careless(machine))
     assert set(told) == {
         "a_stop_in_the_last_instant_holds_a_write_back",

@@ -11,7 +11,7 @@ from robolink_simulators.hosting.in_process.epson import register, unregister
 from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
 from robolink.methods import PointsSource
 from robolink.model import EntryKind, Pose, ToolOffset, rotate_xy
-from robolink.testing import MemoryController, MemoryMachine
+from robolink.controllers import SimpleController, SimpleMachine
 
 SMALL = ToolOffset(0.7, -0.55, -20.0)
 """0.9 mm beside the axis, as a coaxial nozzle."""
@@ -134,8 +134,8 @@ def test_a_person_is_asked_and_the_answer_is_on_record(answers, poses):
         ask_before_write=False,
         attended=True,
     )
-    machine = MemoryMachine({1: SMALL})
-    with MemoryController(machine) as controller:
+    machine = SimpleMachine({1: SMALL})
+    with SimpleController(machine) as controller:
         NozzleChange(controller, plan, operator=person).run()
         recorded = [
             one.details["question"]
@@ -158,8 +158,8 @@ def test_who_does_not_know_writes_nothing():
         ask_before_write=False,
         attended=True,
     )
-    machine = MemoryMachine({1: SMALL})
-    with MemoryController(machine) as controller, pytest.raises(CalibrationError) as caught:
+    machine = SimpleMachine({1: SMALL})
+    with SimpleController(machine) as controller, pytest.raises(CalibrationError) as caught:
         NozzleChange(controller, plan, operator=Person("n", "n")).run()
     assert caught.value.code == "taught_tool_unknown"
     assert machine.read(1) == SMALL
@@ -175,7 +175,7 @@ def test_however_small_the_tool_is_the_wrong_one_is_never_taken_in_silence(lengt
     for u_deg in (0.0, 180.0):
         x, y = rotate_xy(real.x_mm - small.x_mm, real.y_mm - small.y_mm, u_deg)
         poses.append(Pose(300.0 - x, 100.0 - y, -60.0, u_deg))
-    with MemoryController(MemoryMachine({1: small})) as controller:
+    with SimpleController(SimpleMachine({1: small})) as controller:
         with pytest.raises(CalibrationError) as caught:
             PointsSource(lambda: poses).find(controller, 1, small)
         said = PointsSource(lambda: poses, taught_tool=1).find(controller, 1, small)
@@ -189,6 +189,6 @@ def test_a_long_tool_is_not_asked_about():
     for u_deg in (0.0, 180.0):
         x, y = rotate_xy(real.x_mm, real.y_mm, u_deg)
         poses.append(Pose(300.0 - x, 100.0 - y, -60.0, u_deg))
-    with MemoryController(MemoryMachine({1: stored})) as controller:
+    with SimpleController(SimpleMachine({1: stored})) as controller:
         found = PointsSource(lambda: poses).find(controller, 1, stored)
     assert found.result.offset.x_mm == pytest.approx(12.2)

@@ -15,7 +15,7 @@ from robolink.model import EntryKind, Pose, ToolOffset
 from robolink.report import reports_of
 from robolink.runner import Question
 from robolink.stations import Found, StationKind, station_entry
-from robolink.testing import MemoryController
+from robolink.controllers import SimpleController
 from robolink.transaction import recover
 from tests.certificate.live import BEAM_NOISE, row_of, wrong_by
 from tests.contract._sensor_cell import TOOL, sensor_cell
@@ -180,7 +180,7 @@ def test_the_commands_that_learn_a_station_again_can_be_typed(kind, known, comma
     ],
 )
 def test_a_station_is_learnt_with_another_tool_than_the_one_in_doubt(by, commands):
-    controller = MemoryController(identity=f"relearning-{by}")
+    controller = SimpleController(identity=f"relearning-{by}")
     if by is not None:
         found = Found(id="BEAMS-02", kind=StationKind.BEAMS, x_mm=1.0, y_mm=2.0, tool=by)
         controller.outcomes.append(station_entry(found))

@@ -11,7 +11,7 @@ from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.epson.device import EpsonSimulator
 
 import robolink
-from robolink.ambient import replaced
+from robolink.runtime import replaced
 from robolink.errors import (
     LeaseHeldError,
     LeaseLostError,

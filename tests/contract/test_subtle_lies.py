@@ -17,12 +17,11 @@ from robolink.errors import (
     TransportBrokenError,
     TransportTimeoutError,
 )
+from robolink.controllers import SimpleController, SimpleMachine
 from robolink.testing import (
     MOVING_CHECKS,
     READING_CHECKS,
     WRITING_CHECKS,
-    MemoryController,
-    MemoryMachine,
     Subject,
     outcomes,
     tool_checks,
@@ -33,34 +32,34 @@ SPARE = 3
 FIRST = {1: ToolOffset(12.0, -3.5, -20.0), 4: ToolOffset(5.0, 5.0, 5.0)}
 
 
-class LosesAnAngle(MemoryMachine):
+class LosesAnAngle(SimpleMachine):
     def store(self, tool, offset):
-        MemoryMachine.store(self, tool, offset and replace(offset, u_deg=0.0))
+        SimpleMachine.store(self, tool, offset and replace(offset, u_deg=0.0))
 
 
-class TurnsASign(MemoryMachine):
+class TurnsASign(SimpleMachine):
     def store(self, tool, offset):
-        MemoryMachine.store(self, tool, offset and replace(offset, u_deg=-offset.u_deg))
+        SimpleMachine.store(self, tool, offset and replace(offset, u_deg=-offset.u_deg))
 
 
-class RoundsToTenths(MemoryMachine):
+class RoundsToTenths(SimpleMachine):
     def store(self, tool, offset):
-        MemoryMachine.store(self, tool, offset and replace(offset, y_mm=round(offset.y_mm, 1)))
+        SimpleMachine.store(self, tool, offset and replace(offset, y_mm=round(offset.y_mm, 1)))
 
 
-class WritesTheNextToo(MemoryMachine):
+class WritesTheNextToo(SimpleMachine):
     def store(self, tool, offset):
-        MemoryMachine.store(self, tool, offset)
-        MemoryMachine.store(self, tool + 1, offset)
+        SimpleMachine.store(self, tool, offset)
+        SimpleMachine.store(self, tool + 1, offset)
 
 
-class SelectsWhatItWrites(MemoryMachine):
+class SelectsWhatItWrites(SimpleMachine):
     def store(self, tool, offset):
-        MemoryMachine.store(self, tool, offset)
+        SimpleMachine.store(self, tool, offset)
         self.selected = tool if offset else self.selected
 
 
-class SelectsInNameOnly(MemoryMachine):
+class SelectsInNameOnly(SimpleMachine):
     named = 1
 
     def select(self, tool):
@@ -70,17 +69,17 @@ class SelectsInNameOnly(MemoryMachine):
         return self.named
 
 
-class ArrivesBeside(MemoryMachine):
+class ArrivesBeside(SimpleMachine):
     def go(self, target):
-        MemoryMachine.go(self, replace(target, x_mm=target.x_mm + 0.3))
+        SimpleMachine.go(self, replace(target, x_mm=target.x_mm + 0.3))
 
 
-class ArrivesTurned(MemoryMachine):
+class ArrivesTurned(SimpleMachine):
     def go(self, target):
-        MemoryMachine.go(self, replace(target, u_deg=target.u_deg + 1.0))
+        SimpleMachine.go(self, replace(target, u_deg=target.u_deg + 1.0))
 
 
-class GoesOnAfterAStop(MemoryMachine):
+class GoesOnAfterAStop(SimpleMachine):
     """Says that it rests as soon as it is told to, and ends the movement all the same."""
 
     target, ends_s, told = None, 0.0, False
@@ -90,9 +89,9 @@ class GoesOnAfterAStop(MemoryMachine):
 
     def pose(self):
         if self.target is not None and time.monotonic() > self.ends_s:
-            MemoryMachine.go(self, self.target)
+            SimpleMachine.go(self, self.target)
             self.target = None
-        return MemoryMachine.pose(self)
+        return SimpleMachine.pose(self)
 
     def moving(self):
         self.pose()
@@ -102,7 +101,7 @@ class GoesOnAfterAStop(MemoryMachine):
         self.told = True
 
 
-class NeverRests(MemoryMachine):
+class NeverRests(SimpleMachine):
     def moving(self):
         return True
 
@@ -110,7 +109,7 @@ class NeverRests(MemoryMachine):
 def test_a_machine_that_does_not_rest_was_not_stopped():
     """It takes the stop; five seconds later nobody knows what it does."""
     machine, clock = NeverRests(), ManualClock()
-    with MemoryController(machine, identity="memory+object://restless", clock=clock) as controller:
+    with SimpleController(machine, identity="memory+object://restless", clock=clock) as controller:
         with pytest.raises(OutcomeUnknownError, match="did not come to rest") as unconfirmed:
             controller.stop()
         assert "press the emergency stop" in unconfirmed.value.remedy
@@ -144,14 +143,14 @@ def found(connect, *names):
 def test_a_machine_that_lies_is_found(kind, check, words):
     machine = kind(tools=dict(FIRST), selected=1)
     identity = f"memory+object://{kind.__name__}"
-    broken = found(lambda: MemoryController(machine, identity=identity), check)
+    broken = found(lambda: SimpleController(machine, identity=identity), check)
     assert re.search(words, broken[check])
 
 
 def test_a_machine_that_forgets_what_a_connection_wrote_is_found():
     def connect():
-        machine = MemoryMachine(tools=dict(FIRST), selected=1)
-        return MemoryController(machine, identity="memory+object://forgetful")
+        machine = SimpleMachine(tools=dict(FIRST), selected=1)
+        return SimpleController(machine, identity="memory+object://forgetful")
 
     assert (
         found(connect, "a_write_lasts")["a_write_lasts"] == "a new connection finds the new value"
@@ -159,10 +158,10 @@ def test_a_machine_that_forgets_what_a_connection_wrote_is_found():
 
 
 def test_a_driver_that_takes_all_values_for_the_same_is_found():
-    machine = MemoryMachine(tools={**FIRST, SPARE: ToolOffset(1.0)}, selected=1)
+    machine = SimpleMachine(tools={**FIRST, SPARE: ToolOffset(1.0)}, selected=1)
 
     def connect():
-        controller = MemoryController(machine, identity="memory+object://lenient")
+        controller = SimpleController(machine, identity="memory+object://lenient")
         real = controller.tools.same
         controller.tools.same = lambda a, b: real(  # type: ignore[method-assign]
             a and replace(a, u_deg=0), b and replace(b, u_deg=0)
@@ -184,10 +183,10 @@ class Patient(ProcedureLock):
 
 def test_a_driver_in_which_a_second_procedure_waits_is_found_and_waited_for_no_longer(monkeypatch):
     monkeypatch.setattr(tool_checks, "_AT_ONCE_S", 0.05)
-    machine = MemoryMachine(tools=dict(FIRST), selected=1)
+    machine = SimpleMachine(tools=dict(FIRST), selected=1)
 
     def connect():
-        controller = MemoryController(machine, identity="memory+object://patient")
+        controller = SimpleController(machine, identity="memory+object://patient")
         controller._driver.lock = Patient("patient", controller.latch)
         return controller
 
@@ -214,16 +213,16 @@ def test_what_was_found_is_told_though_the_link_goes_when_it_is_put_back():
     def lost(*_given, **_named):
         raise TransportBrokenError("The cable is out.")
 
-    machine = MemoryMachine(tools=dict(FIRST), selected=1)
-    subject = Subject(lambda: MemoryController(machine), tool=SPARE)
+    machine = SimpleMachine(tools=dict(FIRST), selected=1)
+    subject = Subject(lambda: SimpleController(machine), tool=SPARE)
     (one,) = outcomes(subject, [check])
     assert one.broken == "it is kept; The cable is out."
     assert isinstance(one.error, TransportBrokenError)
 
 
 def test_a_machine_that_keeps_its_promises_is_not_blamed():
-    machine = MemoryMachine(tools=dict(FIRST), selected=1)
-    broken = found(lambda: MemoryController(machine, identity="memory+object://honest"))
+    machine = SimpleMachine(tools=dict(FIRST), selected=1)
+    broken = found(lambda: SimpleController(machine, identity="memory+object://honest"))
     assert {name for name, what in broken.items() if what} == set()
     assert len(broken) == len(EVERY)
     assert machine.tools == FIRST

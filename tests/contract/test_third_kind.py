@@ -12,10 +12,9 @@ from robolink.controllers import CONTROLLERS_GROUP, stop_now
 from robolink.errors import ConfigError, ConnectError, RejectedError
 from robolink.methods import TwoPoseSource
 from robolink.runner import Question
+from robolink.controllers import SimpleController, SimpleMachine
 from robolink.testing import (
     ContractBrokenError,
-    MemoryController,
-    MemoryMachine,
     Subject,
     check_controller,
 )
@@ -122,7 +121,7 @@ def test_no_entry_point_is_looked_for_where_the_kind_is_our_own(monkeypatch):
 
 
 def test_a_controller_that_is_open_is_taken_for_its_url():
-    with MemoryController() as controller:
+    with SimpleController() as controller:
         assert robolink.connect(controller) is controller
         assert stop_now(controller).ready
         assert controller.latch.closed
@@ -146,7 +145,7 @@ def test_a_tool_of_it_is_calibrated_at_two_poses(server, monkeypatch):
 
 
 def test_a_controller_that_writes_what_it_likes_does_not_keep_its_promises():
-    class Careless(MemoryMachine):
+    class Careless(SimpleMachine):
         """Stores every tool a little off."""
 
     machine = Careless(tools={1: ToolOffset(1.0)})
@@ -158,13 +157,13 @@ def test_a_controller_that_writes_what_it_likes_does_not_keep_its_promises():
 
     machine.tools = Off(machine.tools)
     with pytest.raises(ContractBrokenError, match="a_write_is_read_back"):
-        check_controller(Subject(lambda: MemoryController(machine)))
+        check_controller(Subject(lambda: SimpleController(machine)))
 
 
 def test_a_machine_that_does_not_tell_which_tool_is_in_force_selects_none():
-    machine = MemoryMachine(tools={1: ToolOffset(1.0)})
+    machine = SimpleMachine(tools={1: ToolOffset(1.0)})
     machine.selected = None  # type: ignore[assignment]
-    with MemoryController(machine) as controller:
+    with SimpleController(machine) as controller:
         with pytest.raises(RejectedError, match="does not report"):
             controller.tools.select(1)
         with controller.preserved("a procedure"):
@@ -173,5 +172,5 @@ def test_a_machine_that_does_not_tell_which_tool_is_in_force_selects_none():
 
 
 def test_the_whole_suite_passes_on_a_controller_in_memory():
-    machine = MemoryMachine()
-    check_controller(Subject(lambda: MemoryController(machine)))
+    machine = SimpleMachine()
+    check_controller(Subject(lambda: SimpleController(machine)))

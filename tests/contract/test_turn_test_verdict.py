@@ -9,7 +9,7 @@ from robolink.calibration import Drift, TurnClaim, VerifyResult
 from robolink.calibration_run import Attended, _records, conclude_turn_test
 from robolink.errors import NotAllowedError, VerifyError
 from robolink.model import EntryKind, Pose
-from robolink.testing import MemoryController
+from robolink.controllers import SimpleController
 
 BEAMS = TurnClaim(
     look_sigma_mm=0.003,
@@ -28,14 +28,14 @@ _numbers = count()
 
 def controller_of_its_own():
     """A controller with a record of its own."""
-    return MemoryController(identity=f"turn-test-verdict-{next(_numbers)}")
+    return SimpleController(identity=f"turn-test-verdict-{next(_numbers)}")
 
 
 def shown(drift_mm: float, u_deg: float = 180.0, limit_mm: float = 0.2) -> VerifyResult:
     return VerifyResult((Drift(u_deg, drift_mm, 0.0),), limit_mm)
 
 
-def newest(controller: MemoryController):
+def newest(controller: SimpleController):
     return next(iter(controller.outcomes.recorded(kinds=(EntryKind.VERIFY,))))
 
 

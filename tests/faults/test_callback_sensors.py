@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from robolink_simulators.epson.camera_calibrations import VisionCalibration
 
-from robolink import ambient
+from robolink import runtime
 from robolink.journal import memory_journal
 from robolink.model import EntryKind, ToolOffset, new_operation
 from robolink.protocols.spel_callback import CallbackLine, CallbackWord
@@ -106,8 +106,8 @@ def test_a_proof_inside_its_tolerance_that_contradicts_the_measurement_is_none(
 def test_beams_that_were_learnt_long_ago_are_not_sure_enough(beams, monkeypatch):
     """The row of their place has grown to 0.1 mm since, and the limit is 0.1 mm."""
     ahead_s = 400 * 86_400.0
-    now_s = ambient.wall_s
-    monkeypatch.setattr(ambient, "wall_s", lambda: now_s() + ahead_s)
+    now_s = runtime.wall_s
+    monkeypatch.setattr(runtime, "wall_s", lambda: now_s() + ahead_s)
     refused(beams, "uncertain", [EntryKind.REFUSED])
 
 

@@ -25,7 +25,7 @@ from robolink_simulators.hosting.streams.epson import serve_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
-from robolink import ambient
+from robolink import runtime
 from robolink.errors import LeaseHeldError, LeaseLostError, TransportTimeoutError
 from robolink.journal import open_journal
 from robolink.journal.store import connection
@@ -125,7 +125,7 @@ def test_f63_a_record_that_another_process_keeps_locked_is_waited_for_and_then_r
 # ---- F64
 
 
-class Jumping(ambient.Ambience):
+class Jumping(runtime.SystemRuntime):
     """Wall time that is another day each time it is asked, forth and back."""
 
     def __init__(self) -> None:
@@ -140,7 +140,7 @@ class Jumping(ambient.Ambience):
 @pytest.mark.fault("F64")
 def test_f64_a_clock_that_jumps_changes_neither_deadlines_nor_the_order_of_the_record(cell):
     jumping = Jumping()
-    with ambient.replaced(jumping):
+    with runtime.replaced(jumping):
         for x_mm in ("12.5", "12.25", "12.75"):
             done = cell.run("tool", "set", "1", "--x", x_mm, "--yes")
             assert done.code == 0, done.err
@@ -159,7 +159,7 @@ def test_f64_a_clock_that_jumps_changes_neither_deadlines_nor_the_order_of_the_r
 @pytest.mark.fault("F64")
 def test_f64_a_time_out_lasts_as_long_as_it_is_whatever_the_clock_says(tmp_path):
     simulator = EpsonSimulator(seed=2)
-    with ambient.replaced(Jumping()), serve_tcp(simulator) as host:
+    with runtime.replaced(Jumping()), serve_tcp(simulator) as host:
         journal = open_journal(str(tmp_path / "journal.db"))
         mine, other = (journal.log(host.url) for _ in range(2))
         with robolink.connect(host.url, outcomes=mine, timeout_s=1.0) as controller:

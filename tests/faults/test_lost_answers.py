@@ -20,7 +20,7 @@ from robolink.errors import (
     UnclearAnswerError,
 )
 from robolink.model import MotionOutcome, MotionProfile, Path, Verdict, WorkBox
-from robolink.standing import standing_after
+from robolink.controller_outcome import outcome_after
 from robolink.transaction import Wanted, change_tools
 
 NEW = ToolOffset(12.75, -3.25, -20)
@@ -373,7 +373,7 @@ def test_ctrl_c_while_leave_is_taken_tells_what_the_work_before_left():
             with robolink.connect("epson+sim://leaving") as controller:
                 before = write(controller).before
                 simulator.on_request = interrupt
-        stands = standing_after(caught.value).tools[1]
+        stands = outcome_after(caught.value).tools[1]
         assert (stands.before, stands.holds) == (before.components(), NEW.components())
         assert simulator.machine.tools.get(1) == NEW
     finally:

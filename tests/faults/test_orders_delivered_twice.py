@@ -10,7 +10,7 @@ import pytest
 from robolink.errors import BusyError, ConfigError, LeaseLostError, OutcomeUnknownError
 from robolink.journal import memory_journal
 from robolink.model import ANY, EntryKind, Marker, MarkerKind, plain_offset
-from robolink.testing import MemoryController, MemoryMachine
+from robolink.controllers import SimpleController, SimpleMachine
 from robolink.transaction import Settler, ToolChange, Wanted, carrying_out, change_tools
 from tests.faults._change_process import NEW, ORDER
 
@@ -21,12 +21,12 @@ class Desk:
     """Several programs on one machine with one record."""
 
     def __init__(self) -> None:
-        self.machine = MemoryMachine()
+        self.machine = SimpleMachine()
         self.journal = memory_journal(f"desk-{next(_desks)}")
 
-    def connected(self) -> MemoryController:
+    def connected(self) -> SimpleController:
         log = self.journal.log("memory://desk")
-        return MemoryController(self.machine, identity="memory://desk", outcomes=log)
+        return SimpleController(self.machine, identity="memory://desk", outcomes=log)
 
 
 JOB = {"what": "tool 1"}

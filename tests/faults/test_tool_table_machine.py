@@ -27,7 +27,7 @@ from robolink.errors import (
     UndefinedToolError,
 )
 from robolink.model import ToolOffset
-from robolink.standing import Effect, standing_after
+from robolink.controller_outcome import Effect, outcome_after
 from robolink.transaction import Wanted, change_tools, plan_undo, recover, undo
 from tests.faults._tool_tables import TOOLS, EpsonTable, PlcTable
 
@@ -89,7 +89,7 @@ class ToolTableMachine(RuleBasedStateMachine):
         else:
             assert self.held[tool] in (believed, offset)
             self.held[tool] = offset
-        assert refused is None or standing_after(refused).effect is Effect.UNCHANGED
+        assert refused is None or outcome_after(refused).effect is Effect.UNCHANGED
 
     @precondition(lambda self: not self.unsettled)
     @rule(tool=NUMBERS, then_select=st.none() | st.sampled_from((0, *TOOLS)))
@@ -169,7 +169,7 @@ class ToolTableMachine(RuleBasedStateMachine):
         except RobolinkError as error:
             self.table.calm_down()
             now = self.table.held()[tool]
-            said = standing_after(error).effect
+            said = outcome_after(error).effect
             assert now in (before, offset)
             assert now == before or said is not Effect.UNCHANGED
             self.held[tool] = now

@@ -23,7 +23,7 @@ from robolink.protocols.epson_text import (
     parse_preferences,
     parse_status,
 )
-from robolink.standing import Effect
+from robolink.controller_outcome import Effect
 from robolink.transport import parse_url
 from tests.fuzz._mutating import edited_bytes, fuzzed
 from tests.unit.conftest import Client

@@ -26,7 +26,7 @@ from robolink.protocols.mailbox import (
     encode_response,
     encode_slot,
 )
-from robolink.standing import Effect
+from robolink.controller_outcome import Effect
 from tests.fuzz._mutating import LREALS, WORDS, edited_words, fuzzed, sealed
 from tests.unit._mailbox_client import linked, owning
 from tests.unit.softmotion_driver._cell import Cell

@@ -13,7 +13,7 @@ from typing import Final
 
 from robolink.controllers.epson.tools import EpsonToolTable
 from robolink.model import MarkerKind
-from robolink.standing import UNTOUCHED
+from robolink.controller_outcome import UNTOUCHED
 from tests.soak import stand_ins
 from tests.soak.adversary import CellKind
 
@@ -156,7 +156,7 @@ DEFECTS: Final = (
     ),
     KnownDefect(
         "an exit code says what broke last, not what stands unproved",
-        {"robolink.standing.standing_after": lambda _error: UNTOUCHED},
+        {"robolink.controller_outcome.outcome_after": lambda _error: UNTOUCHED},
         found_by=_PROXY,
     ),
     KnownDefect(
@@ -209,7 +209,7 @@ DEFECTS: Final = (
     ),
     KnownDefect(
         "an error does not say what it left on the controller",
-        {f"{module}.note_standing": stand_ins.nothing for module in _NOTERS},
+        {f"{module}.note_outcome": stand_ins.nothing for module in _NOTERS},
         found_by=_PROXY,
     ),
     KnownDefect(

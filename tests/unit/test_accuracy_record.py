@@ -31,7 +31,7 @@ from robolink.calibration import RowFact, gauge_study
 from robolink.errors import CalibrationError, JournalError
 from robolink.methods.one_touch.solvers import find_stored_z
 from robolink.model import EntryKind, NewEntry, Recorded, Signature, ToolOffset, plain_offset
-from robolink.testing import MemoryController
+from robolink.controllers import SimpleController
 from robolink.timing import wall_time
 
 # What the journal tells of the rows of a cell, and what of it does not count.
@@ -348,7 +348,7 @@ MEASURED = replace(OLD, z_mm=-20.4)
 
 @pytest.fixture
 def log(request):
-    with MemoryController(identity=request.node.name) as controller:
+    with SimpleController(identity=request.node.name) as controller:
         yield Log(controller)
 
 

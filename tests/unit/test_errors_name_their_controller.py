@@ -18,7 +18,7 @@ from robolink.errors import (
 )
 from robolink.model import Capabilities, MotionProfile, Path, Pose, ToolOffset, WorkBox
 from robolink.protocols.mailbox import ErrorClass, GroupState, Opcode
-from robolink.testing import MemoryController
+from robolink.controllers import SimpleController
 from tests.unit._plc_bench import COMMIT_BIT, Bench
 from tests.unit.softmotion_driver._cell import Cell
 
@@ -103,7 +103,7 @@ def test_a_kind_of_another_package_need_not_name_its_controller():
         def facts(self):
             raise RejectedError("no facts")
 
-    link = MemoryController()._driver
+    link = SimpleController()._driver
     arm = Arm(link, capabilities=Capabilities(), tools=Tools(link))
     assert named(error_of(arm.tools.read, 1)) == (RemoteProtocolError, link.identity, "")
     assert named(error_of(arm.tools.select, 1)) == (

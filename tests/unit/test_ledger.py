@@ -9,7 +9,7 @@ import robolink_cli
 from robolink_simulators.cell.clock import ManualClock
 
 import robolink
-from robolink.ambient import in_a_thread, replaced
+from robolink.runtime import in_a_thread, replaced
 from robolink.controllers.driver_link import SignsOfLife
 from robolink.errors import TransportClosedError
 from robolink.journal import memory_journal
@@ -24,12 +24,12 @@ from robolink.model import (
     WorkBox,
     answer_entry,
     answered_by_in_words,
-    describe_standing,
+    describe_outcome,
     plain_offset,
 )
 from robolink.runner import Confirm, Runner, RunSettings
-from robolink.standing import UNTOUCHED, Effect, standing_after
-from robolink.testing import MemoryController
+from robolink.controller_outcome import UNTOUCHED, Effect, outcome_after
+from robolink.controllers import SimpleController
 from tests.contract._quiet_time import QuietTime
 
 # What stands on a controller is told from what was begun, answered, read and recorded.
@@ -67,22 +67,22 @@ def done(ledger, marker, found):
 
 
 def test_nothing_begun_is_untouched(ledger):
-    assert ledger.standing() == UNTOUCHED
-    assert ledger.standing().untouched
+    assert ledger.outcome() == UNTOUCHED
+    assert ledger.outcome().untouched
 
 
 def test_a_write_is_unknown_until_it_is_read_and_settled_when_it_is_recorded(ledger):
     marker = write()
     ledger.begin(marker)
-    assert (ledger.standing().effect, ledger.standing().settled) == (Effect.UNKNOWN, False)
+    assert (ledger.outcome().effect, ledger.outcome().settled) == (Effect.UNKNOWN, False)
     ledger.proved(marker, NEW)
-    assert (ledger.standing().effect, ledger.standing().settled) == (Effect.CHANGED, False)
+    assert (ledger.outcome().effect, ledger.outcome().settled) == (Effect.CHANGED, False)
     ledger.ended(marker)
-    assert not ledger.standing().settled, "its marker is still there"
+    assert not ledger.outcome().settled, "its marker is still there"
     ledger.recorded(marker)
-    standing = ledger.standing()
-    assert (standing.effect, standing.settled) == (Effect.CHANGED, True)
-    assert standing.tools[1].holds == NEW.components()
+    outcome = ledger.outcome()
+    assert (outcome.effect, outcome.settled) == (Effect.CHANGED, True)
+    assert outcome.tools[1].holds == NEW.components()
 
 
 def test_a_refused_write_changed_nothing(ledger):
@@ -90,75 +90,75 @@ def test_a_refused_write_changed_nothing(ledger):
     ledger.begin(marker)
     ledger.ended(marker)
     ledger.recorded(marker)
-    assert (ledger.standing().effect, ledger.standing().settled) == (Effect.UNCHANGED, True)
-    assert not ledger.standing().untouched
+    assert (ledger.outcome().effect, ledger.outcome().settled) == (Effect.UNCHANGED, True)
+    assert not ledger.outcome().untouched
 
 
 def test_a_tool_that_is_read_settles_a_doubt_only_when_the_controller_was_done_with_it(ledger):
     marker = write()
     ledger.begin(marker)
     ledger.saw_tool(1, OLD)
-    assert ledger.standing().effect is Effect.UNKNOWN, "the write may still be on its way"
+    assert ledger.outcome().effect is Effect.UNKNOWN, "the write may still be on its way"
     ledger.answered(marker)
     ledger.saw_tool(1, OLD)
-    assert ledger.standing().effect is Effect.UNCHANGED
+    assert ledger.outcome().effect is Effect.UNCHANGED
     assert ledger.open_writes(1) == (marker,)
 
 
 def test_a_value_that_was_put_back_is_no_change(ledger):
     done(ledger, write(), NEW)
     done(ledger, write(before=NEW, requested=OLD, operation="back"), OLD)
-    assert ledger.standing().effect is Effect.UNCHANGED
+    assert ledger.outcome().effect is Effect.UNCHANGED
 
 
 def test_what_nobody_kept_is_not_settled_until_it_is_put_back(ledger):
     account = ledger.open()
     done(ledger, write(), NEW)
     ledger.close(account, kept=False)
-    assert not ledger.standing().settled
+    assert not ledger.outcome().settled
     done(ledger, write(before=NEW, requested=OLD, operation="back"), OLD)
-    assert ledger.standing().settled
+    assert ledger.outcome().settled
 
 
 def test_an_account_tells_only_of_its_own_block(ledger):
     done(ledger, write(), NEW)
     with pytest.raises(OSError, match="disk") as caught, ledger.block():
         raise OSError("disk")
-    assert standing_after(caught.value).effect is Effect.UNCHANGED
-    assert ledger.standing().effect is Effect.CHANGED
+    assert outcome_after(caught.value).effect is Effect.UNCHANGED
+    assert ledger.outcome().effect is Effect.CHANGED
 
 
 def test_ctrl_c_carries_what_stands_too(ledger):
     with pytest.raises(KeyboardInterrupt) as caught, ledger.block():
         ledger.begin(move())
         raise KeyboardInterrupt
-    assert standing_after(caught.value).moving == ("Go P1",)
+    assert outcome_after(caught.value).moving == ("Go P1",)
 
 
 def test_a_movement_that_ended_changes_nothing_that_is_kept(ledger):
     ledger.begin(move())
-    assert ledger.standing().effect is Effect.UNKNOWN
+    assert ledger.outcome().effect is Effect.UNKNOWN
     ledger.ended(move())
     ledger.recorded(move())
-    assert (ledger.standing().effect, ledger.standing().moved) == (Effect.UNCHANGED, True)
+    assert (ledger.outcome().effect, ledger.outcome().moved) == (Effect.UNCHANGED, True)
 
 
 def test_a_selection_is_known_when_it_is_read(ledger):
     ledger.begin(select(0, before=1))
-    assert not ledger.standing().selection_known
+    assert not ledger.outcome().selection_known
     ledger.proved(select(0, before=1), 0)
     ledger.ended(select(0, before=1))
     ledger.recorded(select(0, before=1))
-    assert (ledger.standing().effect, ledger.standing().selected) == (Effect.CHANGED, 0)
+    assert (ledger.outcome().effect, ledger.outcome().selected) == (Effect.CHANGED, 0)
     done(ledger, select(1, before=0, operation="back"), 1)
-    assert (ledger.standing().effect, ledger.standing().selected) == (Effect.UNCHANGED, 1)
+    assert (ledger.outcome().effect, ledger.outcome().selected) == (Effect.UNCHANGED, 1)
 
 
 def test_an_undefined_tool_is_a_value_like_any_other(ledger):
     done(ledger, write(before=None), NEW)
-    assert ledger.standing().effect is Effect.CHANGED
+    assert ledger.outcome().effect is Effect.CHANGED
     done(ledger, write(before=NEW, requested=None, operation="back"), None)
-    assert ledger.standing().effect is Effect.UNCHANGED
+    assert ledger.outcome().effect is Effect.UNCHANGED
 
 
 def in_doubt(ledger):
@@ -220,7 +220,7 @@ def output(ledger):
 )
 def test_what_stands_is_said_in_whole_sentences(ledger, story, sentence):
     story(ledger)
-    assert describe_standing(ledger.standing()) == sentence
+    assert describe_outcome(ledger.outcome()) == sentence
 
 
 def test_what_two_connections_left_is_told_as_one():
@@ -229,12 +229,12 @@ def test_what_two_connections_left_is_told_as_one():
     first.begin(move())
     first.ended(move())
     second.begin(write(before=NEW, requested=OLD))
-    whole = first.standing().followed_by(second.standing())
+    whole = first.outcome().followed_by(second.outcome())
     assert whole.moved
     assert (whole.tools[1].before, whole.tools[1].known) == (OLD.components(), False)
     assert whole.effect is Effect.UNKNOWN
     done(second, write(before=NEW, requested=OLD), OLD)
-    whole = first.standing().followed_by(second.standing())
+    whole = first.outcome().followed_by(second.outcome())
     assert (whole.tools[1].differs, whole.effect) == (False, Effect.UNCHANGED)
 
 
@@ -242,11 +242,11 @@ def test_what_one_connection_did_not_look_at_is_as_the_one_before_left_it():
     first, second = Ledger(), Ledger()
     done(first, select(0, 1), 0)
     done(second, write(), NEW)
-    whole = first.standing().followed_by(second.standing())
+    whole = first.outcome().followed_by(second.outcome())
     assert (whole.selected, whole.selected_before, whole.effect) == (0, 1, Effect.CHANGED)
     back = whole.put_back()
     assert (back.selected, back.effect, back.left_open) == (1, Effect.UNCHANGED, False)
-    assert describe_standing(back).endswith("as before. Tool 1 is selected.")
+    assert describe_outcome(back).endswith("as before. Tool 1 is selected.")
 
 
 # No answer is forgotten: what asks, asks through what records, whoever calls it.
@@ -299,7 +299,7 @@ def test_a_question_of_any_procedure_is_on_record_without_a_measurement():
         second = yield Confirm("Take it again?", also=("more",))
         return first, second
 
-    with MemoryController(identity="a procedure") as controller:
+    with SimpleController(identity="a procedure") as controller:
         assert runner_of(controller, "y", "more", tool=3).run(asks()) == (True, "more")
         assert said(controller) == [
             ("Take it again?", "more", 3),
@@ -308,7 +308,7 @@ def test_a_question_of_any_procedure_is_on_record_without_a_measurement():
 
 
 def test_each_way_to_ask_by_the_runner_is_on_record():
-    with MemoryController(identity="each way") as controller:
+    with SimpleController(identity="each way") as controller:
         runner = runner_of(controller, "y", "n", "back", "N-1")
         assert runner.confirm("a?")
         assert runner.confirm_or("b?", also=("back",), decides="accepted") is False

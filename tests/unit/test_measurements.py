@@ -40,7 +40,8 @@ from robolink.model import _journal_entries as former
 from robolink.procedures import LookPlan, MeasurementContext, TouchPlan
 from robolink.runner import Ask, Confirm, Look, Move, Notify, Seek, TeachPrompt, TouchedAt
 from robolink.stations import CameraStation, Station, StationKind
-from robolink.testing import MemoryController, MemoryMachine, PaperCell
+from robolink.controllers import SimpleController, SimpleMachine
+from robolink.testing import PaperCell
 
 # With what one touch of the next nozzle is compared, and what follows from a wrong answer.
 
@@ -62,7 +63,7 @@ def kept(tool=1, station="PIN-07", value=STORED, **said: Any):
 
 @pytest.fixture
 def controller():
-    with MemoryController(MemoryMachine({1: STORED, 2: OTHER})) as controller:
+    with SimpleController(SimpleMachine({1: STORED, 2: OTHER})) as controller:
         yield controller
 
 
@@ -313,7 +314,7 @@ class Leaves:
 @pytest.mark.parametrize("method", SOURCES)
 def test_tool_zero_is_selected_before_a_touch_is_asked_for(method):
     source = SOURCES[method]
-    with MemoryController(MemoryMachine({1: STORED})) as controller:
+    with SimpleController(SimpleMachine({1: STORED})) as controller:
         start = controller.groups[0].pose()
         cell = PaperCell(Pose(*start.coordinates(), tool=0), STORED, (310.0, 0.0, 60.0))
         result = cell.run(source.procedure(STORED, cell.here))

@@ -25,7 +25,7 @@ from robolink.locale import languages
 from robolink.messages import joined, plain, spoken, tr
 from robolink.pose_tables.values import OpenQuestion, unclear
 from robolink.timing import local_label
-from robolink.ways import Way, speaking, way
+from robolink.remedy_words import RemedyWord, speaking, remedy_word
 
 # Every sentence goes through one door, in a form that can be collected and filled.
 
@@ -157,7 +157,7 @@ def own_sentences(path):
 
 
 def test_the_shell_has_a_word_for_every_way():
-    ways = [text for name, text in vars(Way).items() if name.isupper()]
+    ways = [text for name, text in vars(RemedyWord).items() if name.isupper()]
     assert len(set(ways)) == len(ways) > 30
     assert set(SHELL_WAYS) == set(ways)
 
@@ -180,7 +180,7 @@ def test_each_program_says_it_in_its_own_words():
         pytest.raises(SelectedToolError, match=r"--then-select NUMBER, 0 for the flange"),
     ):
         require_replacement(3, None)
-    assert way(Way.RECORD) == "trace"
+    assert remedy_word(RemedyWord.RECORD) == "trace"
 
 
 # Which language a name means, where sentences come from, and what a record keeps of them.

@@ -25,7 +25,8 @@ from robolink.model import EntryKind, NewEntry, WorkBox
 from robolink.model._movement import MotionProfile
 from robolink.procedures import InputSource, ManualPinSource, TouchPlan
 from robolink.runner import foreseen_steps
-from robolink.testing import MemoryController, PaperCell
+from robolink.controllers import SimpleController
+from robolink.testing import PaperCell
 from robolink.version import VERSION
 
 # A public name that was given up works for one more version, and says what it is now.
@@ -340,8 +341,8 @@ def test_a_controller_says_which_it_is_and_in_what_state(url, kind):
 
 
 def test_one_of_another_package_says_so_too():
-    with MemoryController() as controller:
-        assert repr(controller).startswith("<MemoryController memory")
+    with SimpleController() as controller:
+        assert repr(controller).startswith("<SimpleController memory")
     assert repr(controller).endswith(": closed>")
 
 

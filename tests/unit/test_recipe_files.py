@@ -30,7 +30,7 @@ from robolink.methods import (
 from robolink.procedures import TWO_ANGLES_DEG, LookPlan, TouchPlan
 from robolink.recipe import LoadedRecipe, Output, Prompt, Recipe, check_recipe, load_recipe
 from robolink.recipe._loading import _checked
-from robolink.testing import MemoryController
+from robolink.controllers import SimpleController
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "recipes").iterdir())
 KINDS = (
@@ -400,7 +400,7 @@ def test_a_recipe_for_another_cell_is_refused_before_anything_is_looked_at():
     loaded: Any = LoadedRecipe(of_cells("line3", "line4"), Path("a.toml"), "")
     nobody: Any = None
     with pytest.raises(ConfigError, match="is for line3, line4; no cell is named"):
-        RecipeRun(MemoryController(), loaded, operator=nobody)
+        RecipeRun(SimpleController(), loaded, operator=nobody)
     mixer = Cell("mixer", "memory://", settings=nobody, origins={})
     with pytest.raises(ConfigError, match="is for line3, line4, not for mixer"):
-        RecipeRun(MemoryController(), loaded, operator=nobody, cell=mixer)
+        RecipeRun(SimpleController(), loaded, operator=nobody, cell=mixer)

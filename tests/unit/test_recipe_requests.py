@@ -19,8 +19,8 @@ from robolink.errors import ConfigError, DeclinedError, LimitError
 from robolink.model import Pose, ToolOffset
 from robolink.recipe import Answers, LoadedRecipe, Recipe, beyond, load_recipe, require_answers
 from robolink.recipe._loading import _checked
-from robolink.standing import standing_after
-from robolink.testing import MemoryController
+from robolink.controller_outcome import outcome_after
+from robolink.controllers import SimpleController
 
 # What a recipe asks for and a kind of controller cannot do: not offered, and refused at once.
 
@@ -73,7 +73,7 @@ def test_another_camera_and_a_run_that_writes_nothing_ask_for_less():
 def test_a_run_refuses_by_the_same_sentences_before_anything_is_asked(case):
     recipe, _ = CASES[case]
     nobody: Any = None
-    with MemoryController() as controller:
+    with SimpleController() as controller:
         before = controller.exchanges
         with pytest.raises(ConfigError) as refused:
             RecipeRun(controller, LoadedRecipe(recipe, Path("a.toml"), ""), operator=nobody)
@@ -95,7 +95,7 @@ def run_of(controller, loaded):
 
 
 def test_a_copy_with_simulated_numbers_is_refused_by_a_real_controller():
-    with MemoryController() as controller:
+    with SimpleController() as controller:
         with pytest.raises(ConfigError, match=r"numbers of a\.toml are those of a simulated cell"):
             run_of(controller, copied()).preflight()
         # Whoever has put in their own deletes the line; what is refused then is something else.
@@ -110,11 +110,11 @@ def test_a_copy_with_simulated_numbers_runs_on_a_simulated_controller():
 
 
 def test_a_run_that_nobody_looked_ahead_of_refuses_all_the_same():
-    with MemoryController() as controller:
+    with SimpleController() as controller:
         before = controller.tools.selected()
         with pytest.raises(ConfigError, match="simulated cell") as refused:
             run_of(controller, copied()).run()
-        assert standing_after(refused.value).untouched
+        assert outcome_after(refused.value).untouched
         assert controller.tools.selected() == before
 
 

@@ -39,7 +39,7 @@ from robolink.runner import (
     yes_or_no,
 )
 from robolink.runner._jog_steps import typed_pose
-from robolink.testing import MemoryController, MemoryMachine
+from robolink.controllers import SimpleController, SimpleMachine
 
 # What a person may answer, how a jog step may be typed, and that no question is for ever.
 
@@ -355,14 +355,14 @@ class Noting(Listener):
 def run(machine, listener, *, write=True):
     tool = ToolPlan(1, source=PointsSource(lambda: TOUCHES), verify=False)
     plan = ChangePlan((tool,), ask_before_write=False)
-    with MemoryController(machine) as controller:
+    with SimpleController(machine) as controller:
         return NozzleChange(controller, plan, operator=cast(Operator, None), listener=listener).run(
             write=write
         )
 
 
 def test_each_moment_comes_once_and_the_one_before_the_write_before_it():
-    machine = MemoryMachine({1: OLD})
+    machine = SimpleMachine({1: OLD})
     listener = Noting(machine)
     run(machine, listener)
     assert listener.seen == [
@@ -375,7 +375,7 @@ def test_each_moment_comes_once_and_the_one_before_the_write_before_it():
 
 
 def test_what_is_not_written_has_no_moment_before_it():
-    machine = MemoryMachine({1: OLD})
+    machine = SimpleMachine({1: OLD})
     listener = Noting(machine)
     run(machine, listener, write=False)
     assert Moment.BEFORE_WRITE not in [moment for moment, _, _ in listener.seen]
@@ -384,7 +384,7 @@ def test_what_is_not_written_has_no_moment_before_it():
 
 @pytest.mark.parametrize("refuses", [Moment.START, Moment.BEFORE_MEASURE, Moment.BEFORE_WRITE])
 def test_who_refuses_at_a_moment_before_the_write_keeps_the_old_value(refuses):
-    machine = MemoryMachine({1: OLD})
+    machine = SimpleMachine({1: OLD})
     with pytest.raises(DeclinedError):
         run(machine, Noting(machine, refuses=refuses))
     assert machine.read(1) == OLD

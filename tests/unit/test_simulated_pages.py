@@ -22,7 +22,8 @@ from robolink.model import (
 )
 from robolink.register_maps import load_map
 from robolink.report import render, render_drift, reports_of
-from robolink.testing import MemoryController, confirm_whole_map
+from robolink.controllers import SimpleController
+from robolink.testing import confirm_whole_map
 from robolink.transaction import Wanted, change_tools
 from robolink.transport import parse_url
 
@@ -93,7 +94,7 @@ def test_the_drift_page_knows_a_simulator_by_its_name_too():
 def test_a_simulator_says_what_it_is_and_a_controller_that_says_nothing_is_not_one(kind):
     with connect(f"{kind}+sim://says-{kind}") as controller:
         assert says_it_is_simulated(controller)
-    assert not says_it_is_simulated(MemoryController(), ControllerFacts(controller_serial="SIM1"))
+    assert not says_it_is_simulated(SimpleController(), ControllerFacts(controller_serial="SIM1"))
     assert not is_simulated_name("epson:SIMATIC/SIMPLE01")
 
 

@@ -41,7 +41,8 @@ from robolink.model import (
     plain_offset,
 )
 from robolink.procedures import MeasurementContext, TouchPlan
-from robolink.testing import MemoryController, PaperCell
+from robolink.controllers import SimpleController
+from robolink.testing import PaperCell
 from robolink.timing import local_label
 from robolink.transaction import (
     ChangedSince,
@@ -402,7 +403,7 @@ def proposals(*tools, verify=True):
 def marked(*tools, limits=LIMITS, verify=True) -> Mapping[str, Any]:
     """Return what a marker keeps, after it was a line of the record."""
     nobody: Any = None
-    context = MeasurementContext(MemoryController(), nobody, start=START, settings=limits.settings)
+    context = MeasurementContext(SimpleController(), nobody, start=START, settings=limits.settings)
     kept = marking.marked_turn_tests(context, limits, proposals(*tools, verify=verify))
     read: Mapping[str, Any] = json.loads(json.dumps(kept))
     return read
@@ -445,7 +446,7 @@ def test_poses_are_typed_only_where_a_test_by_touches_follows_for_each_tool(veri
         plan for tool, test in enumerate(verified, 1) for plan, _ in proposals(tool, verify=test)
     ]
     nobody: Any = None
-    change = NozzleChange(MemoryController(), ChangePlan(tuple(plans)), operator=nobody)
+    change = NozzleChange(SimpleController(), ChangePlan(tuple(plans)), operator=nobody)
     assert change._context(write=True).runner()._types is typed
 
 

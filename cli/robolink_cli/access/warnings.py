@@ -50,7 +50,7 @@ def _needs_reset(controller: "Controller") -> bool:
 
     with suppress(RobolinkError):
         return controller.status().needs_reset
-    return controller.ledger.standing().reset_first
+    return controller.ledger.outcome().reset_first
 
 
 def note_at_work(outcomes: "OutcomeLog", url: str) -> bool:

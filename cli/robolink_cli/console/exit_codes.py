@@ -17,7 +17,7 @@ from robolink_cli.console.render import dumps
 
 if TYPE_CHECKING:
     from robolink.plug_ins import PlugInModule
-    from robolink.standing import Components, Standing
+    from robolink.controller_outcome import Components, ControllerOutcome
 
 
 _COMMAND: Final = (
@@ -39,7 +39,7 @@ def was_refused(error: BaseException) -> bool:
     return not isinstance(error, ended)
 
 
-def next_of(text: str, error: BaseException, standing: "Standing", typed: Sequence[str]) -> str:
+def next_of(text: str, error: BaseException, outcome: "ControllerOutcome", typed: Sequence[str]) -> str:
     """Return the sentences of an error without the command that it ended as what comes next.
 
     ``recover`` gives way to what comes before it; of another command nothing stays.
@@ -47,7 +47,7 @@ def next_of(text: str, error: BaseException, standing: "Standing", typed: Sequen
     Args:
         text: The sentences; those of the library know no command that ran.
         error: What ended the command.
-        standing: What it left.
+        outcome: What it left.
         typed: The command line that it ended, without the program's name.
     """
     if not typed or not was_refused(error):
@@ -60,7 +60,7 @@ def next_of(text: str, error: BaseException, standing: "Standing", typed: Sequen
             return found[0]
         if words != ["recover"]:
             return ""
-        commands = recover_after(found["robolink"], again=True, reset_first=standing.reset_first)
+        commands = recover_after(found["robolink"], again=True, reset_first=outcome.reset_first)
         return tr("Next: {command}", command=commands) + found["stop"]
 
     said = re.escape(tr("Next: {command}", command="").rstrip())
@@ -158,9 +158,9 @@ def exit_code(error: BaseException) -> int:
     What it left on the controller comes first: where a write or a movement may stand unproved,
     it is 6 whatever broke afterwards.
     """
-    from robolink.standing import standing_after  # here and below, because --help needs none
+    from robolink.controller_outcome import outcome_after  # here and below, because --help needs none
 
-    if not standing_after(error).settled:
+    if not outcome_after(error).settled:
         return UNKNOWN
     if isinstance(error, KeyboardInterrupt):
         return _ENDINGS[_ending(error)]
@@ -181,14 +181,14 @@ def report(error: BaseException, *, as_json: bool, typed: Sequence[str] = ()) ->
         as_json: Whether a machine is told.
         typed: The command line, without the program's name: it is not proposed again.
     """
-    from robolink.standing import UNTOUCHED, standing_after
+    from robolink.controller_outcome import UNTOUCHED, outcome_after
 
     code = exit_code(error)
     if os.environ.get("ROBOLINK_DEBUG"):
         import traceback  # here, because --help needs none
 
         show("".join(traceback.format_exception(error)), beside=True)
-    if is_cut_off(error) and standing_after(error) is UNTOUCHED:
+    if is_cut_off(error) and outcome_after(error) is UNTOUCHED:
         return code  # a list, cut off by its reader: no news to him
     if as_json:
         hand_over(error_document(error, typed))
@@ -203,7 +203,7 @@ def report(error: BaseException, *, as_json: bool, typed: Sequence[str] = ()) ->
             show(sentences(f"  {remedy}"), beside=True)
     if not as_json or isinstance(error, KeyboardInterrupt):
         # Whoever ended it may not be who reads the document.
-        tell_standing(error, typed)
+        tell_outcome(error, typed)
     return code
 
 
@@ -220,11 +220,11 @@ def error_document(error: BaseException, typed: Sequence[str] = ()) -> str:
 
 def error_body(error: BaseException, typed: Sequence[str] = ()) -> dict[str, object]:
     """Return what is known about ``error``, as plain JSON; arguments as for :func:`report`."""
-    from robolink.standing import standing_after
+    from robolink.controller_outcome import outcome_after
 
     what, remedy = _sentences(error, typed)
     ours = isinstance(error, errors.RobolinkError)
-    standing = standing_after(error)
+    outcome = outcome_after(error)
     ended = _ending(error) if isinstance(error, KeyboardInterrupt) else ended_by()
     return {
         "kind": type(error).__name__,
@@ -233,8 +233,8 @@ def error_body(error: BaseException, typed: Sequence[str] = ()) -> dict[str, obj
         "reason": getattr(error, "reason", None) if ours else None,
         "code": (getattr(error, "code", None) or None) if ours else None,
         "ended_by": None if ended is None else str(ended),
-        "controller_state": standing.effect,
-        "stands": standing_payload(standing),
+        "controller_state": outcome.effect,
+        "stands": outcome_payload(outcome),
     }
 
 
@@ -255,9 +255,9 @@ def _ending_in_words(by: EndedBy) -> str:
 
 def _sentences(error: BaseException, typed: Sequence[str]) -> tuple[str, str]:
     if isinstance(error, errors.RobolinkError):
-        from robolink.standing import standing_after
+        from robolink.controller_outcome import outcome_after
 
-        left = standing_after(error)
+        left = outcome_after(error)
         return next_of(error.what, error, left, typed), next_of(error.remedy, error, left, typed)
     if isinstance(error, click.ClickException):
         return error.format_message(), tr("'robolink COMMAND --help' shows what can be given.")
@@ -284,19 +284,19 @@ def _plug_in(error: BaseException) -> "PlugInModule | None":
     return plug_in_module(error)
 
 
-def tell_standing(error: BaseException, typed: Sequence[str] = ()) -> None:
+def tell_outcome(error: BaseException, typed: Sequence[str] = ()) -> None:
     """Say on stderr what stands; nothing of a command that had no controller, or only looked."""
-    from robolink.standing import UNTOUCHED, standing_after
+    from robolink.controller_outcome import UNTOUCHED, outcome_after
 
-    standing = standing_after(error)
-    if standing is not UNTOUCHED:
-        from robolink.model import describe_standing  # here, because --help needs none
+    outcome = outcome_after(error)
+    if outcome is not UNTOUCHED:
+        from robolink.model import describe_outcome  # here, because --help needs none
 
-        told = next_of(describe_standing(standing), error, standing, typed)
+        told = next_of(describe_outcome(outcome), error, outcome, typed)
         show(sentences(told), beside=True)
 
 
-def standing_payload(standing: "Standing") -> dict[str, object]:
+def outcome_payload(outcome: "ControllerOutcome") -> dict[str, object]:
     """Return what stands, as plain JSON with units in the keys.
 
     What a tool holds is ``null`` where it is undefined, and where ``known`` is false.
@@ -311,11 +311,11 @@ def standing_payload(standing: "Standing") -> dict[str, object]:
                 "holds": _named(tool.holds) if tool.known else None,
                 "known": tool.known,
             }
-            for number, tool in standing.tools.items()
+            for number, tool in outcome.tools.items()
         },
-        "selected_tool": standing.selected if standing.selection_known else None,
-        **json_fields(standing, "selected_before", "carried_out", "doubtful", "moving"),
-        **json_fields(standing, "settled", "left_open"),
+        "selected_tool": outcome.selected if outcome.selection_known else None,
+        **json_fields(outcome, "selected_before", "carried_out", "doubtful", "moving"),
+        **json_fields(outcome, "settled", "left_open"),
     }
 
 

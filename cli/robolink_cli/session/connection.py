@@ -11,7 +11,7 @@ import robolink
 from robolink.errors import ConfigError, ControllerError, OutcomeUnknownError, RobolinkError
 from robolink.interrupts import EndedBy, ended_by
 from robolink.messages import joined, tr
-from robolink.standing import UNTOUCHED, Standing, note_standing, standing_after
+from robolink.controller_outcome import UNTOUCHED, ControllerOutcome, note_outcome, outcome_after
 from robolink_cli.access.cell import require_expected_robot
 from robolink_cli.access.record import recording
 from robolink_cli.access.warnings import note_at_work, note_unsettled
@@ -176,13 +176,13 @@ def _saying_what_is_left(
 
 def _record_for_nobody(controller: "Controller") -> None:
     """Put what stands on record where a command was ended because nobody reads it any more."""
-    from robolink.model import EntryKind, NewEntry, describe_standing
+    from robolink.model import EntryKind, NewEntry, describe_outcome
 
-    by, standing = ended_by(), controller.ledger.standing()
-    if by not in (EndedBy.HUNG_UP, EndedBy.OUTPUT_CLOSED) or standing.untouched:
+    by, outcome = ended_by(), controller.ledger.outcome()
+    if by not in (EndedBy.HUNG_UP, EndedBy.OUTPUT_CLOSED) or outcome.untouched:
         return
     details = {"ended_by": str(by)}
-    entry = NewEntry(EntryKind.DECISION, verdict=describe_standing(standing), details=details)
+    entry = NewEntry(EntryKind.DECISION, verdict=describe_outcome(outcome), details=details)
     # What cannot be recorded is said, and is no other end.
     with suppress(ConfigError, OutcomeUnknownError):
         controller.outcomes.append(entry)
@@ -198,13 +198,13 @@ def _only_what_was_touched(*, always: bool) -> Iterator[None]:
         yield
     except BaseException as error:
         ended = isinstance(error, KeyboardInterrupt)
-        if ended and standing_after(error) is UNTOUCHED:
+        if ended and outcome_after(error) is UNTOUCHED:
             # It came before the controller was reached, or at the logout.
             watched = click.get_current_context().meta.get(WATCHED)
-            note_standing(error, watched.ledger.standing() if watched else Standing())
+            note_outcome(error, watched.ledger.outcome() if watched else ControllerOutcome())
         told = always or (ended and not is_cut_off(error))
-        if not told and standing_after(error).untouched:
-            note_standing(error, UNTOUCHED)
+        if not told and outcome_after(error).untouched:
+            note_outcome(error, UNTOUCHED)
         raise
 
 

@@ -13,7 +13,7 @@ from typing import Final
 from robolink.calibration.core.result import RunOrder
 from robolink.deprecation import deprecated
 from robolink.messages import tr
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 BEYOND_TOLERANCE: Final = ("large_residual", "large_rms", "large_pixel_residual")
 """Codes of a result that does not agree with itself, the plainest first: nothing to be written."""
@@ -230,7 +230,7 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
     "axes_not_confirmed": lambda: tr(
         "Nobody confirmed that all axes were held by their motors (not SFREE) when these poses "
         "were taught. To confirm it: {option}.",
-        option=way(Way.AXES_HELD),
+        option=remedy_word(RemedyWord.AXES_HELD),
     ),
     "length_changed": lambda: tr("The length of the tool has changed."),
     "length_not_observable": lambda: tr(

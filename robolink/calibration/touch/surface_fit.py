@@ -252,9 +252,9 @@ def judge_surface_touches(
         >>> judge_surface_touches(columns, misses, standoffs_mm).codes
         ()
     """
-    standing = np.array(standoffs_mm)
+    outcome = np.array(standoffs_mm)
     worst_mm = float(np.abs(misses_mm).max())
-    told = _left(columns, misses_mm, standing)
+    told = _left(columns, misses_mm, outcome)
     grounds = (
         ("touch_not_proven", told is None or told[1] > MOST_LEFT),
         ("large_residual", worst_mm > MOST_RESIDUAL_MM),

@@ -306,7 +306,7 @@ def judge_touches(
     heights = [pose.z_mm for pose in poses]
     limit_mm = height_limit_mm(len(poses), sigma_z_mm) if planar and len(poses) > 1 else None
     range_mm = max(heights) - min(heights) if planar and poses else None
-    left = _left_standing(touches, planar=planar)
+    left = _left_outcome(touches, planar=planar)
     residual_mm = _max_residual_mm(poses, planar=planar)
     beside = any(touch.standoff != NO_STANDOFF for touch in touches)
     grounds = (
@@ -357,7 +357,7 @@ def stand_upright(poses: Sequence[Pose]) -> bool:
     return all(lean <= _UPRIGHT for lean in leans)
 
 
-def _left_standing(
+def _left_outcome(
     touches: Sequence[WitnessedTouch], *, planar: bool
 ) -> tuple[float, float] | None:
     """Return which share of the standoffs is left, and its upper 99 % limit; the worse direction.
@@ -369,15 +369,15 @@ def _left_standing(
         return None
     poses = [touch.captured for touch in touches]
     fitted = pin_columns(poses, planar=planar)
-    standing = standoff_columns([touch.standoff for touch in touches], planar=planar)
-    standing = standing[:, np.any(standing != 0.0, axis=0)]
-    if not standing.shape[1]:
+    outcome = standoff_columns([touch.standoff for touch in touches], planar=planar)
+    outcome = outcome[:, np.any(outcome != 0.0, axis=0)]
+    if not outcome.shape[1]:
         return None
     positions = _positions(poses, planar=planar)
-    columns = np.hstack([fitted, standing])
+    columns = np.hstack([fitted, outcome])
     dof = len(positions) - int(np.linalg.matrix_rank(columns))
     told = int(np.linalg.matrix_rank(columns)) - int(np.linalg.matrix_rank(fitted))
-    if dof < 1 or told < standing.shape[1]:
+    if dof < 1 or told < outcome.shape[1]:
         return None
     solution, _, _, _ = np.linalg.lstsq(columns, positions, rcond=None)
     left = positions - columns @ solution

@@ -29,7 +29,7 @@ from robolink.model import (
     WorkBox,
 )
 from robolink.protocols import spel
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 _PRINTED_MM: Final = 0.001
 """A position is printed with three decimals (docs/reference/spel.md 5.6)."""
@@ -280,7 +280,7 @@ class EpsonGroup(MotionGroupCore):
                 remedy=tr(
                     "Set a time-out on the controller's Remote Ethernet page and state it with "
                     "{timeout}; without it a lost link leaves a moving robot unwatched.",
-                    timeout=way(Way.REMOTE_TIMEOUT),
+                    timeout=remedy_word(RemedyWord.REMOTE_TIMEOUT),
                 ),
             )
         self._link.window.require_abort()

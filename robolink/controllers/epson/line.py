@@ -34,7 +34,7 @@ from robolink.protocols.epson_text import (
 )
 from robolink.timing import Clock, Deadline
 from robolink.transport import LinkUrl, TraceSink, TracingTransport, Transport, open_transport
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 if TYPE_CHECKING:
     from robolink.protocols.epson_binary import Dialect
@@ -300,7 +300,7 @@ def _refused(code: int) -> LoginRefusedError:
         remedy=tr(
             "Give the password that is set on the controller's Remote Ethernet page: "
             "{password}. No second attempt was made.",
-            password=way(Way.PASSWORD),
+            password=remedy_word(RemedyWord.PASSWORD),
         ),
         request="Login",
     )

@@ -19,7 +19,7 @@ from robolink.errors import ConfigError, RemoteProtocolError
 from robolink.messages import tr
 from robolink.model import Finding, Marker, Value, Verdict
 from robolink.timing import local_label
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +153,7 @@ class PendingValues:
                         when=local_label(marker.begun_at),
                     ),
                     remedy=tr(
-                        "Look at the controller, then {forget}.", forget=way(Way.FORGET_MARKER)
+                        "Look at the controller, then {forget}.", forget=remedy_word(RemedyWord.FORGET_MARKER)
                     ),
                 )
         return _finding(marker, now, kind)

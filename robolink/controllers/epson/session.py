@@ -21,7 +21,7 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from typing import Final
 
-from robolink import ambient
+from robolink import runtime
 from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.controllers.epson.line import EpsonConversation, EpsonLine, as_shown
 from robolink.errors import (
@@ -133,7 +133,7 @@ class EpsonSession(EpsonConversation):
         super().__init__(line, timeout_s=timeout_s)
         self.place = line.transport.place
         self.exchanges = 0
-        self._wire = ambient.lock()
+        self._wire = runtime.lock()
         self._gate = InterruptGate()
         self._gate.open()
         self._pending: PendingExecute | None = None

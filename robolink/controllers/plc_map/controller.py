@@ -34,7 +34,7 @@ from robolink.model import (
 from robolink.register_maps import RegisterMap, load_map, span_of
 from robolink.timing import Clock
 from robolink.transport import LinkUrl, open_modbus
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 
 class MappedInputs(DriverPart):
@@ -114,7 +114,7 @@ class FlangeReader(MotionGroupCore):
                 remedy=tr(
                     "Read the poses at the HMI and give them with {poses}; or add [flange] to the "
                     "map, if the PLC has registers for it.",
-                    poses=way(Way.GIVEN_POSES),
+                    poses=remedy_word(RemedyWord.GIVEN_POSES),
                 ),
             )
         span = span_of(self._flange)
@@ -309,7 +309,7 @@ def open_plc_map_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
             tr("The dialogue with a PLC's registers cannot be recorded."),
             remedy=tr(
                 "Leave {record} out; a network capture shows the registers.",
-                record=way(Way.RECORD),
+                record=remedy_word(RemedyWord.RECORD),
             ),
         )
     return open_plc_map(url, outcomes=terms.record_at, timeout_s=terms.timeout_s, clock=terms.clock)

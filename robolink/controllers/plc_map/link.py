@@ -14,7 +14,7 @@ from dataclasses import replace
 from itertools import product
 from typing import Final, NoReturn, Protocol
 
-from robolink import ambient
+from robolink import runtime
 from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.controllers.driver_link import DriverLink
 from robolink.errors import (
@@ -105,7 +105,7 @@ class Registers:
         self.gate = InterruptGate()
         self.gate.open()
         self.latch = StopLatch(client.identity)
-        self._writing = ambient.lock()
+        self._writing = runtime.lock()
 
     def read(self, table: RegisterTable, addresses: range) -> tuple[int, ...]:
         """Return what stands there: in one request, or in parts where the server gives fewer.

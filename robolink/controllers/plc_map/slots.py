@@ -144,7 +144,7 @@ class OffsetValues:
         pairs = zip(COMPONENTS, a.components(), b.components(), strict=True)
         return all(self._alike(name, first, second) for name, first, second in pairs)
 
-    def changed(self, slot: MapSlot, standing: Words, wanted: Words) -> tuple[str, ...]:
+    def changed(self, slot: MapSlot, outcome: Words, wanted: Words) -> tuple[str, ...]:
         """Return the components that ``wanted`` holds otherwise than ``standing``.
 
         What is no number is another one.
@@ -154,7 +154,7 @@ class OffsetValues:
             for name, number in slot.components.items()
             if not self._alike(
                 name,
-                number.decode(tuple(standing[address] for address in number.registers)),
+                number.decode(tuple(outcome[address] for address in number.registers)),
                 number.decode(tuple(wanted[address] for address in number.registers)),
             )
         )

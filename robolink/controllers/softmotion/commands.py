@@ -20,7 +20,7 @@ from contextlib import contextmanager, nullcontext
 from dataclasses import replace
 from typing import Final
 
-from robolink import ambient
+from robolink import runtime
 from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.controllers.softmotion.answers import (
     DISPOSSESSED,
@@ -124,7 +124,7 @@ class CommandSender:
     ) -> None:
         self._wire = wire
         self._snapshots = snapshots
-        self._lock = ambient.reentrant_lock()
+        self._lock = runtime.reentrant_lock()
         self._last = 0
         self.ownership = Ownership(wire, self._to_end, bystanders or Bystanders())
 

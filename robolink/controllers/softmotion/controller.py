@@ -5,7 +5,7 @@ from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Final
 
-from robolink import ambient
+from robolink import runtime
 from robolink.controllers.controller_core import ControllerCore
 from robolink.controllers.registry import ConnectionTerms
 from robolink.controllers.softmotion.answers import describe
@@ -43,7 +43,7 @@ from robolink.protocols.mailbox import (
 )
 from robolink.timing import Deadline
 from robolink.transport import LinkUrl, MailboxLink, open_mailbox_link
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 if TYPE_CHECKING:
     from robolink.controllers.softmotion.facts import MailboxFinding
@@ -280,7 +280,7 @@ def open_softmotion_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
             tr("The dialogue with a PLC mailbox cannot be recorded."),
             remedy=tr(
                 "Leave {record} out; a network capture shows the registers.",
-                record=way(Way.RECORD),
+                record=remedy_word(RemedyWord.RECORD),
             ),
         )
     url, kinematics = _own_kinematics(url)
@@ -345,7 +345,7 @@ def open_softmotion(
         ...     controller.groups[0].name
         'axis group'
     """
-    wire = MailboxWire(link, owner=owner or ambient.random_number(32), timeout_s=timeout_s)
+    wire = MailboxWire(link, owner=owner or runtime.random_number(32), timeout_s=timeout_s)
     try:
         with Concerning(link.identity):
             snapshots = Snapshots(wire)

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from types import TracebackType
 from typing import Final
 
-from robolink import ambient
+from robolink import runtime
 from robolink.protocols.mailbox import heartbeat_word
 from robolink.timing import NS_PER_S
 
@@ -100,7 +100,7 @@ class Turns:
     """
 
     def __init__(self) -> None:
-        self._changed = ambient.waiting_room()
+        self._changed = runtime.waiting_room()
         self._waiters = 0
         self._waiting = 0
         self._let_in = 0
@@ -175,4 +175,4 @@ class Turns:
 
 
 def _now_s() -> float:
-    return ambient.monotonic_ns() / NS_PER_S
+    return runtime.monotonic_ns() / NS_PER_S

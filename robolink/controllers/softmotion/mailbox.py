@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Final, Protocol, TypeVar
 
-from robolink import ambient
+from robolink import runtime
 from robolink.controllers.driver_link import DriverLink, MarkedCommand
 from robolink.controllers.softmotion.answers import describe
 from robolink.controllers.softmotion.commands import CommandSender
@@ -125,7 +125,7 @@ class Mailbox(DriverLink):
     def show_life(self) -> None:
         """Beat for the ownership alone: nothing while a movement or jog is unfinished."""
         # Time that only a test lets pass goes on for nobody beside it.
-        if ambient.steps_time() or not isinstance(self.clock, SteppedClock):
+        if runtime.steps_time() or not isinstance(self.clock, SteppedClock):
             self.wire.beat_at_rest()
 
     @property

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Final, TypeAlias
 from urllib.parse import parse_qsl, quote, unquote
 
-from robolink import ambient
+from robolink import runtime
 from robolink.errors import JournalError
 from robolink.files.durable import make_folder, sync_folder
 from robolink.journal._places import JournalPlace
@@ -271,7 +271,7 @@ def _begin_wal(connection: sqlite3.Connection) -> None:
         except sqlite3.OperationalError as error:
             if error.sqlite_errorcode != sqlite3.SQLITE_BUSY or deadline.expired:
                 raise
-            ambient.sleep(_AGAIN_S)
+            runtime.sleep(_AGAIN_S)
         else:
             return
 

@@ -4,7 +4,7 @@ from typing import Final
 
 from robolink.errors import JournalError
 from robolink.messages import joined, tr
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 # Result codes of SQLite (https://www.sqlite.org/rescode.html), the low byte.
 _SQLITE: Final = {
@@ -115,5 +115,5 @@ def _move_it_away() -> str:
         "Save what can be read with {export} and move the file away; a new one is made then. It "
         "also held what was left unfinished: check the robot's selected tool and its tool "
         "offsets by hand.",
-        export=way(Way.EXPORT_JOURNAL),
+        export=remedy_word(RemedyWord.EXPORT_JOURNAL),
     )

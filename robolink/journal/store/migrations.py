@@ -10,7 +10,7 @@ from robolink.errors import JournalError
 from robolink.journal.store import statements
 from robolink.journal.store.connection import DatabaseConnection
 from robolink.messages import tr
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 _FIRST_TABLES: Final = """
     CREATE TABLE IF NOT EXISTS entries (
@@ -141,7 +141,7 @@ def newer_error(name: str, found: int) -> JournalError:
         remedy=tr(
             "Nothing was written to it. Install the newer robolink that made it; {export} reads "
             "what this one understands.",
-            export=way(Way.EXPORT_JOURNAL),
+            export=remedy_word(RemedyWord.EXPORT_JOURNAL),
         ),
     )
 

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from typing import Final
 
-from robolink import ambient
+from robolink import runtime
 from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.errors import JournalError
 from robolink.journal._journal_loss import traces_of
@@ -113,7 +113,7 @@ class Store:
         self._place = place
         self._read_only = read_only
         self._glance = glance
-        self._lock = ambient.reentrant_lock()
+        self._lock = runtime.reentrant_lock()
         self._backend: Backend | None = None
         self._tables: Tables | None = None
         self._file: tuple[int, int] | None = None

@@ -28,7 +28,7 @@ from robolink.model import (
     read_offset,
 )
 from robolink.timing import local_label
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 if TYPE_CHECKING:
     from robolink.calibration import NeedleChangeResult, Pin
@@ -84,13 +84,13 @@ def find_last_touch(controller: Controller, tool: int, station: str) -> LastTouc
         >>> from robolink.methods import PointsSource, find_last_touch
         >>> from robolink.model import Pose, ToolOffset
         >>> from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
-        >>> from robolink.testing import MemoryController, MemoryMachine
+        >>> from robolink.controllers import SimpleController, SimpleMachine
         >>> class Nobody:  # implements robolink.Operator
         ...     def tell(self, text): ...
         >>> source = PointsSource(lambda: [Pose(298, 99, -20, 0), Pose(322, 91, -20, 180)])
         >>> tool = ToolPlan(1, source, verify=False, pin="PIN-07")
         >>> plan = ChangePlan((tool,), ask_before_write=False)
-        >>> with MemoryController(MemoryMachine({1: ToolOffset(12, -3.5, -20)})) as controller:
+        >>> with SimpleController(SimpleMachine({1: ToolOffset(12, -3.5, -20)})) as controller:
         ...     report = NozzleChange(controller, plan, operator=Nobody()).run()
         ...     find_last_touch(controller, 1, "PIN-07").place_mm
         (310.0, 95.0, -40.0)
@@ -105,7 +105,7 @@ def find_last_touch(controller: Controller, tool: int, station: str) -> LastTouc
             ),
             remedy=tr(
                 "Make a full calibration there first: {calibrate}",
-                calibrate=way(Way.CALIBRATE_TOOL_AT, tool=tool, station=station),
+                calibrate=remedy_word(RemedyWord.CALIBRATE_TOOL_AT, tool=tool, station=station),
             ),
         )
     stored = controller.tools.read(tool)
@@ -311,13 +311,13 @@ def difference_from_last(
         >>> from robolink.methods import PointsSource, difference_from_last
         >>> from robolink.model import Pose, ToolOffset
         >>> from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
-        >>> from robolink.testing import MemoryController, MemoryMachine
+        >>> from robolink.controllers import SimpleController, SimpleMachine
         >>> class Nobody:  # implements robolink.Operator
         ...     def tell(self, text): ...
         >>> stored = ToolOffset(12, -4, -20)
         >>> source = PointsSource(lambda: [Pose(298, 99, -20, 0), Pose(322, 91, -20, 180)])
         >>> tool = ToolPlan(1, source, verify=False, pin="PIN-07")
-        >>> with MemoryController(MemoryMachine({1: stored})) as controller:
+        >>> with SimpleController(SimpleMachine({1: stored})) as controller:
         ...     plan = ChangePlan((tool,), ask_before_write=False)
         ...     report = NozzleChange(controller, plan, operator=Nobody()).run()
         ...     solver = difference_from_last(
@@ -337,7 +337,7 @@ def difference_from_last(
             ),
             remedy=tr(
                 "Give {sigma} (in a recipe sigma_mm), or calibrate with n-angle once.",
-                sigma=way(Way.SIGMA),
+                sigma=remedy_word(RemedyWord.SIGMA),
             ),
         )
     known = find_stored_z(controller, tool, last.value)
@@ -398,8 +398,8 @@ def find_stored_z(controller: Controller, tool: int, stored: ToolOffset) -> Stor
     Example:
         >>> from robolink.methods.one_touch.solvers import find_stored_z
         >>> from robolink.model import ToolOffset
-        >>> from robolink.testing import MemoryController
-        >>> find_stored_z(MemoryController(), 1, ToolOffset(12, -4, -20)).on_record
+        >>> from robolink.controllers import SimpleController
+        >>> find_stored_z(SimpleController(), 1, ToolOffset(12, -4, -20)).on_record
         False
     """
     kinds = (*KEPT, EntryKind.CALIBRATION)

@@ -17,7 +17,7 @@ from robolink.model import Path, Pose, ToolOffset
 from robolink.procedures import NO_OFFSET
 from robolink.procedures.samples import TouchNames
 from robolink.runner import Consider, Move, Notify, Procedure
-from robolink.ways import Way, way
+from robolink.remedy_words import RemedyWord, remedy_word
 
 TURNS_DEG: Final = (0.0, 60.0, 120.0, 180.0, -120.0, -60.0)
 
@@ -207,8 +207,8 @@ def tilt_in_air(over: OverPin, stands: Tilt, goal: Tilt, lift_mm: float) -> Proc
                     "This robot cannot reach it, and stands still with the tip "
                     "lifted. Tilt less with {tilt}, or teach the poses and give "
                     "{points}.",
-                    tilt=way(Way.TILT),
-                    points=way(Way.TAUGHT_POINTS),
+                    tilt=remedy_word(RemedyWord.TILT),
+                    points=remedy_word(RemedyWord.TAUGHT_POINTS),
                 ),
             )
 
@@ -332,7 +332,7 @@ def _not_tilted(why: str) -> CalibrationError:
         remedy=tr(
             "Nothing was tilted. Put the pin where the arm has room to all sides, tilt less with "
             "{tilt}, or teach the poses and give {points}.",
-            tilt=way(Way.TILT),
-            points=way(Way.TAUGHT_POINTS),
+            tilt=remedy_word(RemedyWord.TILT),
+            points=remedy_word(RemedyWord.TAUGHT_POINTS),
         ),
     )

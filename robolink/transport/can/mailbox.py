@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import Final
 
-from robolink import ambient
+from robolink import runtime
 from robolink.errors import (
     Concerning,
     ConnectError,
@@ -111,7 +111,7 @@ class CanopenMailboxLink:
         self.durable, self.clock = durable, clock
         self._timeout_s = timeout_s
         self._watch = NodeWatch(line, node, identity, clock)
-        self._lock = ambient.lock()
+        self._lock = runtime.lock()
 
     def meet(self, *, start: bool) -> None:
         """Ask for the node's heartbeat period, then start the node if wanted.

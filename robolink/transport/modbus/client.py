@@ -7,7 +7,7 @@ Nothing is sent twice and no connection is renewed by itself
 from collections.abc import Sequence
 from typing import Final, Protocol
 
-from robolink import ambient
+from robolink import runtime
 from robolink.errors import (
     ConfigError,
     RejectedError,
@@ -99,7 +99,7 @@ class ModbusClient:
         self.identity, self.clock = identity, transport.clock
         self._unit = unit
         self._timeout_s = timeout_s
-        self._lock = ambient.lock()
+        self._lock = runtime.lock()
         self._repeats_until: Deadline | None = None
 
     @property

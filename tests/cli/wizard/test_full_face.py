@@ -31,7 +31,7 @@ from robolink_simulators.hosting.streams.epson import serve_tcp
 from robolink.errors import DeclinedError
 from robolink.model import Pose
 from robolink.runner import JogSubject, Question
-from robolink.standing import Standing
+from robolink.controller_outcome import ControllerOutcome
 from tests.cli.wizard._people import (
     ARRIVAL,
     HEADER,
@@ -240,7 +240,7 @@ def test_the_last_screen_stays_until_it_is_left_and_may_begin_again(keys, again)
         while desk.poll(0.2) is None:
             pass
         error = DeclinedError("You stopped it.", remedy="Nothing was written.")
-        error.controller_state = Standing(moved=True, selected=1, selected_before=1)
+        error.controller_state = ControllerOutcome(moved=True, selected=1, selected_before=1)
         raise error
 
     with click.Context(click.Command("x")), create_pipe_input() as source:

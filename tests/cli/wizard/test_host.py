@@ -25,7 +25,7 @@ from robolink.calibration_run import ChangeReport, ToolReport
 from robolink.errors import ConfigError, DeclinedError
 from robolink.model import MotionProfile, Path, Pose, ToolReceipt, WorkBox
 from robolink.runner import Move, MoveSubject, Question, Runner, RunSettings
-from robolink.testing import MemoryController
+from robolink.controllers import SimpleController
 from tests.cli.wizard._people import ARRIVAL, HEADER, Sitting, write_subject
 
 # What becomes of the work when its face cannot show it any more.
@@ -137,7 +137,7 @@ def test_the_work_is_ended_in_order_when_the_face_breaks(error):
 
 @pytest.mark.simulator_only
 def test_what_follows_a_movement_reaches_the_screen():
-    desk, controller = Desk(), MemoryController()
+    desk, controller = Desk(), SimpleController()
     target = Pose(300, 0, 90, 30, tool=0)
 
     def course():

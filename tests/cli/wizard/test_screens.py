@@ -54,7 +54,7 @@ from robolink.methods import find_method
 from robolink.model import Path as Way
 from robolink.model import Pose, ToolOffset, ToolReceipt, WorkBox
 from robolink.runner import AngleShown, JogRange, MoveSubject, Question
-from robolink.standing import Standing, note_standing
+from robolink.controller_outcome import ControllerOutcome, note_outcome
 from tests.cli.wizard._people import (
     ARRIVAL,
     CHECK,
@@ -281,7 +281,7 @@ def taught():
 
 def stopped():
     error = DeclinedError(tr("You stopped it."), remedy=tr("Nothing was written."))
-    note_standing(error, Standing(moved=True, selected=1, selected_before=1))
+    note_outcome(error, ControllerOutcome(moved=True, selected=1, selected_before=1))
     command = "robolink -c line3 change needle-22g.toml"
     return ended(Header("line3", "Change needle", command=command), error)
 
@@ -298,7 +298,7 @@ def test_a_job_that_was_refused_for_an_earlier_one_names_recover_last():
 
 def test_after_an_emergency_stop_the_reset_comes_before_recover():
     error = ControllerFaultError("The emergency stop was pressed.", remedy="Release it.")
-    note_standing(error, Standing(left_open=True, reset_first=True))
+    note_outcome(error, ControllerOutcome(left_open=True, reset_first=True))
     last = ended(Header("line3", "Change needle", command="robolink change n.toml"), error)
     assert last.state.ended.lines[-1] == (
         'Next: robolink -c "line3" robot reset, then robolink -c "line3" recover'
@@ -312,15 +312,15 @@ def test_after_an_emergency_stop_the_reset_comes_before_recover():
     ("error", "standing", "headed"),
     [
         (ConfigError("It is a copy."), None, "NOT STARTED"),
-        (ControllerFaultError("The guard is open."), Standing(selected=1), "NOT STARTED"),
-        (ControllerFaultError("The guard is open."), Standing(moved=True), "STOPPED"),
+        (ControllerFaultError("The guard is open."), ControllerOutcome(selected=1), "NOT STARTED"),
+        (ControllerFaultError("The guard is open."), ControllerOutcome(moved=True), "STOPPED"),
         (DeclinedError("You stopped it."), None, "STOPPED"),
         (CalibrationError("too_few", "Too few points."), None, "STOPPED"),
     ],
 )
-def test_what_was_refused_before_anything_happened_was_not_stopped(error, standing, headed):
-    if standing is not None:
-        note_standing(error, standing)
+def test_what_was_refused_before_anything_happened_was_not_stopped(error, outcome, headed):
+    if outcome is not None:
+        note_outcome(error, outcome)
     state = WizardState(Header("line3", "Change needle"), subject="a question before the list")
     last = ended_of(state, error, 0.0)
     assert last is not None

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from robolink import ambient
+from robolink import runtime
 from robolink.errors import JournalError
 from robolink.journal import ChainVerification, memory_journal, open_journal
 from robolink.journal.store.connection import NOTHING, DatabaseConnection, _begin_wal
@@ -349,14 +349,14 @@ def test_a_file_that_another_keeps_to_itself_is_given_up_after_the_usual_wait(
     tmp_path, monkeypatch
 ):
     waited, now = [], [0]
-    monkeypatch.setattr(ambient, "monotonic_ns", lambda: now[0])
+    monkeypatch.setattr(runtime, "monotonic_ns", lambda: now[0])
 
     def sleep(seconds):
         waited.append(seconds)
         assert len(waited) < 1000, "it waits for ever"
         now[0] += round(seconds * 1e9)
 
-    monkeypatch.setattr(ambient, "sleep", sleep)
+    monkeypatch.setattr(runtime, "sleep", sleep)
     path = tmp_path / "busy.db"
     with closing(sqlite3.connect(path, timeout=0)) as first:
         first.execute("CREATE TABLE t (x)")

@@ -10,11 +10,11 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.streams.epson import serve_tcp
 
 import robolink
-from robolink.ambient import replaced
+from robolink.runtime import replaced
 from robolink.errors import JournalError, LeaseHeldError, LeaseLostError, RobolinkError
 from robolink.journal import LEASE_S, ChainVerification, LeaseHolder
 from robolink.model import ToolOffset
-from robolink.testing import MemoryController, MemoryMachine
+from robolink.controllers import SimpleController, SimpleMachine
 from robolink.timing import NS_PER_S
 from robolink.transaction import ToolChange, Wanted, change_tools, recover
 from tests.contract._quiet_time import QuietTime
@@ -37,11 +37,11 @@ def time():
 @pytest.fixture
 def connect(location, open_anew, time):
     """Connect another computer to a controller that both reach."""
-    machine = MemoryMachine()
+    machine = SimpleMachine()
 
     def connected(holder):
         log = open_anew(location).log("acme+usb://cell", holder=holder, clock=time)
-        return MemoryController(machine, outcomes=log)
+        return SimpleController(machine, outcomes=log)
 
     return connected
 

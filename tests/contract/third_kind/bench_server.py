@@ -6,7 +6,7 @@ from types import TracebackType
 from typing import Self
 
 from robolink.model import Pose, ToolOffset
-from robolink.testing import MemoryMachine
+from robolink.controllers import SimpleMachine
 
 _POLLS_PER_MOVE = 2
 """A movement has ended when it was asked about as often as this: no time passes in a test."""
@@ -22,7 +22,7 @@ class BenchServer:
     """
 
     def __init__(self) -> None:
-        self.machine = MemoryMachine(tools={1: ToolOffset(12.0, -3.5, -20.0)})
+        self.machine = SimpleMachine(tools={1: ToolOffset(12.0, -3.5, -20.0)})
         self.asked: list[str] = []
         self._polls_left = 0
         owner = self

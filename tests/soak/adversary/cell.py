@@ -14,7 +14,7 @@ from unittest import mock
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.faults import DiskFault, FaultyDisk
 
-from robolink.ambient import replaced
+from robolink.runtime import replaced
 from robolink.checkpoints import Checkpoint, observed
 from robolink.errors import JournalError, NotReadyError, RobolinkError
 from robolink.interrupts import EndedBy, Interrupted, one_ending, output_closed

@@ -18,7 +18,7 @@ from robolink_simulators.hosting.in_process import epson, softmotion
 from robolink.errors import OutcomeUnknownError
 from robolink.journal._connections import close_files
 from robolink.model import Controller
-from robolink.ways import speaking
+from robolink.remedy_words import speaking
 from tests.soak.adversary.command_lines import ASSIST, FOLDER
 from tests.soak.adversary.computer import VirtualProcess
 from tests.soak.adversary.people import Tell

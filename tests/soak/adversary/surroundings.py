@@ -10,7 +10,7 @@ from typing import Final, Protocol
 
 from robolink_simulators.cell.clock import ManualClock
 
-from robolink.ambient import Ambience, WaitingLock, WaitingRoom
+from robolink.runtime import SystemRuntime, WaitingLock, WaitingRoom
 from robolink.timing import NS_PER_S
 
 _REAL_PATIENCE_S: Final = 300.0
@@ -265,7 +265,7 @@ class SteppedLock:
         self._depth = 0
 
     def acquire(self, blocking: bool = True, timeout: float = -1) -> bool:
-        """See :class:`robolink.ambient.WaitingLock`."""
+        """See :class:`robolink.runtime.WaitingLock`."""
         me = self._turns.current
         if self._holder is me and self._reentrant:
             self._depth += 1
@@ -280,7 +280,7 @@ class SteppedLock:
         return True
 
     def release(self) -> None:
-        """See :class:`robolink.ambient.WaitingLock`."""
+        """See :class:`robolink.runtime.WaitingLock`."""
         self._depth -= 1
         if not self._depth:
             self._holder = None
@@ -306,7 +306,7 @@ class SteppedRoom:
         self._news = 0
 
     def wait(self, timeout: float | None = None) -> bool:
-        """See :class:`robolink.ambient.WaitingRoom`."""
+        """See :class:`robolink.runtime.WaitingRoom`."""
         seen = self._news
         self._lock.release()
         try:
@@ -315,7 +315,7 @@ class SteppedRoom:
             self._lock.acquire()
 
     def wait_for(self, predicate: Callable[[], bool], timeout: float | None = None) -> bool:
-        """See :class:`robolink.ambient.WaitingRoom`."""
+        """See :class:`robolink.runtime.WaitingRoom`."""
         if predicate():
             return True
         self._lock.release()
@@ -326,7 +326,7 @@ class SteppedRoom:
         return predicate()
 
     def notify_all(self) -> None:
-        """See :class:`robolink.ambient.WaitingRoom`."""
+        """See :class:`robolink.runtime.WaitingRoom`."""
         self._news += 1
 
     def __enter__(self) -> bool:
@@ -345,7 +345,7 @@ _FIRST_DAY_S: Final = 1_767_603_600.0
 """2026-01-05 09:00 UTC, a Monday: when every history begins."""
 
 
-class SeededSurroundings(Ambience):
+class SeededSurroundings(SystemRuntime):
     """What a cell's computers draw and see, in place of the real world.
 
     Time passes where it is stepped, and for everybody.

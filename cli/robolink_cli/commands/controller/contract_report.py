@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Final
 from xml.etree import ElementTree as Xml
 
 import robolink
-from robolink import ambient
+from robolink import runtime
 from robolink.errors import ConfigError, RobolinkError, StoppedError, TransportClosedError
 from robolink.files.named import save_named
 from robolink.messages import tr
@@ -187,7 +187,7 @@ class TrialConnections:
         self._record = memory_journal(self._identity).log(self._identity, signature=Signature())
         self._listening = ExitStack()
         self._trace: TraceSink | None = None
-        self._lock = ambient.lock()
+        self._lock = runtime.lock()
         self._latest: Controller | None = None
         self._stopped = False
         self._stopped_by = ""

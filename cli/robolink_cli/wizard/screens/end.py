@@ -16,8 +16,8 @@ from robolink.errors import (
     VerifyError,
 )
 from robolink.messages import joined, tr
-from robolink.model import PersonRole, describe_offset, describe_standing
-from robolink.standing import UNTOUCHED, standing_after
+from robolink.model import PersonRole, describe_offset, describe_outcome
+from robolink.controller_outcome import UNTOUCHED, outcome_after
 from robolink_cli.access.warnings import way_back
 from robolink_cli.console.exit_codes import next_of, was_refused
 from robolink_cli.console.render import next_lines
@@ -107,13 +107,13 @@ def ended_of(state: WizardState, error: BaseException | None, at_s: float) -> La
 
 def stopped_lines(state: WizardState, error: RobolinkError) -> list[str]:
     """Return why it ended, where, what stands on the controller, and the one command to go on."""
-    standing = standing_after(error)
+    outcome = outcome_after(error)
     blocked = _is_blocked(error)
-    stands = "" if standing is UNTOUCHED else describe_standing(standing, settles=not blocked)
+    stands = "" if outcome is UNTOUCHED else describe_outcome(outcome, settles=not blocked)
     # What stands says best that nothing was written.
     remedy = "" if error.remedy in stands else error.remedy
     typed = state.header.command.split()
-    texts = (next_of(one, error, standing, typed) for one in (error.what, remedy, stands))
+    texts = (next_of(one, error, outcome, typed) for one in (error.what, remedy, stands))
     said = [one for one in texts if one]
     return [*_where(state), *said, "", *_next(state, error)]
 
@@ -161,14 +161,14 @@ def _head(state: WizardState, ended: str) -> str:
 def _headed(state: WizardState, error: BaseException) -> str:
     """Return whether a job was stopped, or was refused before anything happened."""
     measured = state.touch is not None or isinstance(error, (CalibrationError, VerifyError))
-    if was_refused(error) and not measured and standing_after(error).untouched:
+    if was_refused(error) and not measured and outcome_after(error).untouched:
         return tr("NOT STARTED")
     return tr("STOPPED")
 
 
 def _is_blocked(error: RobolinkError) -> bool:
     """Tell whether the robot takes nothing but ``recover``, and what comes before it."""
-    return standing_after(error).left_open or isinstance(error, OutcomeUnknownError)
+    return outcome_after(error).left_open or isinstance(error, OutcomeUnknownError)
 
 
 def _where(state: WizardState) -> list[str]:
@@ -184,11 +184,11 @@ def _next(state: WizardState, error: RobolinkError) -> list[str]:
     What was refused would be refused again, so it is proposed only where a person, or what was
     measured, ended it.
     """
-    standing = standing_after(error)
+    outcome = outcome_after(error)
     if _is_blocked(error):
-        back = way_back(state.header.cell, reset_first=standing.reset_first)
+        back = way_back(state.header.cell, reset_first=outcome.reset_first)
         line = tr("Next: {command}", command=back)
-        return [next_of(line, error, standing, state.header.command.split())]
+        return [next_of(line, error, outcome, state.header.command.split())]
     if isinstance(error, VerifyError) and error.next_commands:
         return [
             tr("Next: {command}", command=f'robolink -c "{state.header.cell}" {command}')

@@ -5,7 +5,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Final
 
-from robolink import ambient
+from robolink import runtime
 from robolink.messages import tr
 from robolink.protocols.mailbox import (
     SLOTS,
@@ -35,7 +35,7 @@ class RetainedMemory:
     """
 
     def __init__(self, device_id: int = 0) -> None:
-        self.device_id = device_id or ambient.random_number(32)
+        self.device_id = device_id or runtime.random_number(32)
         self.boot_id = 0
         self.epoch = 0
         self.tool_changed = False

@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
-from robolink import ambient
+from robolink import runtime
 from robolink.protocols.mailbox import Capability, Command, Opcode, WordOrder, Words, encode_command
 from robolink_simulators.softmotion.group.axis_group import AxisGroup
 from robolink_simulators.softmotion.group.condition import SmcGroupState
@@ -77,7 +77,7 @@ class ExecutedMailbox:
         self._overrun = self._paced = 0
         # The clock of a PLC began when it was switched on, nobody knows when; from it the program
         # draws its number, where none is given.
-        self._began_us = 0 if options.mailbox.device_id else _US * ambient.random_number(31)
+        self._began_us = 0 if options.mailbox.device_id else _US * runtime.random_number(31)
         self._group = group
         self._units = units
         self._kinematics = kinematics

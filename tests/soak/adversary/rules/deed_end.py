@@ -16,7 +16,7 @@ from robolink.errors import (
     TransportError,
 )
 from robolink.model import ToolOffset
-from robolink.standing import Effect, standing_after
+from robolink.controller_outcome import Effect, outcome_after
 from tests.soak.adversary.books import BookedMarker
 from tests.soak.adversary.command_lines import selects
 from tests.soak.adversary.computer import VirtualProcess
@@ -171,9 +171,9 @@ class EndRules:
         """Check what the end says of the controller."""
         if error is None:
             return
-        standing = standing_after(error)
+        outcome = outcome_after(error)
         foreign = self._foreign()
-        for tool, stands in standing.tools.items():
+        for tool, stands in outcome.tools.items():
             if not stands.known or tool in foreign:
                 continue
             holds = None if stands.holds is None else ToolOffset(*stands.holds)
@@ -190,20 +190,20 @@ class EndRules:
         for tool in changed:
             self._on.hold(
                 "StateIsTold",
-                tool in foreign or tool in standing.tools or code == UNKNOWN,
+                tool in foreign or tool in outcome.tools or code == UNKNOWN,
                 f"tool {tool} has changed, which {type(error).__name__} does not say",
             )
-        selected = standing.selected
+        selected = outcome.selected
         moved = (
             self._on.plant.moved_itself or self._on.now.crowded or bool(self._on.now.chosen_by_hand)
         )
-        if standing.selection_known and selected is not None and not moved:
+        if outcome.selection_known and selected is not None and not moved:
             self._on.hold(
                 "StateIsTold",
                 selected == state.selected,
                 f"tool {selected} is told to be selected, it is {state.selected}",
             )
-        if standing.effect is Effect.UNCHANGED and not moved:
+        if outcome.effect is Effect.UNCHANGED and not moved:
             self._on.hold(
                 "StateIsTold",
                 state.selected == self._on.now.before.selected or bool(self._on.open_selection()),

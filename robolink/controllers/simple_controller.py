@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from typing import Final
 
-from robolink import ambient
+from robolink import runtime
 from robolink.controllers import ControllerCore, DriverLink, PolledGroup, ToolTableCore, ToolWrite
 from robolink.errors import ToolError, TransportClosedError
 from robolink.interrupts import InterruptGate
@@ -36,10 +36,10 @@ _TOLERANCE: Final = 1e-6
 
 
 @dataclass(slots=True)
-class MemoryMachine:
+class SimpleMachine:
     """A machine of four axes: what is left of it when nobody is connected.
 
-    All that :class:`MemoryController` asks of it are ``read``, ``store``, ``in_force``, ``select``,
+    All that :class:`SimpleController` asks of it are ``read``, ``store``, ``in_force``, ``select``,
     ``pose``, ``go``, ``moving`` and ``halt``. A machine that overrides them is a kind of its own,
     with everything that robolink does for all kinds.
 
@@ -112,7 +112,7 @@ class MemoryMachine:
         )
 
 
-class MemoryLink(DriverLink):
+class SimpleLink(DriverLink):
     """The connection to a machine in memory.
 
     Attributes:
@@ -126,20 +126,20 @@ class MemoryLink(DriverLink):
     """
 
     def __init__(
-        self, machine: MemoryMachine, identity: str, outcomes: OutcomeLog, clock: Clock
+        self, machine: SimpleMachine, identity: str, outcomes: OutcomeLog, clock: Clock
     ) -> None:
         gate = self._own_gate = InterruptGate()
         gate.open()
         super().__init__(identity, clock, StopLatch(identity), outcomes, gate=gate)
         self._machine = machine
-        self._wire = ambient.lock()
+        self._wire = runtime.lock()
         self._closed = False
         self.exchanges = 0
 
     @contextmanager
     def exchange(
         self, request: str, kind: CommandClass = CommandClass.LOOK
-    ) -> Iterator[MemoryMachine]:
+    ) -> Iterator[SimpleMachine]:
         """Reach the machine for one request.
 
         Args:
@@ -167,7 +167,7 @@ class MemoryLink(DriverLink):
         self._own_gate.close()
 
 
-class MemoryController(ControllerCore):
+class SimpleController(ControllerCore):
     """A controller whose machine is an object of this process. Use it as a context manager.
 
     Args:
@@ -178,23 +178,23 @@ class MemoryController(ControllerCore):
 
     Example:
         >>> from robolink import ToolOffset
-        >>> from robolink.testing import MemoryController, MemoryMachine
-        >>> machine = MemoryMachine(tools={1: ToolOffset(12, -3.5, -20)})
-        >>> with MemoryController(machine) as controller:
+        >>> from robolink.controllers import SimpleController, SimpleMachine
+        >>> machine = SimpleMachine(tools={1: ToolOffset(12, -3.5, -20)})
+        >>> with SimpleController(machine) as controller:
         ...     controller.tools.read(1).x_mm
         12
     """
 
     def __init__(
         self,
-        machine: MemoryMachine | None = None,
+        machine: SimpleMachine | None = None,
         *,
         identity: str = "memory+object://machine",
         outcomes: OutcomeLog | None = None,
         clock: Clock | None = None,
     ) -> None:
         outcomes = outcomes or memory_journal(identity).log(identity)
-        link = MemoryLink(machine or MemoryMachine(), identity, outcomes, clock or SystemClock())
+        link = SimpleLink(machine or SimpleMachine(), identity, outcomes, clock or SystemClock())
         self._link = link
         able = Capabilities(tool_write=True, motion=True)
         super().__init__(link, capabilities=able, tools=_MemoryTools(link))
@@ -214,7 +214,7 @@ class MemoryController(ControllerCore):
 
 
 class _MemoryTools(ToolTableCore):
-    def __init__(self, link: MemoryLink) -> None:
+    def __init__(self, link: SimpleLink) -> None:
         super().__init__(link)
         self._link = link
 
@@ -257,7 +257,7 @@ class _MemoryTools(ToolTableCore):
 
 
 class _MemoryWrite(ToolWrite):
-    _link: MemoryLink
+    _link: SimpleLink
 
     def read_before(self, expected: Expected) -> ToolOffset | None:  # noqa: ARG002 - one way only
         return self.read_back()
@@ -272,7 +272,7 @@ class _MemoryWrite(ToolWrite):
 
 
 class _MemoryGroup(PolledGroup):
-    def __init__(self, link: MemoryLink, tools: ToolTable) -> None:
+    def __init__(self, link: SimpleLink, tools: ToolTable) -> None:
         super().__init__(link, tools)
         self._link = link
 

@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from typing import Final
 
 
-class Way:
+class RemedyWord:
     """What a sentence may ask for, as a Python program says it; each is its own key.
 
     Plain texts and no enumeration, because a stop loads them before its first frame.
@@ -73,7 +73,7 @@ def speaking(words: Mapping[str, str]) -> Iterator[None]:
         _spoken = before
 
 
-def way(which: str, /, **values: object) -> str:
+def remedy_word(which: str, /, **values: object) -> str:
     """Return how the users of this program say ``which``, with its placeholders filled."""
     text = _spoken.get(which, which)
     return text.format(**values) if values else text

@@ -17,7 +17,7 @@ from types import TracebackType
 from typing import Protocol
 
 __all__ = [
-    "Ambience",
+    "SystemRuntime",
     "WaitingLock",
     "WaitingRoom",
     "boot_ns",
@@ -103,7 +103,7 @@ def in_a_thread(every_s: float, act: Callable[[], None], name: str) -> Callable[
     return end
 
 
-class Ambience:
+class SystemRuntime:
     """The real surroundings; a subclass stands in for them.
 
     Attributes:
@@ -158,18 +158,18 @@ class Ambience:
             What ends it; ``act`` is not under way any more when that returns.
 
         Example:
-            >>> from robolink.ambient import Ambience
-            >>> end = Ambience().regularly(60.0, lambda: None, "once a minute")
+            >>> from robolink.runtime import SystemRuntime
+            >>> end = SystemRuntime().regularly(60.0, lambda: None, "once a minute")
             >>> end()
         """
         return in_a_thread(every_s, act, name)
 
 
-_present = Ambience()
+_present = SystemRuntime()
 
 
 @contextmanager
-def replaced(ambience: Ambience) -> Iterator[None]:
+def replaced(ambience: SystemRuntime) -> Iterator[None]:
     """Let ``ambience`` stand in for the real surroundings, in every thread, within the block."""
     global _present  # noqa: PLW0603 - a process has one world around it
     before, _present = _present, ambience
@@ -226,7 +226,7 @@ def waiting_room() -> WaitingRoom:
 
 
 def regularly(every_s: float, act: Callable[[], None], name: str) -> Callable[[], None]:
-    """Have ``act`` called every so many seconds; see :meth:`Ambience.regularly`.
+    """Have ``act`` called every so many seconds; see :meth:`SystemRuntime.regularly`.
 
     Args:
         every_s: How often.
@@ -237,13 +237,13 @@ def regularly(every_s: float, act: Callable[[], None], name: str) -> Callable[[]
         What ends it.
 
     Example:
-        >>> from robolink import ambient
-        >>> end = ambient.regularly(60.0, lambda: None, "once a minute")
+        >>> from robolink import runtime
+        >>> end = runtime.regularly(60.0, lambda: None, "once a minute")
         >>> end()
     """
     return _present.regularly(every_s, act, name)
 
 
 def steps_time() -> bool:
-    """Tell whether time passes only where it is stepped; see :class:`Ambience`."""
+    """Tell whether time passes only where it is stepped; see :class:`SystemRuntime`."""
     return _present.steps_time

@@ -24,7 +24,7 @@ class Effect(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class ToolStanding:
+class ToolOutcome:
     """One tool to which a write was sent.
 
     Attributes:
@@ -45,7 +45,7 @@ class ToolStanding:
 
 
 @dataclass(frozen=True, slots=True)
-class Standing:
+class ControllerOutcome:
     """What one block of work left on a controller.
 
     Attributes:
@@ -67,7 +67,7 @@ class Standing:
             else: ``recover`` is refused until then.
     """
 
-    tools: Mapping[int, ToolStanding] = field(default_factory=dict)
+    tools: Mapping[int, ToolOutcome] = field(default_factory=dict)
     selected: int | None = None
     selected_before: int | None = None
     selection_known: bool = True
@@ -106,7 +106,7 @@ class Standing:
         """Whether another tool is selected than before."""
         return self.selected_before not in (None, self.selected)
 
-    def followed_by(self, later: "Standing") -> "Standing":
+    def followed_by(self, later: "ControllerOutcome") -> "ControllerOutcome":
         """Return what stands after the work of two connections, one after the other.
 
         Args:
@@ -119,7 +119,7 @@ class Standing:
             tools[number] = replace(tool, before=before, differs=differs)
         looked = later.selected is not None or later.selected_before is not None
         chosen = self.selected_before is None
-        return Standing(
+        return ControllerOutcome(
             tools=tools,
             selected=later.selected if looked else self.selected,
             selected_before=later.selected_before if chosen else self.selected_before,
@@ -133,7 +133,7 @@ class Standing:
             reset_first=later.reset_first,
         )
 
-    def put_back(self) -> "Standing":
+    def put_back(self) -> "ControllerOutcome":
         """Return what stands once tools and selection were read and are as before, at rest."""
         return replace(
             self,
@@ -149,16 +149,16 @@ class Standing:
         )
 
 
-UNTOUCHED = Standing()
+UNTOUCHED = ControllerOutcome()
 """Nothing was sent that changes or moves anything."""
 
 
-def standing_after(error: BaseException) -> Standing:
+def outcome_after(error: BaseException) -> ControllerOutcome:
     """Return what ``error``, of whatever kind, left on the controller."""
     found = getattr(error, "controller_state", UNTOUCHED)
-    return found if isinstance(found, Standing) else UNTOUCHED
+    return found if isinstance(found, ControllerOutcome) else UNTOUCHED
 
 
-def note_standing(error: BaseException, standing: Standing) -> None:
+def note_outcome(error: BaseException, outcome: ControllerOutcome) -> None:
     """Let ``error``, of whatever kind, say from now on what it left on the controller."""
-    error.controller_state = standing  # type: ignore[attr-defined]
+    error.controller_state = outcome  # type: ignore[attr-defined]

@@ -17,6 +17,23 @@ GONE_IN: Final = "0.2.0"
 """The version without the names that this one still knows; a test reminds whoever makes it."""
 
 OLD_NAMES: Final[Mapping[str, Mapping[str, str]]] = {
+    "robolink.ambient": {
+        "Ambience": "robolink.runtime.SystemRuntime",
+        "WaitingLock": "robolink.runtime.WaitingLock",
+        "WaitingRoom": "robolink.runtime.WaitingRoom",
+        "boot_ns": "robolink.runtime.boot_ns",
+        "lock": "robolink.runtime.lock",
+        "monotonic_ns": "robolink.runtime.monotonic_ns",
+        "random_bytes": "robolink.runtime.random_bytes",
+        "random_number": "robolink.runtime.random_number",
+        "reentrant_lock": "robolink.runtime.reentrant_lock",
+        "regularly": "robolink.runtime.regularly",
+        "replaced": "robolink.runtime.replaced",
+        "sleep": "robolink.runtime.sleep",
+        "steps_time": "robolink.runtime.steps_time",
+        "waiting_room": "robolink.runtime.waiting_room",
+        "wall_s": "robolink.runtime.wall_s",
+    },
     "robolink.config": {"Problem": "robolink.files.toml.Problem"},
     "robolink.controllers.epson": {
         "EpsonController": "robolink.controllers.EpsonController",
@@ -47,6 +64,7 @@ OLD_NAMES: Final[Mapping[str, Mapping[str, str]]] = {
         "Recorded": "robolink.model.Recorded",
         "Signature": "robolink.model.Signature",
     },
+    "robolink.model": {"describe_standing": "robolink.model.describe_outcome"},
     "robolink.nozzle_change": {
         "AcceptanceCriteria": "robolink.calibration_run.AcceptanceCriteria",
         "Attended": "robolink.calibration_run.Attended",
@@ -116,6 +134,17 @@ OLD_NAMES: Final[Mapping[str, Mapping[str, str]]] = {
     "robolink.procedures": {"CalibratedCameraSource": "robolink.procedures.LookSource"},
     "robolink.recipe": {"RecipeRun": "robolink.calibration_run.RecipeRun"},
     "robolink.register_maps": {"Problem": "robolink.files.toml.Problem"},
+    "robolink.standing": {
+        "Effect": "robolink.controller_outcome.Effect",
+        "Standing": "robolink.controller_outcome.ControllerOutcome",
+        "ToolStanding": "robolink.controller_outcome.ToolOutcome",
+        "UNTOUCHED": "robolink.controller_outcome.UNTOUCHED",
+        "standing_after": "robolink.controller_outcome.outcome_after",
+    },
+    "robolink.testing": {
+        "MemoryController": "robolink.controllers.SimpleController",
+        "MemoryMachine": "robolink.controllers.SimpleMachine",
+    },
     "robolink.transaction": {"Jump": "robolink.model.Jump"},
     "robolink_simulators.softmotion.mailbox": {
         "PlcFault": "robolink_simulators.faults.PlcFault",

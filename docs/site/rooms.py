@@ -16,7 +16,7 @@ WIDTH, LEFT, TOP, HEIGHT, GAP = 1080, 46, 20, 44, 8
 COLOURS = {"robolink_cli": "#fde8c8", "robolink_simulators": "#dcecd8", "robolink": "#eef2f8"}
 
 WORDS = {
-    "testing": "what every kind of controller is held to; one in memory",
+    "testing": "what every kind of controller is held to",
     "files": "of robolink, of people, by name",
     "closing": "what is closed",
     "robolink_cli": "commands, options, questions, views",
@@ -51,10 +51,13 @@ WORDS = {
     "plug_ins": "of other packages",
     "interrupts": "Ctrl-C and others",
     "messages": "the catalogue",
-    "ways": "words of who shows",
+    "runtime": "chance, time, locks",
+    "ambient": "old name of runtime",
+    "remedy_words": "words of who shows",
     "lazy_exports": "names on first use",
     "deprecation": "old names",
-    "standing": "what is left",
+    "controller_outcome": "what is left",
+    "standing": "old name of controller_outcome",
     "version": "which robolink",
     "checkpoints": "where another thread may come in",
 }

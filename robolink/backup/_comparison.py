@@ -14,9 +14,9 @@ from robolink.model import (
     ToolTable,
     angle_difference_deg,
 )
+from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.timing import wall_label
 from robolink.version import VERSION
-from robolink.remedy_words import RemedyWord, remedy_word
 
 TOOLS: Final = range(1, 16)
 """The tools that a controller can define (docs/reference/epson.md 3.1); a backup names every
@@ -117,7 +117,9 @@ class ComparisonTolerance:
         if not (0 <= self.length_mm < float("inf") and 0 <= self.angle_deg < float("inf")):
             raise ConfigError(
                 tr("A tolerance must be a number, 0 or more."),
-                remedy=tr("For example {tolerance}.", tolerance=remedy_word(RemedyWord.LENGTH_TOLERANCE)),
+                remedy=tr(
+                    "For example {tolerance}.", tolerance=remedy_word(RemedyWord.LENGTH_TOLERANCE)
+                ),
             )
 
 

@@ -227,7 +227,8 @@ def _check_selection(plan: RestorePlan, now: ToolState) -> None:
                 tool=plan.select,
             ),
             remedy=tr(
-                "Restore that tool too, or leave {selected} out.", selected=remedy_word(RemedyWord.SELECTED_TOO)
+                "Restore that tool too, or leave {selected} out.",
+                selected=remedy_word(RemedyWord.SELECTED_TOO),
             ),
         )
     in_force = now.selected if plan.select is None else plan.select

@@ -36,9 +36,9 @@ from robolink.model import (
     answer_entry,
 )
 from robolink.procedures import MeasurementContext
+from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.runner import Ask, StepDone, TouchSubject
 from robolink.stations import AGREEING_MM, Station, StationKind, stations_on_record
-from robolink.remedy_words import RemedyWord, remedy_word
 
 _UNKNOWN_SIGMA_MM: Final = 0.05
 """Scatter of one touch by a person, where neither residuals nor anybody tells it."""

@@ -22,9 +22,9 @@ from robolink.messages import joined, tr
 from robolink.methods import find_method
 from robolink.model import Controller, NewEntry, Pose, ToolOffset, says_it_is_simulated
 from robolink.procedures import MeasurementContext, TouchesFurther, touches_of
+from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.runner import AGAIN, BACK, MORE, Ask, Look, Seek, StepDone, TouchedAt
 from robolink.stations import stations_on_record
-from robolink.remedy_words import RemedyWord, remedy_word
 
 
 def accuracy_facts(

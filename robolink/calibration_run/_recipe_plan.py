@@ -36,9 +36,9 @@ from robolink.model import (
 )
 from robolink.pose_tables import ReadingChoices
 from robolink.procedures import TipSource
+from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.stations import Station, StationKind
 from robolink.timing import local_label
-from robolink.remedy_words import RemedyWord, remedy_word
 
 if TYPE_CHECKING:
     from robolink.recipe import Recipe, Tool
@@ -464,7 +464,10 @@ def _height(
                 "The reference of {at} does not say how high the contact was.",
                 at=local_label(reference.at),
             ),
-            remedy=tr("Take a new reference with {reference}.", reference=remedy_word(RemedyWord.REFERENCE)),
+            remedy=tr(
+                "Take a new reference with {reference}.",
+                reference=remedy_word(RemedyWord.REFERENCE),
+            ),
         )
     return offset.z_mm - (height - reference.contact_z_mm)
 

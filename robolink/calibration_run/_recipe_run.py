@@ -24,10 +24,10 @@ from robolink.model import (
     says_it_is_simulated,
 )
 from robolink.recipe import Answers, beyond
+from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.runner import Operator
 from robolink.stations import Station, find_stations, require_base_of, stations_on_record
 from robolink.transaction import ChangedSince, Order, changed_since, earlier_corrections
-from robolink.remedy_words import RemedyWord, remedy_word
 
 if TYPE_CHECKING:
     from robolink.recipe import LoadedRecipe, Recipe

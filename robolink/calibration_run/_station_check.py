@@ -14,8 +14,8 @@ from robolink.messages import tr
 from robolink.methods import KEPT
 from robolink.model import Controller, EntryKind, NewEntry
 from robolink.procedures import FindsStation
-from robolink.stations import Station, base_now, find_stations, station_entry, stations_on_record
 from robolink.remedy_words import RemedyWord, remedy_word
+from robolink.stations import Station, base_now, find_stations, station_entry, stations_on_record
 
 
 def check_stations(controller: Controller, proposals: Proposals) -> Proposals:

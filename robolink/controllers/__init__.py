@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from robolink.controllers.registry import connect as connect
     from robolink.controllers.registry import connect_when_reachable as connect_when_reachable
     from robolink.controllers.resolving import MarkerResolver as MarkerResolver
+    from robolink.controllers.simple_controller import SimpleController as SimpleController
+    from robolink.controllers.simple_controller import SimpleMachine as SimpleMachine
     from robolink.controllers.softmotion.controller import (
         SoftMotionController as SoftMotionController,
     )
@@ -60,6 +62,7 @@ else:
                 "capabilities_of_kind connect connect_when_reachable"
             ),
             "resolving": "MarkerResolver",
+            "simple_controller": "SimpleController SimpleMachine",
             "softmotion.controller": "SoftMotionController open_softmotion",
             "softmotion.facts": "MailboxFacts",
             "softmotion.jog": "Jog",

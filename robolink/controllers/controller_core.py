@@ -11,6 +11,7 @@ from functools import cached_property
 from types import TracebackType
 from typing import Final, Self
 
+from robolink.controller_outcome import note_outcome
 from robolink.controllers.driver_link import DriverLink, DriverPart, advise_emergency_stop
 from robolink.controllers.preserving import Preserver
 from robolink.controllers.resolving import MarkerResolver
@@ -31,7 +32,6 @@ from robolink.model import (
     ToolTable,
     VariableTable,
 )
-from robolink.controller_outcome import note_outcome
 
 _STOPS_S: Final = 5.0
 """Longest wait, at the end, for stops that are under way in other threads."""

@@ -10,6 +10,7 @@ from dataclasses import replace
 from typing import Final
 
 from robolink.checkpoints import Checkpoint, checkpoint
+from robolink.controller_outcome import note_outcome
 from robolink.errors import (
     BusyError,
     Concerning,
@@ -23,7 +24,6 @@ from robolink.errors import (
 )
 from robolink.messages import tr
 from robolink.model import Ledger, Marker, MarkerKind, NewEntry, OutcomeLog, new_operation
-from robolink.controller_outcome import note_outcome
 from robolink.stop_latch import StopLatch
 from robolink.timing import local_label, wall_label
 

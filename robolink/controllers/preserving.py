@@ -22,8 +22,8 @@ from robolink.model import (
     ToolTable,
     Verdict,
 )
-from robolink.timing import local_label
 from robolink.remedy_words import RemedyWord, remedy_word
+from robolink.timing import local_label
 
 
 class Preserver:
@@ -152,7 +152,10 @@ def not_understood(marker: Marker) -> ConfigError:
     """Return the error for the marker of a procedure that something else has written."""
     return ConfigError(
         tr("What was left unfinished at {when} cannot be read.", when=local_label(marker.begun_at)),
-        remedy=tr("Select the right tool by hand, then {forget}.", forget=remedy_word(RemedyWord.FORGET_MARKER)),
+        remedy=tr(
+            "Select the right tool by hand, then {forget}.",
+            forget=remedy_word(RemedyWord.FORGET_MARKER),
+        ),
     )
 
 

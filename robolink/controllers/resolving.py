@@ -19,8 +19,8 @@ from robolink.model import (
     read_for_verdict,
     read_offset,
 )
-from robolink.timing import local_label
 from robolink.remedy_words import RemedyWord, remedy_word
+from robolink.timing import local_label
 
 _KINDS = {
     Verdict.DONE: EntryKind.DONE,
@@ -147,7 +147,10 @@ class MarkerResolver(DriverPart):
                 "What was left unfinished at {when} cannot be read.",
                 when=local_label(marker.begun_at),
             ),
-            remedy=tr("Look at the controller, then {forget}.", forget=remedy_word(RemedyWord.FORGET_MARKER)),
+            remedy=tr(
+                "Look at the controller, then {forget}.",
+                forget=remedy_word(RemedyWord.FORGET_MARKER),
+            ),
         )
 
     def settle(self, finding: Finding) -> None:

@@ -10,7 +10,11 @@ from dataclasses import dataclass, field, replace
 from typing import Final
 
 from robolink import runtime
-from robolink.controllers import ControllerCore, DriverLink, PolledGroup, ToolTableCore, ToolWrite
+from robolink.controllers.controller_core import ControllerCore
+from robolink.controllers.driver_link import DriverLink
+from robolink.controllers.motion_group import PolledGroup
+from robolink.controllers.tool_table import ToolTableCore
+from robolink.controllers.tool_writing import ToolWrite
 from robolink.errors import ToolError, TransportClosedError
 from robolink.interrupts import InterruptGate
 from robolink.journal import memory_journal

@@ -12,9 +12,9 @@ from robolink.methods.beams import BeamsParameters
 from robolink.methods.z_touch import ZTouchParameters, measure_z_touch
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import PinTouches, TouchPlan
+from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.runner import Procedure
 from robolink.stations import Found, Station, StationKind, beam_station, touch_station
-from robolink.remedy_words import RemedyWord, remedy_word
 
 _MOST_APART_MM: Final = 0.3
 """Each touch is half of that from their middle: the largest residual of a touch."""
@@ -69,7 +69,9 @@ def learn_station(
             tr("A camera is found together with a tip."),
             remedy=tr(
                 "Measure both at once: {calibrate}",
-                calibrate=remedy_word(RemedyWord.CALIBRATE_CAMERA_AT, tool=tool, station=station.id),
+                calibrate=remedy_word(
+                    RemedyWord.CALIBRATE_CAMERA_AT, tool=tool, station=station.id
+                ),
             ),
         )
     courses: dict[StationKind, Callable[[], Procedure[Found]]] = {

@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING
 
-from robolink.lazy_exports import lazy_exports
+from robolink.lazy_exports import lazy_exports, old_names
 
 if TYPE_CHECKING:
     from robolink.model._change_limits import ChangeGuard as ChangeGuard
@@ -166,4 +166,5 @@ else:
                 "tool_changed"
             ),
         },
+        old_names(__name__),
     )

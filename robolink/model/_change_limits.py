@@ -11,8 +11,8 @@ from robolink.messages import joined, tr
 from robolink.model._journal_entries import EntryKind, NewEntry
 from robolink.model._outcomes import OutcomeLog
 from robolink.model._tools import Jump, ToolOffset
-from robolink.stop_latch import StopLatch
 from robolink.remedy_words import RemedyWord, remedy_word
+from robolink.stop_latch import StopLatch
 
 
 class PersonRole(StrEnum):

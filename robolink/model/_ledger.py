@@ -10,11 +10,12 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
+from robolink.controller_outcome import Components, ControllerOutcome, ToolOutcome, note_outcome
+from robolink.deprecation import deprecated
 from robolink.messages import joined, tr
 from robolink.model._outcomes import Marker, MarkerKind
 from robolink.model._status import ControllerStatus
 from robolink.model._tools import ToolOffset, describe_offset, read_offset
-from robolink.controller_outcome import Components, ControllerOutcome, ToolOutcome, note_outcome
 
 Same = Callable[[ToolOffset | None, ToolOffset | None], bool]
 
@@ -236,6 +237,11 @@ class Ledger:
                 left_open=bool(self._open) or stands,
                 reset_first=self._seen is not None and self._seen[0].needs_reset,
             )
+
+    @deprecated("outcome")
+    def standing(self, account: Account | None = None) -> ControllerOutcome:
+        """Return what :meth:`outcome` returns."""
+        return self.outcome(account)
 
     def _tool(self, tool: int, before: ToolOffset | None) -> ToolOutcome:
         known = all(deed.tool != tool for deed in self._doubts.values())

@@ -143,7 +143,11 @@ def which_rule(letters: Sequence[str]) -> OpenQuestion:
     return OpenQuestion(
         "euler",
         tr("its angles {letters} may turn in several ways", letters=", ".join(letters).upper()),
-        tr("Say which with {euler}: {readings}.", euler=remedy_word(RemedyWord.EULER), readings=readings),
+        tr(
+            "Say which with {euler}: {readings}.",
+            euler=remedy_word(RemedyWord.EULER),
+            readings=readings,
+        ),
     )
 
 

@@ -13,8 +13,8 @@ from typing import Final
 from robolink.errors import CalibrationError, ConfigError, LimitError
 from robolink.messages import tr
 from robolink.model import Path, Pose, ToolOffset, WorkBox
-from robolink.runner import Move, Procedure, Seek
 from robolink.remedy_words import RemedyWord, remedy_word
+from robolink.runner import Move, Procedure, Seek
 
 NO_OFFSET: Final = ToolOffset()
 
@@ -210,5 +210,8 @@ def _outside(name: str, start: Pose, at: Pose, reach_mm: float) -> LimitError:
             away=away_mm,
             reach=reach_mm,
         ),
-        remedy=tr("Look at what is around it, then allow more with {box}.", box=remedy_word(RemedyWord.BOX)),
+        remedy=tr(
+            "Look at what is around it, then allow more with {box}.",
+            box=remedy_word(RemedyWord.BOX),
+        ),
     )

@@ -9,8 +9,8 @@ from robolink.messages import tr
 from robolink.methods import PointsParameters
 from robolink.methods.pivot import LEAST_AXES
 from robolink.model import AnsweredBy, Capabilities
-from robolink.sensing import VISION_GUIDE
 from robolink.remedy_words import RemedyWord, remedy_word
+from robolink.sensing import VISION_GUIDE
 
 if TYPE_CHECKING:
     from robolink.recipe._recipe import Recipe

@@ -27,6 +27,7 @@ from robolink.model import (
     read_offset,
     with_method_name_now,
 )
+from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.report._values import (
     Attempt,
     GaugeOnRecord,
@@ -36,7 +37,6 @@ from robolink.report._values import (
     Report,
     TouchOnRecord,
 )
-from robolink.remedy_words import RemedyWord, remedy_word
 
 
 def recorded_fit(details: Mapping[str, Any]) -> CalibrationResult:
@@ -305,7 +305,9 @@ def reports_of(
     if not tools:
         raise ConfigError(
             tr("These entries are not about a change of a tool's offset."),
-            remedy=tr("{changes} shows entries that are.", changes=remedy_word(RemedyWord.LIST_CHANGES)),
+            remedy=tr(
+                "{changes} shows entries that are.", changes=remedy_word(RemedyWord.LIST_CHANGES)
+            ),
         )
     record = Record(
         change=entries[-1].change or entries[-1].operation,

@@ -30,6 +30,7 @@ from robolink.model import (
     Pose,
     TipSensor,
 )
+from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.runner._dry_run import considered
 from robolink.runner._jog_steps import (
     RunSettings,
@@ -65,7 +66,6 @@ from robolink.runner._steps import (
 )
 from robolink.runner._yes_no import Asking
 from robolink.sensing import median_spot, scatter_of, seen_in
-from robolink.remedy_words import RemedyWord, remedy_word
 
 
 def ended_by(status: ControllerStatus) -> str:

@@ -8,9 +8,9 @@ from robolink.calibration import CameraModel, Sighting
 from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
 from robolink.model import InputEdge, SpotUnit, from_json
+from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.runner import SeenAt
 from robolink.stations._station import Station
-from robolink.remedy_words import RemedyWord, remedy_word
 
 if TYPE_CHECKING:
     from robolink.calibration import Beam, Pin

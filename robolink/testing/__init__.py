@@ -4,7 +4,9 @@ The checks are plain functions; any test framework, or none, can call them. They
 kinds of this package too (``tests/contract/test_controller_contract.py``).
 """
 
-from robolink.testing.memory_controller import SimpleController, SimpleMachine
+from typing import TYPE_CHECKING
+
+from robolink.lazy_exports import old_names
 from robolink.testing.motion_checks import MOVING_CHECKS, WRITING_WHILE_MOVING_CHECKS
 from robolink.testing.on_site import kept_on_site
 from robolink.testing.paper_cell import PaperCell
@@ -18,8 +20,6 @@ __all__ = [
     "CheckOutcome",
     "ContractBrokenError",
     "MOVING_CHECKS",
-    "SimpleController",
-    "SimpleMachine",
     "PaperCell",
     "READING_CHECKS",
     "Subject",
@@ -30,3 +30,6 @@ __all__ = [
     "kept_on_site",
     "outcomes",
 ]
+
+if not TYPE_CHECKING:
+    __getattr__ = old_names(__name__)

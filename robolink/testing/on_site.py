@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from functools import reduce
 from typing import Final, Protocol
 
+from robolink.controller_outcome import ControllerOutcome, note_outcome
 from robolink.errors import (
     ConfigError,
     LeaseHeldError,
@@ -33,7 +34,6 @@ from robolink.model import (
     new_operation,
     plain_offset,
 )
-from robolink.controller_outcome import ControllerOutcome, note_outcome
 from robolink.testing.subject import another_offset
 from robolink.timing import Deadline, SystemClock
 
@@ -141,7 +141,11 @@ def kept_on_site(
         if kept is None:
             raise
         told = _without_doubt(error) if back else error
-        stands = reduce(ControllerOutcome.followed_by, (ledger.outcome() for ledger in ledgers), ControllerOutcome())
+        stands = reduce(
+            ControllerOutcome.followed_by,
+            (ledger.outcome() for ledger in ledgers),
+            ControllerOutcome(),
+        )
         if kept.selected is not None:
             stands = replace(stands, selected_before=kept.selected)
         stands = replace(stands, settled=False, left_open=True)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import Self
 
+from robolink.controller_outcome import note_outcome
 from robolink.errors import (
     BusyError,
     ConfigError,
@@ -41,7 +42,6 @@ from robolink.model import (
     plain_offset,
     tool_changed,
 )
-from robolink.controller_outcome import note_outcome
 from robolink.transaction._orders import Describe, Order, OrderedChange, plain_result
 from robolink.transaction._put_back import PutBack, Step, left_unverified, put_back
 

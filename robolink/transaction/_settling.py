@@ -32,10 +32,10 @@ from robolink.model import (
     read_for_verdict,
     read_offset,
 )
+from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.timing import local_label
 from robolink.transaction._orders import forgotten, kept_later, order_of
 from robolink.transaction._put_back import Step, put_back
-from robolink.remedy_words import RemedyWord, remedy_word
 
 
 class Settler:
@@ -285,7 +285,8 @@ def _steps(marker: Marker) -> list[Step]:
                 when=local_label(marker.begun_at),
             ),
             remedy=tr(
-                "Compare the tools with a backup, then {forget}.", forget=remedy_word(RemedyWord.FORGET_MARKER)
+                "Compare the tools with a backup, then {forget}.",
+                forget=remedy_word(RemedyWord.FORGET_MARKER),
             ),
         ) from error
 

@@ -26,10 +26,10 @@ from robolink.model import (
     read_offset,
     require_engineer,
 )
+from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.timing import local_label
 from robolink.transaction._change import Wanted, change_tools
 from robolink.transaction._put_back import Step
-from robolink.remedy_words import RemedyWord, remedy_word
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,7 +176,9 @@ def of_change(outcomes: OutcomeLog, change: str, tool: int | None) -> list[Recor
     if not done or taken_back:
         raise ConfigError(
             _nothing_to_undo(chosen, taken_back=taken_back),
-            remedy=tr("{changes} shows what can be undone.", changes=remedy_word(RemedyWord.LIST_CHANGES)),
+            remedy=tr(
+                "{changes} shows what can be undone.", changes=remedy_word(RemedyWord.LIST_CHANGES)
+            ),
         )
     return done
 
@@ -372,7 +374,9 @@ def _plan_to(controller: Controller, number: int, tool: int | None) -> UndoPlan:
                 "Entry {number} does not say what was read from a tool of this controller.",
                 number=number,
             ),
-            remedy=tr("{changes} shows entries that do.", changes=remedy_word(RemedyWord.LIST_CHANGES)),
+            remedy=tr(
+                "{changes} shows entries that do.", changes=remedy_word(RemedyWord.LIST_CHANGES)
+            ),
         )
     proved = tool_of(entry)
     if tool not in (None, proved):

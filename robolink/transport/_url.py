@@ -109,7 +109,10 @@ def parse_url(text: str) -> LinkUrl:
     if parts.username is not None or parts.password is not None:
         raise ConfigError(
             tr("A controller URL must not carry a user name or password."),
-            remedy=tr("Remove it, and give it like this: {password}.", password=remedy_word(RemedyWord.PASSWORD)),
+            remedy=tr(
+                "Remove it, and give it like this: {password}.",
+                password=remedy_word(RemedyWord.PASSWORD),
+            ),
         )
     kind, plus, medium = parts.scheme.partition("+")
     if not (kind and plus and medium):
@@ -132,7 +135,8 @@ def parse_url(text: str) -> LinkUrl:
             raise ConfigError(
                 tr("A controller URL must not carry a password."),
                 remedy=tr(
-                    "Remove it, and give it like this: {password}.", password=remedy_word(RemedyWord.PASSWORD)
+                    "Remove it, and give it like this: {password}.",
+                    password=remedy_word(RemedyWord.PASSWORD),
                 ),
             )
     return LinkUrl(kind, medium, parts.hostname or "", port, parts.path, options)

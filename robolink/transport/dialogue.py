@@ -20,9 +20,9 @@ from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.timing import NS_PER_S
 from robolink.transport.byte_stream import SECRET_PLACEHOLDER, Direction
-from robolink.remedy_words import RemedyWord, remedy_word
 
 SCHEMA: Final = "robolink/dialogue/1"
 
@@ -195,5 +195,7 @@ def _passage(line: dict[str, object]) -> Passage:
 def _unreadable(source: str, number: int) -> ConfigError:
     return ConfigError(
         tr("Line {number} of {source} is not part of a dialogue.", number=number, source=source),
-        remedy=tr("Give a file that {record} has written.", record=remedy_word(RemedyWord.DIALOGUE_FILE)),
+        remedy=tr(
+            "Give a file that {record} has written.", record=remedy_word(RemedyWord.DIALOGUE_FILE)
+        ),
     )

@@ -22,6 +22,7 @@ from robolink.calibration import (
     uvw_deg,
 )
 from robolink.calibration_run import Limits
+from robolink.controllers import SimpleController
 from robolink.methods import (
     Absolute,
     AllRoundPlan,
@@ -50,7 +51,6 @@ from robolink.procedures import MeasurementContext, TouchPlan
 from robolink.procedures.tilt_proof import TiltingProof
 from robolink.runner import Ask, Move, TouchedAt
 from robolink.stations import BeamStation, CameraStation, TouchStation
-from robolink.controllers import SimpleController
 from robolink.testing import PaperCell
 from tests.calibration._simulated import refused
 from tests.calibration._surface_person import Ball, Plate

@@ -14,9 +14,9 @@ import pytest
 from robolink_cli import main
 
 import robolink
+from robolink.controllers import SimpleController, SimpleMachine
 from robolink.journal import memory_journal
 from robolink.model import Controller, EntryKind, ToolOffset
-from robolink.controllers import SimpleController, SimpleMachine
 from robolink.testing import (
     MOVING_CHECKS,
     READING_CHECKS,

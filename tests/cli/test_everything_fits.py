@@ -25,13 +25,13 @@ from wcwidth import wcswidth, wcwidth
 from robolink import Pose, ToolOffset, messages
 from robolink.calibration import AccuracyFacts, assessed, carrying, impact_on, solve_pivot
 from robolink.calibration_run import Proposal, Seating
+from robolink.controllers import SimpleController
 from robolink.drift import CellDrift, MeasuredChange, charts_of
 from robolink.locale.languages import translator
 from robolink.model import json_value
 from robolink.report.pictures.control_chart import chart_drawing
 from robolink.report.pictures.plans import draw, pose_drawings
 from robolink.report.pictures.residuals import fit_drawings, order_drawings
-from robolink.controllers import SimpleController
 from robolink.transaction import Wanted, change_tools
 from tests.cli.wizard.test_screens import SCREENS
 

@@ -17,10 +17,10 @@ from robolink_cli.console.output import watched_output
 from robolink_cli.session.connection import open_controller
 
 from robolink import errors
+from robolink.controller_outcome import ControllerOutcome, ToolOutcome, note_outcome
 from robolink.errors import OutcomeUnknownError
 from robolink.interrupts import EndedBy, Interrupted, InterruptGate, ended_by, one_ending
 from robolink.model import EntryKind, ToolOffset
-from robolink.controller_outcome import ControllerOutcome, ToolOutcome, note_outcome
 from robolink.transaction import ToolChange, Wanted, change_tools
 
 # The exit codes that are documented are those of the code, and 6 comes first.

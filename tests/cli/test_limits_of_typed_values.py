@@ -12,10 +12,10 @@ from robolink_cli.prompts import questions as jumps
 import robolink
 from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
 from robolink.config import find_cell
+from robolink.controllers import SimpleController, SimpleMachine
 from robolink.errors import CalibrationError, NotAllowedError
 from robolink.methods import PointsSource
 from robolink.model import ChangeLimits, Jump, PersonRole, Pose, Signature, ToolOffset
-from robolink.controllers import SimpleController, SimpleMachine
 from robolink.transaction import Wanted, change_tools
 
 CELL = """

@@ -22,12 +22,12 @@ from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
 from robolink import errors
+from robolink.controller_outcome import UNTOUCHED
 from robolink.controllers import EpsonController
 from robolink.errors import ControllerFaultError
 from robolink.journal import open_journal
 from robolink.messages import tr
 from robolink.model import MarkerKind
-from robolink.controller_outcome import UNTOUCHED
 from robolink.stopping import far_end_of, find_note, leave_note
 from tests.cli.wizard._people import HEADER
 

@@ -10,7 +10,7 @@ from robolink_simulators.hosting.in_process import softmotion as plc_in_process
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
-from robolink.controllers import ConnectionTerms, PlcMapController
+from robolink.controllers import ConnectionTerms, PlcMapController, SimpleController, SimpleMachine
 from robolink.controllers.softmotion.jog import Jog
 from robolink.journal import memory_journal, signature_here
 from robolink.model import (
@@ -24,7 +24,6 @@ from robolink.model import (
     WorkBox,
 )
 from robolink.protocols.mailbox import Kinematics
-from robolink.controllers import SimpleController, SimpleMachine
 from robolink.testing import Subject
 from robolink.testing.subject import another_offset
 from robolink.transport import parse_url

@@ -25,6 +25,7 @@ from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 import robolink
 from robolink import ToolOffset
+from robolink.controllers import SimpleMachine
 from robolink.controllers.registry import ConnectionTerms
 from robolink.journal import memory_journal
 from robolink.model import TIP, Hand, Pose, Secret, Signature, Spot, SpotUnit, WorkBox, rotate_xy
@@ -32,7 +33,6 @@ from robolink.protocols.epson_text import VariableType
 from robolink.protocols.mailbox.exports import program_texts
 from robolink.runner import RunSettings, ask_yes_no
 from robolink.sensing import open_sensor, seen_once
-from robolink.controllers import SimpleMachine
 from robolink.transport import parse_url
 
 pytest_plugins = ["pytester"]

@@ -6,11 +6,11 @@ from dataclasses import replace
 import pytest
 
 import robolink
-from robolink.runtime import replaced
 from robolink.errors import LeaseHeldError, StoppedError
 from robolink.files.durable import state_folder
 from robolink.journal import open_journal, this_process
 from robolink.model import ANY, ToolOffset
+from robolink.runtime import replaced
 from robolink.timing import NS_PER_S
 from robolink.transaction import ToolChange, Wanted, recover
 from tests.contract._quiet_time import QuietTime

@@ -6,11 +6,11 @@ import pytest
 
 from robolink.calibration_run import ToolPlan
 from robolink.calibration_run._length import told_by_first_touch
+from robolink.controllers import SimpleController
 from robolink.methods import TwoPoseSource
 from robolink.model import Pose, ToolOffset
 from robolink.runner import Ask, StepDone, TouchedAt, TouchSubject
 from robolink.stations import Station, StationKind
-from robolink.controllers import SimpleController
 
 OLD = ToolOffset(12.0, -4.0, -20.0)
 PIN = Station(id="PIN-07", kind=StationKind.PIN).at(310, 95, -40, sigma_mm=0.02)

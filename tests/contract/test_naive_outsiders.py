@@ -7,6 +7,8 @@ from typing import cast
 import pytest
 
 from robolink.calibration_run import Limits
+from robolink.controllers import SimpleController, SimpleMachine
+from robolink.controllers.simple_controller import SimpleLink, _MemoryGroup, _MemoryTools
 from robolink.errors import LimitError, OutcomeUnknownError, StoppedError
 from robolink.model import (
     Controller,
@@ -21,13 +23,11 @@ from robolink.model import (
 from robolink.procedures import MeasurementContext
 from robolink.runner import Move, Operator
 from robolink.stop_latch import CommandClass
-from robolink.controllers import SimpleController, SimpleMachine
 from robolink.testing import (
     ContractBrokenError,
     Subject,
     check_controller,
 )
-from robolink.controllers.simple_controller import SimpleLink, _MemoryGroup, _MemoryTools
 from tests.contract._kinds import KINDS
 
 TOOL = 2

@@ -9,9 +9,9 @@ from robolink_simulators.epson.memory.points import Point
 from robolink_simulators.hosting.in_process.epson import register, unregister
 
 from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
+from robolink.controllers import SimpleController, SimpleMachine
 from robolink.methods import PointsSource
 from robolink.model import EntryKind, Pose, ToolOffset, rotate_xy
-from robolink.controllers import SimpleController, SimpleMachine
 
 SMALL = ToolOffset(0.7, -0.55, -20.0)
 """0.9 mm beside the axis, as a coaxial nozzle."""

@@ -9,13 +9,13 @@ from robolink.accuracy import learning_commands
 from robolink.calibration import AccuracyFacts, ErrorSource, assessed, solve_two_pose
 from robolink.calibration_run import ToolPlan, finish_by_turn_test, open_turn_tests
 from robolink.calibration_run._turn_test import relearning_commands
+from robolink.controllers import SimpleController
 from robolink.errors import NotAllowedError, RobolinkError, VerifyError
 from robolink.methods import BeamsSource
 from robolink.model import EntryKind, Pose, ToolOffset
 from robolink.report import reports_of
 from robolink.runner import Question
 from robolink.stations import Found, StationKind, station_entry
-from robolink.controllers import SimpleController
 from robolink.transaction import recover
 from tests.certificate.live import BEAM_NOISE, row_of, wrong_by
 from tests.contract._sensor_cell import TOOL, sensor_cell

@@ -11,7 +11,6 @@ from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.epson.device import EpsonSimulator
 
 import robolink
-from robolink.runtime import replaced
 from robolink.errors import (
     LeaseHeldError,
     LeaseLostError,
@@ -22,6 +21,7 @@ from robolink.errors import (
 )
 from robolink.journal import LEASE_S, LeaseHolder, open_journal
 from robolink.model import ANY, EntryKind, Signature, ToolOffset, WorkBox
+from robolink.runtime import replaced
 from robolink.transaction import ToolChange, Wanted, recover
 from tests.contract._quiet_time import QuietTime
 from tests.contract._softmotion_cell import SLOW, above, served

@@ -9,6 +9,7 @@ import pytest
 from robolink_simulators.cell.clock import ManualClock
 
 from robolink import ToolOffset
+from robolink.controllers import SimpleController, SimpleMachine
 from robolink.controllers.markers import ProcedureLock
 from robolink.errors import (
     NotReadyError,
@@ -17,7 +18,6 @@ from robolink.errors import (
     TransportBrokenError,
     TransportTimeoutError,
 )
-from robolink.controllers import SimpleController, SimpleMachine
 from robolink.testing import (
     MOVING_CHECKS,
     READING_CHECKS,

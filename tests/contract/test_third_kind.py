@@ -8,11 +8,10 @@ import pytest
 import robolink
 from robolink import ToolOffset
 from robolink.calibration_run import AcceptanceCriteria, ChangePlan, NozzleChange, ToolPlan
-from robolink.controllers import CONTROLLERS_GROUP, stop_now
+from robolink.controllers import CONTROLLERS_GROUP, SimpleController, SimpleMachine, stop_now
 from robolink.errors import ConfigError, ConnectError, RejectedError
 from robolink.methods import TwoPoseSource
 from robolink.runner import Question
-from robolink.controllers import SimpleController, SimpleMachine
 from robolink.testing import (
     ContractBrokenError,
     Subject,

@@ -7,9 +7,9 @@ import pytest
 
 from robolink.calibration import Drift, TurnClaim, VerifyResult
 from robolink.calibration_run import Attended, _records, conclude_turn_test
+from robolink.controllers import SimpleController
 from robolink.errors import NotAllowedError, VerifyError
 from robolink.model import EntryKind, Pose
-from robolink.controllers import SimpleController
 
 BEAMS = TurnClaim(
     look_sigma_mm=0.003,

@@ -9,6 +9,7 @@ from robolink_simulators.hosting.in_process.epson import register, unregister
 
 import robolink
 from robolink import ToolOffset
+from robolink.controller_outcome import outcome_after
 from robolink.errors import (
     OutcomeUnknownError,
     ReadBackError,
@@ -20,7 +21,6 @@ from robolink.errors import (
     UnclearAnswerError,
 )
 from robolink.model import MotionOutcome, MotionProfile, Path, Verdict, WorkBox
-from robolink.controller_outcome import outcome_after
 from robolink.transaction import Wanted, change_tools
 
 NEW = ToolOffset(12.75, -3.25, -20)

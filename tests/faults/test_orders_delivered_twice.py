@@ -7,10 +7,10 @@ from itertools import count
 
 import pytest
 
+from robolink.controllers import SimpleController, SimpleMachine
 from robolink.errors import BusyError, ConfigError, LeaseLostError, OutcomeUnknownError
 from robolink.journal import memory_journal
 from robolink.model import ANY, EntryKind, Marker, MarkerKind, plain_offset
-from robolink.controllers import SimpleController, SimpleMachine
 from robolink.transaction import Settler, ToolChange, Wanted, carrying_out, change_tools
 from tests.faults._change_process import NEW, ORDER
 

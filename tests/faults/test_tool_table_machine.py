@@ -18,6 +18,7 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 
+from robolink.controller_outcome import Effect, outcome_after
 from robolink.errors import (
     ConfigError,
     OutcomeUnknownError,
@@ -27,7 +28,6 @@ from robolink.errors import (
     UndefinedToolError,
 )
 from robolink.model import ToolOffset
-from robolink.controller_outcome import Effect, outcome_after
 from robolink.transaction import Wanted, change_tools, plan_undo, recover, undo
 from tests.faults._tool_tables import TOOLS, EpsonTable, PlcTable
 

@@ -10,6 +10,7 @@ from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.hosting.in_process.transport import InProcessTransport
 
+from robolink.controller_outcome import Effect
 from robolink.controllers import open_epson
 from robolink.controllers.epson.line import text_line
 from robolink.errors import RemoteProtocolError, RobolinkError
@@ -23,7 +24,6 @@ from robolink.protocols.epson_text import (
     parse_preferences,
     parse_status,
 )
-from robolink.controller_outcome import Effect
 from robolink.transport import parse_url
 from tests.fuzz._mutating import edited_bytes, fuzzed
 from tests.unit.conftest import Client

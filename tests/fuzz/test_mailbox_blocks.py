@@ -9,6 +9,7 @@ import pytest
 from hypothesis import strategies as st
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
+from robolink.controller_outcome import Effect
 from robolink.errors import RobolinkError
 from robolink.model import ANY, ToolOffset
 from robolink.protocols.mailbox import (
@@ -26,7 +27,6 @@ from robolink.protocols.mailbox import (
     encode_response,
     encode_slot,
 )
-from robolink.controller_outcome import Effect
 from tests.fuzz._mutating import LREALS, WORDS, edited_words, fuzzed, sealed
 from tests.unit._mailbox_client import linked, owning
 from tests.unit.softmotion_driver._cell import Cell

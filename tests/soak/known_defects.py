@@ -11,9 +11,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
+from robolink.controller_outcome import UNTOUCHED
 from robolink.controllers.epson.tools import EpsonToolTable
 from robolink.model import MarkerKind
-from robolink.controller_outcome import UNTOUCHED
 from tests.soak import stand_ins
 from tests.soak.adversary import CellKind
 

@@ -28,10 +28,10 @@ from robolink.accuracy import (
     upper_half_width,
 )
 from robolink.calibration import RowFact, gauge_study
+from robolink.controllers import SimpleController
 from robolink.errors import CalibrationError, JournalError
 from robolink.methods.one_touch.solvers import find_stored_z
 from robolink.model import EntryKind, NewEntry, Recorded, Signature, ToolOffset, plain_offset
-from robolink.controllers import SimpleController
 from robolink.timing import wall_time
 
 # What the journal tells of the rows of a cell, and what of it does not count.

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from robolink.controllers import ControllerCore, ToolTableCore
+from robolink.controllers import ControllerCore, SimpleController, ToolTableCore
 from robolink.errors import (
     Concerning,
     ConfigError,
@@ -18,7 +18,6 @@ from robolink.errors import (
 )
 from robolink.model import Capabilities, MotionProfile, Path, Pose, ToolOffset, WorkBox
 from robolink.protocols.mailbox import ErrorClass, GroupState, Opcode
-from robolink.controllers import SimpleController
 from tests.unit._plc_bench import COMMIT_BIT, Bench
 from tests.unit.softmotion_driver._cell import Cell
 

@@ -9,7 +9,8 @@ import robolink_cli
 from robolink_simulators.cell.clock import ManualClock
 
 import robolink
-from robolink.runtime import in_a_thread, replaced
+from robolink.controller_outcome import UNTOUCHED, Effect, outcome_after
+from robolink.controllers import SimpleController
 from robolink.controllers.driver_link import SignsOfLife
 from robolink.errors import TransportClosedError
 from robolink.journal import memory_journal
@@ -28,8 +29,7 @@ from robolink.model import (
     plain_offset,
 )
 from robolink.runner import Confirm, Runner, RunSettings
-from robolink.controller_outcome import UNTOUCHED, Effect, outcome_after
-from robolink.controllers import SimpleController
+from robolink.runtime import in_a_thread, replaced
 from tests.contract._quiet_time import QuietTime
 
 # What stands on a controller is told from what was begun, answered, read and recorded.

@@ -8,6 +8,7 @@ import pytest
 
 from robolink.calibration import NeedleChain, NeedleLimits, Pin, solve_two_pose
 from robolink.calibration_run import Limits
+from robolink.controllers import SimpleController, SimpleMachine
 from robolink.errors import CalibrationError, DeclinedError
 from robolink.methods import (
     Absolute,
@@ -40,7 +41,6 @@ from robolink.model import _journal_entries as former
 from robolink.procedures import LookPlan, MeasurementContext, TouchPlan
 from robolink.runner import Ask, Confirm, Look, Move, Notify, Seek, TeachPrompt, TouchedAt
 from robolink.stations import CameraStation, Station, StationKind
-from robolink.controllers import SimpleController, SimpleMachine
 from robolink.testing import PaperCell
 
 # With what one touch of the next nozzle is compared, and what follows from a wrong answer.

@@ -24,8 +24,8 @@ from robolink.journal.store.failures import damaged_error, journal_error
 from robolink.locale import languages
 from robolink.messages import joined, plain, spoken, tr
 from robolink.pose_tables.values import OpenQuestion, unclear
+from robolink.remedy_words import RemedyWord, remedy_word, speaking
 from robolink.timing import local_label
-from robolink.remedy_words import RemedyWord, speaking, remedy_word
 
 # Every sentence goes through one door, in a form that can be collected and filled.
 

@@ -17,6 +17,7 @@ from robolink_simulators.faults import Fault, FaultAction, FaultPlan
 
 import robolink
 from robolink import ANY, Pose, ToolOffset, calibration, drift, errors, journal
+from robolink.controllers import SimpleController
 from robolink.deprecation import GONE_IN, OLD_NAMES, deprecated
 from robolink.errors import ConfigError, ToolIndexError
 from robolink.journal import open_journal
@@ -25,7 +26,6 @@ from robolink.model import EntryKind, NewEntry, WorkBox
 from robolink.model._movement import MotionProfile
 from robolink.procedures import InputSource, ManualPinSource, TouchPlan
 from robolink.runner import foreseen_steps
-from robolink.controllers import SimpleController
 from robolink.testing import PaperCell
 from robolink.version import VERSION
 

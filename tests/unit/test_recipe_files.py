@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from robolink.calibration_run import AcceptanceCriteria, Limits, Moment, RecipeRun
 from robolink.config import Cell
+from robolink.controllers import SimpleController
 from robolink.errors import ConfigError
 from robolink.methods import (
     BeamsParameters,
@@ -30,7 +31,6 @@ from robolink.methods import (
 from robolink.procedures import TWO_ANGLES_DEG, LookPlan, TouchPlan
 from robolink.recipe import LoadedRecipe, Output, Prompt, Recipe, check_recipe, load_recipe
 from robolink.recipe._loading import _checked
-from robolink.controllers import SimpleController
 
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples" / "recipes").iterdir())
 KINDS = (

@@ -14,13 +14,12 @@ from robolink.calibration import CalibrationResult
 from robolink.calibration_run import Proposal, RecipeRun
 from robolink.calibration_run._recipe_plan import Reference, proposed
 from robolink.calibration_run._records import touch_details
-from robolink.controllers import capabilities_of_kind
+from robolink.controller_outcome import outcome_after
+from robolink.controllers import SimpleController, capabilities_of_kind
 from robolink.errors import ConfigError, DeclinedError, LimitError
 from robolink.model import Pose, ToolOffset
 from robolink.recipe import Answers, LoadedRecipe, Recipe, beyond, load_recipe, require_answers
 from robolink.recipe._loading import _checked
-from robolink.controller_outcome import outcome_after
-from robolink.controllers import SimpleController
 
 # What a recipe asks for and a kind of controller cannot do: not offered, and refused at once.
 

@@ -22,6 +22,7 @@ from robolink.calibration_run import (
     Proposal,
     ToolPlan,
 )
+from robolink.controllers import SimpleController, SimpleMachine
 from robolink.errors import CalibrationError, ConfigError, DeclinedError, LimitError
 from robolink.methods import PointsSource
 from robolink.model import ControllerStatus, Path, Pose, ToolOffset, WorkBox
@@ -39,7 +40,6 @@ from robolink.runner import (
     yes_or_no,
 )
 from robolink.runner._jog_steps import typed_pose
-from robolink.controllers import SimpleController, SimpleMachine
 
 # What a person may answer, how a jog step may be typed, and that no question is for ever.
 

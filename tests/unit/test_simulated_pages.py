@@ -9,7 +9,7 @@ from robolink_simulators.plc import PlcSimulator
 from robolink_simulators.plc.serving import serve_plc
 
 from robolink import ToolOffset, connect
-from robolink.controllers import open_plc_map
+from robolink.controllers import SimpleController, open_plc_map
 from robolink.drift import CellDrift, MeasuredChange, measured_changes
 from robolink.errors import ConfigError
 from robolink.journal import memory_journal
@@ -22,7 +22,6 @@ from robolink.model import (
 )
 from robolink.register_maps import load_map
 from robolink.report import render, render_drift, reports_of
-from robolink.controllers import SimpleController
 from robolink.testing import confirm_whole_map
 from robolink.transaction import Wanted, change_tools
 from robolink.transport import parse_url

@@ -21,6 +21,7 @@ from robolink.calibration_run import (
 )
 from robolink.calibration_run import _open_turn_test as marking
 from robolink.calibration_run._measurement import offer_of
+from robolink.controllers import SimpleController
 from robolink.errors import (
     ConfigError,
     LeaseHeldError,
@@ -41,7 +42,6 @@ from robolink.model import (
     plain_offset,
 )
 from robolink.procedures import MeasurementContext, TouchPlan
-from robolink.controllers import SimpleController
 from robolink.testing import PaperCell
 from robolink.timing import local_label
 from robolink.transaction import (

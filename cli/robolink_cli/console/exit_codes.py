@@ -16,8 +16,8 @@ from robolink_cli.console.output import hand_over, sentences, show
 from robolink_cli.console.render import dumps
 
 if TYPE_CHECKING:
-    from robolink.plug_ins import PlugInModule
     from robolink.controller_outcome import Components, ControllerOutcome
+    from robolink.plug_ins import PlugInModule
 
 
 _COMMAND: Final = (
@@ -39,7 +39,9 @@ def was_refused(error: BaseException) -> bool:
     return not isinstance(error, ended)
 
 
-def next_of(text: str, error: BaseException, outcome: "ControllerOutcome", typed: Sequence[str]) -> str:
+def next_of(
+    text: str, error: BaseException, outcome: "ControllerOutcome", typed: Sequence[str]
+) -> str:
     """Return the sentences of an error without the command that it ended as what comes next.
 
     ``recover`` gives way to what comes before it; of another command nothing stays.
@@ -158,7 +160,9 @@ def exit_code(error: BaseException) -> int:
     What it left on the controller comes first: where a write or a movement may stand unproved,
     it is 6 whatever broke afterwards.
     """
-    from robolink.controller_outcome import outcome_after  # here and below, because --help needs none
+    from robolink.controller_outcome import (
+        outcome_after,  # here and below, because --help needs none
+    )
 
     if not outcome_after(error).settled:
         return UNKNOWN

@@ -12,7 +12,9 @@ SHELL_WAYS: Final = {
     RemedyWord.AXES_HELD: "--axes-held; in a recipe axes_held = true",
     RemedyWord.BOX: "--box",
     RemedyWord.CALIBRATE_AT: "'robolink calibrate n-angle --station {station}'",
-    RemedyWord.CALIBRATE_CAMERA_AT: "robolink calibrate camera-affine --tool {tool} --station {station}",
+    RemedyWord.CALIBRATE_CAMERA_AT: (
+        "robolink calibrate camera-affine --tool {tool} --station {station}"
+    ),
     RemedyWord.CALIBRATE_TOOL_AT: "robolink calibrate n-angle --tool {tool} --station {station}",
     RemedyWord.COLUMNS: "--columns",
     RemedyWord.DIALOGUE_FILE: "--record or --transcript",

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import click
 
 import robolink
+from robolink.controller_outcome import UNTOUCHED, ControllerOutcome, note_outcome, outcome_after
 from robolink.errors import ConfigError, ControllerError, OutcomeUnknownError, RobolinkError
 from robolink.interrupts import EndedBy, ended_by
 from robolink.messages import joined, tr
-from robolink.controller_outcome import UNTOUCHED, ControllerOutcome, note_outcome, outcome_after
 from robolink_cli.access.cell import require_expected_robot
 from robolink_cli.access.record import recording
 from robolink_cli.access.warnings import note_at_work, note_unsettled

@@ -357,9 +357,7 @@ def stand_upright(poses: Sequence[Pose]) -> bool:
     return all(lean <= _UPRIGHT for lean in leans)
 
 
-def _left_outcome(
-    touches: Sequence[WitnessedTouch], *, planar: bool
-) -> tuple[float, float] | None:
+def _left_outcome(touches: Sequence[WitnessedTouch], *, planar: bool) -> tuple[float, float] | None:
     """Return which share of the standoffs is left, and its upper 99 % limit; the worse direction.
 
     The standoffs stand beside pin and tip in one least-squares fit, so that a new needle, or a pin

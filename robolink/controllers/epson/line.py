@@ -32,9 +32,9 @@ from robolink.protocols.epson_text import (
     Reply,
     Request,
 )
+from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.timing import Clock, Deadline
 from robolink.transport import LinkUrl, TraceSink, TracingTransport, Transport, open_transport
-from robolink.remedy_words import RemedyWord, remedy_word
 
 if TYPE_CHECKING:
     from robolink.protocols.epson_binary import Dialect

@@ -18,8 +18,8 @@ from robolink.controllers.resolving import MarkerResolver
 from robolink.errors import ConfigError, RemoteProtocolError
 from robolink.messages import tr
 from robolink.model import Finding, Marker, Value, Verdict
-from robolink.timing import local_label
 from robolink.remedy_words import RemedyWord, remedy_word
+from robolink.timing import local_label
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +153,8 @@ class PendingValues:
                         when=local_label(marker.begun_at),
                     ),
                     remedy=tr(
-                        "Look at the controller, then {forget}.", forget=remedy_word(RemedyWord.FORGET_MARKER)
+                        "Look at the controller, then {forget}.",
+                        forget=remedy_word(RemedyWord.FORGET_MARKER),
                     ),
                 )
         return _finding(marker, now, kind)

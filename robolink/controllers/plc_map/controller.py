@@ -32,9 +32,9 @@ from robolink.model import (
     Pose,
 )
 from robolink.register_maps import RegisterMap, load_map, span_of
+from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.timing import Clock
 from robolink.transport import LinkUrl, open_modbus
-from robolink.remedy_words import RemedyWord, remedy_word
 
 
 class MappedInputs(DriverPart):

@@ -41,9 +41,9 @@ from robolink.protocols.mailbox import (
     Opcode,
     Response,
 )
+from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.timing import Deadline
 from robolink.transport import LinkUrl, MailboxLink, open_mailbox_link
-from robolink.remedy_words import RemedyWord, remedy_word
 
 if TYPE_CHECKING:
     from robolink.controllers.softmotion.facts import MailboxFinding

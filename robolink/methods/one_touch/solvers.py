@@ -27,8 +27,8 @@ from robolink.model import (
     from_json,
     read_offset,
 )
-from robolink.timing import local_label
 from robolink.remedy_words import RemedyWord, remedy_word
+from robolink.timing import local_label
 
 if TYPE_CHECKING:
     from robolink.calibration import NeedleChangeResult, Pin

@@ -16,8 +16,8 @@ from robolink.messages import tr
 from robolink.model import Path, Pose, ToolOffset
 from robolink.procedures import NO_OFFSET
 from robolink.procedures.samples import TouchNames
-from robolink.runner import Consider, Move, Notify, Procedure
 from robolink.remedy_words import RemedyWord, remedy_word
+from robolink.runner import Consider, Move, Notify, Procedure
 
 TURNS_DEG: Final = (0.0, 60.0, 120.0, 180.0, -120.0, -60.0)
 

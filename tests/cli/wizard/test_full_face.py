@@ -28,10 +28,10 @@ from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.streams.epson import serve_tcp
 
+from robolink.controller_outcome import ControllerOutcome
 from robolink.errors import DeclinedError
 from robolink.model import Pose
 from robolink.runner import JogSubject, Question
-from robolink.controller_outcome import ControllerOutcome
 from tests.cli.wizard._people import (
     ARRIVAL,
     HEADER,

@@ -22,10 +22,10 @@ from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 import robolink
 from robolink.calibration_run import ChangeReport, ToolReport
+from robolink.controllers import SimpleController
 from robolink.errors import ConfigError, DeclinedError
 from robolink.model import MotionProfile, Path, Pose, ToolReceipt, WorkBox
 from robolink.runner import Move, MoveSubject, Question, Runner, RunSettings
-from robolink.controllers import SimpleController
 from tests.cli.wizard._people import ARRIVAL, HEADER, Sitting, write_subject
 
 # What becomes of the work when its face cannot show it any more.

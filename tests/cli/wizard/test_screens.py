@@ -40,6 +40,7 @@ from robolink.calibration import (
     turn_claim,
 )
 from robolink.calibration_run import ChangeReport, ToolReport
+from robolink.controller_outcome import ControllerOutcome, note_outcome
 from robolink.errors import (
     CalibrationError,
     ConfigError,
@@ -54,7 +55,6 @@ from robolink.methods import find_method
 from robolink.model import Path as Way
 from robolink.model import Pose, ToolOffset, ToolReceipt, WorkBox
 from robolink.runner import AngleShown, JogRange, MoveSubject, Question
-from robolink.controller_outcome import ControllerOutcome, note_outcome
 from tests.cli.wizard._people import (
     ARRIVAL,
     CHECK,

@@ -10,11 +10,11 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.streams.epson import serve_tcp
 
 import robolink
-from robolink.runtime import replaced
+from robolink.controllers import SimpleController, SimpleMachine
 from robolink.errors import JournalError, LeaseHeldError, LeaseLostError, RobolinkError
 from robolink.journal import LEASE_S, ChainVerification, LeaseHolder
 from robolink.model import ToolOffset
-from robolink.controllers import SimpleController, SimpleMachine
+from robolink.runtime import replaced
 from robolink.timing import NS_PER_S
 from robolink.transaction import ToolChange, Wanted, change_tools, recover
 from tests.contract._quiet_time import QuietTime

@@ -5,8 +5,8 @@ import threading
 from types import TracebackType
 from typing import Self
 
-from robolink.model import Pose, ToolOffset
 from robolink.controllers import SimpleMachine
+from robolink.model import Pose, ToolOffset
 
 _POLLS_PER_MOVE = 2
 """A movement has ended when it was asked about as often as this: no time passes in a test."""

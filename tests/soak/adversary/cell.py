@@ -14,11 +14,11 @@ from unittest import mock
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.faults import DiskFault, FaultyDisk
 
-from robolink.runtime import replaced
 from robolink.checkpoints import Checkpoint, observed
 from robolink.errors import JournalError, NotReadyError, RobolinkError
 from robolink.interrupts import EndedBy, Interrupted, one_ending, output_closed
 from robolink.model import Controller, ToolOffset
+from robolink.runtime import replaced
 from robolink.testing import READING_CHECKS, Subject
 from robolink.testing import outcomes as outcomes_of
 from robolink.timing import NS_PER_S

@@ -8,6 +8,7 @@ from robolink.calibration import (
     turn_test_sentences,
 )
 from robolink.calibration_run import ChangeReport, ToolReport, next_steps
+from robolink.controller_outcome import UNTOUCHED, outcome_after
 from robolink.errors import (
     CalibrationError,
     DeclinedError,
@@ -17,7 +18,6 @@ from robolink.errors import (
 )
 from robolink.messages import joined, tr
 from robolink.model import PersonRole, describe_offset, describe_outcome
-from robolink.controller_outcome import UNTOUCHED, outcome_after
 from robolink_cli.access.warnings import way_back
 from robolink_cli.console.exit_codes import next_of, was_refused
 from robolink_cli.console.render import next_lines

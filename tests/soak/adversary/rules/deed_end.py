@@ -8,6 +8,7 @@ from typing import Final
 from robolink_cli.console.exit_codes import BUG, UNKNOWN, exit_code
 
 from robolink.calibration_run import ChangeReport
+from robolink.controller_outcome import Effect, outcome_after
 from robolink.errors import (
     ConfigError,
     LeaseLostError,
@@ -16,7 +17,6 @@ from robolink.errors import (
     TransportError,
 )
 from robolink.model import ToolOffset
-from robolink.controller_outcome import Effect, outcome_after
 from tests.soak.adversary.books import BookedMarker
 from tests.soak.adversary.command_lines import selects
 from tests.soak.adversary.computer import VirtualProcess

@@ -212,6 +212,7 @@ def change(
     attended: bool = False,
     person: Callable[[Any], Person] = person_at,
     interval_mm: float | None = None,
+    drift_mm: float = 0.2,
     rows: Mapping[str, float] | None = None,
     role: str = "",
 ) -> Ended:
@@ -225,6 +226,7 @@ def change(
         attended: Whether a person is asked; else all of it is as under ``--yes``.
         person: Who they are.
         interval_mm: What the process allows the tip to be off.
+        drift_mm: What it allows a turn test to drift.
         rows: What the cell states of the rows of its budget.
         role: Of whoever does it, where the cell names people.
     """
@@ -235,7 +237,9 @@ def change(
         one = ToolPlan(
             TOOL,
             source,
-            AcceptanceCriteria(interval_mm=interval_mm, unattended=not attended),
+            AcceptanceCriteria(
+                interval_mm=interval_mm, drift_tolerance_mm=drift_mm, unattended=not attended
+            ),
             approach=None if course.approach is None else course.approach(cell),
             rows={key: RowFact(half, "stated") for key, half in (rows or {}).items()},
         )

@@ -8,9 +8,13 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import signal
+from contextlib import contextmanager
+
 import pytest
 from robolink_simulators.cell.clock import ManualClock
 
+from robolink.checkpoints import observed
 from robolink.errors import JournalError, LeaseHeldError, LeaseLostError
 from robolink.journal._lease import BEAT_S
 from robolink.journal._lease_view import LEASE_S
@@ -275,6 +279,7 @@ def test_closing_gives_the_lease_up_and_leaves_the_markers(leases):
     assert [known.operation for known in bert.open_markers()] == ["a", "b"]
 
 
+<<<<<<< .merge_file_LK52gQ
 # Whether the holder of a lease still lives: judged by proof, by silence, or by watching.
 
 
@@ -371,3 +376,56 @@ def test_a_lease_whose_holder_makes_no_sense_is_watched_like_a_stranger(leases):
     began_ns = leases.clock.now_ns()
     leases.log(BERT).begin(marker("b"))
     assert leases.clock.now_ns() - began_ns == LEASE_S * 1e9
+=======
+def kept(log):
+    """Hold the lease for a block."""
+    with log.hold("a check"):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("work", "commit"),
+    [
+        pytest.param(lambda log: log.begin(marker("a")), 1, id="begin"),
+        pytest.param(lambda log: (log.begin(marker("a")), log.clear("a")), 2, id="clear"),
+        pytest.param(lambda log: (log.begin(marker("a")), log.close()), 2, id="close"),
+        pytest.param(kept, 1, id="hold"),
+        pytest.param(kept, 2, id="end of hold"),
+    ],
+)
+def test_ctrl_c_behind_a_commit_leaves_the_log_at_one_with_what_is_stored(leases, work, commit):
+    anna, bert = leases.log(ANNA), leases.log(BERT)
+    with behind_commit(commit), pytest.raises(KeyboardInterrupt):
+        work(anna)
+    for known in anna.open_markers():
+        anna.clear(known.operation)
+    bert.begin(marker("b"))
+    bert.clear("b")
+    anna.look()
+    anna.begin(marker("c"))
+
+
+def test_ctrl_c_behind_a_commit_puts_an_answer_on_record_once(leases):
+    anna = leases.log(ANNA)
+    anna.answered(NewEntry(EntryKind.DECISION, verdict="yes"))
+    with behind_commit(1), pytest.raises(KeyboardInterrupt):
+        anna.append(NewEntry(EntryKind.STATION))
+    anna.append(NewEntry(EntryKind.STATION))
+    assert len(list(anna.recorded(kinds=[EntryKind.DECISION]))) == 1
+
+
+@contextmanager
+def behind_commit(number):
+    """Let Ctrl-C come right behind one of the commits of a block."""
+    commits = 0
+
+    def passed(_point, what):
+        nonlocal commits
+        if what == "after":
+            commits += 1
+            if commits == number:
+                signal.raise_signal(signal.SIGINT)
+
+    with observed(passed):
+        yield
+>>>>>>> .merge_file_B9ejiN

@@ -182,15 +182,27 @@ def test_a_line_whose_way_leaves_the_workspace_is_refused():
     assert kind(refused) in (ErrorKind.UNREACHABLE, ErrorKind.AXIS_LIMIT)
 
 
-@pytest.mark.parametrize("bad", [0.0, -1.0, math.nan, math.inf])
+@pytest.mark.parametrize("bad", [0.0, -1.0, math.nan, math.inf, 1.6e-319, 1e-300, 9e-10])
 @pytest.mark.parametrize("place", range(4))
-def test_dynamics_must_be_finite_and_positive(bad, place):
+def test_dynamics_must_be_finite_and_large_enough_to_arrive(bad, place):
     group = standing()
     values = [1.0] * 4
     values[place] = bad
     dynamics = Dynamics(*values)
     assert kind(group.move_linear_absolute(shifted(group, x_mm=-1), dynamics)) is ErrorKind.DYNAMICS
     assert kind(group.move_direct_absolute(in_axes(0, 0, 0, 0), dynamics)) is ErrorKind.DYNAMICS
+
+
+@pytest.mark.parametrize("place", range(4))
+def test_the_least_dynamics_make_a_movement_that_arrives(place):
+    group = standing()
+    values = [1.0] * 4
+    values[place] = 1e-9
+    move = group.move_linear_absolute(shifted(group, x_mm=-1), Dynamics(*values))
+    passing(group, 1.0)
+    assert not move.ended
+    group.advance(group.next_change())
+    assert move.outputs.done
 
 
 def test_factors_of_a_direct_movement_end_at_one():

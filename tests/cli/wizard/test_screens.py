@@ -309,7 +309,7 @@ def test_after_an_emergency_stop_the_reset_comes_before_recover():
 
 
 @pytest.mark.parametrize(
-    ("error", "standing", "headed"),
+    ("error", "outcome", "headed"),
     [
         (ConfigError("It is a copy."), None, "NOT STARTED"),
         (ControllerFaultError("The guard is open."), ControllerOutcome(selected=1), "NOT STARTED"),

@@ -35,6 +35,7 @@ from robolink_simulators.softmotion.kinematics.kinematics import (
 from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 _STILL = 1e-9
+_LEAST_DYNAMICS = 1e-9
 _CHECK_EVERY_MM = 2.0
 _CHECK_EVERY_DEG = 2.0
 _MOST_CHECKS = 500
@@ -55,11 +56,13 @@ class Dynamics(NamedTuple):
     def require_usable(self, most: float = math.inf) -> None:
         """Refuse values that are not finite, not positive or above ``most``.
 
+        So are those next to 0 (assumed): no clock shows when such a movement would arrive.
+
         Raises:
             Refused: Names the value.
         """
         for name, value in self._asdict().items():
-            if not (math.isfinite(value) and 0 < value <= most):
+            if not (math.isfinite(value) and _LEAST_DYNAMICS <= value <= most):
                 raise BlockRefused(ErrorKind.DYNAMICS, f"{name} cannot be {value}")
 
 

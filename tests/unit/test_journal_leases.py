@@ -3,13 +3,12 @@ lives.
 """
 
 import os
+import signal
 import subprocess
 import sys
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-
-import signal
-from contextlib import contextmanager
 
 import pytest
 from robolink_simulators.cell.clock import ManualClock
@@ -279,7 +278,6 @@ def test_closing_gives_the_lease_up_and_leaves_the_markers(leases):
     assert [known.operation for known in bert.open_markers()] == ["a", "b"]
 
 
-<<<<<<< .merge_file_LK52gQ
 # Whether the holder of a lease still lives: judged by proof, by silence, or by watching.
 
 
@@ -376,7 +374,8 @@ def test_a_lease_whose_holder_makes_no_sense_is_watched_like_a_stranger(leases):
     began_ns = leases.clock.now_ns()
     leases.log(BERT).begin(marker("b"))
     assert leases.clock.now_ns() - began_ns == LEASE_S * 1e9
-=======
+
+
 def kept(log):
     """Hold the lease for a block."""
     with log.hold("a check"):
@@ -428,4 +427,3 @@ def behind_commit(number):
 
     with observed(passed):
         yield
->>>>>>> .merge_file_B9ejiN

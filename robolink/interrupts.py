@@ -39,6 +39,7 @@ __all__ = [
     "heed",
     "one_ending",
     "output_closed",
+    "seen_through",
     "window_closed",
 ]
 
@@ -321,6 +322,25 @@ class InterruptGate:
             self._depth -= 1
             _handler.depth -= 1
             _handler.let_out()
+
+
+@contextmanager
+def seen_through() -> Iterator[None]:
+    """Hold Ctrl-C back for a block that must be seen through, whatever session is open.
+
+    For what is stored and then noted in this process: an end in between would leave the two at
+    odds. It is raised at the end of the block, or of the gate around it.
+
+    Raises:
+        Interrupted: It came meanwhile.
+    """
+    gate = InterruptGate()
+    gate.open()
+    try:
+        with gate:
+            yield
+    finally:
+        gate.close()
 
 
 _MAIN = threading.main_thread().ident

@@ -1,12 +1,13 @@
 """The journal as the driver of one controller uses it."""
 
 from collections.abc import Collection, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Final
 
 from robolink import ambient
 from robolink.errors import JournalError, LeaseLostError, OutcomeUnknownError
+from robolink.interrupts import seen_through
 from robolink.journal._identity import Names, Naming
 from robolink.journal._journal_loss import LOST, Traces, leave_trace, traces_of
 from robolink.journal._lease import Lease
@@ -149,7 +150,7 @@ class JournalOutcomeLog:
             LeaseHeldError: Somebody else is changing this controller.
             LeaseLostError: Somebody else was, since :meth:`look` or since the lease was taken.
         """
-        with self._lock:
+        with seen_through(), self._lock:
             names = self._named()
             name = names.identity
             self._require_sound()
@@ -184,7 +185,7 @@ class JournalOutcomeLog:
             OutcomeUnknownError: Another has settled it meanwhile; nothing is recorded either.
         """
         newest: tuple[int, str] | None = None
-        with self._lock:
+        with seen_through(), self._lock:
             names = self._named()
             last = not self._holds and not self._begun - {operation}
             with self._writing(
@@ -194,7 +195,11 @@ class JournalOutcomeLog:
                 )
             ) as tables:
                 if operation in self._begun:
-                    self._proved(tables, operation, last=last)
+                    try:
+                        self._lease.prove(tables.leases, last=last)
+                    except LeaseLostError:
+                        self._begun.discard(operation)  # it is for whoever took over now
+                        raise
                 elif last:
                     self._lease.release(tables.leases)
                 known = tables.markers.remove(names.identity, operation)
@@ -209,14 +214,6 @@ class JournalOutcomeLog:
             if operation == LOST:
                 self._begin_anew(names.identity, newest)
 
-    def _proved(self, tables: "Tables", operation: str, *, last: bool) -> None:
-        """Prove that what was begun here still is this log's to end."""
-        try:
-            self._lease.prove(tables.leases, last=last)
-        except LeaseLostError:
-            self._begun.discard(operation)  # it is for whoever took over now
-            raise
-
     def append(self, *entries: NewEntry) -> None:
         """Put something on record, in one durable transaction.
 
@@ -229,7 +226,7 @@ class JournalOutcomeLog:
         """
         if any(entry.kind not in NO_HISTORY for entry in entries):
             self._refuse_lost()
-        with self._lock:
+        with seen_through(), self._lock:
             name = self._named().record
             with self._writing() as tables:
                 self._put(tables, name, entries)
@@ -350,22 +347,25 @@ class JournalOutcomeLog:
             LeaseLostError: Somebody else was, since :meth:`look`.
             JournalError: It cannot be stored.
         """
-        with self._lock:
-            name = self._named().record
-            self._require_sound()
-            self._lease.prepare()
-            with self._writing(_untouched()) as tables:
-                grip = self._lease.secure(tables.leases, purpose, self.signature.operator)
-                self._put(tables, name, grip.entries)
-            self._lease.settle(grip)
-            self._holds += 1
-        try:
-            yield
-        finally:
+        with ExitStack() as held:
             with self._lock:
-                self._holds -= 1
-                if not self._holds and not self._begun:
-                    self.close()
+                name = self._named().record
+                self._require_sound()
+                self._lease.prepare()
+                with seen_through():
+                    with self._writing(_untouched()) as tables:
+                        grip = self._lease.secure(tables.leases, purpose, self.signature.operator)
+                        self._put(tables, name, grip.entries)
+                    self._lease.settle(grip)
+                    self._holds += 1
+                    held.callback(self._let_go)
+            yield
+
+    def _let_go(self) -> None:
+        with seen_through(), self._lock:
+            self._holds -= 1
+            if not self._holds and not self._begun:
+                self.close()
 
     def beat(self) -> None:
         """Let others see that this process is alive.
@@ -459,7 +459,7 @@ class JournalOutcomeLog:
 
         A lease that cannot be given up ends by its holder's silence.
         """
-        with self._lock:
+        with seen_through(), self._lock:
             if self._lease.held:
                 with suppress(JournalError), self._store.write() as tables:
                     self._lease.release(tables.leases)

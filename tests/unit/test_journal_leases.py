@@ -1,7 +1,11 @@
 """One at a time on a controller: who has the lease, who may take it, who is told of its loss."""
 
+import signal
+from contextlib import contextmanager
+
 import pytest
 
+from robolink.checkpoints import observed
 from robolink.errors import JournalError, LeaseHeldError, LeaseLostError
 from robolink.journal._lease import BEAT_S
 from robolink.journal._lease_view import LEASE_S
@@ -262,3 +266,56 @@ def test_closing_gives_the_lease_up_and_leaves_the_markers(leases):
     anna.close()
     bert.begin(marker("b"))
     assert [known.operation for known in bert.open_markers()] == ["a", "b"]
+
+
+def kept(log):
+    """Hold the lease for a block."""
+    with log.hold("a check"):
+        pass
+
+
+@pytest.mark.parametrize(
+    ("work", "commit"),
+    [
+        pytest.param(lambda log: log.begin(marker("a")), 1, id="begin"),
+        pytest.param(lambda log: (log.begin(marker("a")), log.clear("a")), 2, id="clear"),
+        pytest.param(lambda log: (log.begin(marker("a")), log.close()), 2, id="close"),
+        pytest.param(kept, 1, id="hold"),
+        pytest.param(kept, 2, id="end of hold"),
+    ],
+)
+def test_ctrl_c_behind_a_commit_leaves_the_log_at_one_with_what_is_stored(leases, work, commit):
+    anna, bert = leases.log(ANNA), leases.log(BERT)
+    with behind_commit(commit), pytest.raises(KeyboardInterrupt):
+        work(anna)
+    for known in anna.open_markers():
+        anna.clear(known.operation)
+    bert.begin(marker("b"))
+    bert.clear("b")
+    anna.look()
+    anna.begin(marker("c"))
+
+
+def test_ctrl_c_behind_a_commit_puts_an_answer_on_record_once(leases):
+    anna = leases.log(ANNA)
+    anna.answered(NewEntry(EntryKind.DECISION, verdict="yes"))
+    with behind_commit(1), pytest.raises(KeyboardInterrupt):
+        anna.append(NewEntry(EntryKind.STATION))
+    anna.append(NewEntry(EntryKind.STATION))
+    assert len(list(anna.recorded(kinds=[EntryKind.DECISION]))) == 1
+
+
+@contextmanager
+def behind_commit(number):
+    """Let Ctrl-C come right behind one of the commits of a block."""
+    commits = 0
+
+    def passed(_point, what):
+        nonlocal commits
+        if what == "after":
+            commits += 1
+            if commits == number:
+                signal.raise_signal(signal.SIGINT)
+
+    with observed(passed):
+        yield

@@ -21,6 +21,7 @@ from robolink_simulators.epson.arm.robots import (
     Joints,
     Mechanism,
     Mount,
+    check_depth,
     check_ranges,
     find_robot,
     robots,
@@ -44,9 +45,13 @@ def turned_from(pose, rotation):
 
 
 def somewhere(model, rng, margin_deg=0.0):
-    """Return joints inside the ranges, as far from the singular ones as asked for."""
+    """Return joints where the arm may be, as far from the singular ones as asked for."""
     while True:
         joints = Joints(*(rng.uniform(low, high) for low, high in model.ranges))
+        try:
+            check_depth(model, joints)
+        except OutOfReach:
+            continue
         if model.mechanism is Mechanism.SIX_AXIS:
             bends = (joints[4],)
         else:

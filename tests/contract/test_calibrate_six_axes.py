@@ -264,6 +264,10 @@ MANY, MANY_HELD = 40, 32
 FEW, FEW_HELD = 20, 14
 """Cells and how many of them at least must hold the truth. An interval of 95 % holds 31 or fewer
 of 40 once in 7,700 times, 13 or fewer of 20 once in 29,000 times (binomial distribution)."""
+FALSE_ALARMS, MOST_REFUSED = {"implausible_latency", "proof_contradicts_accuracy"}, 2
+"""What refuses a right result by chance, and in how many cells it may. Each of two latencies is
+refused once in 740 times (docs/reference/evidence.md 13), each turn test once in 1,000 times (20):
+about one cell in 270. More than 2 of 40 are refused once in 2,400 times, of 20 once in 18,000."""
 
 UPRIGHT = (
     "GX4-C351S-L",
@@ -301,16 +305,24 @@ def counted(robots, cells, least, measures):
 def test_the_interval_of_each_method_holds_the_truth_about_as_often_as_it_says(
     measure, robot, cells, least, tmp_path, monkeypatch, record_property
 ):
-    """Counted over cells with other seeds; each axis for itself: they share their touches."""
-    held = dict[str, int]()
+    """Counted over cells with other seeds; each axis for itself: they share their touches.
+
+    A cell that is refused holds nothing.
+    """
+    held, refused = dict[str, int](), dict[int, str]()
     for seed in range(200, 200 + cells):
         folder = tmp_path / str(seed)
         folder.mkdir()
         with method_cell(robot, folder, monkeypatch, seed=seed) as at:
             done, axes = measure(at)
-            assert done.code == 0, (seed, done.err[-1500:])
+            if done.code:
+                refused[seed] = done.document["error"]["code"]
+                assert refused[seed] in FALSE_ALARMS, (seed, done.err[-1500:])
+                continue
             wrongs = wrong_mm(done.document, at.truth, axes)
             for axis, (wrong, half) in zip(axes, wrongs, strict=True):
                 held[axis] = held.get(axis, 0) + (abs(wrong) <= half)
     record_property("held", " ".join(f"{axis} {count}" for axis, count in held.items()))
+    record_property("refused", " ".join(f"{seed} {code}" for seed, code in refused.items()))
+    assert len(refused) <= MOST_REFUSED, refused
     assert min(held.values()) >= least, held

@@ -86,8 +86,9 @@ def test_the_spacing_is_checked():
         solve_board(*pair(f1=(1, 1), f2=(1, 5)))
     spacing = math.hypot(10, 4)
     assert solve_board(*pair(), spacing_mm=spacing * 1.009).measured == ("x_mm", "y_mm", "u_deg")
-    with refused("spacing_mismatch"):
-        solve_board(*pair(), spacing_mm=spacing * 1.02)
+    for wrong in (spacing * 1.02, 0.0):
+        with refused("spacing_mismatch"):
+            solve_board(*pair(), spacing_mm=wrong)
 
 
 def test_two_hands_are_refused_or_warned_of():

@@ -233,6 +233,11 @@ SLIPS = {
     "schema": {**case(), "schema": "something/9"},
     "input.euler": case("pivot", poses=PIVOT, euler="XYZ"),
     "input.fiducials": case("board_two_fiducials", fiducials=tips((310, 50))),
+    "input.before.mm_per_px_matrix": case(
+        "up_camera_affine",
+        observations=[{**at, "px": 640, "py": 512} for at in ROUND],
+        before={"mm_per_px_matrix": [0, 0, 0, 0.0125], "camera_origin": [0, 0]},
+    ),
 }
 
 

@@ -164,7 +164,7 @@ def check_spacing(spacing_mm: float, nominal_mm: float | None) -> None:
                 least=LEAST_SPACING_MM,
             ),
         )
-    if nominal_mm is not None and abs(spacing_mm / nominal_mm - 1) > SPACING_TOLERANCE:
+    if nominal_mm is not None and abs(spacing_mm - nominal_mm) > SPACING_TOLERANCE * nominal_mm:
         raise CalibrationError(
             "spacing_mismatch",
             tr(

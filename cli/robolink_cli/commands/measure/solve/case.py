@@ -351,6 +351,8 @@ def _camera(node: Node) -> cal.CameraModel:
     if len(matrix) != 4 or len(origin) != 2:
         raise unusable(node.path, tr("the matrix has four numbers, the origin two"))
     a, b, c, d = matrix
+    if a * d == b * c:
+        raise unusable(node.at("mm_per_px_matrix"), tr("the matrix of a camera has an inverse"))
     return cal.CameraModel(((a, b), (c, d)), (origin[0], origin[1]))
 
 

@@ -322,6 +322,4 @@ def plc_maker(folder: Path | None) -> "PlcMaker":
     """
     if folder is None:
         return Plc
-    from robolink_simulators.softmotion.program.structured_plc import program_plc, sources_in
-
     return program_plc(sources_in(folder))

@@ -37,7 +37,8 @@ class VirtualProcess:
         alive: Whether it runs.
         controller: The controller that it is connected to, ``None`` before and after.
         stopped_ns: When a stop was acknowledged in it, ``None`` while none was.
-        put_back: Tools whose old value it has written since.
+        put_back: Tools whose old value it has written since, and the one request that did it: where
+            its frame was lost it leaves again, with its number, and is carried out once.
         cut_off: Whether a link of it has failed.
         overtaken: Whether another client was acknowledged in the place of a movement or write.
         stopper: What a stop from another terminal goes to, where that is not the controller.
@@ -50,7 +51,7 @@ class VirtualProcess:
         self.alive = True
         self.controller: Controller | None = None
         self.stopped_ns: int | None = None
-        self.put_back: set[int] = set()
+        self.put_back: dict[int, str] = {}
         self.cut_off = False
         self.overtaken = False
         self.held_back = False

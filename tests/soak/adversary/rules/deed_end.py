@@ -177,9 +177,11 @@ class EndRules:
             if not stands.known or tool in foreign:
                 continue
             holds = None if stands.holds is None else ToolOffset(*stands.holds)
+            # Registers are all that can be read; of these a person was told that they may wait.
+            waits = tool in self._on.doubted and self._on.from_a_lost_write(tool, holds)
             self._on.hold(
                 "StateIsTold",
-                self._on.plant.same(holds, state.tools.get(tool)),
+                waits or self._on.plant.same(holds, state.tools.get(tool)),
                 f"tool {tool} is told to hold {holds}, it holds {state.tools.get(tool)}",
             )
         changed = [
@@ -228,11 +230,10 @@ class RestRules:
     def __init__(self, grounds: Grounds) -> None:
         self._on = grounds
         self._by_others: dict[int, ToolOffset | None] = {}
-        self._told: set[int] = set()
 
     def said(self, text: str) -> None:
         """Note what a person was told: of which tools the registers are not on record."""
-        self._told |= {int(tool) for tool in _DOUBT.findall(text)}
+        self._on.doubted |= {int(tool) for tool in _DOUBT.findall(text)}
 
     def left(self, state: MachineState) -> None:
         """Check what a deed left behind, however it ended, killed or not, before anybody acts."""
@@ -291,7 +292,7 @@ class RestRules:
         it. A person has to have been told, where the record could show it.
         """
         known, _ = self._on.books.value_of(tool)
-        return self._on.from_a_lost_write(tool, holds) and (tool in self._told or not known)
+        return self._on.from_a_lost_write(tool, holds) and (tool in self._on.doubted or not known)
 
     def _agrees(self, tool: int, holds: ToolOffset | None, named: Sequence[BookedMarker]) -> None:
         known, value = self._on.books.value_of(tool)

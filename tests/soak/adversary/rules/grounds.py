@@ -110,6 +110,8 @@ class Grounds:
         story: Where a broken rule is noted.
         staged: Values in registers that wait for a request, left by a write whose record the disk
             has lost: the next request may bring them into force.
+        doubted: Tools of which a person was told that their registers are not on record, and that
+            only the machine's screen shows what it uses.
     """
 
     now: HourSoFar
@@ -119,6 +121,7 @@ class Grounds:
         self.plant = plant
         self.books = books
         self.staged: dict[int, ToolOffset] = {}
+        self.doubted: set[int] = set()
 
     def from_a_lost_write(self, tool: int, holds: ToolOffset | None) -> bool:
         """Tell whether a value is one that nobody could know to wait for a request."""

@@ -131,9 +131,9 @@ class WireRules:
         if sent.kind is SentKind.SELECT:
             named = [m for m in markers if m.kind in ("selection", "change")]
             allowed = bool(named) or not self._on.books.trusted
-        elif sent.kind is SentKind.WRITE and sent.tool and sent.tool not in process.put_back:
-            process.put_back.add(sent.tool)
-            allowed = self._puts_back(sent, markers)
+        elif sent.kind is SentKind.WRITE and sent.tool:
+            once = process.put_back.setdefault(sent.tool, sent.text)
+            allowed = once == sent.text and self._puts_back(sent, markers)
         self._on.hold(
             "StillAfterStop", allowed, f"{sent.text} leaves after the stop was acknowledged"
         )

@@ -47,6 +47,8 @@ LOST_RECORD = drawn_history(177058577, 20).without_hours(
     [hour for hour in range(20) if hour not in (8, 9)]
 )
 """A program that calls back, and a journal that somebody has deleted."""
+NO_HEAD = drawn_history(17250169, 20)
+"""A journal that has lost the note of its last entry, and a program that calls back."""
 FROZEN_PROGRAM = drawn_history(919892947, 20).without_hours(
     [hour for hour in range(20) if hour not in (1, 2, 4)]
 )
@@ -56,7 +58,7 @@ FROZEN_PROGRAM = drawn_history(919892947, 20).without_hours(
 @pytest.mark.soak
 @pytest.mark.parametrize(
     "history",
-    [*HISTORIES, HALF_A_FILE, LOST_RECORD, FROZEN_PROGRAM],
+    [*HISTORIES, HALF_A_FILE, LOST_RECORD, NO_HEAD, FROZEN_PROGRAM],
     ids=lambda history: str(history.seed),
 )
 def test_every_rule_holds_in_what_broke_one(history):

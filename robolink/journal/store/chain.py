@@ -79,7 +79,7 @@ class ChainCheck:
     def problems_at_end(self, head: tuple[int, str] | None) -> Iterator[str]:
         """Compare the end with number and hash of the entry that was stored last."""
         if head is None:
-            yield tr("The note that says which entry was stored last is missing.")
+            yield head_is_missing()
             return
         number, last_hash = head
         if self.number < number:
@@ -92,6 +92,11 @@ class ChainCheck:
             )
         elif self.hash != last_hash:
             yield tr("Entry {number} is not the one that was stored last.", number=number)
+
+
+def head_is_missing() -> str:
+    """Return what is said where the note of the last entry is not there."""
+    return tr("The note that says which entry was stored last is missing.")
 
 
 def _is_unchanged(row: Mapping[str, Any]) -> bool:

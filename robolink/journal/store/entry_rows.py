@@ -6,7 +6,7 @@ from functools import lru_cache
 from typing import Any, Final, TypeAlias, TypeVar
 
 from robolink.journal.store import statements
-from robolink.journal.store.chain import canonical, digest, storable
+from robolink.journal.store.chain import canonical, digest, head_is_missing, storable
 from robolink.journal.store.connection import DatabaseConnection
 from robolink.journal.store.statements import COLUMNS, KIND, NAME
 from robolink.messages import plain
@@ -62,6 +62,10 @@ _LOOKS: Final = 100
 
 _SIGNATURE: Final = tuple(field.name for field in fields(Signature))
 _PLACES: Final = dict.fromkeys(sorted(name for name in COLUMNS if name != "hash"))
+
+
+class DamagedHeadError(Exception):
+    """The note of the entry that was stored last is not there, or holds nothing."""
 
 
 class EntryRows:
@@ -141,7 +145,7 @@ class EntryRows:
     def head(self) -> tuple[int, str] | None:
         """Return number and hash of the entry that was stored last."""
         row = next(iter(self._connection.rows(statements.HEAD)), None)
-        return None if row is None else (row[0], row[1])
+        return None if row is None or None in row else (row[0], row[1])
 
     def settled(self, read: Callable[[], T]) -> tuple[T, _Head | None]:
         """Read something together with the head, as both were at one instant.
@@ -162,7 +166,10 @@ class EntryRows:
         return found, head
 
     def _locked_head(self) -> _Head:
-        ((number, last_hash),) = self._connection.rows(statements.HEAD + self._connection.row_lock)
+        rows = self._connection.rows(statements.HEAD + self._connection.row_lock)
+        if len(rows) != 1 or None in rows[0]:  # a disk that lied kept the page of another table
+            raise DamagedHeadError(head_is_missing())
+        number, last_hash = rows[0]
         return number, last_hash
 
     def _move_head(self, head: _Head, last: Mapping[str, Any]) -> bool:

@@ -19,7 +19,7 @@ from robolink.journal._places import JournalPlace
 from robolink.journal.store import migrations, statements
 from robolink.journal.store.chain import ChainCheck
 from robolink.journal.store.connection import Backend, DatabaseConnection, backend_of
-from robolink.journal.store.entry_rows import EntryRows, Filter
+from robolink.journal.store.entry_rows import DamagedHeadError, EntryRows, Filter
 from robolink.journal.store.failures import damaged_error, journal_error
 from robolink.journal.store.state_rows import LeaseRows, MarkerRows, NameRows
 from robolink.messages import tr
@@ -207,6 +207,9 @@ class Store:
             except JournalError:
                 self._drop()
                 raise
+            except DamagedHeadError as error:
+                self._drop()
+                raise damaged_error(str(error), self._place.name, consequence) from error
             except self._failures as error:
                 self._drop()
                 raise journal_error(error, self._place.name, consequence) from error

@@ -144,6 +144,21 @@ def test_f62_a_marker_under_another_name_blocks_who_does_not_know_it(tmp_path, o
 
 
 @pytest.mark.fault("F62")
+@pytest.mark.parametrize("left", ["", "INSERT INTO head VALUES (NULL, NULL)"], ids=["no", "empty"])
+def test_f62_without_the_note_of_the_last_entry_nothing_is_stored(tmp_path, open_anew, left):
+    """A disk that lied may keep the page of one table and lose that of another."""
+    path = tmp_path / "journal.db"
+    journal = open_anew(str(path))
+    journal.log("cell").append(NewEntry(EntryKind.RAW, tool=2, verdict="kept"))
+    journal.close()
+    with sqlite3.connect(path) as connection:
+        connection.executescript(f"DROP TABLE head; CREATE TABLE head (number, hash); {left}")
+    connection.close()
+    with pytest.raises(JournalError, match=r"is damaged .The note that says which entry"):
+        open_anew(str(path)).log("cell").append(NewEntry(EntryKind.RAW, tool=2, verdict="more"))
+
+
+@pytest.mark.fault("F62")
 def test_f62_a_name_in_the_file_that_is_no_text_any_more_is_damage(tmp_path, open_anew):
     """SQLite complains of it by that name, which Python cannot read."""
     path = tmp_path / "journal.db"

@@ -1,5 +1,6 @@
 """The parameters that methods share: of a tip on a pin, and of a camera that looks up."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, ClassVar
@@ -111,7 +112,7 @@ class UprightPinParameters(PinParameters):
         return self.if_length_changed
 
 
-class SampledParameters(MethodParameters):
+class SampledParameters(MethodParameters, ABC):
     """How an input is switched again and again, until that is enough.
 
     What derives from it has the fields ``until_mm`` and ``retake``, each with a help of its own.
@@ -136,13 +137,13 @@ class SampledParameters(MethodParameters):
         if not self.may_end_early(sigma_stated=check.sigma_stated):
             yield Problem("until_mm", self.nothing_to_leave_out(check))
 
+    @abstractmethod
     def may_end_early(self, *, sigma_stated: bool) -> bool:
         """Tell whether the tip can be known well enough before the last sample."""
-        raise NotImplementedError
 
+    @abstractmethod
     def nothing_to_leave_out(self, check: Check) -> str:
         """Return why it cannot end early, and what to give."""
-        raise NotImplementedError
 
 
 def clearance_below_lift(clearance_mm: float, lift_mm: float, check: Check) -> Iterator[Problem]:

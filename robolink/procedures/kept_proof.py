@@ -178,13 +178,19 @@ class ProofBasis:
         return [tip_pose(pose, written, tool=self.tool).u_deg for pose in self.result.inputs]
 
 
-class ProvesAgain(ABC):  # noqa: B024 - what derives from it has abstract hooks
+class ProvesAgain(ABC):
     """A source that proves by a :class:`KeptProof`, at once and after a break alike.
 
-    What derives from it overrides :meth:`proof_of`, or :meth:`proof` itself.
+    What derives from it defines :meth:`proof_of`. A class that overrides :meth:`proof` itself
+    needs no other.
     """
 
     __slots__ = ()
+
+    def __init_subclass__(cls, **arguments: Any) -> None:  # noqa: ANN401 - those of other bases
+        super().__init_subclass__(**arguments)
+        if "proof" in cls.__dict__ and "proof_of" not in cls.__dict__:
+            cls.proof_of = _proof_as_overridden  # type: ignore[method-assign]
 
     def verify(
         self,
@@ -212,13 +218,19 @@ class ProvesAgain(ABC):  # noqa: B024 - what derives from it has abstract hooks
         """Return the proof of what was measured; see :class:`KeepsProof`."""
         return self.proof_of(ProofBasis(context, tool, result, tip, tolerance_mm))
 
+    @abstractmethod
     def proof_of(self, basis: ProofBasis) -> KeptProof:
         """Return the proof of what was measured.
 
         Args:
             basis: What was measured, and what for.
         """
-        raise NotImplementedError
+
+
+def _proof_as_overridden(self: ProvesAgain, basis: ProofBasis) -> KeptProof:
+    return self.proof(
+        basis.context, basis.tool, basis.result, tip=basis.tip, tolerance_mm=basis.tolerance_mm
+    )
 
 
 def movements(steps: Procedure[VerifyResult], here: Pose) -> int:

@@ -1,5 +1,6 @@
 """What a method takes at each place, what was taken so far, and how one of it is taken again."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
@@ -76,7 +77,7 @@ class SequentialSampler(
         """Return where it was taken, for a person: "U 120.0"."""
 
 
-class TouchNames:
+class TouchNames(ABC):
     """What samplers of touches say alike."""
 
     __slots__ = ()
@@ -89,9 +90,9 @@ class TouchNames:
         """Return which one it is."""
         return tr("Touch {number} at {where}", number=number, where=self.named(touch))
 
+    @abstractmethod
     def named(self, touch: Any) -> str:  # noqa: ANN401
         """Return where one was taken."""
-        raise NotImplementedError
 
 
 class Samples(Generic[PlaceT, TakenT, ResultT]):

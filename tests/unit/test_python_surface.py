@@ -24,7 +24,7 @@ from robolink.journal import open_journal
 from robolink.methods import TwoPoseSource, measure_two_pose
 from robolink.model import EntryKind, NewEntry, WorkBox
 from robolink.model._movement import MotionProfile
-from robolink.procedures import InputSource, ManualPinSource, TouchPlan
+from robolink.procedures import InputSource, ManualPinSource, ProofBasis, ProvesAgain, TouchPlan
 from robolink.runner import foreseen_steps
 from robolink.testing import PaperCell
 from robolink.version import VERSION
@@ -242,6 +242,24 @@ def test_a_source_of_an_input_with_its_hook_by_the_old_name_measures_and_shows_a
     ]
     assert source.steps(1, 2) == (1, 2, Plan())
     assert source.procedure(1, 2) == (1, 2, Plan(None, retake=False))
+
+
+def test_a_source_without_a_proof_is_refused_when_it_is_made_not_when_it_has_measured():
+    class Unproved(ProvesAgain):
+        pass
+
+    with pytest.raises(TypeError, match="proof_of"):
+        Unproved()  # type: ignore[abstract]
+
+
+def test_a_source_that_proves_in_its_own_way_needs_no_other_hook():
+    class ByHand(ProvesAgain):
+        def proof(self, context, tool, result, *, tip, tolerance_mm):
+            return context, tool, result, tip, tolerance_mm
+
+    basis: Any = ProofBasis(*cast("Any", ("context", 1, "result", "tip", 0.1)))
+    made: Any = ByHand()  # type: ignore[abstract]  # proof_of is made of proof
+    assert made.proof_of(basis) == ("context", 1, "result", "tip", 0.1)
 
 
 # What a script gives by mistake is named for what it is, and nothing is sent.

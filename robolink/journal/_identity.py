@@ -4,7 +4,7 @@ import re
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
-from robolink.errors import JournalError
+from robolink.errors import JournalError, RemoteProtocolError
 from robolink.messages import tr
 from robolink.model import EntryKind, Identity, NewEntry, Signature, Who
 from robolink.timing import wall_label
@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 _LOOPBACK_PORT: Final = re.compile(r"[/@](?:127\.[\d.]+|localhost|\[::1\]):(\d+)")
 _FIRST_LENT_PORT: Final = 32768
 """Ports from here on are given out by the system (Linux; other systems begin later)."""
+
+_ANSWERS: Final = 3
+"""Of so many two must be the same."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +75,10 @@ class Naming:
     The controller is asked at the first use of the log, not before: whoever only stops it
     waits for no question. It is asked again as long as it could not tell.
 
+    An answer that is not on record for its address is asked for a second time. A text protocol
+    has no checksum: under a name that came bent, the next run would not meet what this one left
+    open.
+
     Attributes:
         remarks: What a person should know about it, once, in sentences.
 
@@ -85,6 +92,7 @@ class Naming:
         self._store = store
         self._text = text
         self._who: Who | None = None
+        self._told_twice: Identity | None = None
         self._settled: Names | None = None
 
     def ask(self, who: Who) -> None:
@@ -96,11 +104,16 @@ class Naming:
 
         Raises:
             JournalError: The journal cannot be read.
-            TransportError, RemoteProtocolError: The controller was asked, and the link failed.
+            TransportError, RemoteProtocolError: The controller was asked, and the link failed, or
+                it never told the same twice.
         """
         if self._settled is None:
             found = self._who() if self._who else None
             meeting = self._looked_up(found)
+            if self._who and found and found.certain and found.name != meeting.before:
+                if found != self._told_twice:
+                    found = self._told_twice = _told_twice(self._who, found)
+                meeting = self._looked_up(found)
             if found is None or (found.certain and self._recorded(found, meeting, signature)):
                 self._settled = meeting.names
             return meeting.names
@@ -137,6 +150,26 @@ class Naming:
             return False
         self.remarks = _remarks(found, meeting)
         return True
+
+
+def _told_twice(who: Who, first: Identity) -> Identity:
+    """Return what a controller tells twice when it is asked up to three times."""
+    told = [first]
+    while len(told) < _ANSWERS:
+        told.append(who())
+        if told[-1] in told[:-1]:
+            return told[-1]
+    raise RemoteProtocolError(
+        tr(
+            "{address} told something else each time it was asked who it is: {names}.",
+            address=first.address,
+            names=", ".join(one.name for one in told),
+        ),
+        remedy=tr(
+            "Nothing was put on record, so nothing was changed. See what bends the answers "
+            "(cable, converter, a second program), then try again."
+        ),
+    )
 
 
 def _listed(rows: "NameRows", name: str) -> Names:

@@ -182,6 +182,7 @@ _ITSELF: Final[Mapping[str, StandIn]] = {
     "robolink.controllers.DriverLink.carry_out": _carried_out,
     "robolink.controllers.MotionGroupCore._marked": _moved_unmarked,
     "robolink.controllers.markers.MarkerStore.begin": _begun,
+    "robolink.journal._identity._told_twice": lambda _who, first: first,
     "robolink.journal._outcome_log.JournalOutcomeLog._refuse_lost": _nothing,
     "robolink.controllers.markers.MarkerStore.doubt": _open,
     "robolink.controllers.epson.session.EpsonSession._end": _nothing,

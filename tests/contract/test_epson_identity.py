@@ -3,8 +3,9 @@
 import pytest
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.faults import Fault, FaultAction, FaultPlan
 from robolink_simulators.hosting.in_process.epson import register, unregister
-from robolink_simulators.hosting.streams.epson import serve_tcp
+from robolink_simulators.hosting.streams.epson import serve_serial, serve_tcp
 
 import robolink
 from robolink.errors import OutcomeUnknownError
@@ -73,15 +74,58 @@ def test_a_restart_does_not_make_another_controller_of_it(tmp_path):
 
 
 def test_asking_who_it_is_takes_two_queries_and_waits_until_it_must(simulator):
-    with serve_tcp(simulator) as host, robolink.connect(host.url) as controller:
-        controller.status()
-        controller.stop()
-        assert "$GetContNo" not in asked(simulator)
-        before = controller.exchanges
-        controller.outcomes.open_markers()
-        assert controller.exchanges - before == 2
-        controller.outcomes.open_markers()
-        assert controller.exchanges - before == 2
+    with serve_tcp(simulator) as host:
+        with robolink.connect(host.url) as controller:
+            controller.status()
+            controller.stop()
+            assert "$GetContNo" not in asked(simulator)
+            before = controller.exchanges
+            for _ in range(2):
+                controller.outcomes.open_markers()
+                assert controller.exchanges - before == 4  # each twice: it was never met before
+        with robolink.connect(host.url) as controller:
+            before = controller.exchanges
+            controller.outcomes.open_markers()
+            assert controller.exchanges - before == 2
+
+
+@pytest.mark.fault("F07")
+@pytest.mark.parametrize("met_before", [False, True])
+@pytest.mark.parametrize(
+    "fault",
+    [
+        Fault(FaultAction.GARBLE_REPLY, match="GetContNo", position=13, bit=0),
+        Fault(FaultAction.GARBLE_REPLY, match="GetRobotSerial", position=20, bit=0),
+    ],
+    ids=["number", "serial"],
+)
+def test_a_write_that_ends_after_an_answer_came_bent_is_met_by_the_next_run(
+    simulator, fault, met_before
+):
+    url = register("bent-identity", simulator, clock=ManualClock())
+    try:
+        if met_before:
+            with robolink.connect(url) as controller:
+                controller.outcomes.open_markers()
+        simulator.faults = FaultPlan([fault])
+        marker = leave_open(url)
+        assert simulator.faults.pending == ()
+        with robolink.connect(url) as controller:
+            assert controller.outcomes.open_markers() == (marker,)
+            assert controller.outcomes.remarks == ()
+    finally:
+        unregister("bent-identity")
+
+
+@pytest.mark.fault("F08")
+def test_two_swapped_digits_of_a_serial_number_make_no_other_controller_of_it(simulator):
+    """A checksum by XOR does not notice them (docs/remote-rs232.md)."""
+    query = "Print RobotSerial$"
+    with serve_serial(simulator) as host:
+        simulator.faults = FaultPlan([Fault(FaultAction.SWAP_BYTES, match=query)])
+        with robolink.connect(host.url) as controller:
+            assert controller.outcomes.identity == f"epson:{simulator.machine.serial}"
+        assert simulator.faults.pending == ()
 
 
 def test_older_firmware_is_asked_in_its_command_window_once_it_is_ready(options):

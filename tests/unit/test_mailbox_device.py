@@ -272,3 +272,11 @@ def test_what_is_no_number_is_equal_to_nothing(place):
     x, y, z, a, b, c = (math.nan if at == place else 10.0 * at for at in range(6))
     frame = (x, y, z, a, b, c)
     assert not frames_match(frame, frame, tolerance=1e9)
+
+
+@pytest.mark.usefixtures("mailbox_program")
+def test_a_number_that_was_read_wrong_is_not_the_name_under_which_a_write_is_marked(cell):
+    cell.link.plan("read_device", lambda _deliver: encode_device_id(0x1234_BEEE))
+    controller = cell.met()
+    assert controller.outcomes.identity == "softmotion:1234BEEF"
+    assert controller.device_id == 0x1234_BEEF

@@ -107,10 +107,18 @@ class Mailbox(DriverLink):
     ) -> None:
         self.wire = wire
         self.device_id = device_id
-        outcomes.ask(lambda: identity_of(wire, device_id))
+        self._just_read = True
+        outcomes.ask(self._who)
         self.snapshots = snapshots
         self.commands = CommandSender(wire, snapshots, Bystanders(outcomes, tell))
         super().__init__(wire.identity, wire.clock, wire.latch, outcomes, gate=wire.uninterrupted())
+
+    def _who(self) -> Identity:
+        """Return who it is: as it was read when the mailbox was met, from then on anew."""
+        if not self._just_read:
+            self.device_id = read_device_id(self.wire)
+        self._just_read = False
+        return identity_of(self.wire, self.device_id)
 
     @property
     def waited_on(self) -> bool:

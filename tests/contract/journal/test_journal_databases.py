@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from robolink.errors import LeaseHeldError, TransportTimeoutError
+from robolink.errors import LeaseHeldError, RemoteProtocolError, TransportTimeoutError
 from robolink.journal import ChainVerification, LeaseHolder
 from robolink.journal.store.migrations import MIGRATIONS
 from robolink.model import EntryKind, Identity, NewEntry, Signature
@@ -120,6 +120,7 @@ BY_NAME = "epson+tcp://cell-5.plant:5000"
 BY_ADDRESS = "epson+tcp://192.168.0.1:5000"
 PLACE = "epson@192.168.0.1:5000"
 ROBOT_A, ROBOT_B = "epson:RC1/T6-1", "epson:RC2/T6-2"
+BENT = "epson:RB1/T6-1"
 
 
 def met(journal, name, address=BY_NAME, *, certain=True, **options):
@@ -221,7 +222,10 @@ def test_a_port_that_the_system_lends_passes_nothing_on(journal):
 
 def test_who_is_too_busy_to_tell_is_taken_for_whom_it_was_and_asked_again(journal):
     met(journal, ROBOT_A).begin(marker("a"))
-    told = [Identity(PLACE, BY_NAME, PLACE, certain=False), Identity(ROBOT_B, BY_NAME, PLACE)]
+    told = [
+        Identity(PLACE, BY_NAME, PLACE, certain=False),
+        *[Identity(ROBOT_B, BY_NAME, PLACE)] * 2,
+    ]
     log = journal.log(BY_NAME)
     log.ask(lambda: told.pop(0))
     assert [known.operation for known in log.open_markers()] == ["a"]
@@ -230,22 +234,54 @@ def test_who_is_too_busy_to_tell_is_taken_for_whom_it_was_and_asked_again(journa
     assert log.identity == ROBOT_B
 
 
-def test_a_controller_is_asked_once_and_not_before_it_must_be(journal):
-    asked = []
-
-    def who():
-        asked.append(1)
-        return Identity(ROBOT_A, BY_NAME, PLACE)
-
+def told_in_turn(journal, *names):
+    """Return the log of a controller that tells these names, and the list of those untold."""
+    untold = [Identity(name, BY_NAME, PLACE, certain=name != PLACE) for name in names]
     log = journal.log(BY_NAME)
-    log.ask(who)
-    log.beat()
-    log.close()
-    assert asked == []
+    log.ask(lambda: untold.pop(0))
+    return log, untold
+
+
+def test_a_controller_is_not_asked_before_it_must_be_and_once_where_it_is_on_record(journal):
+    for spare in (1, 2):
+        log, untold = told_in_turn(journal, *[ROBOT_A] * 3)
+        log.beat()
+        log.close()
+        assert len(untold) == 3
+        log.begin(marker("a"))
+        log.clear("a")
+        log.open_markers()
+        assert len(untold) == spare
+
+
+@pytest.mark.parametrize("before", ["", ROBOT_A, ROBOT_B])
+@pytest.mark.parametrize("told", [(BENT, ROBOT_A, ROBOT_A), (ROBOT_A, BENT, ROBOT_A)])
+def test_a_name_that_came_bent_hides_nothing_from_the_next_run(journal, before, told):
+    if before:
+        met(journal, before).open_markers()
+    log, _ = told_in_turn(journal, *told)
     log.begin(marker("a"))
-    log.clear("a")
+    assert log.identity == ROBOT_A
+    assert [known.operation for known in met(journal, ROBOT_A).open_markers()] == ["a"]
+    assert not any(BENT in verdict for verdict in verdicts(journal))
+
+
+def test_a_controller_that_never_tells_the_same_name_twice_is_no_controller_on_record(journal):
+    log, _ = told_in_turn(journal, ROBOT_A, BENT, ROBOT_B, ROBOT_A, ROBOT_A)
+    with pytest.raises(RemoteProtocolError, match=f"{ROBOT_A}, {BENT}, {ROBOT_B}"):
+        log.begin(marker("a"))
+    assert journal.open_markers() == ()
+    assert journal.addresses_of(ROBOT_A) == ()
+    log.begin(marker("a"))
+    assert [known for known, _ in journal.open_markers()] == [ROBOT_A]
+
+
+def test_a_name_that_a_busy_controller_does_not_tell_again_is_not_yet_its_name(journal):
+    log, untold = told_in_turn(journal, ROBOT_A, PLACE, PLACE, ROBOT_A, ROBOT_A)
     log.open_markers()
-    assert asked == [1]
+    assert journal.addresses_of(ROBOT_A) == ()
+    assert log.identity == ROBOT_A
+    assert untold == []
 
 
 def test_a_link_that_fails_while_asking_records_nothing(journal):

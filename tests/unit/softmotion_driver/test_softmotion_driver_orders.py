@@ -132,6 +132,7 @@ def test_a_plc_that_started_anew_before_a_command_is_told_nothing(cell, plc, con
     with pytest.raises(TransportBrokenError, match="restarted"):
         controller.io.set_output(5, 1)
     assert cell.link.sent == []
+    cell.connect()
     assert cell.open_requests() == []
 
 

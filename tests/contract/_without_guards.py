@@ -185,7 +185,7 @@ _ITSELF: Final[Mapping[str, StandIn]] = {
     "robolink.journal._identity._told_twice": lambda _who, first: first,
     "robolink.journal._outcome_log.JournalOutcomeLog._refuse_lost": _nothing,
     "robolink.controllers.markers.MarkerStore.doubt": _open,
-    "robolink.controllers.epson.session.EpsonSession._end": _nothing,
+    "robolink.controllers.epson.line.EpsonConversation._end": _nothing,
     "robolink.controllers.softmotion.wire.MailboxWire.ended": _ended,
     "robolink.controllers.ToolWrite.change": _changed,
     "robolink.controllers.ToolTableCore.require_writable": _nothing,

@@ -83,18 +83,33 @@ def test_the_late_end_of_an_execute_does_not_disturb_a_stop(serve):
         assert stop_now(cell.url).state is ControllerState.READY
 
 
+def asked_of(simulator):
+    """Return the names of the requests that came in, in their order."""
+    return [text.split(",")[0].strip() for _, way, text in simulator.log if way == ">"]
+
+
 @pytest.mark.remote_ethernet
-def test_who_does_not_say_who_it_is_is_logged_out_all_the_same(serve):
+@pytest.mark.parametrize("action", [FaultAction.DROP_REPLY, FaultAction.TRUNCATE_REPLY])
+def test_who_falls_silent_once_it_stands_is_told_nothing_more(serve, action):
     simulator = EpsonSimulator(seed=7)
     met: list[str] = []
     with serve(simulator) as cell:
-        simulator.faults.add(Fault(FaultAction.DROP_REPLY, match="GetContNo"))
+        simulator.faults.add(Fault(action, match="GetContNo", position=7))
         assert stop_now(cell.url, timeout_s=0.2, met=met.append).ready
-        asked = [text for _, way, text in simulator.log if way == ">"]
+        asked = asked_of(simulator)
+        with cell.connect() as controller:  # nobody is left logged in
+            assert controller.status().ready
     assert met == []
-    assert [text.split(",")[0].strip() for text in asked] == [
-        *("$Login", "$Abort", "$Stop", "$GetStatus", "$GetContNo", "$Logout")
-    ]
+    assert asked == ["$Login", "$Abort", "$Stop", "$GetStatus", "$GetContNo"]
+
+
+def test_who_cannot_say_who_it_is_is_logged_out_all_the_same(serve):
+    simulator = EpsonSimulator(seed=7, options=EpsonOptions(rc_plus=5, status_flags=10))
+    met: list[str] = []
+    with serve(simulator) as cell:
+        assert stop_now(cell.url, met=met.append).ready
+        assert asked_of(simulator)[-1] == "$Logout"
+    assert met == []
 
 
 @pytest.mark.remote_ethernet

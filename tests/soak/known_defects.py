@@ -48,6 +48,7 @@ _COMMANDS: Final = "robolink.controllers.softmotion.commands"
 _SENDER: Final = f"{_COMMANDS}.CommandSender"
 _CORE: Final = "robolink.controllers.controller_core.ControllerCore"
 _BEGIN: Final = "robolink.controllers.markers.MarkerStore.begin"
+_CONVERSATION: Final = "robolink.controllers.epson.line.EpsonConversation"
 _SESSION: Final = "robolink.controllers.epson.session.EpsonSession"
 
 _THREAD: Final = "stops from a second thread"
@@ -185,7 +186,7 @@ DEFECTS: Final = (
     ),
     KnownDefect(
         "an EPSON session goes on after a time-out",
-        {f"{_SESSION}._end": stand_ins.nothing},
+        {f"{_CONVERSATION}._end": stand_ins.nothing},
         CellKind.EPSON,
         found_by="users of EPICS asyn",
     ),

@@ -20,6 +20,8 @@ from robolink.errors import (
     RejectedError,
     RemoteProtocolError,
     StoppedError,
+    TransportClosedError,
+    TransportError,
     TransportTimeoutError,
 )
 from robolink.files.durable import file_name, state_folder
@@ -377,6 +379,7 @@ class Wire:
     def __init__(self, *pieces):
         self.clock = ManualClock()
         self.sent = []
+        self.closed = False
         self._pieces = list(pieces)
 
     def send(self, data, *, deadline, secret=False):
@@ -386,6 +389,9 @@ class Wire:
         if not self._pieces:
             raise TransportTimeoutError("Nothing came.", remedy="Look at it.")
         return self._pieces.pop(0)
+
+    def close(self):
+        self.closed = True
 
 
 def over(wire: Any) -> EpsonConversation:
@@ -405,12 +411,38 @@ def test_a_stop_passes_over_what_it_did_not_ask_for(answer):
 
 
 def test_who_only_ever_answers_something_else_is_no_controller():
-    wire = Wire(LATE * 8, LATE * 8, LATE + b"#Abort,0\r\n")
+    wire = Wire(LATE * 15 + b"#Abort,0\r\n", LATE * 15 + b"#Stop,0\r\n", LATE * 8, LATE * 8)
     conversation = over(wire)
+    for name in ("Abort", "Stop"):  # each request has its own count
+        assert conversation.exchange(name).fields == ("0",)
     with pytest.raises(RemoteProtocolError, match="a question nobody asked"):
+        conversation.exchange("GetStatus")
+
+
+@pytest.mark.parametrize(
+    "pieces",
+    [(), (b"#GetCon",), (LATE * 16,), (b"",)],
+    ids=["nothing", "half of it", "others only", "the end"],
+)
+def test_after_an_answer_that_was_given_up_nothing_more_is_sent(pieces):
+    wire = Wire(*pieces)
+    conversation = over(wire)
+    with pytest.raises((TransportError, RemoteProtocolError)) as given_up:
+        conversation.exchange("GetContNo")
+    assert (given_up.value.controller, conversation.alive, wire.closed) == ("robot", False, True)
+    with pytest.raises(TransportClosedError, match="has ended") as refused:
+        conversation.exchange("Logout")
+    assert refused.value.__cause__ is given_up.value
+    assert wire.sent == [b"$GetContNo\r\n"]
+
+
+def test_a_conversation_that_was_closed_stays_closed():
+    wire = Wire(b"#Abort,0\r\n")
+    conversation = over(wire)
+    conversation.close()
+    with pytest.raises(TransportClosedError):
         conversation.exchange("Abort")
-    # The next request has its own count, and what came late is none of its answers.
-    assert conversation.exchange("Abort").fields == ("0",)
+    assert (wire.closed, wire.sent) == (True, [])
 
 
 def test_a_refusal_without_a_name_is_the_answer_to_a_stop():

@@ -8,6 +8,11 @@ A stop holds the conversation as it stands here: it has no record beside it, not
 be pending, and what turns up unasked, such as the late answer to the Execute that it ends, is
 passed over. A session (:mod:`robolink.controllers.epson.session`) takes nothing unasked but the
 answer to its own Execute, and adds the lock and the latch.
+
+An answer that was given up ends either of them for good: late bytes die with the connection and can
+never be taken for the answer to a later question (docs/reference/faults.md F01, F06, F09). Nothing
+more is sent then, not even a Logout: the state in which that does no harm was read before the
+silence.
 """
 
 from dataclasses import dataclass
@@ -18,7 +23,10 @@ from robolink.errors import (
     LoginUnansweredError,
     RejectedError,
     RemoteProtocolError,
+    RobolinkError,
     TransportBrokenError,
+    TransportClosedError,
+    TransportError,
     TransportTimeoutError,
 )
 from robolink.messages import tr
@@ -35,6 +43,7 @@ from robolink.protocols.epson_text import (
 from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.timing import Clock, Deadline
 from robolink.transport import LinkUrl, TraceSink, TracingTransport, Transport, open_transport
+from robolink.transport.byte_stream import link_closed
 
 if TYPE_CHECKING:
     from robolink.protocols.epson_binary import Dialect
@@ -142,7 +151,7 @@ _STRAYS: Final = 16
 
 
 class EpsonConversation:
-    """Requests and answers on one line, one after the other.
+    """Requests and answers on one line, one after the other, until one of them is in doubt.
 
     Attributes:
         identity: Which controller this is.
@@ -161,6 +170,12 @@ class EpsonConversation:
         self.identity, self.clock = line.transport.identity, line.transport.clock
         self.timeout_s = timeout_s
         self._passed_over = 0
+        self._ended_by: RobolinkError | None = None
+
+    @property
+    def alive(self) -> bool:
+        """Whether it can still be used."""
+        return self._ended_by is None
 
     def login(self, password: str) -> None:
         """Log in, with an empty password where none is set. One attempt.
@@ -198,17 +213,44 @@ class EpsonConversation:
         Args:
             request: It moves nothing, so that its answer comes within the time-out.
             secret: Whether the traces may not see it.
+
+        Raises:
+            TransportClosedError: The conversation is over; nothing was sent.
+            TransportError, RemoteProtocolError: It is over from here on.
         """
         self._line.require_carried(request.name, *request.parameters)
+        self._require_alive(request)
         self._passed_over = 0
-        data = self._codec.send(request)
-        deadline = Deadline.after(self.clock, self.timeout_s)
-        self._transport.send(data, deadline=deadline, secret=secret)
-        return self._receive(request, deadline)
+        try:
+            data = self._codec.send(request)
+            deadline = Deadline.after(self.clock, self.timeout_s)
+            self._transport.send(data, deadline=deadline, secret=secret)
+            return self._receive(request, deadline)
+        except RobolinkError as error:
+            self._end(error)
+            raise
 
     def close(self) -> None:
         """Close the connection. Idempotent."""
+        self._ended_by = self._ended_by or link_closed(self.identity)
         self._transport.close()
+
+    def _require_alive(self, request: Request) -> None:
+        if self._ended_by is not None:
+            raise TransportClosedError(
+                tr("The connection to {identity} has ended.", identity=self.identity),
+                remedy=tr("Connect again; the controller's state is then read again."),
+                controller=self.identity,
+                request=request.name,
+            ) from self._ended_by
+
+    def _end(self, error: RobolinkError) -> None:
+        if isinstance(error, (TransportError, RemoteProtocolError)):
+            if not error.controller:
+                error.controller = self.identity
+            if self._ended_by is None:
+                self._ended_by = error
+            self._transport.close()
 
     def _receive(self, request: Request, deadline: Deadline) -> Reply | Refusal:
         """Read until the answer to a request that was sent has come."""

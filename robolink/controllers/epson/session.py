@@ -7,9 +7,8 @@ that are legal meanwhile. Whoever holds the lock reads; an Execute answer that t
 the pending motion's slot. The lock is held for one exchange, never for a motion, so that a
 stop always gets in.
 
-A time-out, a broken link or an answer that nobody asked for ends the session for good: late
-bytes die with the connection and can never be taken for the answer to a later question
-(docs/reference/faults.md F01, F06, F09).
+Like every conversation it ends for good with a time-out or a broken link; a session ends with an
+answer that nobody asked for, too.
 
 What a request does is judged from the text that leaves, not from who sends it: one that nobody
 thought of counts as acting, and is held back while a stop is in force.
@@ -30,8 +29,6 @@ from robolink.errors import (
     RejectedError,
     RemoteProtocolError,
     RobolinkError,
-    TransportClosedError,
-    TransportError,
     TransportTimeoutError,
 )
 from robolink.interrupts import InterruptGate
@@ -137,13 +134,7 @@ class EpsonSession(EpsonConversation):
         self._gate = InterruptGate()
         self._gate.open()
         self._pending: PendingExecute | None = None
-        self._ended_by: RobolinkError | None = None
         self.latch = StopLatch(self.identity)
-
-    @property
-    def alive(self) -> bool:
-        """Whether the session can still be used."""
-        return self._ended_by is None
 
     @property
     def pending(self) -> PendingExecute | None:
@@ -220,13 +211,7 @@ class EpsonSession(EpsonConversation):
 
     def close(self) -> None:
         """Close the connection. Idempotent."""
-        if self._ended_by is None:
-            self._ended_by = TransportClosedError(
-                tr("The connection to {identity} is closed.", identity=self.identity),
-                remedy=tr("Connect again."),
-                controller=self.identity,
-            )
-        self._transport.close()
+        super().close()
         self._gate.close()
 
     def _collect(self) -> None:
@@ -256,13 +241,7 @@ class EpsonSession(EpsonConversation):
             self._pending.abort_requested = True
 
     def _check_usable(self, request: Request) -> None:
-        if self._ended_by is not None:
-            raise TransportClosedError(
-                tr("The connection to {identity} has ended.", identity=self.identity),
-                remedy=tr("Connect again; the controller's state is then read again."),
-                controller=self.identity,
-                request=request.name,
-            ) from self._ended_by
+        self._require_alive(request)
         if self._pending is not None and self._pending.answer is None:
             command = find_command(request.name)
             if command is None or not command.during_execute:
@@ -319,14 +298,6 @@ class EpsonSession(EpsonConversation):
                 "again; if it happens twice, look for a second program on this controller."
             ),
         )
-
-    def _end(self, error: RobolinkError) -> None:
-        if isinstance(error, (TransportError, RemoteProtocolError)):
-            if not error.controller:
-                error.controller = self.identity
-            if self._ended_by is None:
-                self._ended_by = error
-            self._transport.close()
 
 
 def log_in(line: EpsonLine, password: Secret | None, *, timeout_s: float) -> EpsonSession:

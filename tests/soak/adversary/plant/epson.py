@@ -228,11 +228,9 @@ class TappedTransport(BentTransport):
         address: Its URL.
 
     Attributes:
-        ends_with_silence: Whether nothing may leave any more once an answer was given up.
         impatience: Movements for which the controller gives up waiting.
     """
 
-    ends_with_silence = True
     impatience: CountedActs | None = None
 
     def __init__(
@@ -259,8 +257,7 @@ class TappedTransport(BentTransport):
         text = self.told(data, secret=secret)
         if self.line is not None:
             self.line.announce(text)
-        forbidden = self._given_up if self.ends_with_silence else ""
-        self._tap.leaving(self._process, replace(_classified(text), forbidden=forbidden))
+        self._tap.leaving(self._process, replace(_classified(text), forbidden=self._given_up))
         self._last = text
         if self.impatience is not None and self.impatience.due(text) and _MOVES.match(text):
             self._early = True
@@ -355,10 +352,10 @@ class EpsonSerialPlant(EpsonPlant):
 
 
 class TappedLine(TappedTransport):
-    """A process's time at the line, on which the adversary reads the frames."""
+    """A process's time at the line, on which the adversary reads the frames.
 
-    ends_with_silence = False
-    """A line outlives every session: it is silenced and turned on anew, in the same process."""
+    A line that is turned on anew is another link: what is forbidden over one is not over the next.
+    """
 
     def told(self, data: bytes, *, secret: bool) -> str:
         """Return a request in words, as the same one is written on a network."""

@@ -9,7 +9,7 @@ looked for before anything is believed, and the error names what was found (docs
 docs/reference/softmotion.md 4.4; docs/reference/faults.md F33, F34, F70).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Final, TypeVar
 
 from robolink.controllers.softmotion.heartbeat import FROZEN_S, PlcHeartbeat
@@ -22,7 +22,6 @@ from robolink.errors import (
     TransportTimeoutError,
 )
 from robolink.messages import tr
-from robolink.model import of_no_tool
 from robolink.protocols.mailbox import (
     PROBE,
     RESPONSE,
@@ -193,27 +192,34 @@ class Snapshots:
         return now
 
     def slot(self, number: int, *, keep: bool = False) -> Slot:
-        """Read a tool slot; needs no ownership, and raises like :meth:`take`.
-
-        A slot has no probe. So values that no tool has are looked into: a program that was
-        changed while it ran may lay them in another order (docs/reference/faults.md F33). Where
-        that is not so, the slot really holds them, and a person has to be able to replace them:
-        whoever reads it asks :attr:`robolink.model.ToolOffset.of_no_tool`.
+        """Read one tool slot as :meth:`slots` does.
 
         Args:
             number: Of the slot.
             keep: Whether the session goes on after a slot that cannot be used.
         """
-        name = tr("Tool slot {number}", number=number)
+        return self.slots((number,), keep=keep)[number]
 
-        def read() -> Slot:
+    def slots(self, numbers: Iterable[int], *, keep: bool = False) -> dict[int, Slot]:
+        """Read tool slots; needs no ownership, and raises like :meth:`take`.
+
+        A slot has no probe, and its checksum is right in each order of words. A program that was
+        changed while it runs may lay them in another order (docs/reference/faults.md F33), and
+        that often makes numbers of a tool. The snapshot before them showed the right order; so
+        must one behind them, which is then the :attr:`latest`, or nothing of them is told.
+
+        Args:
+            numbers: Of the slots.
+            keep: Whether the session goes on after a slot that cannot be used.
+        """
+
+        def read(number: int) -> Slot:
+            name = tr("Tool slot {number}", number=number)
             return self._whole(lambda: self._wire.read_slot(number), decode_slot, name, keep=keep)
 
-        slot = read()
-        if of_no_tool(slot.tool):
-            self.take()  # tells by the probe what is the matter, if it is the order
-            return read()
-        return slot
+        found = {number: read(number) for number in numbers}
+        self.take()
+        return found
 
     def news(
         self, since: Response, *, wait_s: float = LOOK_S, begun_ns: int | None = None

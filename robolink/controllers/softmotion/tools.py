@@ -169,6 +169,16 @@ class SoftMotionToolTable(ToolTableCore):
         """Tell whether the PLC holds both alike: 1e-9, rotations as matrices."""
         return self._mailbox.same(a, b)
 
+    def read_all(self) -> dict[int, ToolOffset | None]:
+        """Read every slot, with one proof of the word order behind them all."""
+        found = {
+            tool: self._mailbox.tool_in(slot)
+            for tool, slot in self._mailbox.snapshots.slots(SLOTS).items()
+        }
+        for tool, offset in found.items():
+            self._mailbox.markers.ledger.saw_tool(tool, offset)
+        return found
+
     def name(self, tool: int) -> str:
         """Read the name of a slot, empty when it has none."""
         self.require_writable(tool)
@@ -193,7 +203,7 @@ class SoftMotionToolTable(ToolTableCore):
             owned = bool(mailbox.wire.epoch)
             slot = mailbox.snapshots.slot(tool)
             stored = mailbox.tool_in(slot)
-            now = mailbox.snapshots.take()
+            now = mailbox.snapshots.latest
             require_still(now)
             in_force = now.tool_slot == tool
             if not self.same(stored, requested):

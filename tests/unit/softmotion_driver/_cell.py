@@ -5,12 +5,13 @@ from contextlib import ExitStack
 from typing import Any, TypeVar
 
 from robolink_simulators.cell.clock import ManualClock
+from robolink_simulators.softmotion.mailbox.image import arranged
 
 from robolink.controllers import SoftMotionController, open_softmotion
 from robolink.errors import ConnectError, RobolinkError, TransportClosedError, TransportTimeoutError
 from robolink.journal import memory_journal
 from robolink.model import Signature, new_operation
-from robolink.protocols.mailbox import encode_slot
+from robolink.protocols.mailbox import RESPONSE, SLOT, WordOrder, encode_slot
 from robolink.transport import MailboxHead
 from tests.unit.softmotion_driver._plc import Plc
 
@@ -46,6 +47,7 @@ class PlcLink:
         self.beats: list[int] = []
         self.response: Distortion = tuple
         self.command: Distortion = tuple
+        self._order = WordOrder.LOW_FIRST
         self._mishaps: dict[str, list[Mishap]] = {}
 
     def plan(self, method: str, mishap: Mishap, *, nth: int = 1) -> None:
@@ -80,6 +82,10 @@ class PlcLink:
 
         self.plan(method, mishap, nth=nth)
 
+    def lay_high_first(self) -> None:
+        """Let the PLC lay values of several words high word first from now on."""
+        self._order = WordOrder.HIGH_FIRST
+
     def silence(self) -> RobolinkError:
         """Return the error of a time-out, after which most links are closed."""
         self.closed = not self.recovers
@@ -102,11 +108,13 @@ class PlcLink:
 
     def read_response(self) -> tuple[int, ...]:
         """Read the response block."""
-        return self.response(self._exchange("read_response", self.plc.response))
+        words = self._exchange("read_response", self.plc.response)
+        return self.response(arranged(RESPONSE, words, self._order))
 
     def read_slot(self, slot: int) -> tuple[int, ...]:
         """Read a tool slot."""
-        return self._exchange("read_slot", lambda: encode_slot(self.plc.slots[slot]))
+        words = self._exchange("read_slot", lambda: encode_slot(self.plc.slots[slot]))
+        return arranged(SLOT, words, self._order)
 
     def read_device(self) -> tuple[int, ...]:
         """Read the device block; an old program has none."""

@@ -17,11 +17,13 @@ from robolink.errors import (
     OutcomeUnknownError,
     ReadBackError,
     RejectedError,
+    RemoteProtocolError,
     ReservedToolError,
     SelectedToolError,
     ToolChangedError,
     ToolError,
     ToolIndexError,
+    TransportClosedError,
     TransportTimeoutError,
     UndefinedToolError,
 )
@@ -418,3 +420,33 @@ def test_a_write_that_left_the_values_of_no_tool_is_settled_with_a_way_out(cell,
     (finding,) = done.settled
     assert finding.verdict is Verdict.CONFLICT
     assert "'robolink tool set' gives such a tool other values" in finding.sentence
+
+
+STILL_A_TOOL = ToolOffset(3.080040797, -1.730152027, -9.87097183, -9.8303)
+"""Read high word first, no number of it is one that no tool can have (1e-79, say)."""
+
+
+@pytest.mark.fault("F33")
+def test_a_word_order_that_changes_before_the_read_back_leaves_the_write_in_doubt(cell, controller):
+    before = list(cell.outcomes.recorded(tool=3))
+    cell.link.before("read_slot", cell.link.lay_high_first, nth=2)
+    with pytest.raises(OutcomeUnknownError, match="high word first"):
+        controller.tools.write(3, STILL_A_TOOL, expected=OLD)
+    assert len(cell.open_requests()) == 1
+    since = [entry.kind for entry in cell.outcomes.recorded(tool=3) if entry not in before]
+    assert EntryKind.READ_BACK not in since
+    done = recover(cell.connect(), confirm=lambda _finding: True)
+    assert [finding.verdict for finding in done.settled] == [Verdict.DONE]
+
+
+@pytest.mark.fault("F33")
+@pytest.mark.parametrize("read", [lambda tools: tools.read(3), lambda tools: tools.read_all()])
+def test_a_slot_in_another_word_order_is_neither_told_nor_recorded(cell, controller, read):
+    controller.tools.write(3, STILL_A_TOOL, expected=OLD)
+    before = list(cell.outcomes.recorded(tool=3))
+    cell.link.lay_high_first()
+    with pytest.raises(RemoteProtocolError, match="high word first"):
+        read(controller.tools)
+    assert list(cell.outcomes.recorded(tool=3)) == before
+    with pytest.raises(TransportClosedError):
+        controller.tools.read(3)

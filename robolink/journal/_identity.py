@@ -161,12 +161,12 @@ def _told_twice(who: Who, first: Identity) -> Identity:
             return told[-1]
     raise RemoteProtocolError(
         tr(
-            "{address} told something else each time it was asked who it is: {names}.",
+            "{address} identified itself differently each time it was asked: {names}.",
             address=first.address,
             names=", ".join(one.name for one in told),
         ),
         remedy=tr(
-            "Nothing was put on record, so nothing was changed. See what bends the answers "
+            "Nothing was recorded, and nothing was changed. Find what corrupts the answers "
             "(cable, converter, a second program), then try again."
         ),
     )

@@ -234,7 +234,6 @@ _AS_IMPORTED: Final[Mapping[str, Mapping[str, StandIn]]] = {
     },
     "robolink.controllers.epson.answers.require_ready": {
         "robolink.controllers.epson.window.require_ready": _nothing,
-        "robolink.controllers.epson.group.require_ready": _nothing,
     },
 }
 LEFT: Final[Mapping[str, Mapping[str, StandIn]]] = {

@@ -75,6 +75,12 @@ def test_each_place_and_what_tries_it_are_there(promise, place, tried):
     assert run_on == set(KINDS) - (set(IMMOBILE) if tried in MOVING else set()), tried
 
 
+@pytest.mark.parametrize("place", sorted(LEFT))
+def test_what_is_taken_out_is_there(place):
+    for imported in LEFT[place]:
+        found(imported)
+
+
 def test_nothing_is_taken_out_that_the_page_does_not_name():
     assert set(LEFT) == {place for _, _, places, _ in ROWS for place in places} - UNTRIED
 

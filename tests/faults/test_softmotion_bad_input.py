@@ -84,7 +84,7 @@ def test_f33_another_word_order_is_named_and_nothing_is_written(order, meaning):
         with pytest.raises(RemoteProtocolError, match=r"\+0 registers") as refusal:
             cell.connect()
         assert meaning in refusal.value.what
-        assert "Nothing was written" in refusal.value.remedy
+        assert "correct the response address" in refusal.value.remedy
         check_nothing_was_written(cell)
 
 

@@ -54,10 +54,9 @@ def controller_with(**changes):
 def test_a_wrong_probe_is_diagnosed(changes, hint):
     with (
         controller_with(**changes) as controller,
-        pytest.raises(RemoteProtocolError, match=hint) as refused,
+        pytest.raises(RemoteProtocolError, match=hint),
     ):
         controller.require_probe()
-    assert "Nothing was written" in refused.value.remedy
 
 
 def test_the_right_probe_passes():

@@ -19,7 +19,7 @@ from robolink.errors import (
     ToolError,
 )
 from robolink.methods import PointsSource
-from robolink.model import ANY, ToolOffset, Verdict
+from robolink.model import ANY, PROOFS, ToolOffset, Verdict
 from robolink.register_maps import RegisterTable
 from robolink.runner import Question
 from robolink.transaction import Wanted, change_tools, recover
@@ -66,6 +66,36 @@ def test_a_commit_bit_follows_the_values_and_is_taken_back(commit_bit):
     assert kinds == [("holding", 100), ("coil", 2000), ("coil", 2000)]
     assert [values for *_, values in commit_bit.plc.writes[1:]] == [[1], [0]]
     assert not controller.outcomes.open_markers()
+
+
+# With its words in the other order X is 3.14 mm: numbers of a tool, too.
+A_TOOL_IN_BOTH_ORDERS = ToolOffset(*unpack("<f", pack("<HH", 0x4049, 0x4120)), 0.0, 0.0)
+
+
+@pytest.mark.fault("F33")
+def test_a_program_that_lays_its_words_otherwise_since_the_write_leaves_it_unproved(
+    commit_bit, monkeypatch
+):
+    with commit_bit.connect() as controller:
+        before = controller.tools.read(1)
+        as_laid = commit_bit.client._read
+
+        def swapped_since(table, address, count):
+            words = as_laid(table, address, count)
+            if commit_bit.program.takeovers and address in (20, 100):
+                return tuple(words[at ^ 1] for at in range(count))
+            return words
+
+        monkeypatch.setattr(commit_bit.client, "_read", swapped_since)
+        with pytest.raises(OutcomeUnknownError) as unproved:
+            controller.tools.write(1, A_TOOL_IN_BOTH_ORDERS, expected=before)
+        assert "probe" in str(unproved.value.__cause__)
+        assert controller.outcomes.open_markers()
+        assert not list(controller.outcomes.recorded(tool=1, kinds=PROOFS))
+    with commit_bit.connect() as again:
+        recover(again)
+        assert again.tools.read(1) == A_TOOL_IN_BOTH_ORDERS
+        assert not again.outcomes.open_markers()
 
 
 def test_a_level_request_names_the_tool_and_stays_until_the_acknowledge(level):

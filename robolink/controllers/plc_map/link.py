@@ -364,9 +364,7 @@ class MappedPlc(DriverLink):
                 value=probe.value,
                 found=number.decode(words),
             ),
-            remedy=tr(
-                "{diagnosis} Nothing was written.", diagnosis=_diagnosis(self.registers, probe)
-            ),
+            remedy=_diagnosis(self.registers, probe),
         )
 
     def require_ready(self, tool: int) -> None:

@@ -250,8 +250,14 @@ class _RegisterWrite(ToolWrite):
         self._slots.bring_into_force(self._slot, self._content)
 
     def read_back(self) -> ToolOffset | None:
-        """Read what is stored."""
-        return self._slots.read(self._slot)
+        """Read what is stored.
+
+        Registers have no proof of their word order, and numbers in another order may be those of
+        a tool (docs/reference/faults.md F33): so the probe is compared behind them.
+        """
+        stored = self._slots.read(self._slot)
+        self._plc.require_probe()
+        return stored
 
 
 class RegisterResolver(MarkerResolver):

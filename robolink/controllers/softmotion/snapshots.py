@@ -86,8 +86,8 @@ def _require_place(words: Sequence[int], controller: str) -> None:
             order=found.order.meaning,
         ),
         remedy=tr(
-            "Nothing was written. Low word first at +0 is right: correct the response address in "
-            "the URL, or the word order in the PLC's union or in the gateway."
+            "Low word first at +0 is right: correct the response address in the URL, or the word "
+            "order in the PLC's union or in the gateway."
         ),
     )
 
@@ -100,8 +100,8 @@ def _foreign(meaning: str, controller: str) -> RemoteProtocolError:
             meaning=meaning,
         ),
         remedy=tr(
-            "Nothing was written. Compare the addresses in the URL and the program in the PLC "
-            "with 'robolink expert plc export'."
+            "Compare the addresses in the URL and the program in the PLC with "
+            "'robolink expert plc export'."
         ),
     )
 

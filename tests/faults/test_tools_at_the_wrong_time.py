@@ -253,7 +253,8 @@ def test_f42_no_tool_of_a_plc_is_changed_while_its_group_moves() -> None:
 def test_f45_what_a_pendant_writes_at_any_step_is_found_out(held: Held) -> None:
     """Up to the last look it is refused, with both values; only the write itself is blind."""
     steps: list[str] = []
-    assert write_with_the_pendant_at(held, None, steps) == "done"
+    for requests in ([], steps):  # who was never met before is asked more
+        assert write_with_the_pendant_at(held, None, requests) == "done"
     ends = [write_with_the_pendant_at(held, step, []) for step in range(len(steps))]
     written = next(step for step, text in enumerate(steps) if is_write(text))
     last_look = max(step for step, end in enumerate(ends) if end == "refused")

@@ -69,7 +69,7 @@ def test_a_commit_bit_follows_the_values_and_is_taken_back(commit_bit):
 
 
 # With its words in the other order X is 3.14 mm: numbers of a tool, too.
-A_TOOL_IN_BOTH_ORDERS = ToolOffset(*unpack("<f", pack("<HH", 0x4049, 0x4120)), 0.0, 0.0)
+A_TOOL_IN_BOTH_ORDERS = ToolOffset(unpack("<f", pack("<HH", 0x4049, 0x4120))[0], 0.0, 0.0)
 
 
 @pytest.mark.fault("F33")

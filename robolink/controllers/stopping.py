@@ -150,13 +150,12 @@ def _tell_who(talk: "EpsonConversation", met: "Callable[[str], None]") -> None:
     """Say which controller stands now, where this firmware tells it without an Execute."""
     from robolink.controllers.epson.link import name_from
 
-    try:
+    def asked() -> str:
         number = talk.exchange("GetContNo").fields
         robots = talk.exchange("GetRobotSerial", "0").fields
-    except RobolinkError:
-        return
-    if name := name_from([text.strip() for text in number], [text.strip() for text in robots]):
-        met(name)
+        return name_from([text.strip() for text in number], [text.strip() for text in robots])
+
+    _tell_what_is_said_twice(asked, met)
 
 
 def _stop_group(link: LinkUrl, means: _Means) -> "ControllerStatus":
@@ -183,10 +182,21 @@ def _tell_which(wire: "MailboxWire", met: "Callable[[str], None]") -> None:
     """Say which PLC stands now, where its program has a number."""
     from robolink.controllers.softmotion.mailbox import identity_of, read_device_id
 
-    with suppress(RobolinkError):
+    def asked() -> str:
         device_id = read_device_id(wire)
-        if device_id is not None:
-            met(identity_of(wire, device_id).name)
+        return "" if device_id is None else identity_of(wire, device_id).name
+
+    _tell_what_is_said_twice(asked, met)
+
+
+def _tell_what_is_said_twice(asked: "Callable[[], str]", met: "Callable[[str], None]") -> None:
+    """Ask which controller stands, and once more: an answer that came bent names another one.
+
+    The note of a stop that names another one holds nothing back here; one without a name does.
+    """
+    with suppress(RobolinkError):
+        if (name := asked()) and name == asked():
+            met(name)
 
 
 def _stop_other(link: LinkUrl, means: _Means) -> "ControllerStatus":

@@ -103,6 +103,21 @@ def test_who_falls_silent_once_it_stands_is_told_nothing_more(serve, action):
     assert asked == ["$Login", "$Abort", "$Stop", "$GetStatus", "$GetContNo"]
 
 
+@pytest.mark.remote_ethernet
+@pytest.mark.parametrize("request_", ["GetContNo", "GetRobotSerial"])
+def test_who_seems_to_be_another_controller_the_second_time_is_not_named(serve, request_):
+    simulator = EpsonSimulator(seed=7)
+    named: list[str] = []
+    with serve(simulator) as cell:
+        stop_now(cell.url, met=named.append)
+        assert len(named) == 1
+        simulator.faults.add(Fault(FaultAction.GARBLE_REPLY, match=request_, position=-3))
+        stop_now(cell.url, met=named.append)
+        assert simulator.faults.pending == ()
+        assert asked_of(simulator)[-1] == "$Logout"
+    assert len(named) == 1
+
+
 def test_who_cannot_say_who_it_is_is_logged_out_all_the_same(serve):
     simulator = EpsonSimulator(seed=7, options=EpsonOptions(rc_plus=5, status_flags=10))
     met: list[str] = []

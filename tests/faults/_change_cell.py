@@ -38,7 +38,7 @@ MOMENTS: Final[tuple[Moment, Moment]] = get_args(Moment)
 EpsonWire = Literal["sim", "tcp", "serial"]
 
 _names = count()
-_WRITE = re.compile(r'\$Execute,"TLSet (\d+), XY')
+_WRITE = re.compile(r'\$Execute,"TL(?:Set (\d+), XY|Clr (\d+))')
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class ChangeCell(ABC):
 
     @abstractmethod
     def writes(self) -> list[int]:
-        """Return the tools that were written so far, in order."""
+        """Return the tools that were written or cleared so far, in order."""
 
     @abstractmethod
     def values_written(self, tool: int = 1) -> list[ToolOffset]:
@@ -132,6 +132,11 @@ class ChangeCell(ABC):
             log = self.journal.log(self.url, clock=ManualClock())
             with robolink.connect(self.url, outcomes=log) as controller:
                 PROGRAMS[program](controller)
+
+    def deliver(self, program: str) -> None:
+        """Run a program in this process to its end."""
+        with robolink.connect(self.url, outcomes=self.journal.log(self.url)) as controller:
+            PROGRAMS[program](controller)
 
     def kill(self, program: str, step: Step) -> None:
         """Run a program and kill it at ``step``."""
@@ -227,7 +232,7 @@ class EpsonChangeCell(ChangeCell):
         epson: It.
     """
 
-    matters = re.compile(r'\$(Log|Execute,"(Tool \d|TLSet ))')
+    matters = re.compile(r'\$(Log|Execute,"(Tool \d|TL(Set|Clr) ))')
 
     def __init__(self, simulator: EpsonSimulator, url: str, folder: Path) -> None:
         super().__init__(simulator, url, folder)
@@ -245,8 +250,8 @@ class EpsonChangeCell(ChangeCell):
         return self._machine.tools.selected
 
     def writes(self) -> list[int]:
-        """Return the tools that were written so far, in order."""
-        found = [match.group(1) for match in map(_WRITE.match, self.requests) if match]
+        """Return the tools that were written or cleared so far, in order."""
+        found = [match[1] or match[2] for match in map(_WRITE.match, self.requests) if match]
         assert len(found) == self._machine.flash_writes
         return [int(tool) for tool in found]
 

@@ -22,6 +22,7 @@ import pytest
 from tests.faults import _killed_calibrations as calibrations
 from tests.faults import _killed_looks as looks
 from tests.faults import _killed_orders as orders
+from tests.faults import _killed_restores as restores
 from tests.faults._change_cell import ChangeCell, Step, WireStep, change_cell
 from tests.faults._change_process import NEW, OLD, CommitStep
 from tests.faults._epson_recipe_cell import EpsonRecipeCell
@@ -179,6 +180,16 @@ def test_f79_an_order_killed_anywhere_and_delivered_again_is_carried_out_once(
         assert NOTHING_LEFT in cell.recover()
         sample = Sample(lambda at: whole or matters_to(cell, at), every=1 if whole else 4)
         die(cell, program, sample, partial(orders.check_killed_order, cell, program))
+
+
+@pytest.mark.parametrize("kind", [pytest.param("EPSON", marks=SOAK), "PLC"])
+@pytest.mark.fault("F57")
+def test_f57_a_restore_killed_anywhere_keeps_what_is_done_and_is_ended_by_another(tmp_path, kind):
+    with KINDS[kind](tmp_path / "cell") as cell:
+        assert NOTHING_LEFT in cell.recover()
+        sample = Sample(partial(matters_to, cell), every=2)
+        die(cell, "restore", sample, partial(restores.check_killed_restore, cell))
+        assert restores.stage(cell) == restores.STAGES[-1]
 
 
 def test_a_look_killed_anywhere_is_never_taken_for_a_later_one(tmp_path):

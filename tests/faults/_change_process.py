@@ -68,9 +68,7 @@ def _restore(controller: Controller) -> None:
     """Bring a backup back that selects tool 2, whose value is new, and knows no tool 1."""
     now = take_backup(controller)
     wanted = replace(now.state, selected=2, tools={**now.state.tools, 1: None, 2: NEW[2]})
-    restore(
-        controller.tools, plan_restore(replace(now, state=wanted), now.state, selected=True)
-    )
+    restore(controller.tools, plan_restore(replace(now, state=wanted), now.state, selected=True))
 
 
 def _look(controller: Controller) -> None:

@@ -42,7 +42,7 @@ class PlcChangeCell(ChangeCell):
     """A SoftMotion PLC; counts what its slots really became, past the wire.
 
     Attributes:
-        executed: Slot and tool of each write that the PLC carried out; no tool where it was cleared.
+        executed: Slot and tool of each write that the PLC carried out; of a clear, no tool.
     """
 
     matters = re.compile("write_command ")

@@ -2,9 +2,9 @@
 
 Each act is a row. Its program runs once against a simulator of this process and dies at its
 instants: before a request is carried out (which it is all the same), before an answer leaves, and
-before and after each durable transaction of the journal. By default a sample is taken: the
-transactions, and what logs in or out, selects, starts or writes. ``ROBOLINK_ALL_KILL_POINTS=1``
-takes all; ``pytest -s`` shows how many.
+before and after each durable transaction of the journal; a controller's own program, before its
+statements. By default a sample is taken: the transactions, and what logs in or out, selects, starts
+or writes. ``ROBOLINK_ALL_KILL_POINTS=1`` takes all; ``pytest -s`` shows how many.
 
 That a real process dies like that is shown at four instants on each kind of line: SIGKILL before
 and after the write of a tool, and before and after the transaction that ends it is durable. There
@@ -23,6 +23,8 @@ from tests.faults import _killed_calibrations as calibrations
 from tests.faults import _killed_looks as looks
 from tests.faults import _killed_orders as orders
 from tests.faults import _killed_restores as restores
+from tests.faults._callback_cell import CallbackCell
+from tests.faults._callback_sensors import BeamCell, CameraCell
 from tests.faults._change_cell import ChangeCell, Step, WireStep, change_cell
 from tests.faults._change_process import NEW, OLD, CommitStep
 from tests.faults._epson_recipe_cell import EpsonRecipeCell
@@ -32,6 +34,7 @@ from tests.faults._kill_points import (
     check_recovered,
     check_recovers,
 )
+from tests.faults._killed_callbacks import MortalCell
 from tests.faults._recipe_instants import EVERYTHING, Instant
 from tests.faults._softmotion_change_cell import plc_change_cell
 from tests.faults._worlds import Worlds
@@ -199,6 +202,35 @@ def test_a_look_killed_anywhere_is_never_taken_for_a_later_one(tmp_path):
         sample = Sample(lambda at: at.what.startswith("$Start"))
         die(cell, "look", sample, partial(looks.check_killed_look, cell))
         assert (cell.tools, cell.selected) == (OLD, 1)
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        pytest.param(CallbackCell, id="pin"),
+        pytest.param(BeamCell, id="beams", marks=SOAK),
+        pytest.param(CameraCell, id="camera", marks=SOAK),
+    ],
+)
+@pytest.mark.parametrize(
+    ("gone", "any_statement"),
+    [("power", False), pytest.param("power", True, marks=SOAK), ("PC", False)],
+)
+@pytest.mark.fault("F57", "F58")
+def test_f57_f58_a_change_by_the_controller_s_own_program_is_proved_or_was_never(
+    tmp_path, kind, gone, any_statement
+):
+    cell = MortalCell(kind, tmp_path)
+    assert cell.lose(gone, any_statement=any_statement) == {"old", "new"}
+    cell.cell.close()
+
+
+@pytest.mark.parametrize("gone", ["power", pytest.param("PC", marks=SOAK)])
+@pytest.mark.fault("F58")
+def test_f58_a_value_that_was_refused_is_put_back_whatever_is_gone_meanwhile(tmp_path, gone):
+    cell = MortalCell(CallbackCell, tmp_path, refused=True)
+    assert cell.lose(gone, any_statement=False) == {"old"}
+    cell.cell.close()
 
 
 CALIBRATION_SHARES: Final = 4

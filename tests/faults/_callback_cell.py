@@ -122,7 +122,7 @@ class CallbackCell:
         self.rng = random.Random(f"callback {seed}")
         self.journal = journal or memory_journal(new_operation())
         self.limits = limits
-        self.server = None if in_process else self._serve()
+        self.server: CallbackServer | None = None if in_process else self._serve()
         self.address = None if self.server is None else self.server.address
         self.calls = ProgramCalls(self._far_end)
         world = WorldParameters(contact_input=CONTACT)
@@ -154,6 +154,7 @@ class CallbackCell:
 
     def restart_server(self):
         """End the server, and start another on another port, with the same journal."""
+        assert self.server is not None
         self.server.close()
         self.server = self._serve()
         self.address = self.server.address

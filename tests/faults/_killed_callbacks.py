@@ -75,7 +75,8 @@ class MortalCell:
                 "statement", f"{file}:{line} {text}"
             )
             try:
-                return cell.run()
+                printed: list[str] = cell.run()
+                return printed
             except PowerCut:
                 cell.lose_power()
                 return None

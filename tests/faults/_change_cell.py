@@ -23,6 +23,7 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.hosting.in_process import epson
 from robolink_simulators.hosting.streams.epson import serve_serial, serve_tcp
+from robolink_simulators.plc import PlcSimulator
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
@@ -67,7 +68,10 @@ class ChangeCell(ABC):
     matters: ClassVar[re.Pattern[str]]
 
     def __init__(
-        self, simulator: EpsonSimulator | SoftMotionSimulator, url: str, folder: Path
+        self,
+        simulator: EpsonSimulator | SoftMotionSimulator | PlcSimulator,
+        url: str,
+        folder: Path,
     ) -> None:
         self.simulator = simulator
         self.url = url
@@ -75,7 +79,9 @@ class ChangeCell(ABC):
         self.skip: Callable[[float], None] = lambda _seconds: None
         in_memory = "+sim://" in url
         self.journal: Journal = (
-            memory_journal(url) if in_memory else open_journal(str(folder / "journal.db"))
+            memory_journal(url.partition("?")[0])
+            if in_memory
+            else open_journal(str(folder / "journal.db"))
         )
 
     @property

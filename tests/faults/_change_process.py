@@ -132,6 +132,7 @@ def acknowledged(folder: Path) -> list[tuple[int, str]]:
 
 
 def _run(program: str, url: str, folder: str, kill_at: CommitStep | None) -> None:
+    os.environ["ROBOLINK_STATE_DIR"] = folder
     _watch_commits(Path(folder) / "acknowledged", kill_at)
     journal = open_journal(f"{folder}/journal.db")
     # Its time stands still: no sign of life comes between the transactions that are counted.

@@ -193,7 +193,8 @@ def plc_factory(request: pytest.FixtureRequest, _robolink_own: "OwnFolder") -> F
     from robolink_simulators.testkit.making import make_plc
 
     def make(*, medium: str = "modbus-tcp", **given: Any) -> "SimulatedCell":  # noqa: ANN401 - as the marker
-        return make_plc(_robolink_own, _asked(request, "plc", given, medium), medium)
+        asked = _asked(request, "plc", given, medium)
+        return make_plc(_robolink_own, asked, medium, _clock_of(request))
 
     return make
 
@@ -230,7 +231,10 @@ def softmotion_sim(request: pytest.FixtureRequest, softmotion_factory: Factory) 
 
 @pytest.fixture
 def plc_sim(request: pytest.FixtureRequest, plc_factory: Factory) -> "SimulatedCell":
-    """A simulated PLC with a register map, on Modbus TCP; ``modbus-rtu`` by parametrizing."""
+    """A simulated PLC with a register map, on Modbus TCP.
+
+    Parametrize it indirectly for other ways to reach it: ``sim``, ``modbus-rtu``.
+    """
     return plc_factory(medium=getattr(request, "param", "modbus-tcp"))
 
 

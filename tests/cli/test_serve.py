@@ -19,6 +19,7 @@ from robolink_simulators.hosting.in_process.softmotion import register, unregist
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 from robolink_simulators.softmotion.mailbox.option_text import PlcOptions
 from robolink_simulators.softmotion.mailbox.options import MailboxOptions
+from robolink_simulators.testkit.program_calls import CallFault
 
 from robolink import runtime
 from robolink.errors import ConfigError, JournalError
@@ -29,7 +30,7 @@ from robolink.serving import CallbackConversation, CallbackLimits, CallbackServe
 from robolink.serving._server import MOST_PROGRAMS
 from tests._documents import wrong_in
 from tests.contract._permit_machine import PermitMachine
-from tests.faults._callback_cell import Bend, CallbackCell
+from tests.faults._callback_cell import CallbackCell
 
 # expert serve: as a process that is killed, and who may call.
 
@@ -63,7 +64,7 @@ def test_a_server_that_is_killed_in_the_proof_leaves_the_old_tool_and_the_next_o
     cell = CallbackCell(tmp_path)
     with ExitStack() as stack:
         stack.callback(cell.close)
-        process, cell.relay.server = started(stack)
+        process, cell.address = started(stack)
         cell.change_needle()
         old = cell.tool
 
@@ -71,15 +72,15 @@ def test_a_server_that_is_killed_in_the_proof_leaves_the_old_tool_and_the_next_o
             if at == 9:
                 process.kill()
                 process.wait(30)
-                return Bend(cut_before=True)
+                return CallFault(cut_before=True)
             return None
 
-        cell.relay.bend = bend
+        cell.calls.fault = bend
         cell.run()
         assert cell.tool.rounded(3) == old.rounded(3)
         journal = open_journal()
         assert [marker.details["verify"] for _, marker in journal.open_markers()] == [True]
-        _, cell.relay.server = started(stack)
+        _, cell.address = started(stack)
         assert cell.run() == ["kept"]
         assert cell.error_mm < 0.02
         assert journal.open_markers() == ()

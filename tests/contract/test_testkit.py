@@ -67,13 +67,14 @@ def test_the_cable_of_a_plc_is_pulled_where_a_connection_ends_with_it(softmotion
             controller.status()
 
 
-@pytest.mark.parametrize("plc_sim", ["modbus-tcp", "modbus-rtu"], indirect=True)
-def test_a_plc_with_a_map_is_served_on_both_buses(plc_sim):
+@pytest.mark.parametrize("plc_sim", ["sim", "modbus-tcp", "modbus-rtu"], indirect=True)
+def test_a_plc_with_a_map_is_served_in_the_process_and_on_both_buses(plc_sim):
     with robolink.connect(plc_sim.url) as controller:
         confirm_whole_map(controller)
+    plc_sim.operator.when("fc16 110", "withdraw_permit")
     write(plc_sim)
     assert plc_sim.truth()["stored"]["2"]["z_mm"] == WANTED.z_mm
-    plc_sim.do("withdraw_permit")
+    assert plc_sim.operator.done == [("fc16 110", "withdraw_permit")]
     with pytest.raises(RobolinkError, match="permit"):
         write(plc_sim, wanted=ToolOffset(9, 9, 9))
     plc_sim.put_back()

@@ -1,22 +1,18 @@
-"""A cell whose running program calls back: simulated controller, real sockets, real server.
+"""A cell whose running program calls back: simulated controller, real server on a real socket.
 
-Program and server talk through a relay of the test's own that passes each question on, waits for
-its answer, and only then lets simulated time go on. So no wall clock decides anything.
+What the program asks is passed on, and simulated time goes on only when it is answered. So no wall
+clock decides anything. Of a run that forks, the questions are answered in its own process.
 """
 
 import math
 import random
-import select
-import socket
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from robolink_simulators.cell.workplace import exchanged
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.epson.memory.points import Point
+from robolink_simulators.testkit.program_calls import AnsweredAt, AnsweredHere, ProgramCalls
 
 from robolink.journal import memory_journal
 from robolink.model import EntryKind, Pose, ToolOffset, new_operation
@@ -95,148 +91,73 @@ class PowerCut(BaseException):
     """The controller loses its power now."""
 
 
-@dataclass
-class Bend:
-    """What the relay does to one exchange; ``late_s`` in simulated time."""
-
-    drop_question: bool = False
-    drop_answer: bool = False
-    bend_question: bool = False
-    bend_answer: bool = False
-    cut_before: bool = False
-    cut_after: bool = False
-
-
-class Relay:
-    """Passes lines on, one exchange at a time, as far as ``bend`` lets it."""
-
-    def __init__(self, server):
-        self.server = server
-        self.listener = socket.create_server(("127.0.0.1", 0))
-        self.listener.setblocking(False)
-        self.bend: Callable[[int, bytes], Bend | None] = lambda _number, _question: None
-        self.questions = []
-        self.answers = []
-        self._program: Any = None
-        self._far: Any = None
-        self._held = b""
-
-    @property
-    def address(self):
-        return self.listener.getsockname()
-
-    def pump(self):
-        """Do what there is to do, without waiting for the program."""
-        ready, _, _ = select.select([self.listener], [], [], 0)
-        if ready:
-            self.cut()
-            self._program, _ = self.listener.accept()
-            self._far = socket.create_connection(self.server, timeout=30)
-        if self._program is None:
-            return
-        if select.select([self._program], [], [], 0)[0]:
-            try:
-                data = self._program.recv(4096)
-            except OSError:
-                data = b""
-            if not data:
-                self.cut()
-                return
-            self._held += data
-        while b"\r\n" in self._held and self._program is not None:
-            line, _, self._held = self._held.partition(b"\r\n")
-            self._exchange(line)
-
-    def _exchange(self, line):
-        self.questions.append(line)
-        bend = self.bend(len(self.questions) - 1, line) or Bend()
-        if bend.cut_before:
-            self.cut()
-            return
-        if bend.drop_question:
-            return
-        if bend.bend_question:
-            line = bent(line)
-        answer = self._asked(line)
-        self.answers.append(answer)
-        if not answer or bend.cut_after:
-            self.cut()
-        elif not bend.drop_answer:
-            if bend.bend_answer:
-                answer = bent(answer)
-            self._program.sendall(answer + b"\r\n")
-
-    def _asked(self, line):
-        answer = b""
-        try:
-            self._far.sendall(line + b"\r\n")
-            while not answer.endswith(b"\r\n"):
-                data = self._far.recv(4096)
-                if not data:
-                    return b""
-                answer += data
-        except OSError:
-            return b""
-        return answer[:-2]
-
-    def cut(self):
-        """Cut both ends off."""
-        for end in (self._program, self._far):
-            if end is not None:
-                end.close()
-        self._program = self._far = None
-        self._held = b""
-
-    def close(self):
-        self.cut()
-        self.listener.close()
-
-
-def bent(line):
-    """Return a line with one digit changed."""
-    at = max(index for index, byte in enumerate(line[:-8]) if chr(byte).isdigit())
-    return line[:at] + bytes([ord("0") + (line[at] - ord("0") + 1) % 10]) + line[at + 1 :]
-
-
 class CallbackCell:
-    """Controller, program, relay, server and journal."""
+    """Controller, program, server and journal, and what passes between program and server.
+
+    Args:
+        folder: Where the program is written.
+        seed: Of the world.
+        journal: Of the server, one of its own by default.
+        limits: Of the server.
+        main: The program; of the class by default.
+        controllers: Names on record that the server was given.
+        in_process: Whether a server without a thread answers.
+    """
 
     main = MAIN
     robot = "T6-602S"
 
-    def __init__(self, folder, *, seed=1, journal=None, limits=LIMITS, main="", controllers=()):
+    def __init__(
+        self,
+        folder,
+        *,
+        seed=1,
+        journal=None,
+        limits=LIMITS,
+        main="",
+        controllers=(),
+        in_process=False,
+    ):
         self.controllers = controllers
         self.rng = random.Random(f"callback {seed}")
         self.journal = journal or memory_journal(new_operation())
         self.limits = limits
-        self.server = self._serve()
-        self.relay = Relay(self.server.address)
+        self.server: CallbackServer | None = None if in_process else self._serve()
+        self.address = None if self.server is None else self.server.address
+        self.calls = ProgramCalls(self._far_end)
         world = WorldParameters(contact_input=CONTACT)
         self.simulator = EpsonSimulator(self.robot, serial=SERIAL, seed=seed, world=world)
         path = Path(folder) / "main.prg"
         path.write_text(main or self.main, encoding="ascii")
-        ports = {201: self.relay.address}
-        self.runner = self.simulator.load([COMPANION, path], ports=ports)
+        self.runner = self.simulator.load([COMPANION, path])
+        self.runner.ports.dial = self.calls.dial
         self.furnish()
 
     def furnish(self):
         """Put into the cell what the program measures with besides the pin."""
 
-    def _serve(self):
-        def conversation(peer):
-            return CallbackConversation(
-                self.journal, self.limits, peer=peer, controllers=self.controllers
-            )
+    def _far_end(self):
+        if self.address is None:
+            return AnsweredHere(self.conversation("the program"))
+        return AnsweredAt(self.address)
 
-        server = CallbackServer("127.0.0.1", 0, conversation)
+    def conversation(self, peer):
+        """Return who answers one program."""
+        return CallbackConversation(
+            self.journal, self.limits, peer=peer, controllers=self.controllers
+        )
+
+    def _serve(self):
+        server = CallbackServer("127.0.0.1", 0, self.conversation)
         server.start()
         return server
 
     def restart_server(self):
         """End the server, and start another on another port, with the same journal."""
+        assert self.server is not None
         self.server.close()
         self.server = self._serve()
-        self.relay.server = self.server.address
+        self.address = self.server.address
 
     @property
     def tool(self):
@@ -294,8 +215,6 @@ class CallbackCell:
             assert change is not None, "the program hangs"
             assert change < end_ns, "the program hangs"
             self.simulator.advance(change)
-            self.relay.pump()
-        self.relay.pump()
         assert self.runner.failure is None, self.runner.failure
         return "".join(self.runner.console).split()
 
@@ -303,7 +222,6 @@ class CallbackCell:
         """Switch the controller off and on."""
         self.runner.on_statement = None
         self.simulator.restart()
-        self.relay.pump()
         self.simulator.machine.switch_all_motors(True)
 
     def run_until(self, cut_at):
@@ -360,5 +278,6 @@ class CallbackCell:
         return [marker for _, marker in self.journal.open_markers()]
 
     def close(self):
-        self.server.close()
-        self.relay.close()
+        self.calls.cut()
+        if self.server is not None:
+            self.server.close()

@@ -23,6 +23,7 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
 from robolink_simulators.hosting.in_process import epson
 from robolink_simulators.hosting.streams.epson import serve_serial, serve_tcp
+from robolink_simulators.plc import PlcSimulator
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
@@ -38,7 +39,7 @@ MOMENTS: Final[tuple[Moment, Moment]] = get_args(Moment)
 EpsonWire = Literal["sim", "tcp", "serial"]
 
 _names = count()
-_WRITE = re.compile(r'\$Execute,"TLSet (\d+), XY')
+_WRITE = re.compile(r'\$Execute,"TL(?:Set (\d+), XY|Clr (\d+))')
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,10 @@ class ChangeCell(ABC):
     matters: ClassVar[re.Pattern[str]]
 
     def __init__(
-        self, simulator: EpsonSimulator | SoftMotionSimulator, url: str, folder: Path
+        self,
+        simulator: EpsonSimulator | SoftMotionSimulator | PlcSimulator,
+        url: str,
+        folder: Path,
     ) -> None:
         self.simulator = simulator
         self.url = url
@@ -75,7 +79,9 @@ class ChangeCell(ABC):
         self.skip: Callable[[float], None] = lambda _seconds: None
         in_memory = "+sim://" in url
         self.journal: Journal = (
-            memory_journal(url) if in_memory else open_journal(str(folder / "journal.db"))
+            memory_journal(url.partition("?")[0])
+            if in_memory
+            else open_journal(str(folder / "journal.db"))
         )
 
     @property
@@ -90,7 +96,7 @@ class ChangeCell(ABC):
 
     @abstractmethod
     def writes(self) -> list[int]:
-        """Return the tools that were written so far, in order."""
+        """Return the tools that were written or cleared so far, in order."""
 
     @abstractmethod
     def values_written(self, tool: int = 1) -> list[ToolOffset]:
@@ -132,6 +138,11 @@ class ChangeCell(ABC):
             log = self.journal.log(self.url, clock=ManualClock())
             with robolink.connect(self.url, outcomes=log) as controller:
                 PROGRAMS[program](controller)
+
+    def deliver(self, program: str) -> None:
+        """Run a program in this process to its end."""
+        with robolink.connect(self.url, outcomes=self.journal.log(self.url)) as controller:
+            PROGRAMS[program](controller)
 
     def kill(self, program: str, step: Step) -> None:
         """Run a program and kill it at ``step``."""
@@ -227,7 +238,7 @@ class EpsonChangeCell(ChangeCell):
         epson: It.
     """
 
-    matters = re.compile(r'\$(Log|Execute,"(Tool \d|TLSet ))')
+    matters = re.compile(r'\$(Log|Execute,"(Tool \d|TL(Set|Clr) ))')
 
     def __init__(self, simulator: EpsonSimulator, url: str, folder: Path) -> None:
         super().__init__(simulator, url, folder)
@@ -245,8 +256,8 @@ class EpsonChangeCell(ChangeCell):
         return self._machine.tools.selected
 
     def writes(self) -> list[int]:
-        """Return the tools that were written so far, in order."""
-        found = [match.group(1) for match in map(_WRITE.match, self.requests) if match]
+        """Return the tools that were written or cleared so far, in order."""
+        found = [match[1] or match[2] for match in map(_WRITE.match, self.requests) if match]
         assert len(found) == self._machine.flash_writes
         return [int(tool) for tool in found]
 

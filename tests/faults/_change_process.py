@@ -10,7 +10,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing.connection import wait
 from pathlib import Path
 from typing import Final, Literal
@@ -18,6 +18,7 @@ from typing import Final, Literal
 from robolink_simulators.cell.clock import ManualClock
 
 import robolink
+from robolink.backup import plan_restore, restore, take_backup
 from robolink.journal import open_journal
 from robolink.model import TIP, Controller, LookingController, ToolOffset
 from robolink.transaction import ToolChange, Wanted, carrying_out, change_tools, recover
@@ -63,6 +64,13 @@ def _deliver(controller: Controller, *tools: int) -> None:
             change_tools(controller, _wanted(*tools), order=order)
 
 
+def _restore(controller: Controller) -> None:
+    """Bring a backup back that selects tool 2, whose value is new, and knows no tool 1."""
+    now = take_backup(controller)
+    wanted = replace(now.state, selected=2, tools={**now.state.tools, 1: None, 2: NEW[2]})
+    restore(controller.tools, plan_restore(replace(now, state=wanted), now.state, selected=True))
+
+
 def _look(controller: Controller) -> None:
     assert isinstance(controller, LookingController)
     controller.look(TIP, program=7)
@@ -75,6 +83,7 @@ PROGRAMS: Final[dict[str, Callable[[Controller], object]]] = {
     "one tool, ordered": lambda controller: _deliver(controller, 1),
     "two tools, ordered": lambda controller: _deliver(controller, 1, 2),
     "recover": recover,
+    "restore": _restore,
     "look": _look,
 }
 
@@ -123,6 +132,7 @@ def acknowledged(folder: Path) -> list[tuple[int, str]]:
 
 
 def _run(program: str, url: str, folder: str, kill_at: CommitStep | None) -> None:
+    os.environ["ROBOLINK_STATE_DIR"] = folder
     _watch_commits(Path(folder) / "acknowledged", kill_at)
     journal = open_journal(f"{folder}/journal.db")
     # Its time stands still: no sign of life comes between the transactions that are counted.

@@ -5,11 +5,10 @@ from pathlib import Path
 
 import pytest
 
-import robolink
 from robolink.errors import OutcomeUnknownError
 from robolink.model import EntryKind
 from tests.faults._change_cell import ChangeCell
-from tests.faults._change_process import NEW, OLD, ORDER, PROGRAMS
+from tests.faults._change_process import NEW, OLD, ORDER
 from tests.faults._epson_recipe_cell import EpsonRecipeCell
 
 RECIPE = """
@@ -26,13 +25,6 @@ number = 1
 """
 
 
-def deliver(cell: ChangeCell, program: str) -> None:
-    """Deliver an order of :data:`PROGRAMS`."""
-    log = cell.journal.log(cell.url)
-    with robolink.connect(cell.url, outcomes=log) as controller:
-        PROGRAMS[program](controller)
-
-
 def check_killed_order(cell: ChangeCell, program: str) -> None:
     """Deliver a killed order until it is carried out, and then once more."""
     tools = [1, 2] if program.startswith("two") else [1]
@@ -40,12 +32,12 @@ def check_killed_order(cell: ChangeCell, program: str) -> None:
     if cell.journal.open_markers():
         written = cell.writes()
         with pytest.raises(OutcomeUnknownError, match="recover"):
-            deliver(cell, program)
+            cell.deliver(program)
         assert cell.writes() == written
         cell.recover()
     stands = all(cell.tools[tool] == NEW[tool] for tool in tools)
     assert len(list(cell.journal.entries(kinds=(EntryKind.ORDER,)))) == stands
-    deliver(cell, program)
+    cell.deliver(program)
     assert cell.tools == {tool: NEW[tool] if tool in tools else OLD[tool] for tool in OLD}
     for tool in tools:
         # Each time that it was made, but the last, it had been taken back.
@@ -54,7 +46,7 @@ def check_killed_order(cell: ChangeCell, program: str) -> None:
         assert made[1::2] == [OLD[tool]] * len(made[1::2])
         assert len(made) in ((1,) if len(tools) == 1 else (1, 3))
     written = cell.writes()
-    deliver(cell, program)
+    cell.deliver(program)
     assert cell.writes() == written
     kept = list(cell.journal.entries(kinds=(EntryKind.ORDER,)))
     assert [entry.details["order"] for entry in kept] == [ORDER]

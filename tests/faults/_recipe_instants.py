@@ -27,7 +27,7 @@ from robolink.runner import Question
 EVERYTHING: Final = os.environ.get("ROBOLINK_ALL_KILL_POINTS") == "1"
 """Whether something comes in at all instants, not at a sample of them."""
 
-Kind = Literal["request", "answer", "wait", "question", "commit"]
+Kind = Literal["request", "answer", "wait", "question", "commit", "statement"]
 _EVERY: Final = 97
 """Every 97th instant belongs to the sample,"""
 _TURNS: Final = 12
@@ -38,7 +38,8 @@ _TURNS: Final = 12
 class Instant:
     """One of them: the ``number``-th of its kind, and what went on.
 
-    Of an answer that is its request, of a commit whether it counts already.
+    Of an answer that is its request, of a commit whether it counts already, of a statement its
+    place in the program and its text.
     """
 
     kind: Kind

@@ -20,6 +20,7 @@ from tests.faults._change_process import OLD
 
 _names = count()
 _UNIT_UM: Final = 1000.0
+_WRITE: Final = re.compile("write_command (WRITE|CLEAR)_TOOL")
 _CYCLES_S: Final = 0.05
 """In this time the mailbox program has looked, and what it was told is done."""
 
@@ -41,7 +42,7 @@ class PlcChangeCell(ChangeCell):
     """A SoftMotion PLC; counts what its slots really became, past the wire.
 
     Attributes:
-        executed: Slot and tool of each write that the PLC carried out.
+        executed: Slot and tool of each write that the PLC carried out; of a clear, no tool.
     """
 
     matters = re.compile("write_command ")
@@ -50,15 +51,20 @@ class PlcChangeCell(ChangeCell):
         super().__init__(simulator, url, folder)
         self._plc = simulator.plc
         self._acting = simulator.acting
-        self.executed: list[tuple[int, Six]] = []
-        define = self._plc.memory.define
+        self.executed: list[tuple[int, Six | None]] = []
+        define, clear = self._plc.memory.define, self._plc.memory.clear
         define(2, to_frame(OLD[2].components(), unit_um=_UNIT_UM), "nozzle")
 
         def counted(number: int, tool: Six, name: str) -> None:
             self.executed.append((number, tool))
             define(number, tool, name)
 
+        def cleared(number: int) -> None:
+            self.executed.append((number, None))
+            clear(number)
+
         self._plc.memory.define = counted  # type: ignore[method-assign]
+        self._plc.memory.clear = cleared  # type: ignore[method-assign]
 
     @property
     def tools(self) -> dict[int, ToolOffset | None]:
@@ -77,16 +83,16 @@ class PlcChangeCell(ChangeCell):
         return self._now().program.holder
 
     def writes(self) -> list[int]:
-        """Return the slots that were written so far, in order."""
+        """Return the slots that were written or cleared so far, in order."""
         self._now()
-        sent = [text for text in self.requests if text.startswith("write_command WRITE_TOOL")]
+        sent = [text for text in self.requests if _WRITE.match(text)]
         assert len(sent) == len(self.executed)
         return [slot for slot, _ in self.executed]
 
     def values_written(self, tool: int = 1) -> list[ToolOffset]:
         """Return what a slot was written as so far, in order."""
         self._now()
-        return [_offset(value) for slot, value in self.executed if slot == tool]
+        return [_offset(value) for slot, value in self.executed if slot == tool and value]
 
     def act(self) -> None:
         """Let the mailbox program come to the cycle in which it looks at what was written."""

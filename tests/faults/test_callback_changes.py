@@ -6,13 +6,14 @@ Both ends are the real ones: companions/epson/recal.prg in the simulated control
 from contextlib import closing
 
 import pytest
+from robolink_simulators.testkit.program_calls import CallFault
 
 from robolink.journal import open_journal
 from robolink.journal._journal_loss import leave_trace
 from robolink.model import EntryKind, ToolOffset
 from robolink.protocols.spel_callback import CallbackLine, CallbackWord, encode_line
 from robolink.serving import CallbackConversation, CallbackLimits
-from tests.faults._callback_cell import CONTACT, MEASURED, PROVED, Bend, CallbackCell
+from tests.faults._callback_cell import CONTACT, MEASURED, PROVED, CallbackCell
 
 KINDS = ("cut_before", "cut_after", "drop_question", "drop_answer", "bend_question", "bend_answer")
 QUESTIONS = 14
@@ -62,7 +63,7 @@ def test_a_needle_is_measured_written_proved_kept_and_on_record(cell):
     assert cell.open_markers() == []
     assert cell.journal.verify().problems == ()
     # No line is longer than a string of a program.
-    assert max(map(len, cell.relay.questions + cell.relay.answers)) <= 255
+    assert max(map(len, cell.calls.questions + cell.calls.answers)) <= 255
 
 
 def test_it_works_with_any_control_device(cell):
@@ -162,7 +163,7 @@ def _stopping():
 
 
 def test_without_a_server_the_program_goes_on_with_the_old_tool(cell):
-    cell.relay.bend = lambda _number, _line: Bend(cut_before=True)
+    cell.calls.fault = lambda _number, _line: CallFault(cut_before=True)
     old = cell.tool
     assert cell.run() == ["no_answer"]
     assert cell.tool == old
@@ -174,7 +175,7 @@ def disturbed(tmp_path, number, kind):
     try:
         cell.change_needle()
         old = cell.tool
-        cell.relay.bend = lambda at, _line: Bend(**{kind: True}) if at == number else None
+        cell.calls.fault = lambda at, _line: CallFault(**{kind: True}) if at == number else None
         cell.run()
         require_sound(cell, old)
         cell.change_needle()
@@ -208,7 +209,7 @@ def test_every_disturbed_exchange_ends_so(tmp_path, number, kind):
 
 
 def test_a_value_that_was_bent_on_its_way_is_never_written(cell):
-    cell.relay.bend = lambda at, _line: Bend(bend_answer=True) if at == 7 else None
+    cell.calls.fault = lambda at, _line: CallFault(bend_answer=True) if at == 7 else None
     written = cell.simulator.machine.flash_writes
     assert cell.run() == ["no_answer"]
     assert cell.simulator.machine.flash_writes == written
@@ -228,7 +229,7 @@ def test_an_open_change_of_somebody_else_gives_no_value(cell):
 
 def test_a_program_that_claims_to_have_kept_what_nobody_proved_is_not_believed(cell):
     """A flag in the controller's memory is no proof; the change stays open for a person."""
-    cell.relay.bend = lambda at, _line: Bend(cut_before=True) if at == 11 else None
+    cell.calls.fault = lambda at, _line: CallFault(cut_before=True) if at == 11 else None
     cell.run()
     assert [marker.kind for marker in cell.open_markers()] == ["change"]
     operation = cell.open_markers()[0].operation

@@ -1,7 +1,9 @@
 """A day of production: eight simulated hours, a needle change an hour, faults among them."""
 
+from robolink_simulators.testkit.program_calls import CallFault
+
 from robolink.model import EntryKind
-from tests.faults._callback_cell import MAIN, MEASURED, Bend, CallbackCell
+from tests.faults._callback_cell import MAIN, MEASURED, CallbackCell
 
 HOURS = 8
 CYCLES = 50
@@ -39,7 +41,7 @@ class Shift:
         self.kept = []
         self.first_question = 0
         cell.runner.on_print = self.heard
-        cell.relay.bend = self.bend
+        cell.calls.fault = self.bend
 
     def heard(self, text):
         word = text.strip()
@@ -47,7 +49,7 @@ class Shift:
             self.produce()
         elif word == "needle":
             self.hour += 1
-            self.first_question = len(self.cell.relay.questions)
+            self.first_question = len(self.cell.calls.questions)
             self.cell.change_needle()
             if self.hour == 2:
                 self.cell.teach(13, MEASURED[2:3], off_mm=1.0)  # not touched
@@ -72,14 +74,14 @@ class Shift:
     def bend(self, number, _question):
         at = number - self.first_question
         bends = {
-            (3, 7): Bend(drop_answer=True),  # the value never arrives
-            (4, 9): Bend(cut_before=True),  # the cable, in the middle of the proof
-            (5, 11): Bend(drop_answer=True),  # KEEP is lost
-            (7, 12): Bend(cut_after=True),  # kept, and the answer to that is lost
+            (3, 7): CallFault(drop_answer=True),  # the value never arrives
+            (4, 9): CallFault(cut_before=True),  # the cable, in the middle of the proof
+            (5, 11): CallFault(drop_answer=True),  # KEEP is lost
+            (7, 12): CallFault(cut_after=True),  # kept, and the answer to that is lost
         }
         if (self.hour, at) == (8, 3):
             self.cell.restart_server()  # the PC is updated while the program measures
-            return Bend(cut_before=True)
+            return CallFault(cut_before=True)
         return bends.get((self.hour, at))
 
 

@@ -51,13 +51,13 @@ def test_what_robot_2_left_open_is_put_back_on_robot_2_when_robot_1_starts(cell)
     cell.change_needle_of(2)
     old = cell.tool
     cut = 3 + 6 + 2  # HELLO, BEGIN, six touches, SOLVE, WROTE: in the proof
-    cell.relay.bend = lambda at, _line: power_off(cell) if at == cut else None
+    cell.calls.fault = lambda at, _line: power_off(cell) if at == cut else None
     with pytest.raises(PowerOff):
         cell.calibrate(2)
     cell.choose(2)
     assert cell.tool.rounded(3) != old.rounded(3)
     cell.lose_power()
-    cell.relay.bend = lambda _at, _line: None
+    cell.calls.fault = lambda _at, _line: None
     cell.change_needle_of(1)
     assert cell.calibrate(1) == ["kept"]
     assert cell.error_mm < 0.02
@@ -107,7 +107,7 @@ def test_a_pc_that_was_cut_off_settles_it_when_it_is_the_control_device(tmp_path
     try:
         cell.change_needle()
         old = cell.tool
-        cell.relay.bend = lambda at, _line: power_off(cell) if at == 9 else None
+        cell.calls.fault = lambda at, _line: power_off(cell) if at == 9 else None
         with pytest.raises(PowerOff):
             cell.run()
         cell.lose_power()
@@ -121,7 +121,7 @@ def test_a_pc_that_was_cut_off_settles_it_when_it_is_the_control_device(tmp_path
             # The PC goes on with it; the flag in the controller knows nothing of that.
             change_tools(controller, [Wanted(1, own, ANY)])
         assert cell.open_markers() == []
-        cell.relay.bend = lambda _at, _line: None
+        cell.calls.fault = lambda _at, _line: None
         cell.restore()
         assert cell.tool.rounded(3) == own
         cell.bring()

@@ -60,7 +60,7 @@ def kept(cell, within_mm):
     assert cell.error_mm < within_mm
     assert kinds_of(cell) == KEPT
     assert cell.open_markers() == []
-    assert max(map(len, cell.relay.questions + cell.relay.answers)) <= 255
+    assert max(map(len, cell.calls.questions + cell.calls.answers)) <= 255
     (entry,) = cell.entries(EntryKind.CALIBRATION)
     return entry.details
 

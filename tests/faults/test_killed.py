@@ -2,9 +2,9 @@
 
 Each act is a row. Its program runs once against a simulator of this process and dies at its
 instants: before a request is carried out (which it is all the same), before an answer leaves, and
-before and after each durable transaction of the journal. By default a sample is taken: the
-transactions, and what logs in or out, selects, starts or writes. ``ROBOLINK_ALL_KILL_POINTS=1``
-takes all; ``pytest -s`` shows how many.
+before and after each durable transaction of the journal; a controller's own program, before its
+statements. By default a sample is taken: the transactions, and what logs in or out, selects, starts
+or writes. ``ROBOLINK_ALL_KILL_POINTS=1`` takes all; ``pytest -s`` shows how many.
 
 That a real process dies like that is shown at four instants on each kind of line: SIGKILL before
 and after the write of a tool, and before and after the transaction that ends it is durable. There
@@ -22,6 +22,9 @@ import pytest
 from tests.faults import _killed_calibrations as calibrations
 from tests.faults import _killed_looks as looks
 from tests.faults import _killed_orders as orders
+from tests.faults import _killed_restores as restores
+from tests.faults._callback_cell import CallbackCell
+from tests.faults._callback_sensors import BeamCell, CameraCell
 from tests.faults._change_cell import ChangeCell, Step, WireStep, change_cell
 from tests.faults._change_process import NEW, OLD, CommitStep
 from tests.faults._epson_recipe_cell import EpsonRecipeCell
@@ -31,6 +34,8 @@ from tests.faults._kill_points import (
     check_recovered,
     check_recovers,
 )
+from tests.faults._killed_callbacks import MortalCell
+from tests.faults._mapped_change_cell import mapped_change_cell
 from tests.faults._recipe_instants import EVERYTHING, Instant
 from tests.faults._softmotion_change_cell import plc_change_cell
 from tests.faults._worlds import Worlds
@@ -41,6 +46,7 @@ SOAK: Final = pytest.mark.soak
 KINDS: Final[dict[str, Callable[[Path], AbstractContextManager[ChangeCell]]]] = {
     "EPSON": partial(change_cell, wire="sim"),
     "PLC": partial(plc_change_cell, wire="sim"),
+    "register map": partial(mapped_change_cell, wire="sim"),
 }
 LINES: Final[dict[str, Callable[[Path], AbstractContextManager[ChangeCell]]]] = {
     "EPSON over TCP": partial(change_cell, wire="tcp"),
@@ -48,6 +54,7 @@ LINES: Final[dict[str, Callable[[Path], AbstractContextManager[ChangeCell]]]] = 
     "PLC over Modbus TCP": partial(plc_change_cell, wire="modbus-tcp"),
     "PLC over Modbus RTU": partial(plc_change_cell, wire="modbus-rtu"),
     "PLC over CANopen": partial(plc_change_cell, wire="can-multicast"),
+    "register map over Modbus TCP": partial(mapped_change_cell, wire="modbus-tcp"),
 }
 
 
@@ -95,6 +102,8 @@ def die(cell: ChangeCell, program: str, sample: Sample, check: Callable[[], None
         pytest.param("PLC", "one tool", marks=SOAK),
         ("PLC", "two tools"),
         pytest.param("PLC", "two tools, verified", marks=SOAK),
+        ("register map", "one tool"),
+        ("register map", "two tools"),
     ],
 )
 @pytest.mark.fault("F57", "F58")
@@ -112,6 +121,7 @@ def test_f57_f58_a_change_killed_anywhere_is_recovered_as_a_whole(tmp_path, kind
 WRITE_1, WRITE_2 = '$Execute,"TLSet 1,', '$Execute,"TLSet 2,'
 LIST, LOOK = '$Execute,"TLSet"', "$GetStatus"
 ON_PLC = "write_command WRITE_TOOL"
+WRITES = (WRITE_1, ON_PLC, "fc16 100")
 LEFT: Final[dict[str, tuple[str, str, str, str, list[int]]]] = {
     "a write whose answer was lost": ("EPSON", "one tool", WRITE_1, WRITE_1, [1]),
     "one tool of two": ("EPSON", "two tools", WRITE_1, LIST, [1]),
@@ -162,7 +172,7 @@ def check_killed_recovery(cell: ChangeCell, program: str, written: list[int]) ->
     check_recovers(cell, program, written)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", ["EPSON", "PLC"])
 @pytest.mark.parametrize(
     ("program", "whole"),
     [
@@ -181,6 +191,16 @@ def test_f79_an_order_killed_anywhere_and_delivered_again_is_carried_out_once(
         die(cell, program, sample, partial(orders.check_killed_order, cell, program))
 
 
+@pytest.mark.parametrize("kind", [pytest.param("EPSON", marks=SOAK), "PLC"])
+@pytest.mark.fault("F57")
+def test_f57_a_restore_killed_anywhere_keeps_what_is_done_and_is_ended_by_another(tmp_path, kind):
+    with KINDS[kind](tmp_path / "cell") as cell:
+        assert NOTHING_LEFT in cell.recover()
+        sample = Sample(partial(matters_to, cell), every=2)
+        die(cell, "restore", sample, partial(restores.check_killed_restore, cell))
+        assert restores.stage(cell) == restores.STAGES[-1]
+
+
 def test_a_look_killed_anywhere_is_never_taken_for_a_later_one(tmp_path):
     with change_cell(tmp_path / "cell", wire="sim") as cell:
         assert NOTHING_LEFT in cell.recover()
@@ -188,6 +208,35 @@ def test_a_look_killed_anywhere_is_never_taken_for_a_later_one(tmp_path):
         sample = Sample(lambda at: at.what.startswith("$Start"))
         die(cell, "look", sample, partial(looks.check_killed_look, cell))
         assert (cell.tools, cell.selected) == (OLD, 1)
+
+
+@pytest.mark.parametrize(
+    "kind",
+    [
+        pytest.param(CallbackCell, id="pin"),
+        pytest.param(BeamCell, id="beams", marks=SOAK),
+        pytest.param(CameraCell, id="camera", marks=SOAK),
+    ],
+)
+@pytest.mark.parametrize(
+    ("gone", "any_statement"),
+    [("power", False), pytest.param("power", True, marks=SOAK), ("PC", False)],
+)
+@pytest.mark.fault("F57", "F58")
+def test_f57_f58_a_change_by_the_controller_s_own_program_is_proved_or_was_never(
+    tmp_path, kind, gone, any_statement
+):
+    cell = MortalCell(kind, tmp_path)
+    assert cell.lose(gone, any_statement=any_statement) == {"old", "new"}
+    cell.cell.close()
+
+
+@pytest.mark.parametrize("gone", ["power", pytest.param("PC", marks=SOAK)])
+@pytest.mark.fault("F58")
+def test_f58_a_value_that_was_refused_is_put_back_whatever_is_gone_meanwhile(tmp_path, gone):
+    cell = MortalCell(CallbackCell, tmp_path, refused=True)
+    assert cell.lose(gone, any_statement=False) == {"old"}
+    cell.cell.close()
 
 
 CALIBRATION_SHARES: Final = 4
@@ -247,14 +296,17 @@ def test_f79_a_change_killed_anywhere_and_delivered_again_is_made_once(tmp_path,
 
 def four_of(steps: list[Step]) -> list[Step]:
     """Return the write of tool 1, before and after, and so the commit that ends the change."""
-    wire = [s for s in steps if isinstance(s, WireStep) and s.request.startswith((WRITE_1, ON_PLC))]
+    wire = [s for s in steps if isinstance(s, WireStep) and s.request.startswith(WRITES)]
     durable = [step for step in steps if isinstance(step, CommitStep)]
     return [*wire[:2], *durable[-4:-2]]  # the last one gives the lease up
 
 
 @pytest.mark.parametrize(
     "line",
-    [pytest.param(name, marks=SOAK if name[-3:] in ("RTU", "pen") else ()) for name in LINES],
+    [
+        pytest.param(name, marks=SOAK if name[-3:] in ("RTU", "pen") or "map" in name else ())
+        for name in LINES
+    ],
 )
 @pytest.mark.fault("F57", "F58")
 def test_f57_f58_a_process_killed_at_four_instants_is_recovered_on_every_line(tmp_path, line):

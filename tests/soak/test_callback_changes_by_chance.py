@@ -8,9 +8,10 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from robolink_simulators.testkit.program_calls import CallFault
 
 from robolink.model import EntryKind
-from tests.faults._callback_cell import MEASURED, PROVED, Bend, CallbackCell
+from tests.faults._callback_cell import MEASURED, PROVED, CallbackCell
 from tests.faults._callback_sensors import BEAM_INPUTS, BeamCell, CameraCell
 
 CHANGES = 250
@@ -24,24 +25,24 @@ def no_fault(_cell, _rng):
 
 def bent_exchange(cell, rng):
     """Something happens to one exchange, or to two."""
-    names = tuple(Bend.__dataclass_fields__)
-    first = len(cell.relay.questions)
+    names = tuple(CallFault.__dataclass_fields__)
+    first = len(cell.calls.questions)
     struck = {
         first + rng.randrange(cell.exchanges): rng.choice(names) for _ in range(rng.choice((1, 2)))
     }
-    cell.relay.bend = lambda at, _line: Bend(**{struck[at]: True}) if at in struck else None
+    cell.calls.fault = lambda at, _line: CallFault(**{struck[at]: True}) if at in struck else None
 
 
 def pc_restarts(cell, rng):
-    at = len(cell.relay.questions) + rng.randrange(cell.exchanges)
+    at = len(cell.calls.questions) + rng.randrange(cell.exchanges)
 
     def bend(number, _line):
         if number != at:
             return None
         cell.restart_server()
-        return Bend(cut_before=True)
+        return CallFault(cut_before=True)
 
-    cell.relay.bend = bend
+    cell.calls.fault = bend
 
 
 def touch_beside(cell, rng):
@@ -95,7 +96,7 @@ def false_finds(cell, _rng):
 
 def camera_bumped(cell, rng):
     """Once, at some exchange, between two looks or before the proof."""
-    camera, at = cell.simulator.world.camera, len(cell.relay.questions)
+    camera, at = cell.simulator.world.camera, len(cell.calls.questions)
     x, y, z = camera.middle_mm
     at += rng.randrange(cell.exchanges)
 
@@ -103,7 +104,7 @@ def camera_bumped(cell, rng):
         if number == at:
             camera.middle_mm = (x + aside(rng), y, z)
 
-    cell.relay.bend = bend
+    cell.calls.fault = bend
     cell.undo = lambda: setattr(camera, "middle_mm", (x, y, z))
 
 
@@ -119,7 +120,7 @@ OWN_FAULTS = {
 
 def one_change(cell, rng, own_faults):
     """Let one change go as chance has it; tell whether a new value stays."""
-    cell.relay.bend, cell.undo = lambda _number, _line: None, lambda: None
+    cell.calls.fault, cell.undo = lambda _number, _line: None, lambda: None
     cell.change_needle()
     old, fault = cell.tool, rng.choice((*FAULTS, *own_faults))
     if fault is None:
@@ -143,10 +144,10 @@ def test_no_unverified_value_stays(tmp_path, record_property, kind, share):
     try:
         cell.change_needle()
         cell.length = len(cell.statements())
-        cell.exchanges = len(cell.relay.questions)
+        cell.exchanges = len(cell.calls.questions)
         kept = sum(one_change(cell, rng, OWN_FAULTS[kind]) for _ in range(CHANGES))
         assert CHANGES / 20 < kept < CHANGES * 19 / 20  # both ends came up
-        cell.relay.bend = lambda _number, _line: None
+        cell.calls.fault = lambda _number, _line: None
         cell.change_needle()
         assert cell.run() == ["kept"]
         assert cell.open_markers() == []

@@ -7,7 +7,7 @@ Where the flange is, from a PLC that tells it; a person moves.
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 from typing import ClassVar, Final, NoReturn
 
@@ -83,6 +83,9 @@ class MappedInputs(DriverPart):
 
 _FAR_MM: Final = 100_000.0
 _FAR_DEG: Final = 36_000.0
+
+_IN_PROCESS: Final = "sim"
+"""The medium of a simulator of this process, with which its tools end."""
 """No head stands farther away or is turned more often."""
 
 
@@ -312,7 +315,8 @@ def open_plc_map_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
                 record=remedy_word(RemedyWord.RECORD),
             ),
         )
-    return open_plc_map(url, outcomes=terms.record_at, timeout_s=terms.timeout_s, clock=terms.clock)
+    record = partial(terms.record_at, durable=url.medium != _IN_PROCESS)
+    return open_plc_map(url, outcomes=record, timeout_s=terms.timeout_s, clock=terms.clock)
 
 
 def open_plc_map(
@@ -387,7 +391,8 @@ def _with_map(url: LinkUrl) -> tuple[RegisterMap, LinkUrl, bool]:
         )
     if said is not None:
         _require_simulator(url, said)
-    return load_map(Path(file).expanduser()), replace(url, options=options), said is not None
+    simulated = said is not None or url.medium == _IN_PROCESS
+    return load_map(Path(file).expanduser()), replace(url, options=options), simulated
 
 
 def _require_simulator(url: LinkUrl, said: str) -> None:

@@ -20,6 +20,7 @@ class LinkKind(StrEnum):
     EPSON_SIM = "epson+sim"
     PLC_TCP = "plc+modbus-tcp"
     PLC_RTU = "plc+modbus-rtu"
+    PLC_SIM = "plc+sim"
     MODBUS_TCP = "softmotion+modbus-tcp"
     MODBUS_RTU = "softmotion+modbus-rtu"
     CAN = "softmotion+can"
@@ -39,7 +40,7 @@ class FaultNotPossibleError(NotNowError):
 
 
 EPSON_LINKS: Final = frozenset({LinkKind.EPSON_TCP, LinkKind.EPSON_SERIAL, LinkKind.EPSON_SIM})
-PLC_LINKS: Final = frozenset({LinkKind.PLC_TCP, LinkKind.PLC_RTU})
+PLC_LINKS: Final = frozenset({LinkKind.PLC_TCP, LinkKind.PLC_RTU, LinkKind.PLC_SIM})
 MAILBOX_LINKS: Final = frozenset(
     {LinkKind.MODBUS_TCP, LinkKind.MODBUS_RTU, LinkKind.CAN, LinkKind.MAILBOX_SIM}
 )

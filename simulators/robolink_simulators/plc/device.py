@@ -309,12 +309,20 @@ class PlcSimulator(HostedDevice):
             return []
         ignored = FaultAction.IGNORE_WRITE in actions
         refusal = actions.get(FaultAction.MODBUS_EXCEPTION)
-        if refusal is None:
-            reply = self._answer(request, frames, ignored=ignored)
-        else:
-            reply = frames.refusal(request, refusal.code)
+        self._requests += 1
+        number = self._requests
+        try:
+            if self.on_request is not None:
+                self.on_request(number, request.words)
+        finally:
+            if refusal is None:
+                reply = self._answer(request, frames, ignored=ignored)
+            else:
+                reply = frames.refusal(request, refusal.code)
         self.exchanges += 1
         self.log.add(self.now_ns, "<", request.words)
+        if self.on_reply is not None:
+            self.on_reply(number, request.words)
         leaving = self.faults.departures(reply, met)
         if (again := actions.get(FaultAction.DUPLICATE_REQUEST)) is not None:
             leaving.append((again.seconds, self._answer(request, frames, ignored=ignored)))

@@ -69,7 +69,7 @@ class PlcHost(TcpHost):
             lock=simulator.lock,
             allow_remote=allow_remote,
         )
-        self.url += f"?unit={simulator.unit}&{_map_option(map_file)}"
+        self.url += f"?unit={simulator.unit}&{map_option(map_file)}"
         # What leads out of this computer may lead to a machine, and says nothing of itself.
         self.url += _SIMULATED if parse_url(self.url).stays_here else ""
         self.present(simulator)
@@ -87,7 +87,7 @@ class PlcLineHost(LineHost):
         options = dict(PTY_LINE)
         if simulator.unit != _DEFAULT_UNIT:
             options["unit"] = str(simulator.unit)
-        self.url = f"plc+modbus-rtu://{self.cable.near}?{urlencode(options)}&{_map_option(map_file)}{_SIMULATED}"
+        self.url = f"plc+modbus-rtu://{self.cable.near}?{urlencode(options)}&{map_option(map_file)}{_SIMULATED}"
         simulator.keep_time(clock)
 
 
@@ -172,5 +172,6 @@ def serve_plc_line(
         raise no_pseudo_terminal(error) from error
 
 
-def _map_option(map_file: Path) -> str:
+def map_option(map_file: Path) -> str:
+    """Return the option of a URL that names a map."""
     return f"map={quote(str(map_file.absolute()))}"

@@ -312,13 +312,16 @@ def _on_bus(own: OwnFolder, simulator: Any, medium: str, clock: SteeredClock) ->
     return url
 
 
-def make_plc(own: OwnFolder, request: CellRequest, medium: str) -> SimulatedCell:
+def make_plc(
+    own: OwnFolder, request: CellRequest, medium: str, clock: ManualClock | None
+) -> SimulatedCell:
     """Make a PLC with a register map and serve it; as :func:`make_epson`.
 
     Args:
         own: Where.
         request: How it is to be; without a map it has two tools, with a commit bit.
-        medium: ``modbus-tcp`` or ``modbus-rtu`` (not on Windows).
+        medium: ``modbus-tcp``, ``modbus-rtu`` (not on Windows) or ``sim``.
+        clock: Its time in the process; of its own where that is left out.
 
     Raises:
         ConfigError: What is asked for does not exist.
@@ -328,15 +331,23 @@ def make_plc(own: OwnFolder, request: CellRequest, medium: str) -> SimulatedCell
 
     path = written_map(own.folder) if request.map is None else Path(request.map)
     simulator = PlcSimulator(load_map(path), seed=_seed(own, request))
-    time = _served_clock(request, SERVED_SPEED)
-    host: Any
-    if medium == "modbus-tcp":
-        host = serve_plc(simulator, path, clock=time)
-    elif medium == "modbus-rtu":
-        host = serve_plc_line(simulator, path, clock=time)
+    time: Any
+    if medium == "sim":
+        from robolink_simulators.hosting.in_process.plc import register, unregister
+
+        name, time = _name(), clock or ManualClock()
+        url = register(name, simulator, path, clock=time)
+        own.stack.callback(unregister, name)
     else:
-        raise _no_medium(medium, ("modbus-tcp", "modbus-rtu"))
-    url = own.stack.enter_context(host).url
+        time = _served_clock(request, SERVED_SPEED)
+        host: Any
+        if medium == "modbus-tcp":
+            host = serve_plc(simulator, path, clock=time)
+        elif medium == "modbus-rtu":
+            host = serve_plc_line(simulator, path, clock=time)
+        else:
+            raise _no_medium(medium, ("modbus-tcp", "modbus-rtu", "sim"))
+        url = own.stack.enter_context(host).url
     return _furnished(own, simulator, time, {medium: url}, request, person=False)
 
 

@@ -1,0 +1,137 @@
+"""A change that the controller's own program makes, and what is gone in the middle of it.
+
+The controller loses its power at a statement of the companion, or the PC that answers is gone
+before or after it stores something. After RobolinkRestore the tool is the old one, or one that was
+proved; no later start touches it; and the next calibration settles what was open.
+"""
+
+from collections.abc import Callable
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import pytest
+from robolink_simulators.testkit.program_calls import AnsweredHere
+
+from robolink.journal.store.store import Store
+from tests.faults._callback_cell import IDENTITY, PROVED, CallbackCell, PowerCut
+from tests.faults._recipe_instants import EVERYTHING, Instant, Instants, exchanges_and_commits
+from tests.faults._worlds import Worlds
+
+_MATTERS = ("rl_flag =", "TLSet n", "JUDGE", "KEPT,", "WROTE", "RlPutBack", "RESTORED,")
+_COMPANION = "recal.prg:"
+
+
+class PcGone(BaseException):
+    """The process of the server ends here."""
+
+
+class _MortalPc(AnsweredHere):
+    """Answers until it is gone; then nothing of it cleans up."""
+
+    def ask(self, question):
+        with suppress(PcGone):
+            return super().ask(question)
+        self.close = lambda: None
+        return b""
+
+
+class MortalCell:
+    """A cell of some kind, of which something is gone once.
+
+    Args:
+        kind: Measures with a pin, with beams, or with a camera.
+        folder: For the program, and for how it ended in each world.
+        refused: Whether a touch of the proof is beside the pin.
+    """
+
+    def __init__(self, kind: type[CallbackCell], folder: Path, *, refused: bool = False) -> None:
+        self.cell = cell = kind(folder, in_process=True)
+        cell.calls.far = lambda: _MortalPc(cell.conversation("the program"))
+        cell.change_needle()
+        if refused:
+            cell.teach(22, PROVED[1:], off_mm=1.0)
+        self._old = cell.tool
+        self._printed = ["touches_not_witnessed" if refused else "kept"]
+        self._ends = folder / "ends"
+        self._dead = pytest.MonkeyPatch()
+
+    def lose(self, gone: str, *, any_statement: bool) -> set[str]:
+        """Let it be gone at its instants; return how the changes ended."""
+        power = gone == "power"
+        worlds = Worlds(
+            Statements(any_statement) if power else lambda at: at.kind == "commit",
+            self._cut_power if power else self._end_pc,
+        )
+        printed = worlds.explore_ends(lambda: self._run(worlds), self._check)
+        assert printed == self._printed
+        assert not worlds.told, worlds.told[0]
+        print(f"{gone}: {len(worlds.came_at)} kill points of {len(worlds.passed)}")  # noqa: T201 - for pytest -s
+        return set(self._ends.read_text().split())
+
+    def _run(self, instants: Instants) -> list[str] | None:
+        cell = self.cell
+        with exchanges_and_commits(cell.simulator, instants):
+            cell.runner.on_statement = lambda _task, file, line, text: instants.pass_by(
+                "statement", f"{file}:{line} {text}"
+            )
+            try:
+                printed: list[str] = cell.run()
+                return printed
+            except PowerCut:
+                cell.lose_power()
+                return None
+            finally:
+                cell.runner.on_statement = None
+
+    def _cut_power(self, _at: Instant) -> None:
+        raise PowerCut
+
+    def _end_pc(self, _at: Instant) -> None:
+        @contextmanager
+        def written(*_given):
+            raise PcGone
+            yield
+
+        self._dead.setattr(Store, "write", written)
+        raise PcGone
+
+    def _check(self, printed: list[str] | None) -> None:
+        cell = self.cell
+        self._dead.undo()
+        if printed is not None:
+            # A process that is gone holds no lease; in this world its process goes on.
+            log = cell.journal.log(IDENTITY)
+            log.take_over("the PC was switched off")
+            log.close()
+        cell.restore()
+        whole = cell.require_whole(self._old)
+        with self._ends.open("a") as ends:
+            ends.write("new\n" if whole else "old\n")
+        machine = cell.simulator.machine
+        tools, held, by_hand = machine.tools, cell.tool, cell.simulator.world.tips[1]
+        tools.set(1, by_hand)
+        cell.restore()
+        assert cell.tool == by_hand
+        tools.set(1, held)
+        cell.change_needle()
+        assert cell.run() == ["kept"]
+        assert cell.open_markers() == []
+        assert cell.journal.verify().problems == ()
+
+
+class Statements:
+    """Chooses those of the companion that matter, or all, the first time that each is reached."""
+
+    def __init__(self, any_statement: bool) -> None:
+        self._chosen: Callable[[str], bool] = (
+            bool if any_statement or EVERYTHING else lambda text: any(w in text for w in _MATTERS)
+        )
+        self._seen = set[str]()
+
+    def __call__(self, at: Instant) -> bool:
+        """Whether the power goes there."""
+        place, _, text = at.what.partition(" ")
+        if at.kind != "statement" or not place.startswith(_COMPANION) or place in self._seen:
+            return False
+        self._seen.add(place)
+        return self._chosen(text.strip())

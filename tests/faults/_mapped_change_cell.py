@@ -1,0 +1,99 @@
+"""A PLC with a register map and two tools, to be changed by programs that are killed."""
+
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import count
+from pathlib import Path
+from typing import Final
+
+import pytest
+from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.hosting.in_process import plc
+from robolink_simulators.plc import PlcSimulator, serve_plc
+
+import robolink
+from robolink.model import ToolOffset
+from robolink.register_maps import load_map
+from robolink.testing import confirm_whole_map
+from tests.faults._change_cell import ChangeCell, kept
+from tests.faults._change_process import OLD
+
+MAP: Final = Path("examples/plc-maps/commit-bit.toml").absolute()
+_FIRST_ADDRESS: Final = {"fc16 100": 1, "fc16 110": 2}
+"""What writes the registers of a tool."""
+
+_TAKEN_OVER_S: Final = 0.5
+"""In this time the PLC takes over what it was asked to."""
+
+_names = count()
+
+
+class MappedChangeCell(ChangeCell):
+    """A PLC whose registers hold the tools; they count once the PLC has taken them over."""
+
+    matters = re.compile("fc16 |fc5 ")
+
+    def __init__(self, simulator: PlcSimulator, url: str, folder: Path) -> None:
+        super().__init__(simulator, url, folder)
+        self._program = simulator.program
+
+    @property
+    def tools(self) -> dict[int, ToolOffset | None]:
+        """What the machine works with, past the wire."""
+        return {tool: _offset(self._program.in_force[tool]) for tool in OLD}
+
+    @property
+    def selected(self) -> int:
+        """Which tool the machine has selected: the first, and robolink selects none."""
+        return 1
+
+    def writes(self) -> list[int]:
+        """Return the tools whose registers were written so far, in order."""
+        return [_FIRST_ADDRESS[text] for text in self.requests if text in _FIRST_ADDRESS]
+
+    def values_written(self, tool: int = 1) -> list[ToolOffset]:
+        """Return nothing: a request is known by its address."""
+        raise NotImplementedError(tool)
+
+    def act(self) -> None:
+        """Let the PLC take over what it was asked to."""
+        self.skip(_TAKEN_OVER_S)
+        with self.simulator.acting():
+            pass
+
+
+@contextmanager
+def mapped_change_cell(folder: Path, *, wire: str = "sim") -> Iterator[MappedChangeCell]:
+    """Have a PLC that holds ``OLD``, with a journal of its own, in this process or over TCP."""
+    folder.mkdir(parents=True)
+    simulator = PlcSimulator(load_map(MAP), seed=1)
+    for tool, offset in OLD.items():
+        x, y, z, u, *_ = offset.components()
+        simulator.program.set_tool(tool, {"x": x, "y": y, "z": z, "u": u})
+    with pytest.MonkeyPatch.context() as environment, _plc_at(wire, simulator) as url:
+        environment.setenv("ROBOLINK_STATE_DIR", str(folder))
+        with robolink.connect(url) as controller:
+            confirm_whole_map(controller)
+        with kept(MappedChangeCell(simulator, url, folder)) as cell:
+            if wire == "sim":
+                cell.skip = plc.clock_of(url.partition("://")[2].partition("?")[0]).sleep
+            assert cell.tools == OLD
+            yield cell
+
+
+@contextmanager
+def _plc_at(wire: str, simulator: PlcSimulator) -> Iterator[str]:
+    if wire == "sim":
+        name = f"changes-{next(_names)}"
+        try:
+            yield plc.register(name, simulator, MAP)
+        finally:
+            plc.unregister(name)
+        return
+    with serve_plc(simulator, MAP, clock=ScaledClock(20.0)) as host:
+        yield host.url
+
+
+def _offset(values: dict[str, float]) -> ToolOffset:
+    return ToolOffset(values["x"], values["y"], values["z"], values["u"])

@@ -181,7 +181,7 @@ def under_old_name(package: str, name: str) -> object:
     while asking.f_back is not None and asking.f_globals.get("__name__") == _GATE:
         depth, asking = depth + 1, asking.f_back
     if not asking.f_code.co_filename.startswith("<frozen importlib"):
-        _warn(f"{package}.{name}", new, depth + 2)
+        warn_of_old_name(f"{package}.{name}", new, depth + 2)
     return getattr(import_module(home), now)
 
 
@@ -208,7 +208,7 @@ def deprecated(instead: str) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
     def marked(old: Callable[_P, _R]) -> Callable[_P, _R]:
         @wraps(old)
         def warned(*args: _P.args, **kwargs: _P.kwargs) -> _R:
-            _warn(old.__qualname__, instead, 3)
+            warn_of_old_name(old.__qualname__, instead, 3)
             return old(*args, **kwargs)
 
         return warned
@@ -230,7 +230,9 @@ def without_sign(sentence: Callable[_P, _R]) -> Callable[_P, _R]:
         if not isinstance(sign, str):
             return said(*args, **kwargs)
         name = sentence.__name__
-        _warn(f"sign of {name}", "'+-' alone, which whoever shows a sentence may replace", 3)
+        warn_of_old_name(
+            f"sign of {name}", "'+-' alone, which whoever shows a sentence may replace", 3
+        )
         found = said(*args[:takes], **kwargs)
         if isinstance(found, str):
             return found.replace("+-", sign)
@@ -239,7 +241,7 @@ def without_sign(sentence: Callable[_P, _R]) -> Callable[_P, _R]:
     return cast("Callable[_P, _R]", warned)
 
 
-def old_hook(kind: type, old: str, new: str, adapted: Callable[..., object]) -> None:
+def old_hook(kind: type, old: str, new: str, adapted: object) -> None:
     """Let a class that overrides a hook by its old name be what it was, and warn whoever wrote it.
 
     A base, which is an ABC, calls it from its ``__init_subclass__``.
@@ -265,11 +267,18 @@ def old_hook(kind: type, old: str, new: str, adapted: Callable[..., object]) -> 
         (12.0, 'Part._length is now length_mm. The old name goes in robolink 0.2.0.')
     """
     if old in vars(kind) and new not in vars(kind):
-        _warn(f"{kind.__qualname__}.{old}", new, 5)
+        warn_of_old_name(f"{kind.__qualname__}.{old}", new, 5)
         setattr(kind, new, adapted)
 
 
-def _warn(old: str, new: str, stacklevel: int) -> None:
+def warn_of_old_name(old: str, new: str, stacklevel: int) -> None:
+    """Warn of a name that was given up.
+
+    Args:
+        old: What it was.
+        new: What it is now.
+        stacklevel: Whose line it is, as :func:`warnings.warn` counts from here.
+    """
     warnings.warn(
         f"{old} is now {new}. The old name goes in robolink {GONE_IN}.",
         DeprecationWarning,

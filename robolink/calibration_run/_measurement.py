@@ -21,7 +21,8 @@ from robolink.errors import CalibrationError, ConfigError, RobolinkError
 from robolink.messages import joined, tr
 from robolink.methods import find_method
 from robolink.model import Controller, NewEntry, Pose, ToolOffset, says_it_is_simulated
-from robolink.procedures import MeasurementContext, TouchesFurther, touches_of
+from robolink.procedures import MeasurementContext, touches_of
+from robolink.procedures.source import touching_further
 from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.runner import AGAIN, BACK, MORE, Ask, Look, Seek, StepDone, TouchedAt
 from robolink.stations import stations_on_record
@@ -172,8 +173,8 @@ class Measuring:
         Raises:
             CalibrationError: They are not trusted any more.
         """
-        source = plan.source
-        assert isinstance(source, TouchesFurther)  # noqa: S101 - it was offered
+        source = touching_further(plan.source)
+        assert source is not None  # noqa: S101 - it was offered
         what = tr("one more touch") if again is None else tr("touch {k} again", k=again + 1)
         self._context.controller.outcomes.append(decision_entry(what, tool=plan.tool))
 
@@ -324,10 +325,10 @@ def offer_of(measured: Sequence[tuple[ToolPlan, Proposal]]) -> FurtherOffer | No
     if len(measured) != 1:
         return None
     ((plan, proposal),) = measured
-    source, result = plan.source, proposal.result
-    if not isinstance(source, TouchesFurther) or not touches_of(result):
+    source, result = touching_further(plan.source), proposal.result
+    if source is None or not touches_of(result):
         return None
-    adds = source.adds_touch
+    adds = source.can_add_touch
     if adds is None:
         return None
     distances = result.residual_distances_mm if result.dof else ()

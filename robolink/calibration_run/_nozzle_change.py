@@ -316,7 +316,7 @@ class NozzleChange:
             shown,
             verdicts,
             again=None if offer is None else offer.worst + 1,
-            adds_touch=offer is not None and offer.adds,
+            can_add_touch=offer is not None and offer.adds,
             stations=found_with(self._controller, [one.tool for one in shown]),
         )
         regard(self._operator, [subject])

@@ -8,6 +8,7 @@ from typing import Literal
 
 from robolink.calibration import CalibrationResult, LengthChange, TurnClaim, VerifyResult
 from robolink.calibration_run._repeatability import Seating
+from robolink.deprecation import deprecated
 from robolink.errors import CalibrationError
 from robolink.model import Jump, ToolOffset, ToolReceipt
 from robolink.procedures import MeasurementContext
@@ -123,20 +124,26 @@ class WriteSubject:
         verdicts: What the limits say, one tuple a proposal.
         again: Number of the touch that can be made again from here, the one that fits worst, or
             the last where nothing tells; ``None`` where none can.
-        adds_touch: Whether one more can be made.
+        can_add_touch: Whether one more can be made.
         stations: Names of the stations that were found with each tool, by its number.
     """
 
     proposals: tuple[Proposal, ...]
     verdicts: tuple[tuple[LimitVerdict, ...], ...]
     again: int | None = None
-    adds_touch: bool = False
+    can_add_touch: bool = False
     stations: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def tools(self) -> tuple[int, ...]:
         """Numbers of the tools."""
         return tuple(proposal.tool for proposal in self.proposals)
+
+    @property
+    @deprecated("can_add_touch")
+    def adds_touch(self) -> bool:
+        """The old name."""
+        return self.can_add_touch
 
 
 @dataclass(frozen=True, slots=True)

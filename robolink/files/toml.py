@@ -5,7 +5,6 @@ key and how all problems of a file are told is the same for them.
 """
 
 import re
-import tomllib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -30,10 +29,9 @@ MOST_SHOWN: Final = 40
 
 _MOST_PARTS: Final = 32
 _PART: Final = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')"""
-_LONG_KEY: Final = re.compile(
-    rf"^[ \t]*+\[*+[ \t]*+{_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_MOST_PARTS}}}"
-    rf"|[{{,][ \t]*+{_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_MOST_PARTS}}}",
-    re.MULTILINE,
+_LONG_KEY: Final = (
+    rf"(?m)^[ \t]*+\[*+[ \t]*+{_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_MOST_PARTS}}}"
+    rf"|[{{,][ \t]*+{_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_MOST_PARTS}}}"
 )
 """A key of very many parts, for which the parser of Python takes time by the square of them: one
 of 60000 parts, 120 kB, took minutes. The keys that we know have four."""
@@ -88,10 +86,12 @@ class FileKind:
         Raises:
             ConfigError: It is no TOML.
         """
+        import tomllib  # a look at a cell whose file is as before reads no TOML
+
         try:
             # Editors on Windows put a byte order mark in front, which TOML does not know.
             text = content.decode("utf-8-sig")
-            if _LONG_KEY.search(text):
+            if re.search(_LONG_KEY, text):
                 raise self._unreadable(
                     path, tr("a key has more than {most} parts", most=_MOST_PARTS)
                 )

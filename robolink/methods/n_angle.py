@@ -296,7 +296,7 @@ class NAngleSource(ManualPinSource):
         return result
 
     @property
-    def adds_touch(self) -> bool:
+    def can_add_touch(self) -> bool:
         """There is always a gap between two angles."""
         return True
 

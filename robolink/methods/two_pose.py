@@ -124,7 +124,7 @@ class TwoPoseSource(ManualPinSource):
         return solve_two_pose(first, second, stored=stored, sigma_mm=self.sigma_mm)
 
     @property
-    def adds_touch(self) -> bool:
+    def can_add_touch(self) -> bool:
         """Two touches are the method; three are another one."""
         return False
 

@@ -2,9 +2,11 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import ClassVar, Protocol, TypeVar, runtime_checkable
+from dataclasses import dataclass
+from typing import Any, ClassVar, Protocol, TypeVar, cast, runtime_checkable
 
 from robolink.calibration import CalibrationResult, VerifyResult
+from robolink.deprecation import warn_of_old_name
 from robolink.model import (
     AnsweredBy,
     Controller,
@@ -347,7 +349,7 @@ class TouchesFurther(Protocol):
     """A source in which a person may go back to the touches of a measurement."""
 
     @property
-    def adds_touch(self) -> bool | None:
+    def can_add_touch(self) -> bool | None:
         """Whether one more can be made than planned; ``None`` where none can be made again."""
 
     def further(
@@ -382,6 +384,36 @@ class TouchesFurther(Protocol):
             >>> round(again.offset.x_mm, 3), round(again.offset.y_mm, 3)
             (12.3, -3.9)
         """
+
+
+@dataclass(frozen=True, slots=True)
+class _AddsTouch:
+    """A source that says ``adds_touch``, the name of before, and derives from no base of ours."""
+
+    source: Any
+
+    @property
+    def can_add_touch(self) -> bool | None:
+        return cast("bool | None", self.source.adds_touch)
+
+    def further(
+        self,
+        context: MeasurementContext,
+        stored: ToolOffset | None,
+        result: CalibrationResult,
+        again: int | None,
+    ) -> CalibrationResult:
+        return cast(CalibrationResult, self.source.further(context, stored, result, again))
+
+
+def touching_further(source: object) -> TouchesFurther | None:
+    """Return a source as one in which a person may go back to the touches; ``None`` for another."""
+    if isinstance(source, TouchesFurther):
+        return source
+    if not hasattr(source, "adds_touch") or not hasattr(source, "further"):
+        return None
+    warn_of_old_name(f"{type(source).__qualname__}.adds_touch", "can_add_touch", 2)
+    return _AddsTouch(source)
 
 
 @runtime_checkable

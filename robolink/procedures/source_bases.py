@@ -15,7 +15,7 @@ from robolink.messages import tr
 from robolink.model import Pose, SpotUnit, TipSensor, ToolOffset
 from robolink.procedures.kept_proof import KeepsProof, KeptProof, ProofBasis, ProvesAgain
 from robolink.procedures.pin_proof import TurnTest, contact_pose, drift_uncertainty_mm
-from robolink.procedures.source import MeasurementContext, MovingSource, TouchesFurther
+from robolink.procedures.source import MeasurementContext, MovingSource, touching_further
 from robolink.procedures.witnessed_touches import TouchPlan
 from robolink.runner import Procedure, SeenAt, TouchedAt
 from robolink.sensing import open_sensor
@@ -119,10 +119,16 @@ class LazySource:
         return source.proof(context, tool, result, tip=tip, tolerance_mm=tolerance_mm)
 
     @property
-    def adds_touch(self) -> bool | None:
+    def can_add_touch(self) -> bool | None:
         """What the source says; see :class:`~robolink.procedures.TouchesFurther`."""
-        source = self._source
-        return source.adds_touch if isinstance(source, TouchesFurther) else None
+        source = touching_further(self._source)
+        return None if source is None else source.can_add_touch
+
+    @property
+    @deprecated("can_add_touch")
+    def adds_touch(self) -> bool | None:
+        """The old name."""
+        return self.can_add_touch
 
     def further(
         self,
@@ -132,8 +138,8 @@ class LazySource:
         again: int | None,
     ) -> CalibrationResult:
         """Go on; see :class:`~robolink.procedures.TouchesFurther`."""
-        source = self._source
-        assert isinstance(source, TouchesFurther)  # noqa: S101 - adds_touch said so
+        source = touching_further(self._source)
+        assert source is not None  # noqa: S101 - can_add_touch said so
         return source.further(context, stored, result, again)
 
     @property
@@ -230,6 +236,7 @@ class TouchSource(ProvesAgain):
             cls, "_steps", "steps", lambda self, *a: self._steps(*a, live=not self.touch.nominal)
         )
         old_hook(cls, "_further_steps", "further_steps", lambda self, *a: self._further_steps(*a))
+        old_hook(cls, "adds_touch", "can_add_touch", property(lambda self: self.adds_touch))
 
     def with_touch(self, plan: TouchPlan) -> Self:
         """Return the same source with another plan of its touches."""
@@ -265,8 +272,14 @@ class TouchSource(ProvesAgain):
 
     @property
     @abstractmethod
-    def adds_touch(self) -> bool:
+    def can_add_touch(self) -> bool:
         """Whether one more can be made than planned, when all are made."""
+
+    @property
+    @deprecated("can_add_touch")
+    def adds_touch(self) -> bool:
+        """The old name."""
+        return self.can_add_touch
 
     def further(
         self,

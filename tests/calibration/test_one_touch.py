@@ -224,7 +224,7 @@ def test_one_touch_is_made_again_over_the_pin_and_nothing_turns_near_it(method, 
     anew = source.further(OnPaper(cell), STORED, result, again)
     asked = [step for step in cell.steps if isinstance(step, Ask)]
     assert len(asked) == 1
-    adds = source.adds_touch and again is None
+    adds = source.can_add_touch and again is None
     index = LAST[method] if again is None else again
     assert len(anew.inputs) == len(result.inputs) + adds
     if not adds:

@@ -170,7 +170,7 @@ def test_a_tip_is_as_sure_as_its_pin(pin_sigma_mm, controller):
     found = PaperCell(HERE, STORED, PIN).run(source.procedure(STORED, HERE))
     assert (found.half_width95 == ()) is (pin_sigma_mm is None)
     assert source.clearance_mm == 4.0, "it is compared with the largest change before it begins"
-    assert source.adds_touch is False, "the touch can be made again, and none added"
+    assert source.can_add_touch is False, "the touch can be made again, and none added"
 
 
 def site_at(controller, **pin):

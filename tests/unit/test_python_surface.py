@@ -17,14 +17,24 @@ from robolink_simulators.faults import Fault, FaultAction, FaultPlan
 
 import robolink
 from robolink import ANY, Pose, ToolOffset, calibration, drift, errors, journal
+from robolink.calibration_run import WriteSubject
 from robolink.controllers import SimpleController
 from robolink.deprecation import GONE_IN, OLD_NAMES, deprecated
 from robolink.errors import ConfigError, ToolIndexError
 from robolink.journal import open_journal
-from robolink.methods import TwoPoseSource, measure_two_pose
+from robolink.methods import OneTouchSource, TwoPoseSource, measure_two_pose
 from robolink.model import EntryKind, NewEntry, WorkBox
 from robolink.model._movement import MotionProfile
-from robolink.procedures import InputSource, ManualPinSource, ProofBasis, ProvesAgain, TouchPlan
+from robolink.procedures import (
+    InputSource,
+    LazySource,
+    ManualPinSource,
+    ProofBasis,
+    ProvesAgain,
+    TouchesFurther,
+    TouchPlan,
+)
+from robolink.procedures.source import touching_further
 from robolink.runner import foreseen_steps
 from robolink.testing import PaperCell
 from robolink.version import VERSION
@@ -200,8 +210,13 @@ def test_a_source_of_touches_with_hooks_by_their_old_names_measures_and_shows_as
     caught, source = told(a_source_with_old_hooks)
     assert [str(one.message).partition(". ")[0] for one in caught] == [
         f"a_source_with_old_hooks.<locals>.Once.{old} is now {new}"
-        for old, new in (("_steps", "steps"), ("_further_steps", "further_steps"))
+        for old, new in (
+            ("_steps", "steps"),
+            ("_further_steps", "further_steps"),
+            ("adds_touch", "can_add_touch"),
+        )
     ]
+    assert source.can_add_touch is False
     assert {one.filename for one in caught} == {__file__}
     stored = ToolOffset(12, -4, -20)
     cell = PaperCell(Pose(300, 100, 20, 0), ToolOffset(12.3, -3.9, -20), (310, 95, -40))
@@ -215,6 +230,40 @@ def test_a_source_of_touches_with_hooks_by_their_old_names_measures_and_shows_as
     shown = told(lambda: foreseen_steps(source.procedure(stored, cell.here), cell.here))[1]
     whole = foreseen_steps(TwoPoseSource().procedure(stored, cell.here), cell.here)
     assert [one.step for one in shown] == [one.step for one in whole]
+
+
+def test_whether_a_touch_can_be_added_is_still_told_by_its_old_name():
+    solver: Any = None
+    for read in (
+        TwoPoseSource(),
+        OneTouchSource(solver),
+        LazySource(TwoPoseSource, sentence="two touches"),
+        WriteSubject((), (), can_add_touch=False),
+    ):
+        caught, said = told(lambda one=read: one.adds_touch)
+        assert said is False
+        assert [str(one.message).partition(". ")[0].partition(".")[2] for one in caught] == [
+            "adds_touch is now can_add_touch"
+        ]
+
+
+def test_a_source_without_a_base_of_ours_that_says_the_old_name_touches_further():
+    class Foreign:
+        adds_touch = True
+
+        def further(self, context, stored, result, again):
+            return context, stored, result, again
+
+    caught, source = told(lambda: touching_further(Foreign()))
+    assert [str(one.message).partition(". ")[0].rpartition(".")[2] for one in caught] == [
+        "adds_touch is now can_add_touch"
+    ]
+    assert isinstance(source, TouchesFurther)
+    assert source.can_add_touch is True
+    given: Any = (1, 2, 3, 4)
+    assert source.further(*given) == given
+    assert touching_further(TwoPoseSource()) == TwoPoseSource()
+    assert touching_further(object()) is None
 
 
 def test_a_source_of_an_input_with_its_hook_by_the_old_name_measures_and_shows_as_before():

@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
-from robolink.runner import Question
+if TYPE_CHECKING:
+    from robolink.runner import Question
 
 
 class AskingDesk(Protocol):
@@ -22,7 +23,7 @@ class AskingDesk(Protocol):
     def regard(self, subject: object) -> None:
         """Take what comes next to be about ``subject``."""
 
-    def ask(self, question: str, kind: Question) -> None:
+    def ask(self, question: str, kind: "Question") -> None:
         """Ask."""
 
     def following(self, look: Callable[[], Any]) -> AbstractContextManager[None]:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import click
 
-from robolink.backup import ToolState, read_tools
 from robolink.errors import ConfigError, NotReadyError
 from robolink.messages import joined, tr
 from robolink.model import Controller
@@ -27,6 +26,7 @@ from robolink_cli.options.shared import GIVEN, TYPED, all_shared
 from robolink_cli.stopping.request import StopRequest
 
 if TYPE_CHECKING:
+    from robolink.backup import ToolState
     from robolink.config import Cell, Expected, Reach
     from robolink_cli.wizard.state import Header
 
@@ -314,7 +314,7 @@ def _typed_again(context: CliContext, chosen: tuple[str, ...], *, anew: bool) ->
     return subprocess.list2cmdline(words)
 
 
-def find_tools(controller: Controller, *, published: bool) -> ToolState:
+def find_tools(controller: Controller, *, published: bool) -> "ToolState":
     """Return all tools and the one in force.
 
     Args:
@@ -326,6 +326,8 @@ def find_tools(controller: Controller, *, published: bool) -> ToolState:
         NotReadyError: The controller cannot be asked now; says what may be done instead.
         ConfigError: The project publishes no tools.
     """
+    from robolink.backup import ToolState, read_tools  # no look needs them
+
     if not published:
         try:
             return read_tools(controller)

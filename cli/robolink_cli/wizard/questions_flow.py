@@ -49,7 +49,7 @@ def offered_words(subject: WriteSubject) -> tuple[str, ...]:
     """Return the words by which a person may go back to the touches before a write."""
     if subject.again is None:
         return ()
-    return (BACK, MORE) if subject.adds_touch else (BACK,)
+    return (BACK, MORE) if subject.can_add_touch else (BACK,)
 
 
 def answered_by_key(state: WizardState, key: KeyPressed) -> Answered:

@@ -58,7 +58,9 @@ class EpsonToolTable(ToolTableCore):
     def read_all(self) -> dict[int, ToolOffset | None]:
         """Read all fifteen from one TLSet listing; it is empty when none is defined."""
         self._window.require_ready("TLSet")
-        listed = spel.parse_tool_listing(_listing(self._window))
+        listed = spel.parse_tool_listing(
+            self._window.printed(spel.list_tools(), may_be_nothing=True)
+        )
         return {tool: listed.get(tool) for tool in self.indices()}
 
     def selected(self) -> int | None:
@@ -150,7 +152,7 @@ class _FlashWrite(ToolWrite):
         """
         with self._window.proving_ready(f"TLSet {self.tool}"):
             if isinstance(expected, ToolOffset) and not self._robot.read().six_axes:
-                listing = _listing(self._window)
+                listing = self._window.printed(spel.list_tools(), may_be_nothing=True)
                 with suppress(RemoteProtocolError):
                     listed = spel.parse_tool_listing(listing).get(self.tool)
                     if self._same(listed, expected) and not self._same(listed, self.requested):
@@ -166,10 +168,6 @@ class _FlashWrite(ToolWrite):
 
     def read_doubted(self) -> ToolOffset | None:
         return _stored_tool(self._window, self.tool)
-
-
-def _listing(window: CommandWindow) -> str:
-    return window.printed(spel.list_tools(), may_be_nothing=True)
 
 
 def _stored_tool(window: CommandWindow, tool: int) -> ToolOffset | None:

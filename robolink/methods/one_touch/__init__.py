@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, Self
 from annotated_types import Ge, Le
 
 from robolink.calibration import CalibrationResult, carrying
+from robolink.deprecation import deprecated
 from robolink.errors import ConfigError
 from robolink.messages import declared, tr
 from robolink.methods.method import (
@@ -204,9 +205,15 @@ class OneTouchSource(ProvesAgain):
         return self.with_touch(replace(self.touch, nominal=True)).steps(stored, here)
 
     @property
-    def adds_touch(self) -> bool:
+    def can_add_touch(self) -> bool:
         """One touch is the method."""
         return False
+
+    @property
+    @deprecated("can_add_touch")
+    def adds_touch(self) -> bool:
+        """The old name."""
+        return self.can_add_touch
 
     def further(
         self,

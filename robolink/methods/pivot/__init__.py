@@ -136,7 +136,7 @@ class PivotSource(PinSource):
         return replace(PinSource.foreseen(self), sampling=TAKE_ALL)
 
     @property
-    def adds_touch(self) -> bool:
+    def can_add_touch(self) -> bool:
         """Which further tilt tells most depends on those of the plan."""
         return False
 

@@ -118,7 +118,7 @@ class SurfaceTouchSource(TouchSource, Generic[SurveyT, ResultT]):
         return (yield from measure_surface(self, self._kind(), require_known_tip(stored)))
 
     @property
-    def adds_touch(self) -> bool:
+    def can_add_touch(self) -> bool:
         """Where one more tells most depends on those of the plan."""
         return False
 

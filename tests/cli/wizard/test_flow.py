@@ -270,7 +270,7 @@ def test_one_earlier_touch_is_made_again_where_the_method_hears_it(line, sent):
     ],
 )
 def test_from_the_new_values_one_key_goes_back_to_the_touches(again, adds, typed, sent):
-    subject = replace(write_subject(1), again=again, adds_touch=adds)
+    subject = replace(write_subject(1), again=again, can_add_touch=adds)
     assert Sitting().asked(subject, Question.YES_NO).keys(typed).sent == ([sent] if sent else [])
     words = {"/": "back", "+": "more"}
     line = Sitting().asked(subject, Question.YES_NO).line(words[typed])
@@ -415,7 +415,7 @@ SUBJECTS = [
     (touch_subject(), Question.PLACE),
     (touch_subject(arrival=None, number=1), Question.PLACE),
     (write_subject(1), Question.YES_NO),
-    (replace(write_subject(3), again=2, adds_touch=True), Question.YES_NO),
+    (replace(write_subject(3), again=2, can_add_touch=True), Question.YES_NO),
     (touch_subject(retakes=True, types=True), Question.PLACE),
     (CHECK, Question.YES_NO),
     (fit_subject(0.1, 0.01, worst=0), Question.YES_NO),

@@ -438,7 +438,7 @@ SCREENS = {
     "recover": recovering,
     "check list": checking,
     "values again": lambda: Sitting().asked(
-        replace(write_subject(1), again=3, adds_touch=True), Question.YES_NO
+        replace(write_subject(1), again=3, can_add_touch=True), Question.YES_NO
     ),
     "fit more": lambda: Sitting().asked(
         replace(fit_subject(0.006, 0.004, 0.131, 0.007, worst=2), more=True), Question.YES_NO

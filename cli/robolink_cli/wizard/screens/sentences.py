@@ -90,7 +90,7 @@ def _further(subject: WriteSubject) -> list[str]:
     if subject.again is None:
         return []
     told = [tr("again = touch {k} again.", k=subject.again)]
-    return [*told, tr("more = one more touch.")] if subject.adds_touch else told
+    return [*told, tr("more = one more touch.")] if subject.can_add_touch else told
 
 
 def _place(state: WizardState) -> str:

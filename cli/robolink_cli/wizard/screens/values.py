@@ -115,7 +115,7 @@ def _further(subject: WriteSubject) -> tuple[tuple[str, str], ...]:
     if subject.again is None:
         return ()
     again = ("/", tr("Touch {k} again", k=subject.again))
-    return (again, ("+", tr("One more touch"))) if subject.adds_touch else (again,)
+    return (again, ("+", tr("One more touch"))) if subject.can_add_touch else (again,)
 
 
 def value_lines(subject: WriteSubject) -> list[str]:

@@ -43,30 +43,22 @@ class Local:
         """Where it stands in the base."""
         return frame_at((self.x_mm, self.y_mm, self.z_mm, self.u_deg, self.v_deg, self.w_deg))
 
-    def carried(self, coordinates: Coordinates, *, tilting: bool) -> Coordinates:
+    def to_base(self, coordinates: Coordinates, *, tilting: bool) -> Coordinates:
         """Express coordinates of this local in the base, of a robot that tilts its tool or not.
 
         A local of two pairs is turned about Z alone: with BaseU its U is simply not added.
         """
         if tilting and not self.base_u:
             return coordinates_of_frame(self.frame @ frame_at(coordinates))
-        return self.to_base(coordinates)
-
-    def seen(self, coordinates: Coordinates, *, tilting: bool) -> Coordinates:
-        """Express base coordinates in this local; undoes :meth:`carried`."""
-        if tilting and not self.base_u:
-            return coordinates_of_frame(self.frame.inverse() @ frame_at(coordinates))
-        return self.from_base(coordinates)
-
-    def to_base(self, coordinates: Coordinates) -> Coordinates:
-        """Express coordinates of this planar local in the base frame, U taken literally."""
         x, y, z, u, v, w = coordinates
         dx_mm, dy_mm = rotate_xy(x, y, self.u_deg)
         turned_deg = u if self.base_u else u + self.u_deg
         return (self.x_mm + dx_mm, self.y_mm + dy_mm, self.z_mm + z, turned_deg, v, w)
 
-    def from_base(self, coordinates: Coordinates) -> Coordinates:
-        """Express base coordinates in this planar local."""
+    def from_base(self, coordinates: Coordinates, *, tilting: bool) -> Coordinates:
+        """Express base coordinates in this local; undoes :meth:`to_base`."""
+        if tilting and not self.base_u:
+            return coordinates_of_frame(self.frame.inverse() @ frame_at(coordinates))
         x, y, z, u, v, w = coordinates
         in_x, in_y = rotate_xy(x - self.x_mm, y - self.y_mm, -self.u_deg)
         return (in_x, in_y, z - self.z_mm, u if self.base_u else u - self.u_deg, v, w)
@@ -110,7 +102,7 @@ class RobotBase:
         return any(self.coordinates)
 
     @property
-    def leans(self) -> bool:
+    def tilted(self) -> bool:
         """Whether its XY plane is not that of the robot."""
         return max(abs(self._place.v_deg), abs(self._place.w_deg)) > _LEVEL_DEG
 
@@ -131,13 +123,17 @@ class RobotBase:
         self._place = place
         return True
 
-    def seen(self, in_robot: Coordinates) -> Coordinates:
+    def to_base(self, coordinates: Coordinates) -> Coordinates:
         """Return coordinates of the robot as the base sees them."""
-        return self._place.seen(in_robot, tilting=self._tilting) if self.moved else in_robot
+        if not self.moved:
+            return coordinates
+        return self._place.from_base(coordinates, tilting=self._tilting)
 
-    def in_robot(self, seen: Coordinates) -> Coordinates:
+    def to_robot(self, coordinates: Coordinates) -> Coordinates:
         """Return coordinates of the base as the robot sees them."""
-        return self._place.carried(seen, tilting=self._tilting) if self.moved else seen
+        if not self.moved:
+            return coordinates
+        return self._place.to_base(coordinates, tilting=self._tilting)
 
     def to_state(self) -> list[float]:
         """Return what survives power-off, ready for JSON."""

@@ -135,7 +135,7 @@ class LocalTable:
         local = self.get(point.local)
         if point.local == 0:
             return point
-        coordinates = local.carried(point.coordinates, tilting=self.tilting)
+        coordinates = local.to_base(point.coordinates, tilting=self.tilting)
         return replace(point, coordinates=coordinates, local=0)
 
     def convert(self, point: Point, number: int) -> Point:
@@ -145,8 +145,8 @@ class LocalTable:
         base, local = self.to_base(point), self.get(number)
         if number == 0:
             return base
-        seen = local.seen(base.coordinates, tilting=self.tilting)
-        return replace(base, coordinates=seen, local=number)
+        coordinates = local.from_base(base.coordinates, tilting=self.tilting)
+        return replace(base, coordinates=coordinates, local=number)
 
 
 class PointTable:

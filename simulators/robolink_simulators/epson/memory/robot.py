@@ -338,7 +338,7 @@ class DrivenRobot:
             Refusal: Its local is not defined.
         """
         base = self.locals.to_base(target)
-        x, y, z, u, v, w = self.kept.base.in_robot(base.coordinates)
+        x, y, z, u, v, w = self.kept.base.to_robot(base.coordinates)
         if not self.model.six_axes:
             v = w = 0.0
         return Pose(x, y, z, u, v, w, hand=base.hand, posture=base.posture)
@@ -346,7 +346,7 @@ class DrivenRobot:
     def point_at(self, pose: Pose) -> Point:
         """Return the point of a pose that the robot sees, as its base sees it."""
         at = Point.at(pose)
-        return replace(at, coordinates=self.kept.base.seen(at.coordinates))
+        return replace(at, coordinates=self.kept.base.to_base(at.coordinates))
 
     def here(self) -> Point:
         """Return the commanded place of the selected tool's tip."""
@@ -358,7 +358,7 @@ class DrivenRobot:
         Raises:
             Refusal: It is not defined.
         """
-        return frame_at(self.kept.base.in_robot(self.control_points.get(number)))
+        return frame_at(self.kept.base.to_robot(self.control_points.get(number)))
 
     def move_base(self, coordinates: Coordinates) -> None:
         """Put the base elsewhere: every local has to be defined anew (documented).

@@ -116,12 +116,12 @@ def arc(evaluator: Evaluator, motion: MotionStatement) -> Leg:
 def _level(machine: Machine, made: Callable[..., MeasuredWay]) -> Callable[..., MeasuredWay]:
     """Return what makes a level arc: level is the XY plane of the base (documented)."""
     base = machine.kept.base
-    if not base.leans:
+    if not base.tilted:
         return made
 
     def in_the_base(*tips: Pose) -> MeasuredWay:
-        seen = (Pose(*base.seen(tip.coordinates()), tip.hand) for tip in tips)
-        way, length_mm = made(*seen)
+        in_base = (Pose(*base.to_base(tip.coordinates()), tip.hand) for tip in tips)
+        way, length_mm = made(*in_base)
         frame = frame_at(base.coordinates)
         return lambda share: frame.point(way(share)), length_mm
 

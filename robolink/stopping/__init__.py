@@ -5,11 +5,13 @@ stands around it: the listener of a process that holds one, how a second termina
 it, and the note by which the next command learns of the stop.
 """
 
+from typing import TYPE_CHECKING
+
+from robolink.lazy_exports import old_names
 from robolink.stopping._asking import (
     ControllerHolder,
     HolderGoneError,
     LastSeen,
-    far_end_of,
     holders_of,
 )
 from robolink.stopping._listener import StopListener
@@ -22,8 +24,10 @@ __all__ = [
     "StopListener",
     "StopNote",
     "clear_note",
-    "far_end_of",
     "find_note",
     "holders_of",
     "leave_note",
 ]
+
+if not TYPE_CHECKING:
+    __getattr__ = old_names(__name__)

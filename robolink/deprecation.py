@@ -141,6 +141,7 @@ OLD_NAMES: Final[Mapping[str, Mapping[str, str]]] = {
         "UNTOUCHED": "robolink.controller_outcome.UNTOUCHED",
         "standing_after": "robolink.controller_outcome.outcome_after",
     },
+    "robolink.stopping": {"far_end_of": "robolink.transport.far_end_of"},
     "robolink.testing": {
         "MemoryController": "robolink.controllers.SimpleController",
         "MemoryMachine": "robolink.controllers.SimpleMachine",

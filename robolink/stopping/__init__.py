@@ -7,25 +7,27 @@ it, and the note by which the next command learns of the stop.
 
 from typing import TYPE_CHECKING
 
-from robolink.lazy_exports import lazy_exports
+from robolink.lazy_exports import old_names
+from robolink.stopping._asking import (
+    ControllerHolder,
+    HolderGoneError,
+    LastSeen,
+    holders_of,
+)
+from robolink.stopping._listener import StopListener
+from robolink.stopping._notes import StopNote, clear_note, find_note, leave_note
 
-if TYPE_CHECKING:
-    from robolink.stopping._asking import ControllerHolder as ControllerHolder
-    from robolink.stopping._asking import HolderGoneError as HolderGoneError
-    from robolink.stopping._asking import LastSeen as LastSeen
-    from robolink.stopping._asking import far_end_of as far_end_of
-    from robolink.stopping._asking import holders_of as holders_of
-    from robolink.stopping._listener import StopListener as StopListener
-    from robolink.stopping._notes import StopNote as StopNote
-    from robolink.stopping._notes import clear_note as clear_note
-    from robolink.stopping._notes import find_note as find_note
-    from robolink.stopping._notes import leave_note as leave_note
-else:
-    __getattr__, __dir__, __all__ = lazy_exports(
-        __name__,
-        {
-            "_asking": "ControllerHolder HolderGoneError LastSeen far_end_of holders_of",
-            "_listener": "StopListener",
-            "_notes": "StopNote clear_note find_note leave_note",
-        },
-    )
+__all__ = [
+    "ControllerHolder",
+    "HolderGoneError",
+    "LastSeen",
+    "StopListener",
+    "StopNote",
+    "clear_note",
+    "find_note",
+    "holders_of",
+    "leave_note",
+]
+
+if not TYPE_CHECKING:
+    __getattr__ = old_names(__name__)

@@ -30,8 +30,8 @@ from robolink.files.durable import make_folder, state_folder
 from robolink.interrupts import ClosedAtExit
 from robolink.model import ControllerStatus, is_own_name
 from robolink.plug_ins import unexpected
-from robolink.stopping._asking import far_end_of
 from robolink.timing import NS_PER_S
+from robolink.transport import far_end_of
 
 KIND: Final = "holders"
 
@@ -85,7 +85,8 @@ class StopListener(ClosedAtExit):
         OSError: There is no place to listen.
 
     Example:
-        >>> from robolink.stopping import StopListener, far_end_of, holders_of
+        >>> from robolink.stopping import StopListener, holders_of
+        >>> from robolink.transport import far_end_of
         >>> from robolink.controllers import SimpleController
         >>> url = "epson+tcp://192.168.0.1:5000"
         >>> with SimpleController(identity=url) as controller:

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from robolink.transport._registry import open_transport as open_transport
     from robolink.transport._url import LinkUrl as LinkUrl
     from robolink.transport._url import UrlOptions as UrlOptions
+    from robolink.transport._url import far_end_of as far_end_of
     from robolink.transport._url import parse_url as parse_url
     from robolink.transport.byte_stream import SECRET_PLACEHOLDER as SECRET_PLACEHOLDER
     from robolink.transport.byte_stream import Direction as Direction
@@ -35,7 +36,7 @@ else:
             "_registry": (
                 "TRANSPORTS_GROUP TransportOpener open_mailbox_link open_modbus open_transport"
             ),
-            "_url": "LinkUrl UrlOptions parse_url",
+            "_url": "LinkUrl UrlOptions far_end_of parse_url",
             "byte_stream": "Direction SECRET_PLACEHOLDER TraceSink TracingTransport Transport",
             "dialogue": (
                 "Dialogue DialogueLog Passage format_dialogue opening_line "

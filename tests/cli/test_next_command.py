@@ -28,7 +28,8 @@ from robolink.errors import ControllerFaultError
 from robolink.journal import open_journal
 from robolink.messages import tr
 from robolink.model import MarkerKind
-from robolink.stopping import far_end_of, find_note, leave_note
+from robolink.stopping import find_note, leave_note
+from robolink.transport import far_end_of
 from tests.cli.wizard._people import HEADER
 
 # A "Next" line never names the command that was refused just now.

@@ -30,8 +30,8 @@ from robolink.errors import OutcomeUnknownError
 from robolink.journal import close_files, open_journal
 from robolink.model import MotionProfile, WorkBox
 from robolink.model import Path as MovePath
-from robolink.stopping import StopListener, far_end_of, find_note
-from robolink.transport import parse_url
+from robolink.stopping import StopListener, find_note
+from robolink.transport import far_end_of, parse_url
 
 CREEPING = MotionProfile(MovePath.STRAIGHT, 5, 1.0)
 

@@ -13,8 +13,9 @@ from robolink_simulators.hosting.streams.epson import serve_tcp
 import robolink
 from robolink.errors import OutcomeUnknownError, RejectedError, StoppedError
 from robolink.model import ControllerStatus, MotionProfile, WorkBox
-from robolink.stopping import HolderGoneError, StopListener, far_end_of, holders_of
+from robolink.stopping import HolderGoneError, StopListener, holders_of
 from robolink.timing import NS_PER_S
+from robolink.transport import far_end_of
 
 
 @pytest.fixture(params=["path", "loopback"])

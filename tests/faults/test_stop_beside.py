@@ -10,7 +10,8 @@ from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_tcp
 from robolink_simulators.hosting.streams.epson import serve_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
-from robolink.stopping import far_end_of, holders_of
+from robolink.stopping import holders_of
+from robolink.transport import far_end_of
 from tests._patience import PATIENCE_S
 from tests.faults._client_process import ClientProcess
 

@@ -12,7 +12,8 @@ from robolink_simulators.hosting.streams.epson import serve_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
-from robolink.stopping import StopListener, clear_note, far_end_of, find_note, leave_note
+from robolink.stopping import StopListener, clear_note, find_note, leave_note
+from robolink.transport import far_end_of
 from tests.faults._client_process import ClientProcess
 from tests.faults._second_address import SecondAddress
 from tests.faults.test_stop_beside import await_that

@@ -11,7 +11,8 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.streams.epson import serve_tcp
 
 import robolink
-from robolink.stopping import StopListener, far_end_of, holders_of
+from robolink.stopping import StopListener, holders_of
+from robolink.transport import far_end_of
 
 pytestmark = [pytest.mark.simulator_only, pytest.mark.soak, pytest.mark.timeout(300)]
 
@@ -22,7 +23,8 @@ MORE_S = 0.5
 
 LOOKING = """
 import sys, threading, time
-from robolink.stopping import far_end_of, holders_of
+from robolink.stopping import holders_of
+from robolink.transport import far_end_of
 (holder,) = holders_of(far_end_of(sys.argv[1]))
 def look():
     while True:

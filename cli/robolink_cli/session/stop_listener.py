@@ -123,7 +123,8 @@ def seen_by_another(url: str) -> dict[str, object] | None:
     """
     if _SEVERAL_CLIENTS in url or "+sim://" in url:
         return None
-    from robolink.stopping import HolderGoneError, far_end_of, holders_of
+    from robolink.stopping import HolderGoneError, holders_of
+    from robolink.transport import far_end_of
 
     try:
         holders = list(holders_of(far_end_of(url)))

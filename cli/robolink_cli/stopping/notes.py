@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 from robolink.errors import ConfigError, DeclinedError, RobolinkError, StoppedError
 from robolink.messages import tr
 from robolink.model import is_own_name
-from robolink.stopping import StopNote, clear_note, far_end_of, find_note
+from robolink.stopping import StopNote, clear_note, find_note
+from robolink.transport import far_end_of
 from robolink_cli.console.render import note
 
 if TYPE_CHECKING:

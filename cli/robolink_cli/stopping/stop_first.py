@@ -20,7 +20,8 @@ from robolink.errors import (
     RobolinkError,
 )
 from robolink.messages import tr
-from robolink.stopping import HolderGoneError, far_end_of, holders_of
+from robolink.stopping import HolderGoneError, holders_of
+from robolink.transport import far_end_of
 from robolink_cli.stopping.request import StopRequest
 
 if TYPE_CHECKING:

@@ -15,7 +15,8 @@ from robolink.errors import ConfigError, RobolinkError, StoppedError, TransportC
 from robolink.files.named import save_named
 from robolink.messages import tr
 from robolink.model import ControllerStatus
-from robolink.stopping import far_end_of, find_note
+from robolink.stopping import find_note
+from robolink.transport import far_end_of
 from robolink_cli.access.record import recording
 from robolink_cli.console.exit_codes import error_body
 from robolink_cli.console.render import note

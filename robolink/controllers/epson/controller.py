@@ -223,7 +223,7 @@ class EpsonController(ControllerCore):
             ReadBackError: The motors are not as asked.
         """
         name, group = "SetMotorsOn" if on else "SetMotorsOff", self.groups[0]
-        with self._link.lock.held(name, calming=not on):
+        with self._link.lock.held(name, calming=not on, leased=False):
             self._link.window.require_ready(name)
             self._link.session.exchange(name, str(self.robot_number()))
             if on:

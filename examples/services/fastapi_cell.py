@@ -9,7 +9,7 @@ can keep two writes apart without a second login. Run one worker process.
 
 import asyncio
 import os
-from collections.abc import AsyncIterator
+from collections.abc import AsyncGenerator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager
 
@@ -34,7 +34,7 @@ def service(url: str | None = None) -> FastAPI:
     stops = ThreadPoolExecutor(1, thread_name_prefix="stop")
 
     @asynccontextmanager
-    async def connected(app: FastAPI) -> AsyncIterator[None]:
+    async def connected(app: FastAPI) -> AsyncGenerator[None, None]:
         address = url or os.environ["ROBOLINK_CONTROLLER"]
         # A write waits 5 s for the writes before it, and only then gets BusyError.
         with robolink.connect(address, wait_s=5.0) as controller:

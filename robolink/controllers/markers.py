@@ -26,6 +26,7 @@ from robolink.errors import (
 )
 from robolink.messages import tr
 from robolink.model import Ledger, Marker, MarkerKind, NewEntry, OutcomeLog, new_operation
+from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.stop_latch import LOOK_S, Patience, StopLatch
 from robolink.timing import local_label, wall_label
 
@@ -146,7 +147,10 @@ class ProcedureLock:
                             "{request} has to wait: another operation is under way.",
                             request=request,
                         ),
-                        remedy=tr("Wait for it to end; stopping is possible at any time."),
+                        remedy=tr(
+                            "Wait for it to end ({wait}); stopping is possible at any time.",
+                            wait=remedy_word(RemedyWord.WAIT),
+                        ),
                     )
                 look = look or self.patience.watch(request, calming=calming)
                 look()

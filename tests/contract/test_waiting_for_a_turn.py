@@ -3,7 +3,6 @@
 import _thread
 import threading
 import time
-from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import replace
@@ -25,6 +24,7 @@ from robolink.errors import (
 from robolink.journal import JournalOutcomeLog, memory_journal, this_process
 from robolink.model import EntryKind, new_operation
 from robolink.transaction import ToolChange, Wanted, carrying_out, change_tools, recover
+from tests._meanwhile import Meanwhile
 from tests._patience import PATIENCE_S
 
 URL = "memory+object://turns"
@@ -53,36 +53,6 @@ def come_to_wait(controller: SimpleController, number: int) -> None:
     while len(controller._driver.lock._waiting) != number:
         assert time.monotonic() < deadline
         time.sleep(0.001)
-
-
-class Meanwhile(runtime.SystemRuntime):
-    """Time passes only where somebody waits; something happens while he does."""
-
-    def __init__(self, happens: Callable[[], None] = lambda: None) -> None:
-        self.slept_s = 0.0
-        self._happens = happens
-
-    def monotonic_ns(self) -> int:
-        return int(self.slept_s * 1e9)
-
-    def sleep(self, seconds: float) -> None:
-        self.slept_s += seconds
-        happens, self._happens = self._happens, lambda: None
-        happens()
-
-    def waiting_room(self) -> runtime.WaitingRoom:
-        return QuickRoom(self)
-
-
-class QuickRoom(threading.Condition):
-    def __init__(self, time: Meanwhile) -> None:
-        super().__init__()
-        self._time = time
-
-    def wait(self, timeout: float | None = None) -> bool:
-        assert timeout is not None
-        self._time.sleep(timeout)
-        return False
 
 
 # Threads of one program, on one controller.

@@ -34,11 +34,8 @@ from robolink.messages import joined, tr
 __all__ = [
     "CommandClass",
     "LONGEST_WAIT_S",
-    "LOOK_S",
     "Patience",
     "StopLatch",
-    "require_wait",
-    "waiting_for",
 ]
 
 

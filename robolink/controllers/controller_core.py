@@ -7,9 +7,8 @@ read. Markers, latch, ledger, recovery, and what happens at the end of a connect
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from functools import cached_property
 from types import TracebackType
-from typing import Final, Self
+from typing import TYPE_CHECKING, Final, Self
 
 from robolink.controller_outcome import note_outcome
 from robolink.controllers.driver_link import DriverLink, DriverPart, advise_emergency_stop
@@ -32,6 +31,12 @@ from robolink.model import (
     ToolTable,
     VariableTable,
 )
+
+if TYPE_CHECKING:  # to pyright a cached_property is no property, and its owner no Controller
+    from builtins import property as cached_property
+else:
+    from functools import cached_property
+
 
 _STOPS_S: Final = 5.0
 """Longest wait, at the end, for stops that are under way in other threads."""

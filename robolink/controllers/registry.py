@@ -20,7 +20,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from types import MappingProxyType
-from typing import Final, Protocol, TypeVar, cast, overload
+from typing import Any, Final, Protocol, TypeVar, cast, overload
 
 from robolink import runtime
 from robolink.errors import (
@@ -170,10 +170,12 @@ def capabilities_of_kind(kind: str) -> Capabilities | None:
         >>> capabilities_of_kind("plc").motion, capabilities_of_kind("acme")
         (False, None)
     """
-    if kind not in _KINDS:
-        return None
+    return cast(Capabilities, _class_of_kind(kind).OF_KIND) if kind in _KINDS else None
+
+
+def _class_of_kind(kind: str) -> Any:  # noqa: ANN401 - a class with OF_KIND
     module, _, name = _KINDS[kind]
-    return cast(Capabilities, getattr(import_module(module), name).OF_KIND)
+    return getattr(import_module(module), name)
 
 
 def _told_as_its_own(kind: str, opener: ControllerOpener) -> ControllerOpener:
@@ -313,9 +315,11 @@ def connect(
                 tr("{given!r} is neither a URL nor a controller.", given=url),
                 remedy=tr("Give a URL such as epson+tcp://192.168.0.1:5000."),
             )
-        return _of_kind(url, kind, str(url.identity))
+        _require_kind(type(url), kind, str(url.identity))
+        return url
     link, wait_s = parse_url(url), require_wait(wait_s or 0.0)
-    _refuse_other_kind(link, kind, url)
+    if kind is not None and link.kind in _KINDS:  # before anything is connected
+        _require_kind(_class_of_kind(link.kind), kind, url)
     terms = ConnectionTerms(
         signature or signature_here(VERSION),
         password=Secret(password) if isinstance(password, str) else password,
@@ -330,7 +334,7 @@ def connect(
     opener = find_opener(link)
     controller = _waited_for(lambda: opener(link, terms), wait_s, tell)
     try:
-        controller = _of_kind(controller, kind, url)
+        _require_kind(type(controller), kind, url)
         if wait_s:
             controller.patience.wait_s, controller.patience.tell = wait_s, tell
     except BaseException:
@@ -341,41 +345,22 @@ def connect(
     return controller
 
 
-def _refuse_other_kind(link: LinkUrl, kind: type[Controller] | None, called: str) -> None:
-    """Refuse, before anything is connected, a URL whose kind is known to be another.
+def _require_kind(found: type, kind: type[Controller] | None, called: str) -> None:
+    """Refuse a controller, or what a URL is known to open, that is not of the kind asked for.
 
     Raises:
-        ConfigError: It is.
+        ConfigError: It is of another kind.
     """
-    if kind is None or link.kind not in _KINDS:
-        return
-    module, _, name = _KINDS[link.kind]
-    opened = getattr(import_module(module), name)
-    if not issubclass(opened, kind):
-        raise _other_kind(called, opened, kind)
-
-
-def _of_kind(controller: Controller, kind: type[Controller] | None, called: str) -> Controller:
-    """Return a controller that is of a kind.
-
-    Raises:
-        ConfigError: It is not.
-    """
-    if kind is not None and not isinstance(controller, kind):
-        raise _other_kind(called, type(controller), kind)
-    return controller
-
-
-def _other_kind(called: str, found: type, kind: type) -> ConfigError:
-    return ConfigError(
-        tr(
-            "{url} is the URL of a controller of the kind {found}, not {kind}.",
-            url=called,
-            found=found.__name__,
-            kind=kind.__name__,
-        ),
-        remedy=tr("Give {found} as the kind, or another URL.", found=found.__name__),
-    )
+    if kind is not None and not issubclass(found, kind):
+        raise ConfigError(
+            tr(
+                "{url} is the URL of a controller of the kind {found}, not {kind}.",
+                url=called,
+                found=found.__name__,
+                kind=kind.__name__,
+            ),
+            remedy=tr("Give {found} as the kind, or another URL.", found=found.__name__),
+        )
 
 
 _AGAIN_S: Final = 0.25

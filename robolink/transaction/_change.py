@@ -176,41 +176,38 @@ class ToolChange:
             StoppedError: A stop came; what was written is put back.
         """
         with self._controller.patience.within(self._wait_s):
-            return self._write_all()
-
-    def _write_all(self) -> tuple[ToolReceipt, ...]:
-        self._controller.latch.require_open(self.request)
-        # What is there already needs no write that would be refused, and is told as done.
-        self._controller.require_settled(self.request)
-        steps = self._believed() or self._compare()
-        for doubt in self._controller.tools.doubts([step.tool for step in steps]):
-            self._tell(doubt)
-        self._selected = self._selected_before(steps)
-        if self._several_steps and any(self._differs(step) for step in steps):
-            for step in steps:  # what a write would be refused for, before the first of them
-                self._controller.change_guard.require(step.tool, step.before, step.requested)
-            tools = {
-                str(step.tool): {
-                    "before": plain_offset(step.before),
-                    "requested": plain_offset(step.requested),
+            self._controller.latch.require_open(self.request)
+            # What is there already needs no write that would be refused, and is told as done.
+            self._controller.require_settled(self.request)
+            steps = self._believed() or self._compare()
+            for doubt in self._controller.tools.doubts([step.tool for step in steps]):
+                self._tell(doubt)
+            self._selected = self._selected_before(steps)
+            if self._several_steps and any(self._differs(step) for step in steps):
+                for step in steps:  # what a write would be refused for, before the first of them
+                    self._controller.change_guard.require(step.tool, step.before, step.requested)
+                tools = {
+                    str(step.tool): {
+                        "before": plain_offset(step.before),
+                        "requested": plain_offset(step.requested),
+                    }
+                    for step in steps
                 }
-                for step in steps
-            }
-            details = {
-                "tools": tools,
-                "verify": self._verify,
-                "change": self._controller.outcomes.change,
-                **(self._ordered.marked(steps) if self._ordered else {}),
-                **self._marked,
-            }
-            if self._selected is not None:
-                details["selected"] = self._selected
-            with self._controller.uninterrupted():
-                self._marker = self._controller.begin(MarkerKind.CHANGE, self.request, details)
-                self._signs_of_life.enter_context(self._controller.signs_of_life())
-        for wanted, step in zip(self._wanted, steps, strict=True):
-            self._receipts += (self._write(wanted, step),)
-        return self._receipts
+                details = {
+                    "tools": tools,
+                    "verify": self._verify,
+                    "change": self._controller.outcomes.change,
+                    **(self._ordered.marked(steps) if self._ordered else {}),
+                    **self._marked,
+                }
+                if self._selected is not None:
+                    details["selected"] = self._selected
+                with self._controller.uninterrupted():
+                    self._marker = self._controller.begin(MarkerKind.CHANGE, self.request, details)
+                    self._signs_of_life.enter_context(self._controller.signs_of_life())
+            for wanted, step in zip(self._wanted, steps, strict=True):
+                self._receipts += (self._write(wanted, step),)
+            return self._receipts
 
     def keep(self, verdict: str = "") -> None:
         """Put on record that the new values stay.

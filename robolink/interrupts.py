@@ -37,6 +37,7 @@ __all__ = [
     "ended_by",
     "heard_by_this_thread",
     "heed",
+    "heed_while_waiting",
     "one_ending",
     "output_closed",
     "seen_through",
@@ -215,6 +216,17 @@ def heed() -> None:
     """
     if _handler.heard_here():
         _handler.let_out()
+
+
+def heed_while_waiting() -> None:
+    """End a wait in which nothing is under way, inside a gate too.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C, or what ends a program like it, came and was held back.
+    """
+    heed()
+    if _handler.heard_here() and _handler.held is not None:
+        raise KeyboardInterrupt  # the gate raises what was held back at its end
 
 
 def end(by: EndedBy) -> None:

@@ -55,6 +55,7 @@ class RemedyWord:
     TOOL: Final = "tool"
     TOOLS: Final = "tools"
     TURN: Final = "turn_in_air(here, {turn:+g}, lift_mm=10)"
+    WAIT: Final = "wait_s=SECONDS"
     YES: Final = "Answers(yes=True)"
 
 

@@ -8,19 +8,33 @@ the stop that follows under the same lock, what comes after it is refused.
 
 Two things are let through, and only in the thread that does them on purpose: the restoring of
 tool, power and speed at the end of a procedure, and one roll-back of each tool of an open change.
+
+How long a call waits for another thread, program or person stands here too: a stop ends the wait.
 """
 
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from enum import Enum, auto
+from typing import Final, TypeVar
 
 from robolink import runtime
-from robolink.errors import Concerning, ControllerError, StoppedError, UnclearAnswerError
-from robolink.messages import tr
+from robolink.errors import (
+    Concerning,
+    ConfigError,
+    ControllerError,
+    LeaseHeldError,
+    RobolinkError,
+    StoppedError,
+    UnclearAnswerError,
+)
+from robolink.interrupts import heed_while_waiting
+from robolink.messages import joined, tr
 
 __all__ = [
     "CommandClass",
+    "LONGEST_WAIT_S",
+    "Patience",
     "StopLatch",
 ]
 
@@ -67,6 +81,11 @@ class StopLatch:
     def closed(self) -> bool:
         """Whether a stop is in force."""
         return self._closed
+
+    @property
+    def closings(self) -> int:
+        """How often it was closed so far: whoever waits sees by it that a stop came meanwhile."""
+        return self._closings
 
     @property
     def restores(self) -> bool:
@@ -127,6 +146,19 @@ class StopLatch:
             StoppedError: A stop is in force.
         """
         if self._closed and not self.restores:
+            raise self._stopped(tr("{request}: ended by a stop.", request=request), request)
+
+    def require_unstopped(self, since: int, request: str) -> None:
+        """Refuse to wait any longer once a stop came, even one that is released again.
+
+        Args:
+            since: What :attr:`closings` was when the wait began.
+            request: What waits.
+
+        Raises:
+            StoppedError: A stop came; nothing was sent.
+        """
+        if self._closings != since:
             raise self._stopped(tr("{request}: ended by a stop.", request=request), request)
 
     @contextmanager
@@ -219,3 +251,170 @@ class StopLatch:
             "start again."
         )
         return StoppedError(said, remedy=remedy, controller=self._controller, request=request)
+
+
+LONGEST_WAIT_S: Final = 86_400.0
+"""Nobody waits longer than a day for his turn."""
+
+LOOK_S: Final = 0.1
+"""From one look to the next, while waiting, whether a stop or Ctrl-C came, or the way is free."""
+
+T = TypeVar("T")
+
+
+def require_wait(wait_s: float) -> float:
+    """Return a wait in seconds.
+
+    Raises:
+        ConfigError: It is negative, longer than :data:`LONGEST_WAIT_S`, or no number.
+    """
+    if not 0 <= wait_s <= LONGEST_WAIT_S:
+        raise ConfigError(
+            tr("A wait of {seconds} s is not possible.", seconds=wait_s),
+            remedy=tr(
+                "Give 0 to {most:g} seconds; 0 means: do not wait. Nothing was sent.",
+                most=LONGEST_WAIT_S,
+            ),
+        )
+    return float(wait_s)
+
+
+class Patience:
+    """How long a call waits that would be refused because somebody else is at work.
+
+    One call waits that long in all: for another thread of this program, for another program that
+    has the lease, for another owner of a PLC's mailbox. Nothing has been sent by then. A stop ends
+    the wait with StoppedError, Ctrl-C with KeyboardInterrupt. The time is the computer's, even at a
+    simulator whose own time is virtual: it is threads and programs that are waited for.
+
+    Attributes:
+        wait_s: For each call that does not say it itself; 0 refuses at once.
+        tell: Told, in a sentence, who is waited for.
+
+    Args:
+        latch: Whose closing ends the wait.
+
+    Example:
+        >>> import robolink
+        >>> with robolink.connect("epson+sim://patience-example", wait_s=5) as controller:
+        ...     controller.patience.wait_s
+        5.0
+    """
+
+    def __init__(self, latch: StopLatch) -> None:
+        self.tell: Callable[[str], None] = lambda _sentence: None
+        self._wait_s = 0.0
+        self._latch = latch
+        self._calls = threading.local()
+
+    @property
+    def wait_s(self) -> float:
+        """See above."""
+        return self._wait_s
+
+    @wait_s.setter
+    def wait_s(self, wait_s: float) -> None:
+        self._wait_s = require_wait(wait_s)
+
+    @property
+    def waits(self) -> bool:
+        """Whether the call under way in this thread may wait, or might have."""
+        return self._calls.__dict__.get("until_ns") is not None
+
+    @property
+    def left_s(self) -> float:
+        """How much longer the call under way in this thread may wait."""
+        until_ns: int | None = self._calls.__dict__.get("until_ns")
+        return 0.0 if until_ns is None else max(0, until_ns - runtime.monotonic_ns()) / 1e9
+
+    @contextmanager
+    def within(self, wait_s: float | None = None) -> Iterator[None]:
+        """Surround one call; what it calls itself waits within the same seconds.
+
+        Args:
+            wait_s: How long it may wait; ``None`` for what is usual here.
+
+        Raises:
+            ConfigError: That is no wait.
+        """
+        call = self._calls.__dict__
+        if wait_s is None and "until_ns" in call:
+            yield
+            return
+        seconds = self._wait_s if wait_s is None else require_wait(wait_s)
+        until_ns = runtime.monotonic_ns() + int(seconds * 1e9) if seconds else None
+        with self._calling({"until_ns": until_ns}):
+            yield
+
+    def between(self) -> AbstractContextManager[None]:
+        """Surround what a user does inside a block: each call there waits for itself."""
+        return self._calling({})
+
+    @contextmanager
+    def _calling(self, state: dict[str, int | None]) -> Iterator[None]:
+        call = self._calls.__dict__
+        before = dict(call)
+        call.clear()
+        call.update(state)
+        try:
+            yield
+        finally:
+            call.clear()
+            call.update(before)
+
+    def watch(self, request: str, *, calming: bool = False) -> Callable[[], None]:
+        """Begin to wait; what is returned raises once a stop, or Ctrl-C, came.
+
+        Args:
+            request: What waits.
+            calming: Whether that may begin while a stop is in force, as a reset may.
+
+        Raises:
+            StoppedError: A stop is in force.
+        """
+        if not calming:
+            self._latch.require_open(request)
+        since = self._latch.closings
+
+        def look() -> None:
+            heed_while_waiting()
+            self._latch.require_unstopped(since, request)
+
+        return look
+
+    def until_free(self, attempt: Callable[[], T], request: str) -> T:
+        """Repeat what is refused because another program or person is at work, while time is left.
+
+        Args:
+            attempt: One attempt, which sends nothing when it is refused.
+            request: What it is for.
+
+        Raises:
+            LeaseHeldError: The last attempt was refused so.
+            StoppedError: A stop came.
+        """
+        look: Callable[[], None] | None = None
+        while True:
+            try:
+                return attempt()
+            except LeaseHeldError as held:
+                left_s = self.left_s
+                if not left_s:
+                    raise
+                if look is None:
+                    look = self.watch(request)
+                    self.tell(waiting_for(held, left_s))
+            look()
+            runtime.sleep(min(left_s, LOOK_S))
+            look()
+
+
+def waiting_for(refusal: RobolinkError, wait_s: float) -> str:
+    """Return what is said when somebody else is waited for.
+
+    Args:
+        refusal: Says who has it.
+        wait_s: How long it is waited at most.
+    """
+    waiting = tr("Waiting for up to {seconds:.0f} s.", seconds=wait_s)
+    return joined(" ", (refusal.what, waiting))

@@ -138,7 +138,7 @@ class NozzleChange:
         """
         require_clearance(self._plan)
         require_inputs(self._controller, self._plan)
-        with self._begun():
+        with self._controller.procedure(self._request), self._begun():
             self._require_possible(write=write)
             context = self._context(write=write)
             measuring = Measuring(context, self._listener)
@@ -155,9 +155,7 @@ class NozzleChange:
     @contextmanager
     def _begun(self) -> Iterator[None]:
         """Watch over the change; put tool, power mode and speed back whatever ends it."""
-        numbers = ", ".join(str(plan.tool) for plan in self._plan.tools)
-        reason = tr("calibrate tool {tool}", tool=numbers)
-        controller = self._controller
+        reason, controller = self._request, self._controller
         controller.outcomes.change = new_operation()
         self._began_ns = controller.clock.now_ns()
         self._plan = replace(
@@ -171,11 +169,19 @@ class NozzleChange:
                 yield
         except (KeyboardInterrupt, StoppedError):
             if self._written is not None and self._written.kept:
-                self._tell(tr("Tool {tool} keeps the new value.", tool=numbers))
+                self._tell(tr("Tool {tool} keeps the new value.", tool=self._numbers))
             raise
         finally:
             self._accepted.close()
             controller.outcomes.change = ""
+
+    @property
+    def _numbers(self) -> str:
+        return ", ".join(str(plan.tool) for plan in self._plan.tools)
+
+    @property
+    def _request(self) -> str:
+        return tr("calibrate tool {tool}", tool=self._numbers)
 
     def _require_possible(self, *, write: bool) -> None:
         """Say what the write would be refused for before a person has measured anything."""

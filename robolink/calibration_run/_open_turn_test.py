@@ -249,24 +249,27 @@ def finish_by_turn_test(
     """
     marker, finding = _open(controller, operation)
     outcomes, request = controller.outcomes, marker.request
-    outcomes.change = str(marker.details.get("change", ""))
-    try:
-        # From here on this marker alone is that of a procedure of this process.
-        with controller.uninterrupted():
-            controller.begin(MarkerKind.CHANGE, request, marker.details, operation=marker.operation)
-        with (
-            controller.latch.watching(request),
-            controller.preserved(tr("turn test")),
-            _put_back_unless_kept(controller, marker),
-        ):
-            proofs = {
-                one.test.tool: _prove(controller, one, operator, tell, attended=attended)
-                for one in tests_of(marker)
-            }
-            finding = _with_statements(finding, proofs)
-            Settler(controller, keep=True).settle(finding)
-    finally:
-        outcomes.change = ""
+    with controller.procedure(request):
+        outcomes.change = str(marker.details.get("change", ""))
+        try:
+            # From here on this marker alone is that of a procedure of this process.
+            with controller.uninterrupted():
+                controller.begin(
+                    MarkerKind.CHANGE, request, marker.details, operation=marker.operation
+                )
+            with (
+                controller.latch.watching(request),
+                controller.preserved(tr("turn test")),
+                _put_back_unless_kept(controller, marker),
+            ):
+                proofs = {
+                    one.test.tool: _prove(controller, one, operator, tell, attended=attended)
+                    for one in tests_of(marker)
+                }
+                finding = _with_statements(finding, proofs)
+                Settler(controller, keep=True).settle(finding)
+        finally:
+            outcomes.change = ""
     return finding
 
 

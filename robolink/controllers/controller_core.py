@@ -5,11 +5,10 @@ read. Markers, latch, ledger, recovery, and what happens at the end of a connect
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
-from contextlib import AbstractContextManager
-from functools import cached_property
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from types import TracebackType
-from typing import Final, Self
+from typing import TYPE_CHECKING, Final, Self
 
 from robolink.controller_outcome import note_outcome
 from robolink.controllers.driver_link import DriverLink, DriverPart, advise_emergency_stop
@@ -33,6 +32,12 @@ from robolink.model import (
     VariableTable,
 )
 
+if TYPE_CHECKING:  # to pyright a cached_property is no property, and its owner no Controller
+    from builtins import property as cached_property
+else:
+    from functools import cached_property
+
+
 _STOPS_S: Final = 5.0
 """Longest wait, at the end, for stops that are under way in other threads."""
 
@@ -45,6 +50,7 @@ class ControllerCore(DriverPart, ABC):
         clock: The clock on which its time passes.
         latch: What holds everything back from :meth:`stop` until :meth:`release_stop`.
         change_guard: What holds back writes that take a tip farther than the cell allows.
+        patience: How long a call waits that would be refused because somebody else is at work.
         outcomes: The doubtful outcomes and the unfinished procedures of this controller.
         ledger: What was done to it since connecting, and how much of that is proved.
         capabilities: What can be asked for.
@@ -91,6 +97,7 @@ class ControllerCore(DriverPart, ABC):
         self.clock = link.clock
         self.latch = link.latch
         self.change_guard = link.change_guard
+        self.patience = link.lock.patience
         self.outcomes = link.markers.outcomes
         self.ledger = link.markers.ledger
         self.capabilities = capabilities
@@ -240,6 +247,15 @@ class ControllerCore(DriverPart, ABC):
     def finish(self, marker: Marker, *entries: NewEntry) -> None:
         """Forget the marker of a procedure, and journal how it ended."""
         self._driver.markers.clear(marker, *entries)
+
+    @contextmanager
+    def procedure(self, request: str, *, wait_s: float | None = None) -> Iterator[None]:
+        """Let only this thread change something within the block; see the model."""
+        with (
+            self._driver.lock.procedure(request, wait_s=wait_s) as leased,
+            self._driver.signs_of_life.shown() if leased else nullcontext(),
+        ):
+            yield
 
     def uninterrupted(self) -> AbstractContextManager[None]:
         """Hold Ctrl-C back for a block that must be seen through."""

@@ -193,7 +193,7 @@ class DriverLink:
         self.latch = latch
         self.markers = MarkerStore(identity, outcomes, latch, simulated=lambda: self.simulated)
         self.change_guard = ChangeGuard(outcomes, latch)
-        self.lock = ProcedureLock(identity, latch)
+        self.lock = ProcedureLock(identity, latch, outcomes)
         self._gate = gate
         self._waiting: list[None] = []
 

@@ -5,16 +5,18 @@ What keeps two procedures of this process apart stands here too.
 
 import threading
 from collections.abc import Callable, Collection, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from typing import Final
 
+from robolink import runtime
 from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.controller_outcome import note_outcome
 from robolink.errors import (
     BusyError,
     Concerning,
     JournalError,
+    LeaseHeldError,
     LeaseLostError,
     OutcomeUnknownError,
     RemoteProtocolError,
@@ -24,7 +26,8 @@ from robolink.errors import (
 )
 from robolink.messages import tr
 from robolink.model import Ledger, Marker, MarkerKind, NewEntry, OutcomeLog, new_operation
-from robolink.stop_latch import StopLatch
+from robolink.remedy_words import RemedyWord, remedy_word
+from robolink.stop_latch import LOOK_S, Patience, StopLatch
 from robolink.timing import local_label, wall_label
 
 _PROCEDURES: Final = frozenset({MarkerKind.SELECTION, MarkerKind.CHANGE})
@@ -33,50 +36,155 @@ _OF_A_TOOL: Final = frozenset({"tool", "select"})
 
 
 class ProcedureLock:
-    """Lets one thread at a time run a procedure on a controller; others are told at once.
+    """Lets one thread at a time run a procedure on a controller; another is told at once, or waits.
+
+    Those that wait get their turn in the order in which they came. Whoever may not wait is refused
+    while others do.
+
+    Attributes:
+        patience: How long a call waits.
 
     Args:
         identity: Which controller.
         latch: Under which no procedure begins, and none ends well.
+        outcomes: Keeps the lease, for which whoever may wait does that too.
     """
 
-    def __init__(self, identity: str, latch: StopLatch) -> None:
-        self._lock = threading.RLock()
+    def __init__(self, identity: str, latch: StopLatch, outcomes: OutcomeLog) -> None:
+        self.patience = Patience(latch)
         self._identity = identity
         self._latch = latch
+        self._outcomes = outcomes
+        self._room = runtime.waiting_room()
+        self._owner: int | None = None
+        self._depth = 0
+        self._waiting: list[int] = []
 
     @contextmanager
-    def held(self, request: str, *, calming: bool = False) -> Iterator[None]:
-        """Hold the procedure lock.
+    def held(self, request: str, *, calming: bool = False, leased: bool = True) -> Iterator[None]:
+        """Hold the procedure lock for one call.
 
         Args:
             request: What it is held for.
             calming: Whether that may go on while a stop is in force, as a reset may.
+            leased: Whether it needs the lease, as everything that is marked does.
 
         Raises:
-            BusyError: Another thread holds it.
+            BusyError: Another thread holds it, or another program is at work, and for no longer is
+                it waited.
             StoppedError: A stop is in force, or came meanwhile.
         """
-        with Concerning(self._identity, request):
+        with Concerning(self._identity, request), self.patience.within():
             if calming:
-                with self._latch.calming(request), self._locked(request):
+                with self._latch.calming(request), self._locked(request, calming=True):
                     yield
             else:
-                with self._locked(request), self._latch.watching(request):
+                with (
+                    self._locked(request),
+                    self._leased(request, wanted=leased),
+                    self._latch.watching(request),
+                ):
                     yield
 
     @contextmanager
-    def _locked(self, request: str) -> Iterator[None]:
+    def procedure(self, request: str, *, wait_s: float | None = None) -> Iterator[bool]:
+        """Hold it for a block of a user's; see :meth:`robolink.model.Controller.procedure`.
+
+        Returns:
+            Whether the lease is kept as well.
+        """
+        patience = self.patience
+        with ExitStack() as block, patience.within(wait_s):
+            with Concerning(self._identity, request):  # what the block raises is about itself
+                block.enter_context(self._locked(request))
+                leased = block.enter_context(self._leased(request))
+            with patience.between():
+                yield leased
+
+    @contextmanager
+    def _locked(self, request: str, *, calming: bool = False) -> Iterator[None]:
         checkpoint(Checkpoint.PROCEDURE, request)
-        if not self._lock.acquire(blocking=False):
-            raise BusyError(
-                tr("{request} has to wait: another operation is under way.", request=request),
-                remedy=tr("Wait for it to end; stopping is possible at any time."),
-            )
+        self._enter(request, calming=calming)
         try:
             yield
         finally:
-            self._lock.release()
+            with self._room:
+                self._depth -= 1
+                if not self._depth:
+                    self._owner = None
+                    self._room.notify_all()
+
+    def _enter(self, request: str, *, calming: bool) -> None:
+        me = threading.get_ident()
+        with self._room:
+            if self._owner == me:
+                self._depth += 1
+                return
+            if not self._is_free_for(me):
+                self._await_turn(me, request, calming=calming)
+            self._owner, self._depth = me, 1
+
+    def _is_free_for(self, thread: int) -> bool:
+        """Whether it is free, and nobody else's turn; whoever waits under a stop is leaving."""
+        first = not self._waiting or self._waiting[0] == thread or self._latch.closed
+        return self._owner is None and first
+
+    def _await_turn(self, me: int, request: str, *, calming: bool) -> None:
+        """Wait in the room until it is this thread's turn.
+
+        Raises:
+            BusyError: That took too long.
+            StoppedError: A stop came.
+        """
+        look: Callable[[], None] | None = None
+        self._waiting.append(me)
+        try:
+            while not self._is_free_for(me):
+                left_s = self.patience.left_s
+                if not left_s:
+                    raise BusyError(
+                        tr(
+                            "{request} has to wait: another operation is under way.",
+                            request=request,
+                        ),
+                        remedy=tr(
+                            "Wait for it to end ({wait}); stopping is possible at any time.",
+                            wait=remedy_word(RemedyWord.WAIT),
+                        ),
+                    )
+                look = look or self.patience.watch(request, calming=calming)
+                look()
+                self._room.wait(min(left_s, LOOK_S))
+                look()
+        finally:
+            self._waiting.remove(me)
+            self._room.notify_all()
+
+    @contextmanager
+    def _leased(self, request: str, *, wanted: bool = True) -> Iterator[bool]:
+        """Wait for the lease where this call may wait, and keep it for the block.
+
+        So nobody comes in between what is read and what is written. A record that cannot be kept
+        is told by what needs it.
+        """
+        if not (wanted and self.patience.waits and self._depth == 1):
+            yield False
+            return
+        with ExitStack() as held:
+
+            def take() -> None:
+                self._outcomes.look()
+                try:
+                    held.enter_context(self._outcomes.hold(request))
+                except LeaseLostError as lost:  # somebody was faster; nothing has been read yet
+                    raise LeaseHeldError(lost.what, remedy=lost.remedy) from lost
+
+            try:
+                self.patience.until_free(take, request)
+            except JournalError:
+                yield False
+                return
+            yield True
 
 
 class MarkerStore:

@@ -63,7 +63,8 @@ class Preserver:
     def preserved(self, reason: str) -> Iterator[None]:
         """See :meth:`robolink.model.Controller.preserved`."""
         markers = self._link.markers
-        with self._link.lock.held(reason), markers.ledger.block():
+        lock = self._link.lock
+        with lock.held(reason), lock.patience.between(), markers.ledger.block():
             markers.look()
             # Before a person measures for what would be refused, whether or not a tool is told.
             markers.require_settled(reason)

@@ -20,12 +20,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from types import MappingProxyType
-from typing import Final, Protocol, TypeVar, cast
+from typing import Any, Final, Protocol, TypeVar, cast, overload
 
 from robolink import runtime
 from robolink.errors import (
     ConfigError,
     ConnectError,
+    LeaseHeldError,
+    LoginUnansweredError,
     RobolinkError,
     TransportBrokenError,
     TransportTimeoutError,
@@ -34,6 +36,7 @@ from robolink.journal import open_log, signature_here
 from robolink.messages import tr
 from robolink.model import Capabilities, ChangeLimits, Controller, OutcomeLog, Secret, Signature
 from robolink.plug_ins import PlugInError, find_plug_in
+from robolink.stop_latch import require_wait, waiting_for
 from robolink.timing import Clock, Deadline, SystemClock
 from robolink.transport import LinkUrl, TraceSink, parse_url
 from robolink.version import VERSION
@@ -167,10 +170,12 @@ def capabilities_of_kind(kind: str) -> Capabilities | None:
         >>> capabilities_of_kind("plc").motion, capabilities_of_kind("acme")
         (False, None)
     """
-    if kind not in _KINDS:
-        return None
+    return cast(Capabilities, _class_of_kind(kind).OF_KIND) if kind in _KINDS else None
+
+
+def _class_of_kind(kind: str) -> Any:  # noqa: ANN401 - a class with OF_KIND
     module, _, name = _KINDS[kind]
-    return cast(Capabilities, getattr(import_module(module), name).OF_KIND)
+    return getattr(import_module(module), name)
 
 
 def _told_as_its_own(kind: str, opener: ControllerOpener) -> ControllerOpener:
@@ -194,12 +199,56 @@ def _told_as_its_own(kind: str, opener: ControllerOpener) -> ControllerOpener:
     return opened
 
 
+OfKind = TypeVar("OfKind", bound=Controller)
+Reached = TypeVar("Reached")
+
+
+@overload
 def connect(
     url: str | Controller,
     *,
+    kind: type[OfKind],
     password: str | Secret | None = None,
     timeout_s: float = 3.0,
     remote_timeout_s: float = 60.0,
+    wait_s: float | None = None,
+    clock: Clock | None = None,
+    trace: TraceSink | None = None,
+    outcomes: OutcomeLog | None = None,
+    signature: Signature | None = None,
+    limits: ChangeLimits | None = None,
+    glance: bool = False,
+    tell: Callable[[str], None] = lambda _sentence: None,
+) -> OfKind: ...
+
+
+@overload
+def connect(
+    url: str | Controller,
+    *,
+    kind: None = None,
+    password: str | Secret | None = None,
+    timeout_s: float = 3.0,
+    remote_timeout_s: float = 60.0,
+    wait_s: float | None = None,
+    clock: Clock | None = None,
+    trace: TraceSink | None = None,
+    outcomes: OutcomeLog | None = None,
+    signature: Signature | None = None,
+    limits: ChangeLimits | None = None,
+    glance: bool = False,
+    tell: Callable[[str], None] = lambda _sentence: None,
+) -> Controller: ...
+
+
+def connect(
+    url: str | Controller,
+    *,
+    kind: type[Controller] | None = None,
+    password: str | Secret | None = None,
+    timeout_s: float = 3.0,
+    remote_timeout_s: float = 60.0,
+    wait_s: float | None = None,
     clock: Clock | None = None,
     trace: TraceSink | None = None,
     outcomes: OutcomeLog | None = None,
@@ -215,10 +264,15 @@ def connect(
             ``softmotion+modbus-tcp://192.168.0.2:502`` or
             ``plc+modbus-tcp://192.168.0.2?map=machine.toml``. A controller that is open
             already is returned as it is, whatever else is given.
+        kind: The class of controller that the URL leads to, :class:`~.EpsonController` say, where
+            more is needed than all kinds have: the result is then typed as one of those.
         password: An EPSON controller's remote password, if one is set; a PLC has none.
         timeout_s: Longest wait for one answer.
         remote_timeout_s: The remote time-out set on an EPSON controller. It cannot be read
             over the wire; 0 forbids motion. A PLC's watchdog is part of its mailbox program.
+        wait_s: How long connecting, and later each call of this controller, waits for another
+            program or thread that is at work, in seconds; ``None`` or 0 refuses at once. The
+            controller has it as ``patience.wait_s``.
         clock: Replaces the machine's clock; a simulator brings its own.
         trace: Called with (time in ns, "sent" or "received", bytes) for all traffic but the
             login frame; of an EPSON controller only.
@@ -232,11 +286,11 @@ def connect(
         glance: Whether this is for a look, so that a journal in which nothing is unfinished is
             not opened before something has to be recorded. The controller is not asked for its
             identity then.
-        tell: Told, in sentences, what is waited for: ten seconds at most, until a PLC gives away
-            the mailbox of a run that has ended.
+        tell: Told, in sentences, what is waited for: others who are at work, and ten seconds at
+            most until a PLC gives away the mailbox of a run that has ended.
 
     Raises:
-        ConfigError: The URL or an option is wrong.
+        ConfigError: The URL or an option is wrong, or leads to another kind of controller.
         ConnectError: Nobody is reached, nobody answers the login, or the PLC's mailbox program
             does not run.
         RemoteProtocolError: What answers is no mailbox of this version, or the probe of a
@@ -246,9 +300,14 @@ def connect(
 
     Example:
         >>> import robolink
+        >>> from robolink.controllers import EpsonController
         >>> with robolink.connect("epson+sim://connect-example?seed=1") as controller:
         ...     print(controller.status().state, controller.tools.selected())
         ready 1
+        >>> url = "epson+sim://connect-example"
+        >>> with robolink.connect(url, kind=EpsonController) as epson:
+        ...     epson.robot_number()  # what only this kind has: no isinstance needed
+        1
     """
     if not isinstance(url, str):
         if not hasattr(url, "tools"):
@@ -256,8 +315,11 @@ def connect(
                 tr("{given!r} is neither a URL nor a controller.", given=url),
                 remedy=tr("Give a URL such as epson+tcp://192.168.0.1:5000."),
             )
+        _require_kind(type(url), kind, str(url.identity))
         return url
-    link = parse_url(url)
+    link, wait_s = parse_url(url), require_wait(wait_s or 0.0)
+    if kind is not None and link.kind in _KINDS:  # before anything is connected
+        _require_kind(_class_of_kind(link.kind), kind, url)
     terms = ConnectionTerms(
         signature or signature_here(VERSION),
         password=Secret(password) if isinstance(password, str) else password,
@@ -269,13 +331,63 @@ def connect(
         glance=glance,
         tell=tell,
     )
-    controller = find_opener(link)(link, terms)
+    opener = find_opener(link)
+    controller = _waited_for(lambda: opener(link, terms), wait_s, tell)
+    try:
+        _require_kind(type(controller), kind, url)
+        if wait_s:
+            controller.patience.wait_s, controller.patience.tell = wait_s, tell
+    except BaseException:
+        controller.close()
+        raise
     if limits is not None:
         controller.change_guard.limits = limits
     return controller
 
 
-Reached = TypeVar("Reached")
+def _require_kind(found: type, kind: type[Controller] | None, called: str) -> None:
+    """Refuse a controller, or what a URL is known to open, that is not of the kind asked for.
+
+    Raises:
+        ConfigError: It is of another kind.
+    """
+    if kind is not None and not issubclass(found, kind):
+        raise ConfigError(
+            tr(
+                "{url} is the URL of a controller of the kind {found}, not {kind}.",
+                url=called,
+                found=found.__name__,
+                kind=kind.__name__,
+            ),
+            remedy=tr("Give {found} as the kind, or another URL.", found=found.__name__),
+        )
+
+
+_AGAIN_S: Final = 0.25
+"""Between two attempts to log in where somebody else is."""
+
+
+def _waited_for(
+    connecting: Callable[[], Reached], wait_s: float, tell: Callable[[str], None]
+) -> Reached:
+    """Connect, and wait for others who are logged in; the time is the computer's.
+
+    Raises:
+        LoginUnansweredError, LeaseHeldError: Somebody is still there.
+    """
+    deadline, told = Deadline.after(SystemClock(), wait_s), False
+    while True:
+        try:
+            return connecting()
+        except (LoginUnansweredError, LeaseHeldError) as taken:
+            left_s = deadline.remaining_s()
+            if not left_s:
+                raise
+            if not told:
+                tell(waiting_for(taken, left_s))
+                told = True
+        runtime.sleep(min(left_s, _drawn(2 * _AGAIN_S)))
+
 
 FIRST_PAUSE_S: Final = 1.0
 LONGEST_PAUSE_S: Final = 60.0

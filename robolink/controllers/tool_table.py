@@ -172,23 +172,32 @@ class ToolTableCore(DriverPart, ABC):
         self._driver.markers.ledger.saw_tool(tool, found)
         return found
 
-    def write(self, tool: int, offset: ToolOffset, *, expected: Expected) -> ToolReceipt:
+    def write(
+        self, tool: int, offset: ToolOffset, *, expected: Expected, wait_s: float | None = None
+    ) -> ToolReceipt:
         """Write and read back; see :class:`robolink.model.ToolTable`."""
         self.require_writable(tool)
         _require_offset(offset)
         _require_expected(expected)
         storable = self._storable(tool, offset)
         self._require_values_of_a_tool(tool, storable)
-        return self._set(tool, storable, expected)
+        with self._driver.lock.patience.within(wait_s):
+            return self._set(tool, storable, expected)
 
     def clear(
-        self, tool: int, *, expected: Expected, then_select: int | None = None
+        self,
+        tool: int,
+        *,
+        expected: Expected,
+        then_select: int | None = None,
+        wait_s: float | None = None,
     ) -> ToolReceipt:
         """Clear and read back; see :class:`robolink.model.ToolTable`."""
         self.require_writable(tool)
         _require_expected(expected)
         self._refuse_operator(tool)
-        with self._driver.lock.held(self._clear_request(tool)):
+        lock = self._driver.lock
+        with lock.patience.within(wait_s), lock.held(self._clear_request(tool)):
             self._require_clearable(tool)
             if not self._would_lose_selection(tool, expected, then_select):
                 return self._set(tool, None, expected)
@@ -235,11 +244,11 @@ class ToolTableCore(DriverPart, ABC):
         self._driver.markers.ledger.saw_selected(found)
         return found
 
-    def select(self, tool: int) -> None:
+    def select(self, tool: int, *, wait_s: float | None = None) -> None:
         """Put a tool in force and read the selection back; see the model."""
         self._require_known(tool)
-        request = self._select_request(tool)
-        with self._driver.lock.held(request):
+        request, lock = self._select_request(tool), self._driver.lock
+        with lock.patience.within(wait_s), lock.held(request):
             self._require_selectable(request)
             before = self._selected()
             self._driver.markers.ledger.saw_selected(before)

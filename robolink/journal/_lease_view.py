@@ -20,6 +20,7 @@ from robolink.errors import LeaseHeldError
 from robolink.files.durable import make_folder, state_folder
 from robolink.messages import tr
 from robolink.model import ClientRun, EntryKind, NewEntry, Signature
+from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.timing import local_label, wall_label
 
 _DEAD_STATES: Final = ("Z", "X")
@@ -203,8 +204,9 @@ class LeaseView:
                 sign=last_sign,
             ),
             remedy=tr(
-                "Nothing was sent. Wait until it has finished, or end it; after {seconds:.0f} s "
-                "without a sign of life it may be replaced.",
+                "Nothing was sent. Wait until it has finished ({wait}), or end it; after "
+                "{seconds:.0f} s without a sign of life it may be replaced.",
+                wait=remedy_word(RemedyWord.WAIT),
                 seconds=LEASE_S,
             ),
             controller=controller,

@@ -18,7 +18,7 @@ from robolink.model._movement import MotionGroup
 from robolink.model._outcomes import Marker, MarkerKind, OutcomeLog, Resolver
 from robolink.model._status import ControllerStatus
 from robolink.model._tools import ToolTable
-from robolink.stop_latch import StopLatch
+from robolink.stop_latch import Patience, StopLatch
 from robolink.timing import Clock
 
 Value = bool | int | float | str
@@ -256,6 +256,10 @@ class Controller(Protocol):
     def latch(self) -> StopLatch:
         """What holds everything back from :meth:`stop` until :meth:`release_stop`."""
 
+    @property
+    def patience(self) -> Patience:
+        """How long a call waits that would be refused because somebody else is at work."""
+
     def stop(self) -> None:
         """Stop everything; from any thread, at any time, more than once.
 
@@ -329,6 +333,34 @@ class Controller(Protocol):
 
     def finish(self, marker: Marker, *entries: NewEntry) -> None:
         """Forget the marker of a procedure, and journal how it ended."""
+
+    def procedure(
+        self, request: str, *, wait_s: float | None = None
+    ) -> AbstractContextManager[None]:
+        """Let only this thread change something on the controller within the block.
+
+        What other threads change meanwhile is refused with BusyError, or waits. Where this call
+        may wait it takes the lease as well, so that no other program comes in between. The block
+        belongs to the thread that entered it.
+
+        Args:
+            request: What the block does, as a person may read it.
+            wait_s: How long to wait for others, in seconds, 0 not at all; ``None`` for
+                ``patience.wait_s``.
+
+        Raises:
+            BusyError: Others are at work still.
+            StoppedError: A stop came while this waited.
+
+        Example:
+            >>> import robolink
+            >>> from robolink import ToolOffset
+            >>> with robolink.connect("epson+sim://procedure-example") as controller:
+            ...     with controller.procedure("move tool 1 by 0.1 mm", wait_s=10):
+            ...         old = controller.tools.read(1)
+            ...         new = ToolOffset(old.x_mm + 0.1, old.y_mm, old.z_mm)
+            ...         receipt = controller.tools.write(1, new, expected=old)
+        """
 
     def uninterrupted(self) -> AbstractContextManager[None]:
         """Hold Ctrl-C back for a block that must be seen through."""

@@ -233,13 +233,17 @@ class ToolTable(Protocol):
             tools: Those that are about to be changed.
         """
 
-    def write(self, tool: int, offset: ToolOffset, *, expected: Expected) -> ToolReceipt:
+    def write(
+        self, tool: int, offset: ToolOffset, *, expected: Expected, wait_s: float | None = None
+    ) -> ToolReceipt:
         """Write ``offset`` if the stored value is ``expected``, then read it back.
 
         Args:
             tool: Its number, 1 and more.
             offset: What it is to hold, mm and degrees; rounded to what the controller keeps.
             expected: What is believed to be stored, ``None`` for undefined, ``ANY`` for anything.
+            wait_s: How long to wait for other threads and programs that are at work, in seconds,
+                0 not at all; ``None`` for the controller's ``patience.wait_s``.
 
         Raises:
             ReservedToolError: Tool 0.
@@ -247,6 +251,7 @@ class ToolTable(Protocol):
             ToolChangedError: Something else is stored; nothing was written.
             ReadBackError: Another value came back.
             NotReadyError: The state would not allow a write; nothing was written.
+            BusyError: Another thread or program is at work; nothing was written.
             OutcomeUnknownError: No answer came to the write.
 
         Example:
@@ -271,7 +276,12 @@ class ToolTable(Protocol):
         """Return what :meth:`select` would send besides its reads."""
 
     def clear(
-        self, tool: int, *, expected: Expected, then_select: int | None = None
+        self,
+        tool: int,
+        *,
+        expected: Expected,
+        then_select: int | None = None,
+        wait_s: float | None = None,
     ) -> ToolReceipt:
         """Remove a definition; same conditions and errors as :meth:`write`.
 
@@ -280,6 +290,7 @@ class ToolTable(Protocol):
             expected: What is believed to be stored.
             then_select: The tool to put in force before, if ``tool`` is in force; 0 is the
                 flange. What is in force is left alone otherwise.
+            wait_s: As for :meth:`write`.
 
         Raises:
             SelectedToolError: The tool is in force and no other one is named; nothing was sent.
@@ -301,8 +312,12 @@ class ToolTable(Protocol):
         ``None`` where the controller does not tell.
         """
 
-    def select(self, tool: int) -> None:
+    def select(self, tool: int, *, wait_s: float | None = None) -> None:
         """Put a tool in force and read the selection back.
+
+        Args:
+            tool: Its number, 0 for the flange.
+            wait_s: As for :meth:`write`.
 
         Raises:
             UndefinedToolError: The tool has no definition.

@@ -84,6 +84,9 @@ class ToolChange:
         tell: Told, in sentences, what was put back.
         order: The order that it carries out; with the values it is kept that this is done.
         describe: Makes the result of the order from what was written.
+        wait_s: How long the block, and then :meth:`write`, waits for other threads and programs
+            that are at work, in seconds, 0 not at all; ``None`` for the controller's
+            ``patience.wait_s``.
 
     Example:
         >>> from robolink import ToolOffset, connect
@@ -105,6 +108,7 @@ class ToolChange:
         tell: Callable[[str], None] = lambda _sentence: None,
         order: Order | None = None,
         describe: Describe = plain_result,
+        wait_s: float | None = None,
     ) -> None:
         self._controller = controller
         self._wanted = tuple(wanted)
@@ -122,14 +126,21 @@ class ToolChange:
         self._spoiled: int | None = None
         self._selected: int | None = None
         self._account: Account | None = None
+        self._wait_s = wait_s
         self._signs_of_life = ExitStack()
+        self._procedure = ExitStack()
         self.kept = False
 
     def __enter__(self) -> Self:
-        self._account = self._controller.ledger.open()
-        if not self._controller.outcomes.change:
-            self._controller.outcomes.change = new_operation()
-            self._own_id = True
+        controller = self._controller
+        with ExitStack() as entered:
+            # Id, marker and roll-back are those of one change at a time.
+            entered.enter_context(controller.procedure(self.request, wait_s=self._wait_s))
+            self._account = controller.ledger.open()
+            if not controller.outcomes.change:
+                controller.outcomes.change = new_operation()
+                self._own_id = True
+            self._procedure = entered.pop_all()
         return self
 
     def __exit__(
@@ -146,7 +157,8 @@ class ToolChange:
             self._signs_of_life.close()
             if self._own_id:
                 self._controller.outcomes.change = ""
-            self._settle_account(error)
+            with self._procedure:
+                self._settle_account(error)
 
     def write(self) -> tuple[ToolReceipt, ...]:
         """Write everything and read it back.
@@ -163,38 +175,39 @@ class ToolChange:
             BusyError: Another process has the controller.
             StoppedError: A stop came; what was written is put back.
         """
-        self._controller.latch.require_open(self.request)
-        # What is there already needs no write that would be refused, and is told as done.
-        self._controller.require_settled(self.request)
-        steps = self._believed() or self._compare()
-        for doubt in self._controller.tools.doubts([step.tool for step in steps]):
-            self._tell(doubt)
-        self._selected = self._selected_before(steps)
-        if self._several_steps and any(self._differs(step) for step in steps):
-            for step in steps:  # what a write would be refused for, before the first of them
-                self._controller.change_guard.require(step.tool, step.before, step.requested)
-            tools = {
-                str(step.tool): {
-                    "before": plain_offset(step.before),
-                    "requested": plain_offset(step.requested),
+        with self._controller.patience.within(self._wait_s):
+            self._controller.latch.require_open(self.request)
+            # What is there already needs no write that would be refused, and is told as done.
+            self._controller.require_settled(self.request)
+            steps = self._believed() or self._compare()
+            for doubt in self._controller.tools.doubts([step.tool for step in steps]):
+                self._tell(doubt)
+            self._selected = self._selected_before(steps)
+            if self._several_steps and any(self._differs(step) for step in steps):
+                for step in steps:  # what a write would be refused for, before the first of them
+                    self._controller.change_guard.require(step.tool, step.before, step.requested)
+                tools = {
+                    str(step.tool): {
+                        "before": plain_offset(step.before),
+                        "requested": plain_offset(step.requested),
+                    }
+                    for step in steps
                 }
-                for step in steps
-            }
-            details = {
-                "tools": tools,
-                "verify": self._verify,
-                "change": self._controller.outcomes.change,
-                **(self._ordered.marked(steps) if self._ordered else {}),
-                **self._marked,
-            }
-            if self._selected is not None:
-                details["selected"] = self._selected
-            with self._controller.uninterrupted():
-                self._marker = self._controller.begin(MarkerKind.CHANGE, self.request, details)
-                self._signs_of_life.enter_context(self._controller.signs_of_life())
-        for wanted, step in zip(self._wanted, steps, strict=True):
-            self._receipts += (self._write(wanted, step),)
-        return self._receipts
+                details = {
+                    "tools": tools,
+                    "verify": self._verify,
+                    "change": self._controller.outcomes.change,
+                    **(self._ordered.marked(steps) if self._ordered else {}),
+                    **self._marked,
+                }
+                if self._selected is not None:
+                    details["selected"] = self._selected
+                with self._controller.uninterrupted():
+                    self._marker = self._controller.begin(MarkerKind.CHANGE, self.request, details)
+                    self._signs_of_life.enter_context(self._controller.signs_of_life())
+            for wanted, step in zip(self._wanted, steps, strict=True):
+                self._receipts += (self._write(wanted, step),)
+            return self._receipts
 
     def keep(self, verdict: str = "") -> None:
         """Put on record that the new values stay.
@@ -411,6 +424,7 @@ def change_tools(
     tell: Callable[[str], None] = lambda _sentence: None,
     order: Order | None = None,
     describe: Describe = plain_result,
+    wait_s: float | None = None,
 ) -> tuple[ToolReceipt, ...]:
     """Write tools that nothing is to verify: all of them, or none.
 
@@ -420,6 +434,7 @@ def change_tools(
         tell: Told what was put back.
         order: The order that this carries out (:func:`robolink.transaction.carrying_out`).
         describe: Makes the result of the order from what was written.
+        wait_s: As for :class:`ToolChange`.
 
     Raises:
         RobolinkError: As :meth:`ToolChange.write`; the old values are back, or the error says
@@ -433,7 +448,9 @@ def change_tools(
         ...     print(controller.tools.read(2).x_mm)
         5.0
     """
-    change = ToolChange(controller, wanted, tell=tell, order=order, describe=describe)
+    change = ToolChange(
+        controller, wanted, tell=tell, order=order, describe=describe, wait_s=wait_s
+    )
     with controller.latch.watching(change.request), change:
         receipts = change.write()
         change.keep()

@@ -131,7 +131,9 @@ def require_order_id(order: str) -> str:
 
 
 @contextmanager
-def carrying_out(controller: Controller, order: str, job: Mapping[str, object]) -> Iterator[Order]:
+def carrying_out(
+    controller: Controller, order: str, job: Mapping[str, object], *, wait_s: float | None = None
+) -> Iterator[Order]:
     """Keep the lease, look the order up, and put its id on record with all that is done for it.
 
     Where :attr:`Order.done` says that it was carried out before, nothing is to be done; else the
@@ -142,6 +144,7 @@ def carrying_out(controller: Controller, order: str, job: Mapping[str, object]) 
         controller: The controller, connected.
         order: The id that the line computer gave.
         job: What is ordered, plain JSON. The same order must not come with another job.
+        wait_s: How long to wait for other threads and programs, as :class:`ToolChange` does.
 
     Raises:
         BusyError: Another process is changing this controller.
@@ -168,7 +171,11 @@ def carrying_out(controller: Controller, order: str, job: Mapping[str, object]) 
     require_order_id(order)
     outcomes, purpose = controller.outcomes, tr("order {order}", order=order)
     plain = json.loads(json.dumps(job))
-    with outcomes.hold(purpose), controller.signs_of_life():
+    with (
+        controller.procedure(purpose, wait_s=wait_s),
+        outcomes.hold(purpose),
+        controller.signs_of_life(),
+    ):
         # Whoever is told that it is done starts production: with the tool in force, at the speed
         # and in the power that a killed run has perhaps not put back.
         controller.require_settled(purpose)

@@ -350,7 +350,12 @@ def recover(
         ...     print(recover(controller).left)
         ()
     """
-    with controller.outcomes.hold(tr("recover")), controller.signs_of_life():
+    request = tr("recover")
+    with (
+        controller.procedure(request),
+        controller.outcomes.hold(request),
+        controller.signs_of_life(),
+    ):
         markers = [
             marker
             for marker in _in_order(controller.outcomes.open_markers())

@@ -342,28 +342,29 @@ def undo(
     """
     if not plan.steps:
         return Undone("", ())
-    outcomes = controller.outcomes
-    # Before the decision goes on record.
-    controller.require_settled(plan.sentence)
-    change = outcomes.change = new_operation()
-    try:
-        require_engineer(outcomes, tr("undo a change of a tool"))
-        outcomes.append(
-            NewEntry(EntryKind.DECISION, verdict=plan.sentence, details=dict(plan.details))
-        )
-        wanted = [
-            Wanted(step.tool, step.requested, step.before, then_select=then_select)
-            for step in plan.steps
-        ]
-        with ExitStack() as accepted:
-            for step in plan.steps:
-                # What was proved there before is no slip of the fingers; the figure goes on record.
-                jump = controller.change_guard.beyond(step.before, step.requested)
-                if jump is not None:
-                    accepted.enter_context(controller.change_guard.accepting(step.tool, jump))
-            return Undone(change, change_tools(controller, wanted, tell=tell))
-    finally:
-        outcomes.change = ""
+    with controller.procedure(plan.sentence):
+        # Before the decision goes on record.
+        controller.require_settled(plan.sentence)
+        outcomes = controller.outcomes
+        change = outcomes.change = new_operation()
+        try:
+            require_engineer(outcomes, tr("undo a change of a tool"))
+            outcomes.append(
+                NewEntry(EntryKind.DECISION, verdict=plan.sentence, details=dict(plan.details))
+            )
+            wanted = [
+                Wanted(step.tool, step.requested, step.before, then_select=then_select)
+                for step in plan.steps
+            ]
+            with ExitStack() as accepted:
+                for step in plan.steps:
+                    # What was proved before is no slip of the fingers; the figure goes on record.
+                    jump = controller.change_guard.beyond(step.before, step.requested)
+                    if jump is not None:
+                        accepted.enter_context(controller.change_guard.accepting(step.tool, jump))
+                return Undone(change, change_tools(controller, wanted, tell=tell))
+        finally:
+            outcomes.change = ""
 
 
 def _plan_to(controller: Controller, number: int, tool: int | None) -> UndoPlan:

@@ -204,6 +204,7 @@ _ITSELF: Final[Mapping[str, StandIn]] = {
     "robolink.controllers.PolledGroup.halt": lambda group: group._send_stop(),
     "robolink.transaction.ToolChange._take_back": _nothing,
     "robolink.controllers.markers.ProcedureLock.held": _open,
+    "robolink.controllers.ControllerCore.procedure": _open,
     "robolink_cli.session.motion_consent.agree_to_motion": _nothing,
     "robolink.controllers.ToolTableCore.preview_write": _previewed,
     "robolink.controllers.ToolTableCore._require_known": _nothing,

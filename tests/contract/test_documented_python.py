@@ -9,6 +9,7 @@ import shutil
 import textwrap
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -99,6 +100,11 @@ class Agrees:
 def with_password(stack: ExitStack) -> dict[str, Any]:
     stack.enter_context(epson(password=Secret("...")))
     return {}
+
+
+def one_client(stack: ExitStack) -> dict[str, Any]:
+    stack.enter_context(epson())
+    return {"robolink": robolink, "replace": replace}
 
 
 def two_tools(stack: ExitStack) -> dict[str, Any]:
@@ -326,11 +332,12 @@ MAKERS = {
     "camera-and-board.md 2": nothing,
     "custom-kinematics.md 1": nothing,
     "extending.md 1": two_tools,
-    "extending.md 2": an_acme_camera,
-    "extending.md 3": a_camera_for_a_recipe,
-    "extending.md 4": a_panel,
-    "extending.md 5": nothing,
-    "extending.md 6": an_acme_arm,
+    "extending.md 2": one_client,
+    "extending.md 3": an_acme_camera,
+    "extending.md 4": a_camera_for_a_recipe,
+    "extending.md 5": a_panel,
+    "extending.md 6": nothing,
+    "extending.md 7": an_acme_arm,
     "fault-plans.md 1": a_fault_plan,
     "monitor-only.md 1": with_variables,
     "journal.md 1": a_journal,

@@ -57,19 +57,26 @@ class WritesByItself(_MemoryTools):
         super().__init__(link)
         self._machine = machine
 
-    def write(self, tool: int, offset: ToolOffset, *, expected: Expected) -> ToolReceipt:
+    def write(
+        self, tool: int, offset: ToolOffset, *, expected: Expected, wait_s: float | None = None
+    ) -> ToolReceipt:
         before = self._machine.read(tool)
         self._machine.store(tool, offset)
         return ToolReceipt(tool, before, offset, offset)
 
     def clear(
-        self, tool: int, *, expected: Expected, then_select: int | None = None
+        self,
+        tool: int,
+        *,
+        expected: Expected,
+        then_select: int | None = None,
+        wait_s: float | None = None,
     ) -> ToolReceipt:
         before = self._machine.read(tool)
         self._machine.store(tool, None)
         return ToolReceipt(tool, before, None, None)
 
-    def select(self, tool: int) -> None:
+    def select(self, tool: int, *, wait_s: float | None = None) -> None:
         self._machine.select(tool)
 
 

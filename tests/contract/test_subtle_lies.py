@@ -1,6 +1,7 @@
 """Machines that lie in a subtle way: the contract of a controller finds each, and names it."""
 
 import re
+import threading
 import time
 from contextlib import contextmanager
 from dataclasses import replace
@@ -175,9 +176,13 @@ def test_a_driver_that_takes_all_values_for_the_same_is_found():
 class Patient(ProcedureLock):
     """Lets a second procedure wait for the first in place of telling it."""
 
+    def __init__(self, *given):
+        super().__init__(*given)
+        self._told = threading.RLock()
+
     @contextmanager
-    def held(self, _request, *, calming=False):
-        with self._lock:
+    def held(self, _request, *, calming=False, leased=True):
+        with self._told:
             yield
 
 
@@ -187,7 +192,7 @@ def test_a_driver_in_which_a_second_procedure_waits_is_found_and_waited_for_no_l
 
     def connect():
         controller = SimpleController(machine, identity="memory+object://patient")
-        controller._driver.lock = Patient("patient", controller.latch)
+        controller._driver.lock = Patient("patient", controller.latch, controller.outcomes)
         return controller
 
     (broken,) = found(connect, "one_procedure_at_a_time").values()

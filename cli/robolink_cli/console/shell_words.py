@@ -47,6 +47,7 @@ SHELL_WAYS: Final = {
     RemedyWord.TOOL: "--tool",
     RemedyWord.TOOLS: "--tool",
     RemedyWord.TURN: "'robolink robot jog --turn {turn:g}'",
+    RemedyWord.WAIT: "--wait SECONDS",
     RemedyWord.YES: "--yes",
 }
 """Options and commands; a test holds it to every way that there is."""

@@ -203,6 +203,18 @@ def _link_options(command: CommandT) -> CommandT:
             ),
         ),
         click.option(
+            "--wait",
+            "wait_s",
+            metavar="SECONDS",
+            type=NumberInside(min=0),
+            expose_value=False,
+            callback=_keep,
+            help=declared(
+                "How long to wait for another program that has the controller (0); a stop does "
+                "not wait."
+            ),
+        ),
+        click.option(
             "--operator",
             metavar="ID",
             type=LINE,

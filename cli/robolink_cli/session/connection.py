@@ -88,6 +88,7 @@ def open_controller(
             password=password,
             timeout_s=context.timeout_s,
             remote_timeout_s=context.remote_timeout_s,
+            wait_s=context.wait_s,
             trace=trace,
             signature=signature,
             limits=_limits_of(context, usual_change_mm),

@@ -39,6 +39,7 @@ class CliContext(NamedTuple):
         password_file: File whose first line is the password.
         timeout_s: Longest wait for one answer.
         remote_timeout_s: The remote time-out that is set in the controller; 0 for none.
+        wait_s: How long another program that has the controller is waited for.
         cell: What the cell files say, when a cell was named instead of a URL.
         record: File to which the dialogue with the controller is appended.
         operator: Badge or name of the person.
@@ -53,6 +54,7 @@ class CliContext(NamedTuple):
     password_file: str | None = None
     timeout_s: float = 3.0
     remote_timeout_s: float = 60.0
+    wait_s: float = 0.0
     cell: "Cell | None" = None
     record: str | None = None
     operator: str | None = None

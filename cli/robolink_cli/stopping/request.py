@@ -10,12 +10,14 @@ VALUES: Final = {
     "--password-file": "password_file",
     "--timeout": "timeout_s",
     "--remote-timeout": "",
+    "--wait": "",
     "--operator": "operator",
     "--record": "record",
     "--lang": "",
 }
 """Options with a value that may stand beside ``stop``, and where it is kept; a stop needs no
-remote time-out, and the language is found elsewhere. A test compares them with click's."""
+remote time-out, waits for nobody, and the language is found elsewhere. A test compares them with
+click's."""
 
 FLAGS: Final = {"--json": "json"}
 

@@ -1,8 +1,7 @@
 """An EPSON controller on Remote Ethernet, and logging in to one."""
 
 from contextlib import suppress
-from functools import cached_property
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from robolink.controllers.controller_core import ControllerCore
 from robolink.controllers.epson.answers import NOT_EXECUTED, may_log_out, require_ready
@@ -55,6 +54,11 @@ from robolink.protocols.epson_text import Preference, Refusal, Reply, Request
 from robolink.protocols.spel import Statement
 from robolink.stop_latch import CommandClass
 from robolink.transport import LinkUrl
+
+if TYPE_CHECKING:  # to pyright a cached_property is no property, and its owner no Controller
+    from builtins import property as cached_property
+else:
+    from functools import cached_property
 
 
 class EpsonController(ControllerCore):
@@ -223,7 +227,7 @@ class EpsonController(ControllerCore):
             ReadBackError: The motors are not as asked.
         """
         name, group = "SetMotorsOn" if on else "SetMotorsOff", self.groups[0]
-        with self._link.lock.held(name, calming=not on):
+        with self._link.lock.held(name, calming=not on, leased=False):
             self._link.window.require_ready(name)
             self._link.session.exchange(name, str(self.robot_number()))
             if on:

@@ -7,9 +7,9 @@ Where the flange is, from a PLC that tells it; a person moves.
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property, partial
+from functools import partial
 from pathlib import Path
-from typing import ClassVar, Final, NoReturn
+from typing import TYPE_CHECKING, ClassVar, Final, NoReturn
 
 from robolink.controllers.controller_core import ControllerCore
 from robolink.controllers.driver_link import DriverPart
@@ -35,6 +35,11 @@ from robolink.register_maps import RegisterMap, load_map, span_of
 from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.timing import Clock
 from robolink.transport import LinkUrl, open_modbus
+
+if TYPE_CHECKING:  # to pyright a cached_property is no property, and its owner no Controller
+    from builtins import property as cached_property
+else:
+    from functools import cached_property
 
 
 class MappedInputs(DriverPart):

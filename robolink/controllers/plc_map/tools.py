@@ -91,7 +91,7 @@ class RegisterToolTable(ToolTableCore):
         self.select(tool)
         return ()
 
-    def select(self, tool: int) -> None:
+    def select(self, tool: int, *, wait_s: float | None = None) -> None:  # noqa: ARG002 - alike
         """Refuse: which tool is in force is the machine's affair.
 
         Raises:

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar, Final
 
 from robolink import runtime
@@ -44,6 +43,12 @@ from robolink.protocols.mailbox import (
 from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.timing import Deadline
 from robolink.transport import LinkUrl, MailboxLink, open_mailbox_link
+
+if TYPE_CHECKING:  # to pyright a cached_property is no property, and its owner no Controller
+    from builtins import property as cached_property
+else:
+    from functools import cached_property
+
 
 if TYPE_CHECKING:
     from robolink.controllers.softmotion.facts import MailboxFinding

@@ -283,7 +283,7 @@ class SoftMotionGroup(MotionGroupCore):
     def _switch(self, opcode: Opcode, *, enabled: bool) -> None:
         mailbox, draft = self._mailbox, Command(0, opcode)
         request = describe(draft)
-        with mailbox.lock.held(request, calming=not enabled):
+        with mailbox.lock.held(request, calming=not enabled, leased=False):
             if self.motors_on() is enabled:
                 return
             now = mailbox.prepare(draft, request)

@@ -160,7 +160,9 @@ class Mailbox(DriverLink):
             if draft.needs_permit:
                 require_permit(now)
             if draft.needs_owner:
-                self.commands.ownership.require(request)
+                self.lock.patience.until_free(
+                    lambda: self.commands.ownership.require(request), request
+                )
             return now
 
     def same(self, a: ToolOffset | None, b: ToolOffset | None) -> bool:

@@ -26,14 +26,14 @@ _EVERY_DAY: Final = {
     ),
     "status": (
         f"{CONTROLLER}.operate:status",
-        declared("What the robot is doing and which tool is selected"),
+        declared("Show what the robot is doing and which tool is selected"),
     ),
-    "stop": (f"{CONTROLLER}.operate:stop", declared("Stop every motion now")),
+    "stop": (f"{CONTROLLER}.operate:stop", declared("Stop the robot now")),
     "recover": (
         f"{RECORD}.recover:recover",
-        declared("After a stop, a crash or a lost link: what is open, put it right"),
+        declared("After a stop, a crash or a lost link: finish or undo the interrupted job"),
     ),
-    "undo": (f"{RECORD}.undo:undo", declared("Take the last tool change back")),
+    "undo": (f"{RECORD}.undo:undo", declared("Undo the last tool change")),
 }
 
 _MEASURE_AND_MOVE: Final = {
@@ -57,7 +57,7 @@ _SET_UP: Final = {
     "sim": (f"{SIMULATE}.sim:sim", declared("Simulated controllers to practise on")),
     "demo": (
         f"{SIMULATE}.demo:demo",
-        declared("A whole needle change on a simulated robot, nothing needed"),
+        declared("Watch a whole needle change on a simulated robot; needs no machine"),
     ),
 }
 

@@ -78,7 +78,7 @@ class LazyGroup(click.Group):
             said, names = error.message, self.list_commands(ctx)
             names += self._unlisted.keys() - self.renamed.keys()
             if grouped := self._groups_with(ctx, error.command_name):
-                hints = (tr("There is 'robolink {command}'.", command=one) for one in grouped)
+                hints = (tr("Did you mean 'robolink {command}'?", command=one) for one in grouped)
                 said, names = joined(" ", (said, *hints)), []
             raise click.exceptions.NoSuchCommand(
                 error.command_name, said, names, error.ctx
@@ -156,6 +156,6 @@ class FrontPage(LazyGroup):
         formatter.write_paragraph()
         formatter.write_text(tr("First time here? robolink demo. More: robolink expert --help"))
         formatter.write_text(
-            tr("Pages to read: robolink docs. Recipes to begin with: robolink recipe list")
+            tr("Documentation: robolink docs. Recipes to start from: robolink recipe list")
         )
         self.format_epilog(ctx, formatter)

@@ -114,7 +114,7 @@ def _tell_stop(request: "StopRequest", outcome: "StopOutcome") -> int:
     return code
 
 
-_UNREAD: Final = declared("Not yet read by a native technician: tell us what reads wrong.")
+_UNREAD: Final = declared("Not yet checked by a native technician: please report mistakes.")
 """Under the help page of each translation."""
 
 

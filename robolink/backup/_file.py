@@ -66,7 +66,7 @@ class JsonReader:
             raise self.wrong(path, tr("it is not an object in braces"))
         for name in value:
             if name not in names:
-                raise self.wrong(_joined(path, name), tr("this name is not known here"))
+                raise self.wrong(_joined(path, name), tr("unknown name"))
         for name in names:
             if name not in value:
                 raise self.wrong(_joined(path, name), tr("it is missing"))

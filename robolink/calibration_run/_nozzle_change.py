@@ -308,9 +308,7 @@ class NozzleChange:
     ) -> FurtherTouch | None:
         """Have the proposals accepted; return the touch that is to be made before that."""
         numbers = ", ".join(str(plan.tool) for plan in self._plan.tools)
-        question = tr(
-            "Write these values to tool {tool}? 'robolink undo' takes them back.", tool=numbers
-        )
+        question = tr("Write these values to tool {tool}? 'robolink undo' undoes it.", tool=numbers)
         if not self._plan.ask_before_write:
             if self._plan.agreed_by is not None:
                 entry = answer_entry(question, True, self._plan.agreed_by, accepted=True)

@@ -47,7 +47,7 @@ class PinParameters(MethodParameters):
     """How a tip is taken off a pin and brought back."""
 
     lift_mm: Annotated[
-        float, Ge(1), Le(100), MM, Help(declared("How far the tip is lifted before it turns."))
+        float, Ge(1), Le(100), MM, Help(declared("How far to lift the tip before the turn."))
     ] = 10.0
     clearance_mm: Annotated[
         float,
@@ -67,7 +67,7 @@ class PinParameters(MethodParameters):
     ] = None
     off_in_contact: Annotated[
         bool,
-        Help(declared("Whether that input goes off, not on, in contact.")),
+        Help(declared("The input goes off, not on, in contact.")),
     ] = False
 
     @property
@@ -237,7 +237,7 @@ class LookParameters(MethodParameters):
         Help(declared("How many pictures are taken at each look; the median counts.")),
     ] = 3
     lift_mm: Annotated[
-        float, Ge(1), Le(100), MM, Help(declared("How far the tip is lifted before it turns."))
+        float, Ge(1), Le(100), MM, Help(declared("How far to lift the tip before the turn."))
     ] = 10.0
     beside_mm: Annotated[
         float,

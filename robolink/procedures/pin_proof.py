@@ -143,7 +143,7 @@ class _Turning:
             place,
             key=self._count,
             turning=tr("Turning about the new tip."),
-            instruction=tr("Jog the tip onto the pin again. We measure how far it was off."),
+            instruction=tr("Jog the tip onto the pin again. robolink measures how far off it was."),
         )
         self._count += 1
         return place, found

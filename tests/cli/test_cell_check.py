@@ -65,7 +65,7 @@ def test_a_cell_in_order_ends_with_0_goes_on_record_and_is_not_touched(cells, si
     assert simulator.machine.flash_writes == 0
     assert simulator.machine.arm.moves_started == 0
     assert main.run(["check"]) == 0
-    assert "line3: in order (tools read: 15, stations: 0, " in capsys.readouterr().out
+    assert "line3: no problem found (tools read: 15, stations: 0, " in capsys.readouterr().out
     assert len(recorded()) == 2
 
 
@@ -137,7 +137,7 @@ def test_one_cell_that_does_not_answer_leaves_the_others_looked_at(cells, simula
     assert by_name["away"]["findings"] == []
     assert sorted(entry.verdict.split(":")[0] for entry in recorded()) == [
         "In order.",
-        "The cell could not be looked at",
+        "The cell could not be checked",
     ]
     assert main.run(["check", "line3"]) == 0
     assert "away" not in capsys.readouterr().out

@@ -41,7 +41,7 @@ def test_a_controller_that_keeps_its_promises_is_only_looked_at(run, simulator):
     assert simulator.counters()["tool_writes"] == 0
     assert simulator.counters()["moves_started"] == 0
     code, out, _ = run("expert", "check-contract")
-    assert "All 8 promises" in out
+    assert "All 8 checks" in out
 
 
 def test_what_the_checks_ask_is_recorded(run, simulator, tmp_path):
@@ -89,7 +89,7 @@ def test_a_driver_of_ones_own_that_breaks_a_promise_is_told_by_name(monkeypatch,
     broken = {one["name"]: one["broken"] for one in told["checks"] if one["broken"]}
     assert (code, told["kept"]) == (1, False)
     assert broken == {"tools_are_read_by_number": "read() and read_all() agree"}
-    assert "1 of 8 promises are broken" in capsys.readouterr().out
+    assert "1 of 8 checks failed" in capsys.readouterr().out
 
 
 def test_each_promise_is_told_how_it_was_found():
@@ -147,9 +147,9 @@ def test_told_to_it_writes_and_moves_and_puts_everything_back(
         (("--write", "--tool", "2"), 9, "nobody to ask"),
         (("--move",), 9, "nobody to ask"),
         (("--write", "--tool", "1", "--yes"), 2, "Tool 1 is selected"),
-        (("--write", "--yes"), 2, "--write and --tool go together"),
-        (("--tool", "2", "--yes"), 2, "--write and --tool go together"),
-        (("--write", "--tool", "2", "--yes", "--junit", "no/such/a.xml"), 2, "no folder no/such"),
+        (("--write", "--yes"), 2, "--write needs --tool"),
+        (("--tool", "2", "--yes"), 2, "--write needs --tool"),
+        (("--write", "--tool", "2", "--yes", "--junit", "no/such/a.xml"), 2, "folder no/such"),
         (("--driver", "json:dumps"), 2, "gives no controller: TypeError"),
         (("--driver", "os:getcwd"), 2, "gives no controller: str has no __enter__"),
         (("--driver", "nowhere"), 2, "is not the name of a driver"),

@@ -135,7 +135,7 @@ def test_a_signal_while_it_is_put_back_waits_for_that(epson):
         assert epson.run(*ALL)[0] == 0
     code, _, err = ended(epson, signal.SIGTERM, counting.logins[-1], *ALL)
     assert (code, epson.open_markers()) == (143, ())
-    assert f"Of {len(EVERY)} promises {len(EVERY)} were looked at" in err
+    assert f"{len(EVERY)} of {len(EVERY)} checks were made" in err
     assert epson.cases()[-1] == ("what_was_there_is_put_back", "error")
 
 
@@ -144,7 +144,7 @@ def test_a_reader_reads_what_was_found_before_it_was_ended(epson):
         assert epson.run()[0] == 0
     code, out, err = ended(epson, signal.SIGINT, counting.logins[-1], "--lang", "en")
     assert (code, out) == (130, "")
-    assert "Of 8 promises 7 were looked at, 0 of them are broken." in err
+    assert "7 of 8 checks were made, 0 failed." in err
     assert epson.cases()[-2:] == [
         ("a_marker_of_somebody_else_is_refused", "kept"),
         ("closing_is_final", "error"),
@@ -163,10 +163,7 @@ def test_a_lost_answer_is_told_as_what_it_was_once_the_old_value_was_read(epson)
     )
     assert "recover" not in error["remedy"]
     assert "a write is read back: No clear answer came" in err
-    assert (
-        f"Of {len(EVERY)} promises {len(READING_CHECKS)} were looked at, 0 of them are broken."
-        in err
-    )
+    assert f"{len(READING_CHECKS)} of {len(EVERY)} checks were made, 0 failed." in err
     assert (epson.kept(), epson.open_markers()) == (epson.before, ())
     assert epson.end_of_report() == (1, len(EVERY) - len(READING_CHECKS) - 1)
 

@@ -49,7 +49,11 @@ COMMANDS = {
         "Tool 2 is selected (before: 1).",
     ),
     "jog": (["jog", "x+0.5", "z+1", "--yes"], "robolink/jog/1", "tool 1 in local 0"),
-    "calibrate two-pose": ([], "robolink/calibration/1", "Tool 1 is written and read back."),
+    "calibrate two-pose": (
+        [],
+        "robolink/calibration/1",
+        ("Written. The controller has stored tool 1."),
+    ),
     "recover with a word": (["recover", "--yes"], "robolink/recover/1", ""),
 }
 

@@ -291,7 +291,7 @@ def test_a_look_that_breaks_off_is_one_line_and_the_others_go_on(capsys, monkeyp
         if "Input/output error" in check["what"]
     }
     assert broken == (
-        "this could not be looked at (OSError: [Errno 5] Input/output error).",
+        "this could not be checked (OSError: [Errno 5] Input/output error).",
         "warn",
     )
     assert {"journal", "keyring"} <= {check["subject"] for check in document["checks"]}

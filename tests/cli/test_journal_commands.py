@@ -249,7 +249,7 @@ def test_an_empty_list_is_no_error(run, document, state_folder, tmp_path):
 
 def test_a_list_without_a_match_says_so(run, recorded):
     code, out, _ = run("journal", "list", "--tool", "15")
-    assert (code, out) == (0, "The journal has no such entry.\n")
+    assert (code, out) == (0, "There is no such entry in the journal.\n")
 
 
 def test_a_journal_that_may_only_be_read_is_listed_and_exported(document, recorded, state_folder):

@@ -53,7 +53,7 @@ def test_a_journal_without_history_of_a_known_controller_blocks_until_a_person_l
     lose(changed)
     code, _, err = run("status")
     assert code == 0
-    assert "knows nothing of it" in err
+    assert "has no record of it" in err
     stood = simulator.machine.tip()
     assert run("jog", "x+1", "--yes")[0] == 6
     assert run("tool", "set", "1", "--x", "14", "--yes")[0] == 6
@@ -76,7 +76,7 @@ def test_either_sign_is_enough(run, changed, gone, state_folder):
     delete(changed)
     (file,) = (state_folder / gone).iterdir()
     file.unlink()
-    assert "knows nothing of it" in run("status")[2]
+    assert "has no record of it" in run("status")[2]
 
 
 def test_another_place_is_named(run, changed, tmp_path, monkeypatch):

@@ -91,7 +91,7 @@ def test_what_changes_something_takes_no_cell_where_nobody_is_asked(
     cells("line3")
     assert main.run([*words, *yes]) == 2
     shown = capsys.readouterr().err
-    assert "takes the only one, line3, only where it can ask you first" in shown
+    assert "uses the only cell, line3, only if it can ask you first" in shown
     assert "-c line3" in shown
     assert changes(simulator.log) == []
 

@@ -139,7 +139,7 @@ def test_doctor_names_what_is_there_and_what_is_needed(instead, name):
     assert first.startswith(f"bad   {name}: 1.0.3 is installed, ")
     assert first.endswith(" is needed.")
     assert "\nok    python: " in done.stdout
-    assert done.stdout.endswith("Something is wrong; see the first lines.\n")
+    assert done.stdout.endswith("Problems were found; see the first lines.\n")
 
 
 def test_doctor_without_click_speaks_json_too(instead):

@@ -216,7 +216,7 @@ def test_on_a_terminal_the_person_is_asked_and_may_leave(shown, serve, person):
         "1.u",
         "2.x",
     ]
-    assert "so no command changes them: 1.z, 2.z" in out
+    assert "so robolink does not change them: 1.z, 2.z" in out
 
 
 def test_a_component_that_is_zero_everywhere_is_compared_by_a_test_value(shown, serve, person):

@@ -75,7 +75,7 @@ BAD = {
     "tool backup": (["golden.json"], "exists already"),
     "tool restore": (["golden.json", "--tool", "16"], "16"),
     "tool compare": (["missing.json"], "cannot be read"),
-    "robot io get": ([], "One place can be read"),
+    "robot io get": ([], "Only one place can be read"),
     "robot io set": (["70000", "on"], "70000"),
     "robot variable get": (["g_Long", "--index", "0"], "need --type"),
     "robot variable set": (["g_Long", "x", "--type", "Long"], "x"),

@@ -178,7 +178,7 @@ def test_the_page_says_who_when_with_what_and_what_came_of_it(run, recorded, sim
         "half a turn would be best",
         "odd thing",
         "Passed: 0.022 mm off at most, limit 0.200 mm.",
-        "All 7 entries of the journal were checked",
+        "All 7 journal entries were checked",
         *(found.hash for found in open_journal().entries()),
     ):
         assert words in text
@@ -249,7 +249,7 @@ def test_a_journal_that_was_tampered_with_shows_at_the_top(run, recorded, state_
     assert code == 1
     assert "Entry 1 was changed after it was stored." in err
     text = text_of(tmp_path / "page.html")
-    assert text.index("The journal is NOT as it was stored.") < text.index("controller")
+    assert text.index("The journal was CHANGED after it was stored.") < text.index("controller")
 
 
 def test_a_file_is_replaced_only_with_force(run, recorded, tmp_path):

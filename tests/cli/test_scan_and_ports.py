@@ -85,7 +85,7 @@ def test_a_person_sees_a_url_and_a_count(listener, capsys):
     assert main.run(["scan", "127.0.0.1-2", "--port", str(port)]) == 0
     shown = capsys.readouterr().out
     assert shown.startswith(f"epson+tcp://127.0.0.1:{port}\nport {port}: 1 of 2 addresses")
-    assert "does not prove a controller" in shown
+    assert "need not be a controller" in shown
 
 
 def test_nobody_there_is_said_and_is_no_error(listener, capsys):
@@ -170,7 +170,7 @@ def test_serial_ports_are_listed_by_name_and_whether_they_may_be_used(plugged_in
     assert main.run(["ports"]) == 0
     assert capsys.readouterr().out == (
         f"{usable}\n{tmp_path}/ttyUSB1  adapter  USB VID:PID=0403:6001\n"
-        "    you may not use it; 'robolink cell doctor' says what to do\n"
+        "    no permission to use it; 'robolink cell doctor' says what to do\n"
     )
 
 
@@ -256,7 +256,7 @@ def test_into_a_conversation_of_others_nothing_is_sent(capsys, far_end):
     assert heard == []
     assert main.run(["scan", "--line", url]) == 0
     shown = capsys.readouterr().out
-    assert "something sends there unasked; nothing was sent to it" in shown
+    assert "something sends there unasked; robolink sent nothing" in shown
     assert "sent: nothing; received: 31 32" in shown
 
 

@@ -150,7 +150,7 @@ def test_status_shows_who_has_it_and_the_last_state_with_its_age(held, capsys):
     before = controller.exchanges
     assert main.run(["-c", url, "status"]) == 0
     out = capsys.readouterr().out
-    assert out.startswith("ann ('robolink change') has this controller.")
+    assert out.startswith("ann ('robolink change') has locked this controller.")
     assert " s ago: emergency stop" in out
     assert main.run(["-c", url, "--json", "status"]) == 0
     said = json.loads(capsys.readouterr().out)

@@ -194,11 +194,11 @@ tcp = "127.0.0.1:6012"
         ),
         (
             '[cells.a]\nkind = "epson"\ncount = 3\ntcp = "127.0.0.1:65534"',
-            "line 5, cells.a.tcp: there are not so many ports",
+            "line 5, cells.a.tcp: there are not that many ports",
         ),
         (
             '[cells.a]\nkind = "softmotion"\ncount = 124\ncan = "virtual:x"',
-            "line 4, cells.a.count: a bus has no more than 127 nodes",
+            "line 4, cells.a.count: a bus has at most 127 nodes",
         ),
         ("", "cells: must be a table"),
         ('[cell.a]\nkind = "epson"', "line 2, cell: is not known; is cells meant?"),

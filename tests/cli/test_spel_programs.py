@@ -251,7 +251,7 @@ def test_a_project_file_is_refused_by_what_is_wrong_with_it(ended, program, proj
     points = program(PROJECT.replace("other.pts", "gone.pts"), "points.sprj")
     end = ended("spel", "check", points)
     assert end.code == 0
-    assert "Not beside the project file: gone.pts" in end.err
+    assert "Missing in the folder of the project file: gone.pts" in end.err
     assert "lists no program" in ended("spel", "check", program("ENVT0100\n", "no.sprj")).err
 
 

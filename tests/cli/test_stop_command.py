@@ -285,7 +285,7 @@ def test_a_note_holds_the_next_movement_until_somebody_releases_it(moving, stop,
     assert main.run([*jog, moving.url]) == 0
     assert moving.machine.arm.moves_started == started + 1
     assert main.run(["-c", localhost, "release"]) == 0
-    assert "No stop is noted" in capsys.readouterr().out
+    assert "No stop is on record" in capsys.readouterr().out
 
 
 class Person:

@@ -68,7 +68,7 @@ def test_a_jog_from_the_other_folder_asks_before_it_moves_the_flange(epson, fold
     folder("second")
     code, said = run("-c", "a", "status")
     assert code == 0
-    assert "Tool 0 is selected, but the cell a works with tool 1." in said
+    assert "Tool 0 is selected, but the cell a uses tool 1." in said
     assert open_journal().open_markers() == ()
     stood = simulator.machine.tip()
     code, said = run("-c", "a", "jog", "x+1", "--yes")

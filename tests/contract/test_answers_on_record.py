@@ -230,5 +230,5 @@ def test_whoever_learns_a_station_has_the_answer_beside_its_place(arm, monkeypat
         done = arm.run("station", "learn", "PIN-07", "--tool", "1")
     assert done.code == 0, done.err
     asked = [str(one.details.get("question")) for one in arm.recorded(EntryKind.DECISION)]
-    assert asked[0] == "Keep this on record?"
+    assert asked[0] == "Record this?"
     assert any(MOVES in question for question in asked)

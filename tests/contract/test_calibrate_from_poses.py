@@ -90,7 +90,7 @@ def test_taught_points_give_the_tip_and_what_was_not_measured_is_kept(command, s
     assert code == 0
     assert stored(simulator) == ToolOffset(12.3, -3.9, -20.0)
     assert "Z -20.000: not measured, stays" in out
-    assert "Tool 1 is written and read back." in out
+    assert "Written. The controller has stored tool 1." in out
     assert "Not tested yet. To test:" in out
 
 

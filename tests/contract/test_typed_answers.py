@@ -50,7 +50,7 @@ def test_what_was_typed_before_a_question_or_during_a_jog_answers_nothing(start,
     arm = simulator.machine.arm
     terminal = start("jog", "-c", url)
     terminal.press(b"y\r\n\r\n")
-    terminal.wait_for("Typed too early, so it was not taken: 'y'")
+    terminal.wait_for("Typed too early and ignored: 'y'")
     terminal.wait_for(YES_NO)
     # A scanner: neither a yes nor a no, and its LF is not the answer to the next question.
     terminal.press(b"4006381333931\r\n")
@@ -62,7 +62,7 @@ def test_what_was_typed_before_a_question_or_during_a_jog_answers_nothing(start,
     terminal.wait_for(JOG)
     before = arm.flange()
     terminal.press(b"x + 0.5\nx+1\n\n")
-    terminal.wait_for(r"Typed too early, so it was not taken: 'x\+1'")
+    terminal.wait_for(r"Typed too early and ignored: 'x\\+1'")
     terminal.wait_for(r"done: moved 0\.[45]\d\d mm")
     assert arm.flange().x_mm - before.x_mm == pytest.approx(0.5, abs=0.2)
     terminal.press(b"x0.1\n")

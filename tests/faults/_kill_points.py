@@ -4,7 +4,7 @@ from robolink.model import ToolOffset
 from tests.faults._change_cell import ChangeCell
 from tests.faults._change_process import NEW, OLD
 
-NOTHING_LEFT = "Nothing is left unfinished on this controller."
+NOTHING_LEFT = "No job is left unfinished on this controller."
 
 
 def right_values(program: str, cell: ChangeCell, written: list[int]) -> dict[int, ToolOffset]:

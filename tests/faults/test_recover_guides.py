@@ -83,7 +83,7 @@ def test_the_word_of_a_person_settles_the_rest_in_the_same_run(cell):
     ended = cell.run("recover", asks=True)
     assert ended.code == 0, ended.err
     assert cell.open_markers() == ()
-    assert "Everything is settled; tool 1 is selected." in ended.out
+    assert "All jobs are finished or undone; tool 1 is selected." in ended.out
     assert len(poses(ended.err)) == 1
 
 

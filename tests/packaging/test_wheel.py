@@ -84,7 +84,7 @@ def test_the_wheel_brings_grammar_and_catalogue(names):
 def test_the_wheel_brings_the_chinese_sentences_as_gettext_reads_them(wheel, names):
     folder = "robolink/locale/zh_CN/LC_MESSAGES"
     assert not any(name.endswith(".po") for name in names)
-    for name, english in (("robolink", "Stop every motion now"), ("click", "Usage:")):
+    for name, english in (("robolink", "Stop the robot now"), ("click", "Usage:")):
         translations = gettext.GNUTranslations(io.BytesIO(wheel.read(f"{folder}/{name}.mo")))
         assert translations.gettext(english) != english
 

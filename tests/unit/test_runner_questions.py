@@ -215,8 +215,8 @@ def test_what_was_fed_in_before_a_question_answers_none_and_what_comes_after_doe
         operator.ask("Write it?", Question.YES_NO)
         assert operator.poll(0.05) is None
         assert [line for line in shown if line.startswith("Typed too early")] == [
-            "Typed too early, so it was not taken: 'y'",
-            "Typed too early, so it was not taken: 'z-2'",
+            "Typed too early and ignored: 'y'",
+            "Typed too early and ignored: 'z-2'",
         ]
         feed.write("n\n")
         assert operator.poll(20) == "n\n"

@@ -111,7 +111,7 @@ def test_a_change_that_is_killed_at_a_touch_is_put_right_by_recover(
     assert simulator.machine.tools.selected == 0
     told = once_it_is_silent(windows, state, tmp_path, "recover")
     assert told.returncode == 0, told.stderr
-    assert "Everything is settled; tool 1 is selected." in told.stdout + told.stderr
+    assert "All jobs are finished or undone; tool 1 is selected." in told.stdout + told.stderr
     assert simulator.machine.tools.selected == 1
     assert simulator.machine.flash_writes == 0
 

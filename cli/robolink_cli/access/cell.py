@@ -71,8 +71,8 @@ def require_expected_robot(controller: "Controller", cell: "Expected") -> None:
                 found=", ".join(found) or tr("a robot that does not say its model"),
             ),
             remedy=tr(
-                "Check the address first. If the cell file is wrong, correct 'robot' in {path} or "
-                "take it out.",
+                "Check the address first. If the cell file is wrong, correct or remove "
+                "'robot' in {path}.",
                 path=cell.robot_file,
             ),
         )
@@ -111,11 +111,11 @@ def nothing_named() -> ConfigError:
     if len(names) == 1:
         return ConfigError(
             tr(
-                "No cell is named. A command that moves or writes takes the only one, {name}, "
-                "only where it can ask you first.",
+                "No cell is named. A command that moves or writes uses the only cell, "
+                "{name}, only if it can ask you first.",
                 name=names[0],
             ),
-            remedy=tr("Name it: -c {name}", name=names[0]),
+            remedy=tr("Add it: -c {name}", name=names[0]),
         )
     return ConfigError(
         tr("No cell is named, and there are several: {names}.", names=", ".join(names)),

@@ -81,7 +81,7 @@ def report_on_record(outcomes: OutcomeLog, change: str, tool: int) -> Report:
     if outcomes.durable:
         reports, _ = reports_from(open_journal(read_only=True), entries)
     else:
-        kept_nowhere = tr("The journal of this simulator ends with this command.")
+        kept_nowhere = tr("The journal of this simulator is deleted when this command ends.")
         reports = _made(entries, kept_nowhere, ())
     for report in reports:
         if report.tool == tool:
@@ -108,9 +108,9 @@ def _checked(journal: Journal) -> tuple[str, list[str]]:
     except JournalError as error:
         return tr("The journal could not be checked: {error}", error=error), []
     if found.problems:
-        return tr("The journal is NOT as it was stored."), list(found.problems)
+        return tr("The journal was CHANGED after it was stored."), list(found.problems)
     return tr(
-        "All {count} entries of the journal were checked when this page was made: none was "
-        "changed and none is missing.",
+        "All {count} journal entries were checked when this page was made: none was "
+        "changed, none is missing.",
         count=found.checked,
     ), []

@@ -84,8 +84,8 @@ def from_keyring(identity: str) -> Secret | None:
         raise ConfigError(
             tr("The system's keyring failed: {cause}.", cause=cause),
             remedy=tr(
-                "Mend it, or give the password in a file, or set PYTHON_KEYRING_BACKEND to "
-                "keyring.backends.null.Keyring, so that none is asked."
+                "Repair it, or give the password in a file. To use no keyring, set "
+                "PYTHON_KEYRING_BACKEND to keyring.backends.null.Keyring."
             ),
         ) from error
     return None if value is None else Secret(value)

@@ -65,8 +65,8 @@ def note_at_work(outcomes: "OutcomeLog", url: str) -> bool:
         working = outcomes.at_work()
     if working:
         what = tr(
-            "It ends by itself what it has begun; there is nothing to recover. Wait for it, or "
-            "stop it: robolink -c {url} stop",
+            "It finishes its own job; there is nothing to recover. Wait for it, or stop "
+            "it: robolink -c {url} stop",
             url=url,
         )
         note(f"{working}\n  {what}")
@@ -108,15 +108,15 @@ def _record_missing(marker: "Marker", url: str) -> str:
     details = marker.details
     journal, before = str(details.get("journal", "")), str(details.get("before", ""))
     said = tr(
-        "This controller was changed from here before, but the journal {journal} knows nothing "
-        "of it: jobs left unfinished do not show.",
+        "This computer changed this controller before, but the journal {journal} has no "
+        "record of it: interrupted jobs are not shown.",
         journal=journal,
     )
     if before and before != journal:
         said += " " + tr("Its record was kept in {before}.", before=before)
     remedy = tr(
-        "Look at the selected tool and at the tools first. Then 'robolink -c {url} recover' "
-        "asks you, and begins a new record.",
+        "First check the selected tool and the tool values. Then run 'robolink -c {url} "
+        "recover': it asks you and starts a new record.",
         url=url,
     )
     return f"{said}\n  {remedy}"

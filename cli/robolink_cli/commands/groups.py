@@ -15,7 +15,7 @@ from robolink_cli.options.shared import shared_options
 _ROBOT: Final = {
     "where": (
         f"{CONTROLLER}.operate:where",
-        declared("Where the robot is, and with which tool."),
+        declared("Show where the robot is, and with which tool."),
     ),
     "jog": (f"{CONTROLLER}.jog:jog", declared("Move a small step, in Power Low.")),
     "motors": (
@@ -25,56 +25,61 @@ _ROBOT: Final = {
     "reset": (f"{CONTROLLER}.operate:reset", declared("Clear an error of the controller.")),
     "release": (
         f"{CONTROLLER}.operate:release",
-        declared("Let the robot be moved again after a stop."),
+        declared("Allow movement again after a stop."),
     ),
     "io": (f"{CONTROLLER}.io:io", declared("Read inputs, switch outputs and memory bits.")),
     "variable": (f"{CONTROLLER}.var:var", declared("Read and set the project's variables.")),
     "take-ownership": (
         f"{CONTROLLER}.operate:take_ownership",
-        declared("Take a PLC's mailbox from another client, because a person insists."),
+        declared("Take over a PLC's mailbox that another client has locked."),
     ),
 }
 
 _CELL: Final = {
-    "list": (f"{COMPUTER}.config:list_cells", declared("The cells that have a name here.")),
+    "list": (f"{COMPUTER}.config:list_cells", declared("List the cells of the cell files.")),
     "new": (
         f"{COMPUTER}.config:new_cell",
-        declared("Write a new cell into a cell file; asks what it needs."),
+        declared("Add a cell to a cell file; asks for what it needs."),
     ),
-    "show": (f"{COMPUTER}.config:show", declared("All settings that count for one cell.")),
+    "show": (f"{COMPUTER}.config:show", declared("Show all settings of one cell.")),
     "tools": (
         f"{MEASURE}.cell_tools:cell_tools",
-        declared("All tools of a cell: value, last change, age, and what is due."),
+        declared("Show all tools of a cell: value, last change, age, and what is due."),
     ),
     "check": (
         f"{COMPUTER}.cell_check:check",
-        declared(
-            "Whether cells are in order and nothing is due; for a nightly job, moves nothing."
-        ),
+        declared("Nightly check: unexpected changes, overdue checks. Moves nothing."),
     ),
-    "files": (f"{COMPUTER}.config:path", declared("Which cell files are looked at.")),
-    "validate": (f"{COMPUTER}.config:check", declared("Whether the cell files are right.")),
+    "files": (f"{COMPUTER}.config:path", declared("Show which cell files robolink reads.")),
+    "validate": (f"{COMPUTER}.config:check", declared("Check the cell files.")),
     "doctor": (
         f"{COMPUTER}.doctor:doctor",
-        declared("What could go wrong on this computer."),
+        declared("Check this computer's setup."),
     ),
-    "scan": (f"{COMPUTER}.scan:scan", declared("Try which of a few addresses answer.")),
+    "scan": (f"{COMPUTER}.scan:scan", declared("Find which of a few addresses answer.")),
     "ports": (f"{COMPUTER}.ports:ports", declared("List the serial ports.")),
-    "people": (f"{COMPUTER}.config:people", declared("Who works at a cell, and in which role.")),
+    "people": (
+        f"{COMPUTER}.config:people",
+        declared("Show who works at a cell, and in which role."),
+    ),
     "station": (
         f"{MEASURE}.station:station",
-        declared("Pins, beams, surfaces and cameras of a cell: where, and how well known."),
+        declared(
+            "Show the pins, beams, surfaces and cameras of a cell: where, and how accurately known."
+        ),
     ),
     "accuracy": (
         f"{MEASURE}.accuracy:accuracy",
-        declared("What a cell knows of its accuracy, and the command that measures each row."),
+        declared(
+            "Show what is known of a cell's accuracy, and the command that measures each row."
+        ),
     ),
 }
 
 _EXPERT: Final = {
     "serve": (
         f"{COMPANIONS}.serve:serve",
-        declared("Answer programs that calibrate a tool themselves."),
+        declared("Serve robot programs that start a calibration themselves."),
     ),
     "spel": (
         f"{COMPANIONS}.spel:spel",
@@ -82,15 +87,15 @@ _EXPERT: Final = {
     ),
     "plc": (
         f"{COMPANIONS}.plc:plc",
-        declared("The register map and data types of a PLC's mailbox."),
+        declared("Export the register map and data types of a PLC's mailbox."),
     ),
     "verify-controller": (
         f"{CONTROLLER}.verify_controller:verify_controller",
-        declared("Find out, reading only, what this controller really does."),
+        declared("Find out how this controller really behaves. Reads only."),
     ),
     "check-contract": (
         f"{CONTROLLER}.check_contract:check_contract",
-        declared("Hold a controller, reading only, to what every kind promises."),
+        declared("Check that a controller behaves as every type must. Reads only."),
     ),
     "execute-raw": (
         f"{CONTROLLER}.operate:execute_raw",
@@ -102,16 +107,16 @@ _EXPERT: Final = {
     ),
     "poses": (
         f"{MEASURE}.poses:poses",
-        declared("What robolink understands of a file of poses."),
+        declared("Show how robolink reads a file of poses."),
     ),
     "docs": (f"{SHIPPED}.docs:docs", declared("Read the pages of the documentation.")),
     "recipe": (
         f"{SHIPPED}.recipe:recipe",
-        declared("Copy a recipe to begin with; check your own."),
+        declared("Copy a recipe to start from; check your own."),
     ),
     "completion": (
         f"{COMPUTER}.completion:completion",
-        declared("Make TAB complete commands."),
+        declared("Set up TAB completion."),
     ),
 }
 
@@ -138,8 +143,8 @@ cell = LazyGroup(
     cls=LazyGroup,
     lazy=_EXPERT,
     help=declared(
-        "What integrators and engineers need besides.\n\n"
-        "The options stand before or after the name of any command."
+        "More commands, for integrators and engineers.\n\n"
+        "You can put the options before or after the name of any command."
     ),
 )
 @shared_options

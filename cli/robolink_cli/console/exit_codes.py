@@ -253,7 +253,7 @@ def _ending_in_words(by: EndedBy) -> str:
     if by is EndedBy.HUNG_UP:
         return tr("The window was closed, or the connection to it was lost (SIGHUP).")
     if by is EndedBy.OUTPUT_CLOSED:
-        return tr("Nobody reads the output any more, so the command was ended.")
+        return tr("The command was stopped: the pipe for its output was closed.")
     return tr("You stopped it (Ctrl-C).")
 
 
@@ -264,7 +264,7 @@ def _sentences(error: BaseException, typed: Sequence[str]) -> tuple[str, str]:
         left = outcome_after(error)
         return next_of(error.what, error, left, typed), next_of(error.remedy, error, left, typed)
     if isinstance(error, click.ClickException):
-        return error.format_message(), tr("'robolink COMMAND --help' shows what can be given.")
+        return error.format_message(), tr("For the options: robolink COMMAND --help")
     if isinstance(error, KeyboardInterrupt):
         return _ending_in_words(_ending(error)), ""
     if isinstance(error, (EOFError, click.Abort)):
@@ -273,10 +273,10 @@ def _sentences(error: BaseException, typed: Sequence[str]) -> tuple[str, str]:
 
     plug_in = _plug_in(error)
     if plug_in is None:
-        remedy = tr("Set ROBOLINK_DEBUG=1 to see where, and report it with that text.")
+        remedy = tr("Set ROBOLINK_DEBUG=1 to see where, and report it with the output.")
     else:
         remedy = tr(
-            "Set ROBOLINK_DEBUG=1 to see where, and report it to whoever made {package}.",
+            "Set ROBOLINK_DEBUG=1 to see where, and report it to the makers of {package}.",
             package=plug_in.package,
         )
     return unexpected(error), remedy

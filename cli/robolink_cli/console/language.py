@@ -112,7 +112,7 @@ class _Listener:
             return None
         translate = translator(language)
         if translate is None:
-            _remark(tr("The Chinese sentences are not compiled here: make messages does it."))
+            _remark(tr("The Chinese sentences are not compiled here. Run: make messages"))
         else:
             self._let_click_speak(language)
             _now.append(language)
@@ -241,7 +241,8 @@ def _shown_here(language: str) -> bool:
     if encoding is not None:
         _remark(
             tr(
-                "This window cannot show Chinese (its encoding is {encoding}), so this is English.",
+                "This window cannot show Chinese (its encoding is {encoding}), so robolink "
+                "uses English.",
                 encoding=encoding,
             )
         )

@@ -17,18 +17,18 @@ F = TypeVar("F", bound=Callable[..., Any])
 DryRun = Annotated[
     bool,
     CliOption(
-        late=True, help="Show the exact requests and check the limits; read only, write nothing."
+        late=True, help="Show the exact requests and check the limits; reads only, writes nothing."
     ),
 ]
 
-Yes = Annotated[bool, CliOption(late=True, help="Answer yes to the question asked.")]
+Yes = Annotated[bool, CliOption(late=True, help="Answer yes to the question.")]
 
-Overwrite = Annotated[bool, CliOption(help="Overwrite a file that is already there.")]
+Overwrite = Annotated[bool, CliOption(help="Overwrite an existing file.")]
 
 Published = Annotated[
     bool,
     CliOption(
-        help="The tools as the companion program published them; works while production runs."
+        help="Use the tools published by the companion program; works while production runs."
     ),
 ]
 
@@ -37,8 +37,7 @@ ThenSelect = Annotated[
     click.IntRange(0, 15),
     CliOption(
         metavar="NUMBER",
-        help="The tool that the machine is to have selected in place of one that is selected and "
-        "loses its definition; 0 is the flange.",
+        help="The tool to select instead when the selected tool is cleared; 0 is the flange.",
     ),
 ]
 
@@ -55,7 +54,7 @@ Plain = Annotated[
         late=True,
         expose_value=False,
         callback=_keep_plain,
-        help="Lines instead of a screen; for screen readers. Also ROBOLINK_PLAIN=1.",
+        help="Use lines instead of a screen; for screen readers. Also ROBOLINK_PLAIN=1.",
     ),
 ]
 """Is kept for the whole command line, so that no command is told it."""
@@ -80,6 +79,6 @@ def refuse_motion_options(context: click.Context) -> None:
         typed = context.get_parameter_source(str(parameter.name)) is ParameterSource.COMMANDLINE
         if isinstance(parameter, MotionOption) and typed:
             raise ConfigError(
-                tr("{option} says how to move, and nothing moves here.", option=parameter.opts[0]),
-                remedy=tr("Leave it out; it belongs to a measurement by the robot."),
+                tr("{option} is for movements, and nothing moves here.", option=parameter.opts[0]),
+                remedy=tr("Leave it out; use it when the robot measures."),
             )

@@ -41,7 +41,7 @@ ImpactPoints = Annotated[
 ]
 
 ImpactFile = Annotated[
-    Path | None, CliOption(help="The same for all points of a .pts file of EPSON RC+.")
+    Path | None, CliOption(help="Same, for all points of a .pts file of EPSON RC+.")
 ]
 
 
@@ -55,7 +55,7 @@ def impact_request(
     """
     if numbers and path is not None:
         raise ConfigError(
-            tr("Only one of these can be given: {names}.", names=", ".join(names)),
+            tr("These cannot be combined: {names}.", names=", ".join(names)),
             remedy=tr("Read the points from the controller or from a file."),
         )
     if numbers:
@@ -141,7 +141,7 @@ def _show_left_out(impact: "Impact") -> None:
         say(tr("  not taught, skipped: {count}", count=len(impact.undefined)))
     if impact.other_local:
         named = ", ".join(f"P{n} (local {local})" for n, local in impact.other_local.items())
-        left_out = tr("In another local, left out: {points}.", points=named)
+        left_out = tr("In another local coordinate system, left out: {points}.", points=named)
         say(f"  {left_out}")
 
 

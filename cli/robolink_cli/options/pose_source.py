@@ -37,18 +37,18 @@ def reading_options(function: Callable[..., Any]) -> Callable[..., Any]:
             "--euler",
             metavar="NAME",
             help=declared(
-                "How its angles turn: epson, kuka, fanuc, xyzrpw, codesys, rotvec, RzRyRx .."
+                "Rule of its angles: epson, kuka, fanuc, xyzrpw, codesys, rotvec, RzRyRx .."
             ),
         ),
         click.option(
             "--length",
             type=click.Choice(["mm", "cm", "m", "in"]),
-            help=declared("Unit of its lengths, when the file does not say it."),
+            help=declared("Unit of its lengths, if the file does not state it."),
         ),
         click.option(
             "--columns",
             metavar="x,y,z,u",
-            help=declared("What its columns are, when the file does not say it; '-' skips one."),
+            help=declared("Names of its columns, if the file does not state them; '-' skips one."),
         ),
     ):
         command = option(command)
@@ -160,8 +160,8 @@ def pose_source_options(
             "--axes-held",
             is_flag=True,
             help=declared(
-                "All axes were held by their motors, none let go (SFREE), when the poses were "
-                "taught; without it a person is asked."
+                "All axes were held by their motors, none released (SFREE), when the poses "
+                "were taught; without it robolink asks you."
             ),
         ),
     )
@@ -250,13 +250,13 @@ def pose_source(
     named = [name for name, value in given.items() if value]
     if len(named) > 1:
         raise ConfigError(
-            tr("Only one of these can be given: {names}.", names=", ".join(named)),
-            remedy=tr("Give the poses in one way only."),
+            tr("These cannot be combined: {names}.", names=", ".join(named)),
+            remedy=tr("Give the poses in only one form."),
         )
     if path is None and choices != NOTHING_SAID:
         raise ConfigError(
-            tr("--columns, --length and --euler belong to a file of poses."),
-            remedy=tr("Give it with --poses."),
+            tr("--columns, --length and --euler need a file of poses."),
+            remedy=tr("Add --poses."),
         )
     of_all: dict[str, Any] = {"taught_tool": taught_tool, "axes_held": axes_held}
     if points:
@@ -268,8 +268,8 @@ def pose_source(
         return PoseSource("file", path=path, choices=choices, **of_all)
     if taught_tool is not None or axes_held:
         raise ConfigError(
-            tr("--taught-tool and --axes-held belong to poses that exist already."),
-            remedy=tr("Give them with --points, --pose or --poses."),
+            tr("--taught-tool and --axes-held need existing poses."),
+            remedy=tr("Add --points, --pose or --poses."),
         )
     return None
 
@@ -315,7 +315,7 @@ def _typed_as_pose(numbers: tuple[float, ...], needs: Sequence[str]) -> "Pose":
     if not set(needs) <= stated:
         form = "X,Y,Z,U,V,W" if "v_deg" in needs else "X,Y,Z,U"
         raise ConfigError(
-            tr("A typed pose does not state all that is needed here."),
+            tr("A typed pose lacks values that are needed here."),
             remedy=tr("Write {form}, in mm and degrees.", form=form),
         )
     return Pose(x_mm, y_mm, z_mm, u_deg, v_deg, w_deg)

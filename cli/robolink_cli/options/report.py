@@ -39,7 +39,7 @@ ReportPath = Annotated[
 
 ForceReport = Annotated[
     bool,
-    CliOption(help="Let --report overwrite a file that is already there; it forces nothing else."),
+    CliOption(help="Let --report overwrite an existing file; forces nothing else."),
 ]
 
 
@@ -54,7 +54,7 @@ def report_request(path: Path | None, *, force: bool) -> ReportRequest | None:
     if path is None:
         if force:
             raise ConfigError(
-                tr("--force belongs to --report."),
+                tr("--force needs --report."),
                 remedy=tr("Leave it out; it forces nothing else."),
             )
         return None

@@ -43,7 +43,7 @@ class LineType(_ParamType):
         """
         text = str(value)
         if visible(text) != text or "\n" in text:
-            self.fail(tr("it must not hold control characters or line breaks"), param, ctx)
+            self.fail(tr("it must not contain control characters or line breaks"), param, ctx)
         if len(text) > LONGEST:
             self.fail(tr("it has more than {most} characters", most=LONGEST), param, ctx)
         return text
@@ -222,7 +222,7 @@ def _link_options(command: CommandT) -> CommandT:
             show_envvar=True,
             expose_value=False,
             callback=_keep,
-            help=declared("Badge or name of who works here, for the record and the role."),
+            help=declared("Your badge or name, for the record and the role."),
         ),
         click.option(
             "--record",

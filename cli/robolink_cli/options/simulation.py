@@ -40,8 +40,8 @@ Encoding = Annotated[
     _Encoding(),
     CliOption(
         metavar="NAME",
-        help="Code page of the files: utf-8, gbk, cp932, cp1250. Without it, the first of UTF-8, "
-        "cp932 and GBK that fits is used, and named.",
+        help="Code page of the files: utf-8, gbk, cp932, cp1250. Default: the first of "
+        "UTF-8, cp932 and GBK that fits; robolink names it.",
     ),
 ]
 
@@ -102,7 +102,9 @@ SECTIONS: Final[tuple[HelpSection, ...]] = (
 EXISTING_FILE: Final = click.Path(exists=True, dir_okay=False, path_type=Path)
 
 Seed = Annotated[
-    int, click.IntRange(min=0), CliOption(help="Another cell: other tools, another tip.")
+    int,
+    click.IntRange(min=0),
+    CliOption(help="Seed of the simulated cell: another seed has other tools and another tip."),
 ]
 
 Pace = Annotated[
@@ -111,8 +113,8 @@ Pace = Annotated[
     CliOption(
         "--speed",
         metavar="FACTOR",
-        help="How many times faster than real the simulated time passes. At 0 it passes with "
-        "requests and steps of the control API alone.",
+        help="How many times faster than real time the simulation runs. At 0, time passes "
+        "only with requests and steps of the control API.",
     ),
 ]
 
@@ -121,19 +123,16 @@ ExchangeTime = Annotated[
     NumberInside(min=0, max=10),
     CliOption(
         metavar="SECONDS",
-        help="How much simulated time each request takes besides; without it 0, and 0.05 at "
-        "--speed 0.",
+        help="Extra simulated time of each request; default 0, or 0.05 at --speed 0.",
     ),
 ]
 
-AllowRemote = Annotated[bool, CliOption(help="Listen where other machines can reach it, too.")]
+AllowRemote = Annotated[bool, CliOption(help="Also listen where other machines can connect.")]
 
 FaultPlan = Annotated[
     Path | None,
     EXISTING_FILE,
-    CliOption(
-        metavar="FILE", help="What is planned to go wrong: a file, as docs/fault-plans.md explains."
-    ),
+    CliOption(metavar="FILE", help="File of planned faults (docs/fault-plans.md)."),
 ]
 
 
@@ -143,9 +142,7 @@ class SimulationOptions(NamedTuple):
     seed: Seed = 1
     state: Annotated[
         Path | None,
-        CliOption(
-            help="File that keeps the tools over a restart, as flash or retained memory does."
-        ),
+        CliOption(help="File that keeps the tools over a restart, like flash or retained memory."),
     ] = None
     speed: Pace = 1.0
     exchange: ExchangeTime = None
@@ -154,7 +151,7 @@ class SimulationOptions(NamedTuple):
         CliOption(
             "--option",
             metavar="NAME=VALUE",
-            help="A habit of the device; a wrong name lists them all. May be repeated.",
+            help="A behaviour of the device; a wrong name lists all of them. May be repeated.",
         ),
     ] = ()
     allow_remote: AllowRemote = False
@@ -163,8 +160,8 @@ class SimulationOptions(NamedTuple):
         tuple[str, ...],
         CliOption(
             metavar="NAME=VALUE",
-            help="How imperfect the cell is, and how its camera is built; a wrong name lists all. "
-            "May be repeated.",
+            help="Errors of the simulated cell, and properties of its camera; a wrong name "
+            "lists all. May be repeated.",
         ),
     ] = ()
 
@@ -186,13 +183,11 @@ class ServedLife(NamedTuple):
             help="Where the control API listens (docs/control-api.md); port 0 takes a free one.",
         ),
     ] = "127.0.0.1:0"
-    with_parent: Annotated[
-        bool, CliOption(help="End when the process that started this one has ended.")
-    ] = False
+    with_parent: Annotated[bool, CliOption(help="End when the parent process has ended.")] = False
     idle_exit_s: Annotated[
         float | None,
         NumberInside(min=0.1),
-        CliOption(metavar="SECONDS", help="End when nobody has asked for anything for this long."),
+        CliOption(metavar="SECONDS", help="End when no request came for this long."),
     ] = None
     parent: int | None = None
 
@@ -207,7 +202,7 @@ def one_place(context: click.Context, given: click.Parameter, value: Any) -> Any
     """
     sources = map(context.get_parameter_source, ("address", "serial"))
     if all(source is ParameterSource.COMMANDLINE for source in sources):
-        raise click.UsageError(tr("--serial stands in place of --tcp: give one of them."))
+        raise click.UsageError(tr("--serial and --tcp cannot be combined: give one of them."))
     return None if given.name == "address" and context.params.get("serial") else value
 
 
@@ -271,8 +266,8 @@ class ProjectOptions(NamedTuple):
         str | None,
         CliOption(
             metavar="NAME",
-            help="A function to run to its end first. It sets what the project keeps outside its "
-            "programs, with HomeSet, TLSet, SetNet and SetCom.",
+            help="A function to run first, to its end. It makes the settings that a "
+            "project keeps outside its programs, with HomeSet, TLSet, SetNet and SetCom.",
         ),
     ] = None
     vision: Annotated[
@@ -287,8 +282,8 @@ class ProjectOptions(NamedTuple):
         CliOption(
             "--com",
             metavar="NUMBER=DEVICE",
-            help="Serial line of a port of OpenCom, as 1=/dev/pts/3; no other is reached. "
-            "May be repeated.",
+            help="Serial line of a port of OpenCom, as 1=/dev/pts/3; programs reach no "
+            "other. May be repeated.",
         ),
     ] = ()
     folder: Annotated[
@@ -297,7 +292,7 @@ class ProjectOptions(NamedTuple):
         CliOption(
             "--files",
             metavar="DIR",
-            help="Folder for the files that programs write and read; no other is reached. "
-            "Without it they are gone at the end.",
+            help="Folder for the files of the programs; they reach no other. Without it "
+            "the files are deleted at the end.",
         ),
     ] = None

@@ -97,7 +97,7 @@ def require_turn(
     if wanted and wanted not in defined:
         raise ConfigError(
             tr("Tool {tool} is not defined.", tool=wanted),
-            remedy=tr("Write about where its tip is with 'robolink tool set' first."),
+            remedy=tr("First write the approximate place of its tip with 'robolink tool set'."),
         )
     numbers = [wanted] if wanted else sorted(defined)
     require_turn_inside(

@@ -81,7 +81,7 @@ class TerminalOperator:
         assert self._lines is not None  # noqa: S101 - looked at by whoever calls
         for line in self._lines.forget(quiet_s):
             if line.strip():
-                self._show(tr("Typed too early, so it was not taken: {line!r}", line=line))
+                self._show(tr("Typed too early and ignored: {line!r}", line=line))
 
 
 def _how(kind: Question) -> str:
@@ -216,10 +216,10 @@ class AssistedOperator:
         if self._answers > MOST_STEPS:
             raise DeclinedError(
                 tr(
-                    "The simulated operator did not get there in {count} steps.",
+                    "The simulated operator did not reach the pin in {count} steps.",
                     count=MOST_STEPS,
                 ),
-                remedy=tr("Look where pin and tip are: robolink sim assist URL truth"),
+                remedy=tr("To see where pin and tip are: robolink sim assist URL truth"),
             )
         if self._kind is Question.YES_NO:
             return "y"
@@ -228,7 +228,7 @@ class AssistedOperator:
         if self._kind is Question.TEXT:
             return tr("simulated")
         if self._stays:
-            self._show(tr("  operator: presses Enter, without a look"))
+            self._show(tr("  operator: presses Enter without looking"))
             return ""
         steps, arrived = self._ahead.pop(0) if self._ahead else "", tr("there")
         if self._kind is Question.PLACE:

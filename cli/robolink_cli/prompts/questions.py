@@ -192,5 +192,5 @@ def _ask(figure: str) -> None:
                 "terminal, or with --accept-jump and --accept-turn."
             ),
         )
-    if not asked(tr("{figure} Write it all the same? Check sign and unit first.", figure=figure)):
+    if not asked(tr("{figure} Write it anyway? Check sign and unit first.", figure=figure)):
         raise DeclinedError(tr("That was not y."), remedy=tr("Nothing was written."))

@@ -220,7 +220,7 @@ def saved_tools(controller: "Controller") -> "CheckPoint":
     from robolink_cli.wizard.state import CheckPoint, Mark
 
     if not controller.outcomes.durable:
-        gone = tr("The tools are not saved: what is simulated ends with this command")
+        gone = tr("The tools are not saved: the simulation ends with this command")
         return CheckPoint(Mark.LOOK, gone)
     try:
         backup = kept_backup(controller)
@@ -262,12 +262,12 @@ def tools_as_left(controller: "Controller", tools: "Sequence[int]") -> tuple[str
         nozzle = last.signature.nozzle
         said.append(
             tr(
-                "Tool {t} is as the last change left it: {value}. {when}, needle {id}.",
+                "Tool {t} is unchanged since the last change: {value}. {when}, needle {id}.",
                 **facts,
                 id=nozzle,
             )
             if nozzle
-            else tr("Tool {t} is as the last change left it: {value}. {when}.", **facts)
+            else tr("Tool {t} is unchanged since the last change: {value}. {when}.", **facts)
         )
     return tuple(said)
 

@@ -238,7 +238,8 @@ def _check_robot(controller: "Controller", cell: "Expected", *, looks: bool) -> 
 
 def _unrecorded() -> str:
     return tr(
-        "So unfinished jobs may not show, and nothing can be changed until the journal is repaired."
+        "Unfinished jobs may be missing here, and robolink changes nothing until the "
+        "journal is repaired."
     )
 
 

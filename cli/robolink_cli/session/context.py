@@ -334,7 +334,7 @@ def find_tools(controller: Controller, *, published: bool) -> "ToolState":
         try:
             return read_tools(controller)
         except NotReadyError as error:
-            hint = tr("With the companion program in the project, --published works now too.")
+            hint = tr("With the companion program in the project, you can use --published now.")
             error.remedy = joined(" ", (error.remedy, hint))
             raise
     found = require_epson(controller, tr("published tools")).published_tools()

@@ -33,7 +33,7 @@ def doubt_about(selected: int | None, controller: "Controller", cell: "Expected 
         if cell.tool == selected:
             return ""
         return tr(
-            "Tool {selected} is selected, but the cell {cell} works with tool {tool}.",
+            "Tool {selected} is selected, but the cell {cell} uses tool {tool}.",
             selected=selected,
             cell=cell.cell,
             tool=cell.tool,
@@ -42,8 +42,8 @@ def doubt_about(selected: int | None, controller: "Controller", cell: "Expected 
     if not before:
         return ""
     return tr(
-        "Tool 0, the bare flange, is selected; the last procedure on record began with tool "
-        "{tool}.",
+        "Tool 0, the bare flange, is selected; the last procedure on record started with "
+        "tool {tool}.",
         tool=before,
     )
 
@@ -65,8 +65,8 @@ def heed_selection(controller: "Controller", cell: "Expected | None", *, yes: bo
     if not doubt:
         return
     remedy = tr(
-        "Nothing moved. Another program or computer may have left it so. Select the right "
-        "one: 'robolink tool select N'; the key 'tool' of the cell file says which it is."
+        "Nothing moved. Another program or computer may have selected it. Select the right "
+        "tool: 'robolink tool select N'; the key 'tool' of the cell file names it."
     )
     if yes or json_is_on() or not on_terminal():
         raise DeclinedError(doubt, remedy=remedy)
@@ -94,8 +94,8 @@ def note_doubts(
         # This command only asks, so it is not the owner.
         note(
             tr(
-                "Another client owns the mailbox: a program here, or on another computer. What "
-                "moves or writes is refused until it ends."
+                "Another client has the mailbox locked: a program here, or on another "
+                "computer. Until it ends, robolink cannot move or write."
             )
         )
 

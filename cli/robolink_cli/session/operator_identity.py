@@ -53,7 +53,9 @@ def signature_of(operator: str | None, cell: "Expected | None", *, changes: bool
     if operator not in people:
         raise ConfigError(
             tr("{operator!r} is not among the people of this cell.", operator=operator),
-            remedy=tr("Give --operator as the cell file has it, or have it added there: 'people'."),
+            remedy=tr(
+                "Give --operator as in the cell file, or have it added there under 'people'."
+            ),
         )
     return replace(here, operator=operator, role=people[operator])
 

@@ -51,7 +51,7 @@ OrderId = Annotated[
     OrderType(),
     CliOption(
         metavar="ID",
-        help="Id of this order from a line computer; delivered again it does nothing, and "
+        help="Id of this order from a line computer; a repeated order does nothing and "
         "reports the first result.",
     ),
 ]
@@ -105,8 +105,8 @@ def show_done(order: "Order") -> None:
     assert order.done is not None  # noqa: S101 - the caller looked
     say(
         tr(
-            "Order {order} was carried out on {at}, as change {change}; nothing was moved or "
-            "written now.",
+            "Order {order} was carried out on {at}, as change {change}. Nothing was moved "
+            "or written now.",
             order=order.id,
             at=local_label(order.done.at),
             change=order.done.change[:8],

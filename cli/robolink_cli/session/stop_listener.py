@@ -50,7 +50,7 @@ def listening_for_stop(
     except OSError as error:
         note(
             tr(
-                "'robolink stop' in another terminal cannot reach this one: {cause}.",
+                "'robolink stop' in another terminal cannot reach this command: {cause}.",
                 cause=error.strerror or error,
             )
         )

@@ -37,14 +37,13 @@ def heed_stop(url: str, controller: "Controller", *, yes: bool) -> None:
         raise StoppedError(
             found.sentence,
             remedy=tr(
-                "Look into the cell first. Then run 'robolink robot release' "
-                "(or 'reset', where the "
-                "controller wants one), or leave --yes out and answer the question."
+                "Look into the cell first. Then run 'robolink robot release' (or 'reset', "
+                "if the controller needs it), or leave out --yes and answer the question."
             ),
             controller=url.partition("?")[0],
         )
     note(found.sentence)
-    if not asked(tr("Has that been looked into, and may the robot move again?")):
+    if not asked(tr("Has the cause been checked, and may the robot move again?")):
         raise DeclinedError(tr("That was not y."), remedy=tr("Nothing was sent."))
     _clear(keys, name)
 
@@ -96,7 +95,7 @@ def release_stop(request: "StopRequest", *, yes: bool) -> dict[str, object]:
     found = find_note(keys, name)
     if found is not None:
         note(found.sentence)
-        agree(tr("Has that been looked into, and may the robot move again?"), yes=yes)
+        agree(tr("Has the cause been checked, and may the robot move again?"), yes=yes)
         _clear(keys, name)
     return {"released": found is not None, "note": _plain(found)}
 
@@ -127,8 +126,11 @@ def _clear(keys: frozenset[str], name: str) -> None:
         clear_note(keys, name)
     except OSError as error:
         raise ConfigError(
-            tr("The note of the stop stays: {cause}.", cause=error.strerror or error),
-            remedy=tr("See that this user may write the state folder, then try again."),
+            tr(
+                "The record of the stop could not be removed: {cause}.",
+                cause=error.strerror or error,
+            ),
+            remedy=tr("Make the state folder writable for this user, then try again."),
         ) from error
 
 

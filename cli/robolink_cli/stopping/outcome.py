@@ -41,14 +41,16 @@ class Telling:
         named, state = _shown(outcome.url), state_word(outcome.state)
         if outcome.holder:
             return tr(
-                "{controller} stands still; its state is: {state}. {holder} was working on "
-                "it, and stopped it.",
+                "{controller}: the robot has stopped (confirmed). State: {state}. {holder} "
+                "was working on it, and stopped it.",
                 controller=named,
                 state=state,
                 holder=outcome.holder,
             )
         return tr(
-            "{controller} stands still; its state is: {state}.", controller=named, state=state
+            "{controller}: the robot has stopped (confirmed). State: {state}.",
+            controller=named,
+            state=state,
         )
 
     def remarks(self) -> list[str]:
@@ -65,8 +67,8 @@ class Telling:
         if outcome.error is None:
             told.append(
                 tr(
-                    "Nothing moves with --yes until 'robolink robot reset' or "
-                    "'robolink robot release' is given."
+                    "Commands with --yes are blocked until you run 'robolink robot reset' "
+                    "or 'robolink robot release'."
                 )
             )
         return [*taken, *told]
@@ -92,8 +94,8 @@ class Telling:
         except LeaseHeldError as held:
             error.what = joined(" ", (error.what, held.what))
             error.remedy = tr(
-                "The stop is not confirmed: press the emergency stop, or stop it at that "
-                "computer, which alone can."
+                "The stop is not confirmed: press the emergency stop, or stop the robot at "
+                "that computer; only that one can."
             )
 
     def _noted(self) -> list[str]:
@@ -114,8 +116,8 @@ class Telling:
         except OSError as error:
             return [
                 tr(
-                    "The note of this stop could not be kept ({cause}): the next command that "
-                    "moves does not know of it.",
+                    "This stop could not be recorded ({cause}): the next command that "
+                    "moves will not ask first.",
                     cause=error.strerror or error,
                 )
             ]

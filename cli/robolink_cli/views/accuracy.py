@@ -122,7 +122,7 @@ def show_accuracy(known: Sequence[RowsOfRobot]) -> None:
             if row.fact.basis == "default":
                 steps[f"  {row.key}: {_step(place, row)}"] = None
     if steps:
-        say(tr("Nobody has measured or stated these; how to:"))
+        say(tr("Not measured and not stated yet; to do it:"))
         for step in steps:
             say(step)
     else:

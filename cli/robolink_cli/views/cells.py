@@ -45,7 +45,9 @@ def refused_by_methods(settings: "CellSettings") -> Iterator[Problem]:
             refusals.setdefault(problem, []).append(method.name)
     for problem, names in refusals.items():
         methods = ", ".join(names)
-        said = tr("{why} These methods refuse it: {methods}.", why=problem.what, methods=methods)
+        said = tr(
+            "{why} These methods are not possible: {methods}.", why=problem.what, methods=methods
+        )
         yield Problem(problem.where, said)
 
 
@@ -84,8 +86,8 @@ def show_files(files: Sequence[Mapping[str, object]]) -> None:
     """Print the places, one a line."""
     why = {
         "named": tr("named by ROBOLINK_CONFIG"),
-        "folder": tr("the working folder's"),
-        "user": tr("the user's"),
+        "folder": tr("from the working folder"),
+        "user": tr("from the user's folder"),
         "site": tr("for everybody on this computer"),
     }
     for file in files:
@@ -121,7 +123,12 @@ def show_check(payload: Mapping[str, Any]) -> None:
     if payload["disagreement"]:
         say(payload["disagreement"])
     if not payload["files"]:
-        say(tr("There is no cell file to check; 'robolink cell files' shows where one may be."))
+        say(
+            tr(
+                "There is no cell file to check; 'robolink cell files' shows where robolink "
+                "looks for one."
+            )
+        )
 
 
 def cells_payload(cells: Iterable[Cell]) -> dict[str, Any]:
@@ -141,7 +148,12 @@ def show_cells(payload: Mapping[str, Any]) -> None:
     for name, cell in cells.items():
         say(f"{padded(name, width)}  {cell['url']}  {cell['robot'] or ''}".rstrip())
     if not cells:
-        say(tr("There is no cell; 'robolink cell files' shows where a cell file may be."))
+        say(
+            tr(
+                "There is no cell; 'robolink cell files' shows where robolink looks for a "
+                "cell file."
+            )
+        )
 
 
 def people_payload(cells: Iterable[Cell]) -> dict[str, Any]:
@@ -166,7 +178,12 @@ def show_people(payload: Mapping[str, Any]) -> None:
         for person, role in people.items():
             say(f"  {person:{width}}  {role}")
     if not payload["cells"]:
-        say(tr("There is no cell; 'robolink cell files' shows where a cell file may be."))
+        say(
+            tr(
+                "There is no cell; 'robolink cell files' shows where robolink looks for a "
+                "cell file."
+            )
+        )
 
 
 def cell_payload(cell: Cell, context: CliContext, *, origin: bool) -> dict[str, Any]:
@@ -274,7 +291,7 @@ def show_cell_tools(payload: Mapping[str, Any]) -> None:
 
 def _changed(told: Mapping[str, Any]) -> str:
     if told["changed_at"] is None:
-        return tr("never from here")
+        return tr("never by robolink")
     by = told["nozzle"] or told["operator"] or ""
     return f"{local_label(told['changed_at'])}  {by}".rstrip()
 

@@ -173,10 +173,10 @@ def show_seen(payload: Mapping[str, object], named: str) -> None:
         payload: The document of it.
         named: How the person names the controller.
     """
-    say(tr("{holder} has this controller.", holder=payload["held_by"]))
+    say(tr("{holder} has locked this controller.", holder=payload["held_by"]))
     age_s = payload["age_s"]
     if not isinstance(age_s, float):
-        say(tr("It has not read the state yet."))
+        say(tr("No state has been read yet."))
         return
     say(
         tr(
@@ -246,7 +246,7 @@ def _show_preferences(told: object) -> None:
 def show_pose(payload: Mapping[str, object]) -> None:
     """Print a pose and the joints; what this kind of controller has not is not spoken of."""
     if payload["tool"] is None:
-        title = tr("tool not told by this controller")
+        title = tr("this controller does not report the tool")
     elif payload["hand"] is None:
         title = tr("tool {tool}", tool=payload["tool"])
     else:
@@ -276,7 +276,7 @@ def show_tools(tools: Mapping[str, Mapping[str, object] | None], selected: int |
         table(tr("tools (* selected)"), (tr("tool"), *AXES), rows)
     odd = [tool for tool, offset in tools.items() if offset is not None and _of_no_tool(offset)]
     if odd:
-        say(tr("  holding the values of no tool: {tools}", tools=", ".join(odd)))
+        say(tr("  values that are no tool: {tools}", tools=", ".join(odd)))
     missing = [tool for tool, offset in tools.items() if offset is None]
     if missing:
         say(tr("  undefined: {tools}", tools=", ".join(missing)))

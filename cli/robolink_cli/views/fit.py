@@ -85,7 +85,7 @@ def _fit(result: CalibrationResult) -> str:
             return tr("One touch cannot be checked.")
         if result.method == "two-pose":
             return tr("Two touches cannot check each other.")
-        return tr("Nothing is left over that could check it.")
+        return tr("No measurement is left over to check it.")
     return tr(
         "The {count} touches agree within {rms:.3f} mm; the worst is {largest:.3f} mm off.",
         count=len(result.residuals_mm) - len(result.rejected),
@@ -132,7 +132,7 @@ def _change(result: CalibrationResult) -> str:
     if "z_mm" in result.changed or not isinstance(stored, dict):
         return told
     return tr(
-        "{told}; the stored Z was measured: entry {number} of the journal",
+        "{told}; the stored Z was measured: journal entry {number}",
         told=told,
         number=stored["entry"],
     )
@@ -173,7 +173,7 @@ def _camera(result: CalibrationResult) -> str:
     if isinstance(result, CameraRound) and result.camera_error_mm is not None:
         dx_mm, dy_mm = result.camera_error_mm
         return tr(
-            "the camera sees things X {dx:+.3f} Y {dy:+.3f} mm beside where they are",
+            "the camera sees everything X {dx:+.3f} Y {dy:+.3f} mm off",
             dx=dx_mm,
             dy=dy_mm,
         )
@@ -312,7 +312,7 @@ def show_report(report: ToolReport) -> None:
     if receipt.skipped:
         say(tr("Tool {tool} has this value already. Nothing was written.", tool=tool))
     else:
-        say(tr("Tool {tool} is written and read back.", tool=tool))
+        say(tr("Written. The controller has stored tool {tool}.", tool=tool))
     if report.verification is None:
         say(tr("Not tested yet."))
     else:
@@ -367,20 +367,20 @@ def show_course(steps: Sequence[PlannedStep]) -> None:
     ways = sum(step.shown in (TeachPrompt.ALONG_X, TeachPrompt.ALONG_Z) for step in steps)
     if ways:
         plan = tr(
-            "Touches of the pin by you: {asks}. Ways along the tool's axes shown by you: "
-            "{ways}. Moves of the robot by itself: {moves}.",
+            "You touch the pin: {asks} times. You show moves along the tool's axes: "
+            "{ways}. The robot moves by itself: {moves} times.",
             asks=asks,
             ways=ways,
             moves=moves,
         )
     elif asks:
         plan = tr(
-            "Touches of the pin by you: {asks}. Moves of the robot by itself: {moves}.",
+            "You touch the pin: {asks} times. The robot moves by itself: {moves} times.",
             asks=asks,
             moves=moves,
         )
     else:
-        plan = tr("Moves of the robot by itself: {moves}. Nobody touches anything.", moves=moves)
+        plan = tr("The robot moves by itself: {moves} times. Nobody touches anything.", moves=moves)
     note(tr("{plan} All moves stay in the allowed area.", plan=plan))
 
 
@@ -401,7 +401,7 @@ def show_steps(steps: object) -> None:
             say(f"       {step['refusal']}")
     say(
         tr(
-            "These steps measure. What is written afterwards, and the turn test if there is one, "
-            "depend on the result."
+            "These are the measuring steps. The write and the turn test, if any, depend on "
+            "the result."
         )
     )

@@ -85,12 +85,12 @@ def first_offset(
 def show_list(entries: Sequence[Recorded], *, all_controllers: bool) -> None:
     """Print entries as a table."""
     if not entries:
-        say(tr("The journal has no such entry."))
+        say(tr("There is no such entry in the journal."))
         if not all_controllers:
             say(
                 tr(
-                    "It knows a controller by the addresses at which it was met: 'robolink -c URL "
-                    "status' makes one known."
+                    "The journal knows a controller by the addresses used so far. To add "
+                    "one: robolink -c URL status"
                 )
             )
         return
@@ -392,7 +392,7 @@ def show_diff(a: Sequence[Recorded], b: Sequence[Recorded]) -> None:
         table(tr("poses of the flange"), ("", "", *AXES, tr("hand")), rows)
     facts = list(_different_facts(one, other))
     if facts:
-        table(tr("what else differs"), ("", one.name, other.name), facts)
+        table(tr("other differences"), ("", one.name, other.name), facts)
 
 
 def _show_tools(

@@ -89,7 +89,7 @@ def _show_statements(document: Mapping[str, object]) -> None:
     if repeatable is not None:
         say(tr("  repeatable to +-{mm} mm (95 %)", mm=stated_mm(repeatable, 4)))
     else:
-        say(tr("  repeatable: not known; nothing tells how large the errors are, state sigma_mm"))
+        say(tr("  repeatable: not known; state sigma_mm, the size of the errors"))
     if isinstance(accurate, float):
         say(tr("  accurate to +-{mm} mm (95 %)", mm=stated_mm(accurate, 4)))
     intervals = document["interval95"]

@@ -66,7 +66,7 @@ def known_station(context: CliContext, name: str, *, robot: str | None = None) -
     if len(learnt) > 1:
         raise ConfigError(
             tr(
-                "Several robots of this controller have a place of station {name}: {robots}.",
+                "Several robots of this controller have a station {name}: {robots}.",
                 name=name,
                 robots=", ".join(whose for whose, _ in learnt),
             ),

@@ -83,7 +83,7 @@ def advance(state: WizardState, happening: Happening) -> Advanced:
         case WaitsForAnswer():
             return _waiting(state, happening.at_s), []
         case TooFast():
-            return state.says(tr("Too fast for a hand. Ignored.")), []
+            return state.says(tr("Looked like a scanner; ignored. Type it again.")), []
         case LineTyped():
             return _line(state, happening)
         case KeyPressed():
@@ -271,7 +271,7 @@ def _key(state: WizardState, key: KeyPressed) -> Advanced:
     if stops_at_once(state, key.name):
         return _stop(state)
     if state.has_field and _too_early(state, key):
-        said = tr("Typed too early, so nothing of it was taken. Please once more.")
+        said = tr("Typed too early and ignored. Please type it again.")
         return replace(state, early_s=key.at_s, typed="", message=said), []
     if state.question is None or not state.waits or not _armed(state, key.at_s):
         if state.at_place and key.name == "main" and not state.waits:
@@ -316,7 +316,7 @@ def _key_at_place(state: WizardState, key: KeyPressed) -> Advanced:
 def _begin_pose(state: WizardState) -> Advanced:
     """Open the field into which a pose is typed."""
     if state.touch is None or not state.touch.types:
-        return state.says(tr("Here no pose can be typed.")), []
+        return state.says(tr("You cannot type a pose here.")), []
     return replace(state, typing=True, typed="", pose_typed="", message=""), []
 
 
@@ -333,7 +333,7 @@ def _pose_typed(state: WizardState, text: str) -> Advanced:
     if not numbers:
         return replace(state, pose_typed="", message=""), []
     if len(numbers) not in (4, 6):
-        return state.says(tr("A pose is X Y Z U, or X Y Z U V W. Nothing was taken.")), []
+        return state.says(tr("A pose is X Y Z U, or X Y Z U V W. Nothing was recorded.")), []
     said = tr("Typed: {pose}. [5] or take records it as typed.", pose=" ".join(numbers))
     return replace(state, pose_typed=" ".join(numbers), message=said), []
 
@@ -354,7 +354,7 @@ def _again(state: WizardState, number: int | None = None) -> Advanced:
     """Have an earlier touch made again: the one before, where no other is named."""
     touch = state.touch
     if touch is None or touch.number < 2 or touch.proof:
-        return state.says(tr("There is no earlier touch to make again.")), []
+        return state.says(tr("There is no earlier touch to repeat.")), []
     if not touch.retakes:
         return _answer(state, "again")
     number = touch.number - 1 if number is None else number
@@ -379,7 +379,7 @@ def _line(state: WizardState, line: LineTyped) -> Advanced:
     settles = typed or question.kind is Question.CHOICE
     if settles and not listed and not _armed(state, line.at_s):
         # The end of a code that a scanner began before the question was there is another code.
-        return state.says(tr("Typed too early, so nothing of it was taken. Please once more.")), []
+        return state.says(tr("Typed too early and ignored. Please type it again.")), []
     if state.at_place:
         return _line_at_place(state, line, meaning)
     return _taken(state, answered_by_line(state, line.text))

@@ -159,5 +159,5 @@ def _require_agreeing(name: str, heights_mm: Sequence[float], sigma_z_mm: float)
                 "Heights differ by {spread:.2f} mm on one pin: at least one touch was in the air.",
                 spread=spread,
             ),
-            remedy=tr("Touch the pin again, each time until the tip is on it."),
+            remedy=tr("Touch the pin again. Each time, jog until the tip is on it."),
         )

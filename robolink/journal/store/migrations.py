@@ -150,5 +150,5 @@ def empty_error(name: str) -> JournalError:
     """Return the error about a database in which nobody has made the tables yet."""
     return JournalError(
         tr("The journal {name} is empty.", name=name),
-        remedy=tr("The first change that robolink makes starts it."),
+        remedy=tr("robolink creates it at the first change."),
     )

@@ -162,7 +162,7 @@ def _shown(swing: "_Swing", proof: DriftProof, tilt: Tilt) -> Procedure[None]:
     swing.touches.tell_of(proof.so_far())
     found = yield from swing.touch(
         tilt,
-        tr("Jog the tip onto the pin again. We measure how far it was off."),
+        tr("Jog the tip onto the pin again. robolink measures how far off it was."),
         key=len(proof.touches),
     )
     proof.add(swing.over.pose(tilt, 0.0), found, in_space=True)

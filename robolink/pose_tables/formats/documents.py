@@ -181,7 +181,7 @@ def read_json(text: str, choices: ReadingChoices) -> RawTable:
     try:
         documents = list(_documents(text))
     except (ValueError, RecursionError) as error:
-        raise UnusableText(tr("it is not JSON ({error})", error=error)) from error
+        raise UnusableText(tr("it is not a JSON file ({error})", error=error)) from error
     document = documents[0] if len(documents) == 1 else documents
     return read_document(document, choices, layout="JSON")
 

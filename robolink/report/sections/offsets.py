@@ -135,4 +135,4 @@ def left_out(impact: Impact) -> Iterator[str]:
         yield tr("Not taught, skipped: {count}.", count=len(impact.undefined))
     if impact.other_local:
         named = ", ".join(f"P{n} (local {local})" for n, local in impact.other_local.items())
-        yield tr("In another local, left out: {points}.", points=named)
+        yield tr("In another local coordinate system, left out: {points}.", points=named)

@@ -370,7 +370,7 @@ def test_a_pose_is_typed_into_a_field_that_enter_only_closes():
 def test_a_typed_pose_is_gone_after_a_step_and_where_none_is_taken():
     hand = at_touch(types=True).line("pose 1 2 3 4").keys("6")
     assert hand.jogs("x+0.1").keys("5").sent == ["x+0.1", "done"]
-    assert at_touch().keys(".").state.message == "Here no pose can be typed."
+    assert at_touch().keys(".").state.message == "You cannot type a pose here."
     assert at_touch().line("pose 1 2 3 4").state.pose_typed == ""
     three = at_touch(types=True).line("pose 1 2 3")
     assert "Nothing was taken." in three.state.message

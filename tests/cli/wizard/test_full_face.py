@@ -102,7 +102,7 @@ def test_keys_of_a_pipe_jog_take_and_write():
             until(lambda: "[Enter] Done" in face.text)
             time.sleep(0.35)
             paste(source, "N-7\r5")  # no key of another line may come with it
-            until(lambda: "Too fast for a hand. Ignored." in face.text)
+            until(lambda: "Looked like a scanner; ignored. Type it again." in face.text)
             paste(source, "N-7\r")
             until(lambda: "Touch 2 of 4" in face.text)
             time.sleep(0.35)
@@ -113,7 +113,7 @@ def test_keys_of_a_pipe_jog_take_and_write():
             assert answers == ["N-7"]
             source.send_text("4006381333931\r\n")
             time.sleep(0.3)
-            assert "Too fast for a hand. Ignored." in face.text
+            assert "Looked like a scanner; ignored. Type it again." in face.text
             source.send_text("\t")
             until(lambda: "[8] X-" in face.text)  # the arrows are turned
             source.send_text("\x1b[6~")  # PgDn: Z down
@@ -343,13 +343,13 @@ def test_a_scanner_and_keys_typed_during_the_start_do_nothing(hand, simulator):
     hand.see(r"Start moving \(2 open\)")
     hand.rest(0.5)
     os.write(hand.master, b"4006381333931\r\n")
-    hand.see("Too fast for a hand. Ignored.")
+    hand.see("Looked like a scanner; ignored. Type it again.")
     assert "2 open" in hand.text
     hand.press(["2", "5"] * 3)
     hand.see("Touch 1 of 2")
     hand.rest(0.4)
     os.write(hand.master, b"4006381333931\r\n")
-    hand.see("Too fast for a hand. Ignored.")
+    hand.see("Looked like a scanner; ignored. Type it again.")
     assert simulator.machine.arm.moves_started == 0
     hand.press(["0"])
     assert hand.end() == 9
@@ -426,6 +426,6 @@ def test_what_a_command_says_without_a_question_stays_when_the_screen_is_gone(si
         hand = ScreenHand(["recover", "-c", host.url])
         try:
             assert hand.end() == 0
-            assert "Nothing is left unfinished on this controller." in hand.text
+            assert "No job is left unfinished on this controller." in hand.text
         finally:
             hand.close()

@@ -199,7 +199,7 @@ def test_what_is_not_known_is_said_and_the_picture_stays_where_the_movement_bega
         state, _ = advance(state, one)
     rows = "\n".join(screen_of(state, 11.1).rows())
     assert state.pose == ARRIVAL
-    assert "Picture of the start: this controller tells no position while it moves." in rows
+    assert "Picture of the start: this controller reports no position while it moves." in rows
     assert "reading 0.1 s" in rows
     there = Reading(11.2, "running", pose=replace(ARRIVAL, z_mm=-70.0))
     state, _ = advance(state, WasRead(there))

@@ -228,8 +228,11 @@ def remarked():
     """What was found out before the list is read on it."""
     hand = Sitting(motors=False)
     for said in (
-        tr("Station {station} is not known yet: a full calibration there finds it.", station="P"),
-        tr("There is no earlier touch to make again."),
+        tr(
+            "Station {station} is not known yet: run a full calibration there to find it.",
+            station="P",
+        ),
+        tr("There is no earlier touch to repeat."),
     ):
         hand.happens(WasTold(said))
     return hand.asked(CHECK, Question.YES_NO)
@@ -247,7 +250,7 @@ def recovering():
     options = (
         tr("The old one. Put the old value back."),
         tr("The new one. Make the turn test, then keep the new value."),
-        tr("I cannot tell. Stay blocked; call an engineer."),
+        tr("I am not sure. Keep the robot blocked and call an engineer."),
     )
     holds = tr("Tool {tool} holds the new value {now}.", tool=1, now="X 12.300 Y -3.750 Z -20.000")
     found = tr("What we read: {sentence}", sentence=holds)
@@ -523,7 +526,7 @@ def test_lines_say_what_the_turn_test_has_shown_too():
     told = told_question(turning_on().state).splitlines()
     assert told[:2] == [
         "At U 90.0 it was 0.008 mm off: OK.",
-        "At U 180.0 it was 0.093 mm off: too near to the limit.",
+        "At U 180.0 it was 0.093 mm off: too near the limit.",
     ]
     beyond = touch_subject(limit_mm=0.1, earlier=(AngleShown(90.0, 0.2, False),))
     assert told_question(Sitting().asked(beyond).state).startswith(

@@ -50,7 +50,7 @@ def check_map(
         CliOption(
             "--from-csv",
             metavar="LIST.csv",
-            help="Start a map from a register list, and show it; nothing else is done.",
+            help="Draft a map from a register list and show it. Does nothing else.",
         ),
     ] = None,
     shows: Annotated[
@@ -63,8 +63,8 @@ def check_map(
 ) -> None:
     """Check the map of a PLC's registers: the file, or with -c its values against the HMI.
 
-    No command changes a value that nobody has compared here. One value of each component and one
-    of each tool are enough; a component that is 0 needs a test value.
+    robolink changes only values that somebody has compared here. One value of each component and
+    one of each tool are enough; a component that is 0 needs a test value.
     """
     if register_list is not None:
         _start(register_list)
@@ -84,8 +84,8 @@ def _start(register_list: Path) -> None:
         note(remark)
     note(
         tr(
-            "Components of tools found: {found}. Rows left for you: {left}. Fill in what is "
-            "open, then 'robolink expert plc check-map MAP.toml'.",
+            "Tool components found: {found}. Rows left for you: {left}. Fill in the rest, "
+            "then: robolink expert plc check-map MAP.toml",
             found=draft.found,
             left=len(draft.left),
         )
@@ -105,7 +105,7 @@ def _check_file(file: Path) -> None:
 
     def show() -> None:
         table(found.name, (tr("what"), tr("place"), tr("how")), rows)
-        say(tr("The file is right. With -c its values are compared with the HMI."))
+        say(tr("The file is valid. To compare its values with the HMI, add -c."))
 
     emit("plc-map", payload, show)
 
@@ -134,7 +134,7 @@ def _check_values(context: CliContext, shows: tuple[str, ...]) -> None:
 
     def show() -> None:
         if register_map.probe is not None:
-            say(tr("The probe reads {value:g}, as it should.", value=register_map.probe.value))
+            say(tr("The probe reads {value:g}, as expected.", value=register_map.probe.value))
         if confirmed:
             say(
                 tr(
@@ -147,7 +147,7 @@ def _check_values(context: CliContext, shows: tuple[str, ...]) -> None:
         if missing:
             say(
                 tr(
-                    "Not compared yet, so no command changes them: {values}.",
+                    "Not compared yet, so robolink does not change them: {values}.",
                     values=", ".join(map(str, missing)),
                 )
             )
@@ -325,8 +325,7 @@ class MapComparison:
         tests = [one for one in wanted if one.why_not]
         entering = [
             tr(
-                "First enter a test value at the HMI for {values}, and put the old one back "
-                "afterwards.",
+                "First enter a test value at the HMI for {values}; afterwards restore the old one.",
                 values=", ".join(str(one.value) for one in tests),
             )
         ]
@@ -390,8 +389,8 @@ class MapComparison:
             raise DeclinedError(
                 tr("Not everything was compared."),
                 remedy=tr(
-                    "What was compared stays on record, and no command changes the rest. Run "
-                    "it again to go on."
+                    "The comparisons made are on record; robolink does not change the "
+                    "rest. Run the command again to go on."
                 ),
             )
         if not answer:
@@ -415,7 +414,7 @@ class MapComparison:
         if left != before:
             note(
                 tr(
-                    "{key} still reads {found}: put it right before production.",
+                    "{key} still reads {found}: correct it before production.",
                     key=value,
                     found=left,
                 )
@@ -443,7 +442,7 @@ class MapComparison:
                 " ",
                 (
                     tr(
-                        "The confirmation by {by} of {at} is taken back.",
+                        "The confirmation by {by} of {at} is withdrawn.",
                         by=held.by,
                         at=local_label(held.at),
                     ),

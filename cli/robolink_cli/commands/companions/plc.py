@@ -85,12 +85,12 @@ def export(
             "Beremiz."
         ),
     ] = "0200",
-    force: Annotated[bool, CliOption(help="Overwrite files that were changed.")] = False,
+    force: Annotated[bool, CliOption(help="Overwrite files that you have changed.")] = False,
 ) -> None:
     """Write the program of the mailbox, its register map and its CANopen data sheet.
 
-    docs/plc-program.md says what to do with them. Their licence is 0BSD: they may be used in a
-    machine without any duty.
+    docs/plc-program.md explains how to use them. Their licence is 0BSD: you may use them in a
+    machine without conditions.
     """
     schema = PlcopenSchema(plcopen)
     texts = plc_texts(ExportProfile(profile), base, kinematics, read_modes, schema=schema)

@@ -31,26 +31,24 @@ def serve(
         CliOption(
             "--spel",
             metavar="HOST:PORT",
-            help="Where SPEL+ programs call, for example 127.0.0.1:5001. With -c CELL, that cell "
-            "says "
-            "where its stations are.",
+            help="Where SPEL+ programs connect, for example 127.0.0.1:5001. With -c CELL, "
+            "the stations are those of that cell.",
         ),
     ] = None,
     method: Annotated[
         Literal["n-angle", "pivot"] | None,
         CliOption(
             "--plc",
-            help="Answer the program of the PLC that is named: it touches a pin, by this method. "
-            "docs/plc-callback.md",
+            help="Serve the program of the PLC named with -c: it touches a pin, by this "
+            "method. docs/plc-callback.md",
         ),
     ] = None,
     allow: Annotated[
         tuple[str, ...],
         CliOption(
             metavar="ADDRESS",
-            help="Address of a controller that may call; needed for any HOST but this computer's "
-            "own. "
-            "May be repeated.",
+            help="Address of a controller that may connect; needed unless HOST is this "
+            "computer's own. May be repeated.",
         ),
     ] = (),
     controllers: Annotated[
@@ -67,7 +65,10 @@ def serve(
     tolerance_mm: Annotated[
         float,
         NumberInside(min=0, min_open=True),
-        CliOption("--tolerance-mm", help="Largest drift about the new tip, and widest interval."),
+        CliOption(
+            "--tolerance-mm",
+            help="Largest drift of the new tip in the turn test, and widest interval.",
+        ),
     ] = 0.1,
     max_change_mm: Annotated[
         float,
@@ -77,7 +78,7 @@ def serve(
     sigma_mm: Annotated[
         float | None,
         NumberInside(min=0, min_open=True),
-        CliOption("--sigma-mm", help="How far one touch scatters, where it is known."),
+        CliOption("--sigma-mm", help="Scatter of one touch, if known."),
     ] = None,
     tool: Annotated[
         int | None,
@@ -89,16 +90,16 @@ def serve(
     permit_is_contact: Annotated[
         bool,
         CliOption(
-            help="With a PLC: its permit comes only by the contact of tip and pin while it "
-            "calibrates."
+            help="With a PLC: while it calibrates, it gives its permit only when tip and pin touch."
         ),
     ] = False,
 ) -> None:
-    """Answer running programs that calibrate a tool at their own safe point.
+    """Let running programs calibrate a tool at their own safe point.
 
-    The program moves; here it is decided whether the value is proved, and all is put on record. A
-    SPEL+ program writes by itself, and nothing is sent to its controller (docs/spel-callback.md).
-    Into the slot of a PLC the value is written from here (docs/plc-callback.md).
+    The program moves the robot; robolink calculates and tests the value, and keeps the record. A
+    SPEL+ program writes the value itself, and robolink sends nothing to its controller
+    (docs/spel-callback.md). For a PLC, robolink writes the value into its slot
+    (docs/plc-callback.md).
     """
     from robolink.serving import CallbackLimits
 
@@ -140,7 +141,9 @@ def _serve_programs(
 
     def conversation(peer: str) -> CallbackConversation:
         def tell(code: str, error: "RobolinkError") -> None:
-            sentence = tr("{peer} is answered {code}: {cause}", peer=peer, code=code, cause=error)
+            sentence = tr(
+                "{peer} gets the answer {code}: {cause}", peer=peer, code=code, cause=error
+            )
             events.refused(sentence, code, error, peer=peer)
 
         return CallbackConversation(
@@ -171,7 +174,13 @@ def _announce(server: "CallbackServer") -> None:
     if json_is_on():
         hand_over(json.dumps({"schema": "robolink/serve/1", "host": host, "port": port}))
     else:
-        show(tr("Programs may call at {host}:{port}. Ctrl-C ends it.", host=host, port=port))
+        show(
+            tr(
+                "Programs can connect to {host}:{port}. Ctrl-C ends the service.",
+                host=host,
+                port=port,
+            )
+        )
 
 
 class ServeEvents:
@@ -208,7 +217,8 @@ def serve_plc(context: CliContext, plan: "PermitPlan", limits: "CallbackLimits")
             free_machine(controller)
             where = controller.identity
         events.tell(
-            "listening", tr("The program of {where} may call. Ctrl-C ends it.", where=where)
+            "listening",
+            tr("The program of {where} can connect. Ctrl-C ends the service.", where=where),
         )
         while not termination.came:
             try:

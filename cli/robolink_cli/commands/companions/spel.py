@@ -80,7 +80,7 @@ def _require_own(folder: Path, texts: Mapping[str, bytes]) -> None:
         path = folder / name
         if path.exists() and not holds(path, data):
             raise ConfigError(
-                tr("{path} is there already and differs; it was not written over.", path=path),
+                tr("{path} exists already and differs; it was not overwritten.", path=path),
                 remedy=tr("Name another folder, or give --force."),
             )
 
@@ -98,14 +98,14 @@ _PointFiles = Annotated[
 ]
 
 
-@click.command("check", short_help="Build SPEL+ programs and show every fault.")
+@click.command("check", short_help="Build SPEL+ programs and show every error.")
 @json_option
 def check(*, files: _Files, points: _PointFiles = (), encoding: Encoding = None) -> int:
-    """Build SPEL+ programs and show every fault with its file, line and column.
+    """Build SPEL+ programs and show every error with its file, line and column.
 
-    All files together are one project; a .sprj file stands for the files that it lists. Point
-    files, IOLabels.dat and UserErrors.dat that lie beside them are read for the names in them.
-    Nothing runs and no controller is asked.
+    All files together are one project; a .sprj file stands for the files that it lists. robolink
+    also reads the names in point files, IOLabels.dat and UserErrors.dat in the same folder.
+    Nothing runs, and no controller is needed.
     """
     from robolink_simulators.epson.spel.programs.program_load import check_project
     from robolink_simulators.epson.spel.source_text import ProgramRefused
@@ -119,20 +119,20 @@ def check(*, files: _Files, points: _PointFiles = (), encoding: Encoding = None)
         note(str(fault))
     if checked.faults:
         raise ProgramRefused(checked.faults)
-    say(tr("{count} functions, no fault found.", count=len(checked.functions)))
+    say(tr("{count} functions, no error found.", count=len(checked.functions)))
     if checked.data.missing_points:
         note(
             tr(
-                "Not beside the project file: {names}. Undeclared names were taken for point "
-                "labels.",
+                "Missing in the folder of the project file: {names}. Undeclared names were "
+                "taken as point labels.",
                 names=", ".join(checked.data.missing_points),
             )
         )
     elif not checked.data.known:
         note(
             tr(
-                "No point file and no IOLabels.dat lies beside the programs: names that nobody "
-                "declares were taken for labels."
+                "The folder of the programs holds no point file and no IOLabels.dat: "
+                "undeclared names were taken as labels."
             )
         )
     return 0
@@ -165,12 +165,12 @@ def run(
         str | None,
         CliOption(
             metavar="NAME",
-            help="The function to start; it takes no arguments. Without it main, or none beside "
-            "background tasks.",
+            help="The function to start; it takes no arguments. Default: main, or with "
+            "background tasks none.",
         ),
     ] = None,
     project: ProjectOptions,
-    trace: Annotated[bool, CliOption(help="Show each statement before it is carried out.")] = False,
+    trace: Annotated[bool, CliOption(help="Show each statement before it runs.")] = False,
     robot: Annotated[
         str | None,
         CliOption(metavar="MODEL", help=f"Model of the robot.  [default: {DEFAULT_ROBOT}]"),
@@ -180,7 +180,7 @@ def run(
         CliOption(
             "--option",
             metavar="NAME=VALUE",
-            help="A habit of the device; a wrong name lists them all. May be repeated.",
+            help="A behaviour of the device; a wrong name lists all of them. May be repeated.",
         ),
     ] = (),
     most_s: Annotated[
@@ -193,11 +193,11 @@ def run(
 ) -> None:
     """Run SPEL+ programs on a simulated controller and show what they print.
 
-    --option background_tasks=NAME,NAME names functions that begin as background tasks. They go on
-    until --for is over, and may start main themselves (StartMain); nothing else is started then.
+    --option background_tasks=NAME,NAME names functions that start as background tasks. They run
+    until --for is over, and may start main themselves (StartMain); then nothing else is started.
 
-    Simulated time does not wait, unless a TCP/IP port is open or Input waits for a line, which is
-    taken from here. Nothing but this machine is reached, and no robot moves.
+    Simulated time does not wait, unless a TCP/IP port is open or Input waits for a line, which you
+    type here. The programs reach only this computer, and no robot moves.
     """
     from robolink_simulators.epson import EpsonSimulator
 
@@ -223,7 +223,7 @@ def run(
         document = {"printed": "".join(printed), "ended": ended, "simulated_s": seconds}
         emit_json("robolink/spel-run/1", document)
     elif not ended:
-        note(tr("It still ran after {seconds:g} s of simulated time.", seconds=most_s))
+        note(tr("It was still running after {seconds:g} s of simulated time.", seconds=most_s))
 
 
 def _run(
@@ -266,11 +266,11 @@ def _typed_line() -> str | None:
 
 def _failed(failure: "TaskFailure", default_robot: str | None) -> ControllerFaultError:
     """Return how a program ended; with the robot, where a default one may be the cause."""
-    remedy = tr("Mend that line, or let OnErr deal with the error.")
+    remedy = tr("Correct that line, or handle the error with OnErr.")
     if default_robot is not None:
         remedy = tr(
-            "No robot was named, so the program ran on {robot}. Name its own robot with --robot, "
-            "or mend that line.",
+            "No robot was named, so the program ran on {robot}. Name its robot with "
+            "--robot, or correct that line.",
             robot=default_robot,
         )
     return ControllerFaultError(
@@ -290,7 +290,7 @@ def _failed(failure: "TaskFailure", default_robot: str | None) -> ControllerFaul
 
 @click.group()
 def spel() -> None:
-    """Programs that a controller's project can hold."""
+    """Programs for a controller's project."""
 
 
 spel.add_command(check)
@@ -304,16 +304,16 @@ def export(
     folder: Annotated[
         Path, click.Path(file_okay=False, path_type=Path), CliArgument(metavar="DIR")
     ],
-    force: Annotated[bool, CliOption(help="Overwrite files that were changed.")] = False,
+    force: Annotated[bool, CliOption(help="Overwrite files that you have changed.")] = False,
 ) -> None:
-    """Write the companion programs: what a controller's project can hold of robolink.
+    """Write the companion programs: robolink's part of a controller's project.
 
     robolink_tools.prg publishes the tool table while production runs: add it to the RC+ project
-    and call RobolinkPublish; docs/monitor-only.md says where. robolink_vision.prg takes looks for
-    the camera vision-guide (docs/camera-and-board.md). With recal.prg the running program
+    and call RobolinkPublish; docs/monitor-only.md says where. robolink_vision.prg takes pictures
+    for the camera vision-guide (docs/camera-and-board.md). With recal.prg the running program
     calibrates a tool itself (docs/spel-callback.md). calc_tool.prg and
-    calc_board_tool.prg set tool 1 by Vision Guide; add them only where they are needed. The
-    licence is 0BSD: they may be used in a machine without any duty.
+    calc_board_tool.prg set tool 1 by Vision Guide; add them only if you need them. The
+    licence is 0BSD: you may use them in a machine without conditions.
     """
     written = [str(path) for path in export_companions(folder, replace=force)]
     if json_is_on():

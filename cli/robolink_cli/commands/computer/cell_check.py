@@ -88,19 +88,18 @@ def check(
             "--measure",
             metavar="RECIPE.toml",
             shell_complete=complete_recipe,
-            help="Also measure the tips as this recipe says, by its sensor; the robot moves "
-            "after a yes on "
-            "a terminal. Nothing is written.",
+            help="Also measure the tips with the sensor of this recipe; the robot moves "
+            "after you confirm on a terminal. Writes nothing.",
         ),
     ] = None,
     published: Published = False,
 ) -> int:
-    """Check that cells are in order, for a job that runs every night. Nothing moves.
+    """Check cells for unexpected changes and overdue checks, for example nightly. Moves nothing.
 
-    Without CELL it checks the cell of -c, or else all cells of the cell files: tools against what
-    was last proved to be in them, due days of stations, and the course of the changes against its
-    limits. Each check goes on record as one entry of the journal. Exit code 1 when somebody should
-    see to something; when a cell could not be checked, the code of why not.
+    Without CELL it checks the cell of -c, or else all cells of the cell files: tools against their
+    last confirmed values, due dates of stations, and the trend of the changes against its limits.
+    Each check is one entry in the journal. Exit code 1 when something needs attention; when a cell
+    could not be checked, the code that says why.
     """
     contexts = _contexts(context, cells)
     sensor = None if recipe is None else SensorCheck.of(recipe, cells=len(contexts))
@@ -196,7 +195,7 @@ def _record_that_nobody_looked(context: CliContext, error: RobolinkError) -> Non
 def _not_looked(error: RobolinkError) -> "NewEntry":
     from robolink.model import EntryKind, NewEntry
 
-    verdict = tr("The cell could not be looked at: {what}", what=error.what)
+    verdict = tr("The cell could not be checked: {what}", what=error.what)
     return NewEntry(EntryKind.CHECK, verdict=verdict, details={"error": type(error).__name__})
 
 
@@ -231,14 +230,14 @@ def _show(checked: Sequence[CheckedCell]) -> None:
     """Print one line a cell, what is to be seen to below it; cells with something first."""
     for one in sorted(checked, key=lambda one: one.well):
         if one.inspection is None:
-            say(tr("{cell}: could not be looked at.", cell=one.name))
+            say(tr("{cell}: could not be checked.", cell=one.name))
             say(f"  {one.error}")
             continue
         if one.well:
             say(
                 tr(
-                    "{cell}: in order (tools read: {tools}, stations: {stations}, measured "
-                    "changes on record: {changes}).",
+                    "{cell}: no problem found (tools read: {tools}, stations: {stations}, "
+                    "measured changes on record: {changes}).",
                     cell=one.name,
                     tools=len(one.inspection.tools),
                     stations=len(one.inspection.stations),
@@ -246,7 +245,7 @@ def _show(checked: Sequence[CheckedCell]) -> None:
                 )
             )
             continue
-        say(tr("{cell}: somebody should see to this.", cell=one.name))
+        say(tr("{cell}: needs attention.", cell=one.name))
         for found in one.inspection.findings:
             say(f"  {found.sentence}")
             if found.remedy:
@@ -275,14 +274,16 @@ class SensorCheck:
         """
         if cells != 1:
             raise ConfigError(
-                tr("One cell is measured at a time, because somebody has to watch it."),
+                tr("Only one cell can be measured at a time, because somebody has to watch it."),
                 remedy=tr("Name the cell."),
             )
         loaded = load_recipe(recipe)
         if not on_terminal():
             raise DeclinedError(
                 tr("The robot would move, but there is nobody to ask."),
-                remedy=tr("A check moves nothing without a person: run it on a terminal."),
+                remedy=tr(
+                    "A check moves the robot only if a person confirms: run it on a terminal."
+                ),
             )
         return cls(loaded)
 
@@ -296,7 +297,9 @@ class SensorCheck:
         run = RecipeRun(controller, self.loaded, operator=terminal(), cell=cell, measure_only=True)
         run.preflight()
         limits = run.plan.limits
-        purpose = tr("to measure as {recipe!r} says; nothing is written", recipe=self.loaded.name)
+        purpose = tr(
+            "to measure by the recipe {recipe!r}, without writing", recipe=self.loaded.name
+        )
         question = motion_question(
             controller, purpose, speed_mm_s=limits.speed_mm_s, box_mm=limits.box.x_max_mm
         )

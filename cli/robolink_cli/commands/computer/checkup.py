@@ -63,8 +63,8 @@ def guarded(subject: str, look: Callable[[], Iterable[Remark]]) -> Iterator[Rema
         yield Remark(
             subject,
             Level.WARN,
-            tr("this could not be looked at ({error}).", error=failure(error)),
-            tr("The other lines still count."),
+            tr("this could not be checked ({error}).", error=failure(error)),
+            tr("The other lines are still valid."),
         )
 
 
@@ -150,7 +150,7 @@ def check_versions() -> Iterator[Remark]:
         yield Remark(
             "robolink",
             Level.WARN,
-            tr("it runs from a folder and is not installed, so versions were not compared."),
+            tr("robolink runs from a folder and is not installed, so versions were not compared."),
             tr("Run: python -m pip install robolink"),
         )
         return
@@ -167,10 +167,9 @@ def check_name() -> Iterator[Remark]:
         yield Remark(
             "name",
             Level.BAD,
-            tr("the package {other} brings a 'robolink' of its own.", other=other),
+            tr("the package {other} has its own 'robolink'.", other=other),
             tr(
-                "Keep the two apart: install this robolink in an environment of its own, and "
-                "uninstall {other} here.",
+                "Install this robolink in a separate environment, and uninstall {other} here.",
                 other=other,
             ),
         )
@@ -183,7 +182,7 @@ def check_name() -> Iterator[Remark]:
             tr("Rename or remove it; robolink itself runs from {own}.", own=own),
         )
     if not others and not shadows:
-        yield Remark("name", Level.OK, tr("nothing else calls itself robolink."))
+        yield Remark("name", Level.OK, tr("no other package is called robolink."))
 
 
 def _homes() -> Iterator[Path]:
@@ -263,7 +262,7 @@ def in_words(remarks: Sequence[Remark]) -> Iterator[str]:
         if remark.remedy:
             yield f"      {remark.remedy}"
     if any(remark.level is Level.BAD for remark in remarks):
-        yield tr("Something is wrong; see the first lines.")
+        yield tr("Problems were found; see the first lines.")
     else:
         yield tr("No problem was found.")
 
@@ -314,7 +313,10 @@ def check_cell_files() -> Iterator[Remark]:
             yield Remark(
                 "cells",
                 Level.WARN,
-                tr("anybody may change {path}, and with it where commands go.", path=path),
+                tr(
+                    "anybody may change {path}, and so send commands to another controller.",
+                    path=path,
+                ),
                 tr("Run: chmod o-w {path}", path=path),
             )
         else:
@@ -351,14 +353,14 @@ def check_serial_ports() -> Iterator[Remark]:
             yield Remark(
                 "serial",
                 Level.WARN,
-                tr("you may not use {device}.", device=port.device),
+                tr("you have no permission to use {device}.", device=port.device),
                 tr(
                     "Run: sudo usermod -aG {group} $USER, then log in again.",
                     group=port.group or "dialout",
                 ),
             )
     if not ports:
-        yield Remark("serial", Level.OK, tr("there is no serial port."))
+        yield Remark("serial", Level.OK, tr("no serial port was found."))
 
 
 def check_lines_of_cells() -> Iterator[Remark]:
@@ -371,8 +373,8 @@ def check_lines_of_cells() -> Iterator[Remark]:
             yield Remark(
                 "serial",
                 Level.WARN,
-                tr("{device} of {cells} is not there.", device=device, cells=", ".join(names)),
-                tr("Plug the adapter in; 'robolink cell ports' lists those that are there."),
+                tr("{device} of {cells} was not found.", device=device, cells=", ".join(names)),
+                tr("Plug the adapter in; 'robolink cell ports' lists the ports found."),
             )
 
 
@@ -383,7 +385,7 @@ def check_journal() -> Iterator[Remark]:
 
     try:
         if not may_exist(default_location()):
-            yield Remark("journal", Level.OK, tr("nothing was recorded yet."))
+            yield Remark("journal", Level.OK, tr("the journal is empty."))
             return
         journal = open_journal(read_only=True)
         unsettled = journal.open_markers()
@@ -406,7 +408,7 @@ def check_journal() -> Iterator[Remark]:
             or tr('Run: robolink -c "{where}" recover', where=where),
         )
     if not unsettled:
-        yield Remark("unsettled", Level.OK, tr("nothing was left unfinished."))
+        yield Remark("unsettled", Level.OK, tr("no job is left unfinished."))
 
 
 def _others_may(path: Path, bits: int) -> bool:

@@ -15,7 +15,7 @@ a star would be files."""
 @click.command()
 @click.argument("shell", type=click.Choice(["bash", "zsh", "fish", "powershell"]))
 def completion(shell: str) -> None:
-    r"""Print the script that makes TAB complete commands, options and cells.
+    r"""Print the script for TAB completion of commands, options and cells.
 
     \b
     bash        echo 'eval "$(robolink expert completion bash)"' >> ~/.bashrc

@@ -27,7 +27,10 @@ def new_cell(
     url: Annotated[str | None, CliOption(metavar="URL", help="The controller's URL.")] = None,
     robot: Annotated[
         str | None,
-        CliOption(metavar="MODEL", help="The model that must be there, as the controller says it."),
+        CliOption(
+            metavar="MODEL",
+            help="The robot model that the cell must have, as the controller reports it.",
+        ),
     ] = None,
     remote_timeout_s: Annotated[
         float | None,
@@ -37,16 +40,17 @@ def new_cell(
     read_by: Annotated[
         str | None,
         CliOption(
-            metavar="WHO", help="Who read that time-out on the controller, and when; goes with it."
+            metavar="WHO",
+            help="Who read that time-out on the controller, and when; needed with it.",
         ),
     ] = None,
     file: Annotated[
-        Path, CliOption(metavar=None, help="The cell file; what it says already stays.")
+        Path, CliOption(metavar=None, help="The cell file; its present content stays.")
     ] = Path("robolink.toml"),
 ) -> None:
-    """Write a cell into a cell file; what is not given is asked for on a terminal.
+    """Add a cell to a cell file; on a terminal it asks for what you left out.
 
-    No controller is asked. A cell of the same name is never changed.
+    Connects to no controller. Never changes an existing cell.
     """
     from robolink.config import add_cell, content_with_cell
 
@@ -72,7 +76,7 @@ def new_cell(
         lambda typed: content_with_cell(file, name, {"url": typed}),
     )
     said: dict[str, str | float] = {"url": url}
-    robot = robot or (_if_known(tr("Which robot model must be there?")) if asks else None)
+    robot = robot or (_if_known(tr("Which robot model must the cell have?")) if asks else None)
     if robot:
         said["robot"] = robot
     if remote_timeout_s is None and asks and url.startswith("epson+"):
@@ -87,7 +91,11 @@ def new_cell(
         remote_timeout_s = None if typed == _LEFT_OUT else _seconds(typed)
     if remote_timeout_s is not None:
         said["remote_timeout_s"] = remote_timeout_s
-        read_by = read_by or (asked_for_text(tr("Who read it there, and when?")) if asks else None)
+        read_by = read_by or (
+            asked_for_text(tr("Who read that time-out on the controller, and when?"))
+            if asks
+            else None
+        )
     if read_by:
         said["remote_timeout_confirmed_by"] = read_by
     add_cell(file, name, said)
@@ -131,7 +139,7 @@ def _seconds(text: str) -> float:
 @click.command()
 @json_option
 def path() -> None:
-    """Show the files that are looked at; the first that says something wins."""
+    """Show the cell files that robolink reads; the first with a value wins."""
     from robolink_cli.views.cells import files_payload, show_files
 
     payload = files_payload()
@@ -144,7 +152,7 @@ def check(
     *,
     file: Annotated[Path | None, CliArgument()] = None,
 ) -> int:
-    """Check one cell FILE, or all that are in use, and say everything that is wrong."""
+    """Check one cell FILE, or all that are in use, and list every error."""
     from robolink_cli.views.cells import check_payload, show_check
 
     payload = check_payload(file)
@@ -158,12 +166,11 @@ def show(
     context: CliContext,
     *,
     cell: Annotated[str | None, CliArgument()] = None,
-    origin: Annotated[bool, CliOption(help="Say where each value came from.")] = False,
+    origin: Annotated[bool, CliOption(help="Show where each value comes from.")] = False,
 ) -> None:
-    """Show the cells, or all that is in force for one CELL.
+    """Show the cells, or all settings of one CELL.
 
-    Options such as --timeout are counted in, so it shows what a command given the same ones
-    would work with.
+    Options such as --timeout count: it shows the settings of a command with the same options.
     """
     from robolink.config import find_cell, load_cells
     from robolink_cli.views.cells import cell_payload, cells_payload, show_cell, show_cells
@@ -195,7 +202,7 @@ def people(
     *,
     cell: Annotated[str | None, CliArgument()] = None,
 ) -> None:
-    """List who works at one CELL, or at all, and in which role; an engineer may do everything."""
+    """List who works at one CELL, or at all cells, and in which role. Engineers may do everything."""
     from robolink.config import find_cell, load_cells
     from robolink_cli.views.cells import people_payload, show_people
 

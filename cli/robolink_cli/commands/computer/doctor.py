@@ -10,10 +10,10 @@ from robolink_cli.options.shared import json_option
 @click.command()
 @json_option
 def doctor() -> int:
-    """Look at versions, folders, cell files, passwords, ports and unsettled work.
+    """Check versions, folders, cell files, passwords, ports and unfinished jobs.
 
-    No controller is spoken to and nothing is changed. What is wrong stands first; then the exit
-    code is 1.
+    Connects to no controller and changes nothing. Problems are listed first; then the exit code
+    is 1.
     """
     from dataclasses import asdict
 

@@ -126,9 +126,9 @@ def show_lines(asked: Sequence[AskedLine]) -> None:
 
     found = {
         AtTheLine.CONTROLLER: tr("an EPSON controller answers by Remote RS232"),
-        AtTheLine.OTHER: tr("something answers, but not as Remote RS232 at these settings"),
-        AtTheLine.TALKING: tr("something sends there unasked; nothing was sent to it"),
-        AtTheLine.NOBODY: tr("nobody answers"),
+        AtTheLine.OTHER: tr("something answers, but it is not Remote RS232 with these settings"),
+        AtTheLine.TALKING: tr("something sends there unasked; robolink sent nothing"),
+        AtTheLine.NOBODY: tr("no answer"),
     }
     for line in asked:
         if line.probe is None:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def ports() -> int:
     """List the serial ports, the cells on them, and whether you may use them. Opens none.
 
-    Ends with 1 when the system or a cell file could not be asked; what could be is shown.
+    Exit code 1 when the system or a cell file could not be read; the rest is shown.
     """
     from robolink_cli.commands.computer.checkup import tried
     from robolink_cli.commands.computer.lines import devices_of_cells, ports_unknown, serial_ports
@@ -39,7 +39,7 @@ def ports() -> int:
 
 
 def _cells_unknown(error: str) -> str:
-    return tr("Which cells are on serial ports could not be found out ({error}).", error=error)
+    return tr("The cells on serial ports could not be read ({error}).", error=error)
 
 
 def _show(found: "list[SerialPort]", cells: dict[str, list[str]]) -> None:
@@ -51,4 +51,4 @@ def _show(found: "list[SerialPort]", cells: dict[str, list[str]]) -> None:
         if names := cells.get(port.device):
             say(tr("    cells: {names}", names=", ".join(names)))
         if not port.usable:
-            say(tr("    you may not use it; 'robolink cell doctor' says what to do"))
+            say(tr("    no permission to use it; 'robolink cell doctor' says what to do"))

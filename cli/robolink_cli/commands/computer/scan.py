@@ -35,22 +35,21 @@ def scan(
         CliOption(
             "--line",
             metavar="URL",
-            help="Ask who is at this serial line, for example "
-            "epson+serial:///dev/ttyUSB0?baud=38400. "
-            "May be repeated.",
+            help="Find what answers on this serial line, for example "
+            "epson+serial:///dev/ttyUSB0?baud=38400. May be repeated.",
         ),
     ] = (),
 ) -> None:
-    """Try which addresses of RANGE accept a TCP connection, at most 256 of them.
+    """Find which addresses of RANGE accept a TCP connection, at most 256 of them.
 
-    RANGE is 192.168.0.7, 192.168.0.1-20 or 192.168.0.0/28. Each connection is closed at once
-    and nothing is sent. A controller serves one client at a time and its maker does not say
-    what a second connection does to the first: scan while nobody is connected. The serial
-    ports of this computer are listed beside; none is opened but those of --line.
+    RANGE is 192.168.0.7, 192.168.0.1-20 or 192.168.0.0/28. robolink closes each connection at once
+    and sends nothing. A controller serves one client at a time and its maker does not say what a
+    second connection does to the first: scan while nobody is connected. The serial ports of this
+    computer are listed too; only those of --line are opened.
 
-    A line is listened to first. If it is silent, 04 and 02 53 03 50 are sent: turn Remote RS232 on,
-    and tell the status. That changes and moves nothing on an EPSON controller; do not name a line
-    with a device on it that these five bytes could harm.
+    robolink listens to a line first. If it is silent, robolink sends 04 and 02 53 03 50: turn
+    Remote RS232 on, and report the status. That changes and moves nothing on an EPSON controller;
+    do not name a line with a device that these five bytes could harm.
     """
     from robolink_cli.commands.computer.checkup import tried
     from robolink_cli.commands.computer.lines import (
@@ -114,7 +113,7 @@ def _show(
         )
     )
     if answering:
-        say(tr("An open port does not prove a controller: 'robolink -c URL status' asks it."))
+        say(tr("An open port need not be a controller; to check: robolink -c URL status"))
 
 
 MOST: Final = 256
@@ -158,7 +157,7 @@ def parse_range(text: str) -> list[str]:
     if not 1 <= count <= MOST:
         raise ConfigError(
             tr("{text!r} stands for {count} addresses.", text=text, count=max(count, 0)),
-            remedy=tr("Give from 1 to {most} addresses, in rising order.", most=MOST),
+            remedy=tr("Give 1 to {most} addresses, lowest first.", most=MOST),
         )
     return [str(ipaddress.IPv4Address(number)) for number in range(first, last + 1)]
 

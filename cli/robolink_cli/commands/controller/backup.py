@@ -107,7 +107,7 @@ def show_comparison(comparison: Comparison, tolerance: ComparisonTolerance, iden
     if comparison.equal:
         say(
             tr(
-                "Equal: all tools of {url} are as in the file, within {mm:g} mm and {deg:g} deg.",
+                "Equal: all tools of {url} match the file, within {mm:g} mm and {deg:g} deg.",
                 url=identity,
                 mm=tolerance.length_mm,
                 deg=tolerance.angle_deg,
@@ -154,7 +154,7 @@ def backup(
     file: Annotated[Path, _FILE, CliArgument()],
     force: Overwrite = False,
 ) -> None:
-    """Save all fifteen tools, the one that is selected, and which controller it is. Reads only."""
+    """Save all fifteen tools, the selected tool and the controller's identity. Reads only."""
     from robolink.backup import save, take_backup
     from robolink.files.named import require_free
 
@@ -174,25 +174,25 @@ def compare(
     length_mm: Annotated[
         float,
         NumberInside(min=0),
-        CliOption("--tolerance", help="Largest difference of X, Y, Z that counts as none."),
+        CliOption("--tolerance", help="Ignore differences of X, Y, Z up to this."),
     ] = 0.0005,
     angle_deg: Annotated[
         float,
         NumberInside(min=0),
-        CliOption("--tolerance-deg", help="Largest difference of U, V, W that counts as none."),
+        CliOption("--tolerance-deg", help="Ignore differences of U, V, W up to this."),
     ] = 0.0005,
     ignore_selected: Annotated[
         bool,
         CliOption(
-            help="Show another selected tool, but do not count it: a program selects tools by "
-            "itself."
+            help="Show a different selected tool, but do not count it: programs select "
+            "tools themselves."
         ),
     ] = False,
     published: Published = False,
 ) -> int:
-    """Show what differs from a backup. Exit code 1 when something does. Reads only.
+    """Show the differences from a backup. Exit code 1 if there are any. Reads only.
 
-    The file may be of another controller: one good file can be compared with many cells.
+    The file may be from another controller: you can compare one good file with many cells.
     """
     from robolink.backup import compare as compare_tools
     from robolink.backup import load
@@ -227,7 +227,7 @@ def restore(
     ] = (),
     selected: Annotated[bool, CliOption(help="Also select the backup's tool.")] = False,
     other_controller: Annotated[
-        bool, CliOption(help="The backup is of another controller and is still meant for this one.")
+        bool, CliOption(help="Accept a backup from another controller.")
     ] = False,
     accepted_mm: AcceptedLength = None,
     accepted_deg: AcceptedAngle = None,
@@ -236,8 +236,8 @@ def restore(
 ) -> None:
     """Write the tools of a backup that differ, each only if nobody changed it meanwhile.
 
-    A tool that is undefined in the backup is cleared. Nothing else is changed. A change beyond
-    the cell's max_change_mm or max_change_deg is asked about, even with --yes.
+    A tool that is undefined in the backup is cleared. Nothing else changes. Before a change beyond
+    the cell's max_change_mm or max_change_deg it asks, even with --yes.
     """
     from robolink.backup import load, plan_restore, read_tools, require_same_controller
 
@@ -255,7 +255,7 @@ def restore(
             if not json_is_on():
                 restoration.show()
             agree(
-                tr("Write these values to the controller? 'robolink undo' takes them back."),
+                tr("Write these values to the controller? 'robolink undo' undoes it."),
                 yes=yes,
                 asks=not json_is_on(),
             )

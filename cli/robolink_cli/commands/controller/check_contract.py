@@ -56,21 +56,22 @@ def check_contract(
         bool,
         CliOption(
             "--write",
-            help="Also hold it to the promises about writing: with --tool, and after a yes.",
+            help="Also check writing: needs --tool, and asks first.",
         ),
     ] = False,
     tool: Annotated[
         int | None,
         click.IntRange(min=1),
         CliOption(
-            metavar="NUMBER", help="The tool that --write may change; one that no program uses."
+            metavar="NUMBER",
+            help="The tool that --write may change; choose one that no program uses.",
         ),
     ] = None,
     moves: Annotated[
         bool,
         CliOption(
             "--move",
-            help="Also hold it to the promises about movement: small steps up, after a yes.",
+            help="Also check movement: small steps up; asks first.",
         ),
     ] = False,
     step_mm: Annotated[
@@ -82,27 +83,29 @@ def check_contract(
         str | None,
         CliOption(
             metavar="MODULE:NAME",
-            help="Check a driver of your own: what this is called for gives a controller.",
+            help="Check your own driver: a class or function that returns a controller.",
         ),
     ] = None,
     junit: Annotated[
-        Path | None, CliOption(help="Also write the findings as JUnit XML, for pipelines.")
+        Path | None, CliOption(help="Also write the results as JUnit XML, for CI.")
     ] = None,
     yes: Yes = False,
 ) -> int:
-    """Hold a controller to what every kind of controller promises; without options, reading only.
+    """Check that a controller behaves as every controller type must; without options it only reads.
 
     With --write it writes one tool several times, selects it and the flange, stops and resets;
-    with --move it goes up and down in small steps. Tool, selection, power and speed come back, and
-    stay on record until they are back: where this is killed, 'robolink recover' brings them back.
-    Ends with 1 where a promise is broken; what a controller refuses to show in its present state is
-    an error, as elsewhere.
+    with --move it moves up and down in small steps. Tool, selection, power and speed are restored,
+    and stay on record until then: if this is killed, 'robolink recover' restores them. Exit code 1
+    when a check fails; if the controller refuses to show something in its present state, that is an
+    error, as elsewhere.
     """
     if (writes and tool is None) or (tool is not None and not writes):
-        raise click.UsageError(tr("--write and --tool go together: say which tool may change."))
+        raise click.UsageError(
+            tr("--write needs --tool, and the reverse: the tool that may change.")
+        )
     asked = _Asked(tool, step_mm if moves else None, yes)
     if junit is not None and not junit.parent.is_dir():
-        raise click.UsageError(tr("There is no folder {path}.", path=junit.parent))
+        raise click.UsageError(tr("The folder {path} does not exist.", path=junit.parent))
     from robolink_cli.commands.controller.contract_report import ContractReport
 
     report = ContractReport(_checks(asked), junit)
@@ -121,14 +124,14 @@ def _show(report: "ContractReport") -> None:
 
     def show() -> None:
         rows = [
-            (one.name.replace("_", " "), one.broken or tr("kept"))
+            (one.name.replace("_", " "), one.broken or tr("passed"))
             for one in sorted(found, key=lambda one: not one.broken)
         ]
-        table(tr("what {who} promises", who=report.identity), (tr("promise"), tr("found")), rows)
+        table(tr("checks of {who}", who=report.identity), (tr("check"), tr("found")), rows)
         say(
-            tr("{count} of {all} promises are broken.", count=len(broken), all=len(found))
+            tr("{count} of {all} checks failed.", count=len(broken), all=len(found))
             if broken
-            else tr("All {all} promises that were looked at are kept.", all=len(found))
+            else tr("All {all} checks made have passed.", all=len(found))
         )
 
     checks = [
@@ -151,7 +154,7 @@ def _of_a_cell(context: CliContext, asked: _Asked, report: "ContractReport") -> 
                     lambda *, leaves: open_controller(
                         context, quiet=True, changes=True, leaves=leaves
                     ),
-                    tr("checks of the contract"),
+                    tr("contract checks"),
                     tool=asked.tool,
                     agree=lambda controller: _agree(controller, asked),
                     trials=trials.ledgers,
@@ -185,8 +188,8 @@ def _looked_at(connect: "Callable[[], Controller]", asked: _Asked, report: "Cont
         for wanted, can in ((asked.tool, able.tool_write), (asked.step_mm, able.motion)):
             if wanted is not None and not can:
                 raise ConfigError(
-                    tr("This controller cannot be held to that: it is not able to do it."),
-                    remedy=tr("Leave --write or --move out."),
+                    tr("This controller cannot be checked for that: it cannot do it."),
+                    remedy=tr("Leave out --write or --move."),
                 )
         report.identity = str(controller.outcomes.identity)
         return tool
@@ -226,7 +229,7 @@ def _examine(
         report.found.append(one)
         if asked.changes:
             said = one.broken if one.error is None else one.error.what
-            note(f"{one.name.replace('_', ' ')}: {said or tr('kept')}")
+            note(f"{one.name.replace('_', ' ')}: {said or tr('passed')}")
         if one.error is not None:
             raise one.error
 
@@ -253,8 +256,8 @@ def _agree(controller: "Controller", asked: _Asked) -> None:
         said.append(tr("Tool {tool} is written several times and selected.", tool=asked.tool))
     said.append(
         tr(
-            "The controller is stopped and reset, which can switch outputs off: a part may "
-            "drop. What was there comes back. Start the checks now?"
+            "The checks stop and reset the controller, which can switch outputs off: a "
+            "part may drop. They restore the tool. Start them now?"
         )
     )
     if asked.step_mm is not None:

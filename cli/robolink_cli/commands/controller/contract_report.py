@@ -97,7 +97,7 @@ class ContractReport:
                 note(f"{one.name.replace('_', ' ')}: {one.broken}")
         note(
             tr(
-                "Of {all} promises {count} were looked at, {broken} of them are broken.",
+                "{count} of {all} checks were made, {broken} failed.",
                 all=len(self._checks),
                 count=len(looked_at),
                 broken=len(self.broken),
@@ -266,7 +266,7 @@ class TrialConnections:
 
         if "+sim://" in self._url:
             return
-        who = tr("the checks of the contract")
+        who = tr("the contract checks")
         # Where there is no place to listen, Ctrl-C is left, as the command's page says.
         with suppress(OSError):
             self._listening.enter_context(StopListener(self, self._url, who=who, heard=self._hear))
@@ -296,12 +296,12 @@ def driver_named(name: str) -> "Callable[[], Controller]":
         cause = str(error) if ours else f"{type(error).__name__}: {error}"
         raise ConfigError(
             tr("The driver {name!r} cannot be loaded: {cause}.", name=name, cause=cause),
-            remedy=tr("It is looked for in the present folder and among installed packages."),
+            remedy=tr("robolink searches the present folder and the installed packages."),
         ) from error
     if not callable(made):
         raise ConfigError(
             tr("{name!r} cannot be called.", name=name),
-            remedy=tr("Name a class or a function that takes nothing and gives a controller."),
+            remedy=tr("Name a class or function that takes no arguments and returns a controller."),
         )
 
     def connect() -> "Controller":
@@ -332,6 +332,6 @@ def told_of_the_driver(name: str) -> Iterator[None]:
 
 def _no_controller(name: str, cause: str) -> ConfigError:
     return ConfigError(
-        tr("The driver {name!r} gives no controller: {cause}.", name=name, cause=cause),
-        remedy=tr("Name a class or a function that takes nothing and gives a controller."),
+        tr("The driver {name!r} returned no controller: {cause}.", name=name, cause=cause),
+        remedy=tr("Name a class or function that takes no arguments and returns a controller."),
     )

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from robolink.model import Controller, ValueReceipt
 
 _number = click.IntRange(min=0, max=0xFFFF)
-_Memory = Annotated[bool, CliOption(help="Memory bits in place of inputs or outputs.")]
+_Memory = Annotated[bool, CliOption(help="Memory bits instead of inputs or outputs.")]
 
 
 @click.group()
@@ -43,10 +43,10 @@ def get(
     output: Annotated[bool, CliOption(help="An output, read through Execute.")] = False,
     memory: _Memory = False,
 ) -> None:
-    """Show an input. Legal while production runs, except with --output."""
+    """Show an input. Allowed while production runs, except with --output."""
     if sum(at is not None for at in (bit, byte, word)) != 1:
         raise ConfigError(
-            tr("One place can be read at a time."),
+            tr("Only one place can be read at a time."),
             remedy=tr("Give one of BIT, --byte PORT and --word PORT."),
         )
     if output and (memory or bit is None):
@@ -101,12 +101,12 @@ def set_bit(
         "skipped": receipt is not None and receipt.skipped,
     }
     if payload["skipped"]:
-        done = tr("was so already")
+        done = tr("no change needed")
     elif payload["value"] is None:
         done = tr("switched, acknowledged; it cannot be read back")
     else:
         done = tr("switched, read back")
-    line = tr("{kind} {bit} is {switch}: {done}", kind=kind, bit=bit, switch=switch, done=done)
+    line = tr("{kind} {bit} {switch}: {done}", kind=kind, bit=bit, switch=switch, done=done)
     emit("io-set", payload, lambda: say(line))
 
 

@@ -44,49 +44,47 @@ def jog(
         float,
         NumberInside(min=0, min_open=True),
         CliOption(
-            help="How far from the start the tool may be jogged, in every direction.",
+            help="How far from the start you may jog the tool, in every direction.",
             show_default=False,
         ),
     ] = 50.0,
     turn_deg: Annotated[
         float | None,
         CliOption(
-            help="Turn U by so much, also by more than 5 degrees: lift first, check the whole "
-            "way round, "
-            "turn, and stay lifted."
+            help="Turn U by this much, also by more than 5 degrees: lifts first, checks "
+            "the whole turn, turns, stays lifted."
         ),
     ] = None,
     lift_mm: Annotated[
-        float, NumberInside(1, 100), CliOption(help="How far the tip is lifted before it turns.")
+        float, NumberInside(1, 100), CliOption(help="How far to lift the tip before the turn.")
     ] = 10.0,
     tip: Annotated[
         int | None,
         click.IntRange(1, 15),
         CliOption(
-            help="For a turn with tool 0: the tool whose tip swings round; without it all that "
-            "are defined."
+            help="For a turn with tool 0: the tool whose tip swings round; default: all "
+            "defined tools."
         ),
     ] = None,
     keys: Annotated[
-        bool, CliOption(help="Jog by single keys on a full screen; on a terminal only.")
+        bool, CliOption(help="Jog with single keys on a full screen; needs a terminal.")
     ] = False,
     dry_run: DryRun = False,
     yes: Yes = False,
     _plain: Plain = False,
 ) -> None:
-    """Move the selected tool by STEPS such as x+0.1 z-0.5 u+5; without STEPS, ask for them.
+    """Move the selected tool by STEPS such as x+0.1 z-0.5 u+5; without STEPS, it asks for them.
 
     Each step is one move in Power Low of at most 5 mm or 5 degrees. Negative numbers need no
-    quoting: write x-0.1.
+    quotes: write x-0.1.
 
-    With --turn 180 it lifts the tool, turns U by that, and stays lifted. With a tool selected it
-    turns about the tip and the flange swings; with tool 0 the tip swings.
+    With --turn 180 it lifts the tool, turns U by 180 degrees, and stays lifted. With a tool
+    selected it turns about the tip and the flange swings; with tool 0 the tip swings.
 
     With --keys each key press is one step: arrows X and Y, PageUp and PageDown Z, Home and End U,
-    or the same places of the keypad; + and - the step size (0.01, 0.1, 0.5, 1, 5). What is
-    pressed while the robot moves is dropped, so that a key that is held down ends with its
-    release. Space, 0 and Esc stop the step under way, and leave when the robot stands still. None
-    of them is an emergency stop.
+    or the same places of the keypad; + and - the step size (0.01, 0.1, 0.5, 1, 5). Keys pressed
+    while the robot moves are ignored, so it stops when you release a key. Space, 0 and Esc stop the
+    present step, or leave when the robot does not move. None of them is an emergency stop.
     """
     from robolink.runner import parse_steps
     from robolink_cli.views.documents import pose_payload, show_pose
@@ -194,17 +192,15 @@ def _require_one(steps: tuple[str, ...], turn_deg: float | None, *, keys: bool) 
     """
     if turn_deg is not None and (steps or keys):
         raise ConfigError(
-            tr("A turn is a movement of its own."),
-            remedy=tr("Give --turn alone; then the steps in a second command."),
+            tr("--turn cannot be combined with steps."),
+            remedy=tr("Give --turn alone, then the steps in a second command."),
         )
     if turn_deg is not None:
         return
     given = click.get_current_context().get_parameter_source
     for name in ("lift_mm", "tip"):
         if given(name) is ParameterSource.COMMANDLINE:
-            raise ConfigError(
-                tr("--lift and --tip belong to a turn."), remedy=tr("Give them with --turn.")
-            )
+            raise ConfigError(tr("--lift and --tip need --turn."), remedy=tr("Add --turn."))
 
 
 def _require_keys(steps: tuple[str, ...], *, dry_run: bool) -> None:
@@ -215,8 +211,8 @@ def _require_keys(steps: tuple[str, ...], *, dry_run: bool) -> None:
     """
     if steps or dry_run:
         raise ConfigError(
-            tr("With --keys the steps are known only when they are pressed."),
-            remedy=tr("Leave --keys out to give steps, or to see their requests."),
+            tr("--keys cannot be combined with steps or a dry run."),
+            remedy=tr("Leave out --keys to give steps, or to see their requests."),
         )
     if not may_be_guided():
         raise ConfigError(

@@ -34,10 +34,10 @@ if TYPE_CHECKING:
 @click.command()
 @looking_options
 def status(context: CliContext) -> None:
-    """Show what the controller is doing. Reads only; legal while production runs.
+    """Show what the controller is doing. Reads only; allowed while production runs.
 
-    A controller that serves one client is not asked while another robolink of this computer has
-    it: who that is, and what it saw last, is shown instead.
+    While another robolink on this computer uses a controller that serves only one client, this
+    shows who that is, and the last state that it read.
     """
     from robolink_cli.session.motion_consent import note_doubts
     from robolink_cli.session.stop_listener import seen_by_another
@@ -57,7 +57,7 @@ def status(context: CliContext) -> None:
 @click.command()
 @looking_options
 def where(context: CliContext) -> None:
-    """Show where the selected tool is (measured), and the joints."""
+    """Show the measured position of the selected tool, and the joints."""
     from robolink_cli.views.documents import pose_payload, show_pose
 
     with open_controller(context, looks=True) as controller:
@@ -73,10 +73,10 @@ def stop(
     *,
     dry_run: DryRun = False,
 ) -> None:
-    """Bring the robot to rest, whoever moves it. Not an emergency stop, and no substitute for one.
+    """Stop the robot from any terminal, whatever is moving it. Not an emergency stop.
 
-    Nothing is asked and no file is waited for. From then on a command that moves asks first, until
-    'robolink robot reset' or 'robolink robot release'.
+    It asks nothing and waits for no file. Afterwards every command that moves asks first, until
+    you run 'robolink robot reset' or 'robolink robot release'.
     """
     from robolink_cli.stopping.outcome import Telling, requests_of
     from robolink_cli.stopping.stop_first import stop_first
@@ -102,9 +102,9 @@ def release(
     *,
     yes: Yes = False,
 ) -> None:
-    """Let the robot be moved again after a stop: shows who stopped it and when, and asks.
+    """Allow movement again after a stop: shows who stopped the robot and when, and asks.
 
-    Nothing is sent: a PLC that is held by a stop, and a controller in error, need 'reset'.
+    Sends nothing: a PLC stopped by robolink, and a controller in error, need 'reset'.
     """
     from robolink_cli.stopping.notes import release_stop
 
@@ -113,9 +113,9 @@ def release(
         "release",
         payload,
         lambda: say(
-            tr("Released: the robot may be moved again.")
+            tr("Released: commands may move the robot again.")
             if payload["released"]
-            else tr("No stop is noted here; there is nothing to release.")
+            else tr("No stop is on record here; there is nothing to release.")
         ),
     )
 
@@ -150,9 +150,7 @@ def reset(
     emit(
         "reset",
         payload,
-        lambda: say(
-            tr("The reset was carried out; the controller is: {state}.", state=state_word(state))
-        ),
+        lambda: say(tr("Reset done. The controller's state is: {state}.", state=state_word(state))),
     )
 
 
@@ -185,7 +183,7 @@ def motors(
     dry_run: DryRun = False,
     yes: Yes = False,
 ) -> None:
-    """Switch the robot's motors on or off, and prove it."""
+    """Switch the robot's motors on or off, and confirm it."""
     on = switch == "on"
     with open_controller(context, calms=not on) as controller:
         if dry_run:
@@ -210,7 +208,7 @@ def enable(
     dry_run: DryRun = False,
     yes: Yes = False,
 ) -> None:
-    """Enable the axis group of a PLC, and prove it; its own program switches the drives."""
+    """Enable the axis group of a PLC, and confirm it; the PLC's own program switches the drives."""
     _switch_group(context, on=True, dry_run=dry_run, yes=yes)
 
 
@@ -222,7 +220,7 @@ def disable(
     dry_run: DryRun = False,
     yes: Yes = False,
 ) -> None:
-    """Disable the axis group of a PLC, which must stand still, and prove it."""
+    """Disable the axis group of a PLC, which must not be moving, and confirm it."""
     _switch_group(context, on=False, dry_run=dry_run, yes=yes)
 
 
@@ -248,14 +246,14 @@ def execute_raw(
     statement: Annotated[str, CliArgument()],
     yes: Yes = False,
 ) -> None:
-    """Run one SPEL+ statement as typed; it takes an engineer, and goes on record.
+    """Run one SPEL+ statement as typed; for engineers. It goes on record.
 
-    It is sent once, as it stands, and must be answered within --timeout: it is not for
-    movements, which may end in a doubtful outcome.
+    robolink sends it once, unchanged, and needs the answer within --timeout. Do not use it for
+    movements: robolink may not be able to confirm how they ended.
     """
     with open_controller(context, changes=True) as controller:
         agree_to_motion(
-            tr("Send {statement!r} as it stands? It may do anything.", statement=statement),
+            tr("Send {statement!r} as typed? It may do anything.", statement=statement),
             yes=yes,
             in_tool=False,
         )
@@ -272,10 +270,10 @@ def take_ownership(
     dry_run: DryRun = False,
     yes: Yes = False,
 ) -> None:
-    """Take a PLC's mailbox from the client that holds it; nobody has it afterwards.
+    """Take a PLC's mailbox from the client that has it locked; afterwards it is free.
 
-    For a program that hangs or that nobody finds. What that client has under way is halted by
-    the PLC within half a second, and it is refused from then on.
+    For a program that hangs or that nobody can find. The PLC stops that client's movement within
+    half a second, and refuses its commands from then on.
     """
     with open_controller(context, changes=not dry_run) as controller:
         plc = require_softmotion(controller)
@@ -292,7 +290,7 @@ def take_ownership(
         "ownership",
         payload,
         lambda: say(
-            tr("Nobody else held the mailbox. It is free.")
+            tr("No other client had the mailbox locked. It is free.")
             if held is None
             else tr("The mailbox was taken from client {holder}, and is free now.", holder=held)
         ),
@@ -317,25 +315,26 @@ def _ask(plc: "SoftMotionController", holder: str, *, yes: bool) -> None:
     if not yes and not on_terminal():
         raise DeclinedError(
             tr(
-                "Client {holder} holds the mailbox of {controller}, but there is nobody to ask.",
+                "Client {holder} has the mailbox of {controller} locked, and there is "
+                "nobody to ask.",
                 holder=holder,
                 controller=plc.identity,
             ),
             remedy=tr(
-                "End that program; 10 s after its last sign the mailbox is free. To insist all the "
-                "same, run it on a terminal, or give --yes."
+                "End that program; 10 s after its last signal the mailbox is free. To take "
+                "over anyway, run this on a terminal, or add --yes."
             ),
             controller=plc.identity,
         )
     if plc.status().running:
         question = tr(
-            "Client {holder} holds the mailbox, and the axis group moves: the PLC will halt "
-            "it. Take the mailbox away? Only if you see the cell.",
+            "Client {holder} has the mailbox locked, and the axis group moves: the PLC "
+            "will stop it. Take over the mailbox? Only if you can see the cell.",
             holder=holder,
         )
     else:
         question = tr(
-            "Client {holder} holds the mailbox. Take it away? Only if you see the cell.",
+            "Client {holder} has the mailbox locked. Take it over? Only if you can see the cell.",
             holder=holder,
         )
     agree(question, yes=yes)

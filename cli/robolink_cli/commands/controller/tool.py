@@ -40,13 +40,13 @@ _FROM_FILES = "robolink_cli.commands.controller.backup"
 _BESIDES = {
     "impact": (
         "robolink_cli.commands.measure.impact:impact",
-        declared("How far a tool change moves the tip at taught points."),
+        declared("Show how far a tool change moves the tip at taught points."),
     ),
     "backup": (f"{_FROM_FILES}:backup", declared("Save all tools to a file.")),
-    "restore": (f"{_FROM_FILES}:restore", declared("Put the tools of a backup back.")),
+    "restore": (f"{_FROM_FILES}:restore", declared("Restore the tools of a backup.")),
     "compare": (
         f"{_FROM_FILES}:compare",
-        declared("What differs from a backup; exit code 1 when something does."),
+        declared("Show the differences from a backup; exit code 1 if any."),
     ),
 }
 
@@ -88,9 +88,8 @@ def get(
     mode: Annotated[
         Literal["set", "active", "last"] | None,
         CliOption(
-            help="On a PLC, what SMC_GroupReadTool says: the tool set, that of the movement "
-            "under way, or "
-            "that of the movement commanded last."
+            help="On a PLC, what SMC_GroupReadTool reports: the tool that is set, that of "
+            "the present movement, or that of the last command."
         ),
     ] = None,
 ) -> None:
@@ -100,7 +99,7 @@ def get(
 
     if (number is None) == (mode is None):
         raise ConfigError(
-            tr("Either a tool number or --mode is needed."),
+            tr("A tool number or --mode is missing."),
             remedy=tr("Write for example 'robolink tool get 1', or with a PLC --mode set."),
         )
     if number is None:
@@ -163,10 +162,10 @@ def set_tool(
     dry_run: DryRun = False,
     yes: Yes = False,
 ) -> None:
-    """Write a tool offset; components that are not given are kept.
+    """Write a tool offset; components that you leave out stay.
 
-    A change beyond the cell's max_change_mm or max_change_deg takes an engineer, who is shown the
-    figure and asked, even with --yes.
+    A change beyond the cell's max_change_mm or max_change_deg needs an engineer, who sees the
+    figure and must confirm it, even with --yes.
     """
     from robolink.transaction import Wanted, change_tools
 
@@ -261,7 +260,7 @@ class _Setting:
         if not agreed:
             agree(
                 tr(
-                    "Write these values to tool {tool}? 'robolink undo' takes them back.",
+                    "Write these values to tool {tool}? 'robolink undo' undoes it.",
                     tool=self._number,
                 ),
                 yes=yes,
@@ -301,10 +300,9 @@ def clear(
     dry_run: DryRun = False,
     yes: Yes = False,
 ) -> None:
-    """Remove a tool's definition. Where the cell names people, it takes an engineer.
+    """Remove a tool's definition. If the cell names people, this needs an engineer.
 
-    The tool that is selected is cleared only with --then-select: the machine goes on with that
-    one.
+    The selected tool is cleared only with --then-select: the machine then uses that tool.
     """
     from robolink.backup import keep_first_backup
     from robolink.transaction import Wanted, change_tools
@@ -337,7 +335,7 @@ def _clear_question(number: int, then_select: int | None) -> str:
     if then_select is None:
         return tr("Clear tool {number}?", number=number)
     return tr(
-        "Clear tool {number}? If it is selected now, tool {other} is selected in its place.",
+        "Clear tool {number}? If it is selected now, tool {other} is selected instead.",
         number=number,
         other=then_select,
     )
@@ -361,7 +359,7 @@ def select(
             return
         if before != number:
             agree(
-                tr("Select tool {number} in place of {before}?", number=number, before=before),
+                tr("Select tool {number} instead of {before}?", number=number, before=before),
                 yes=yes,
                 asks=not json_is_on(),
             )

@@ -53,7 +53,7 @@ def get(
         CliOption(help="How many elements, from --index on; the last subscript counts up."),
     ] = None,
 ) -> None:
-    """Show a variable. Legal while production runs."""
+    """Show a variable. Allowed while production runs."""
     subscripts = _subscripts(index)
     if (subscripts and kind is None) or (count is not None and not subscripts):
         raise ConfigError(
@@ -108,7 +108,7 @@ def set_variable(
         "value": receipt.read_back,
         "skipped": receipt.skipped,
     }
-    done = tr("was so already") if receipt.skipped else tr("set, read back")
+    done = tr("no change needed") if receipt.skipped else tr("set, read back")
     line = tr("{name} = {value}: {done}", name=name, value=receipt.read_back, done=done)
     emit("variable-set", payload, lambda: say(line))
 

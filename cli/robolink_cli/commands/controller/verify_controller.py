@@ -37,17 +37,17 @@ def verify_controller(
     transcript: Annotated[
         Path | None,
         _file,
-        CliOption(help="Write all that was said, for 'robolink sim epson --replay'."),
+        CliOption(help="Write the whole dialogue, for 'robolink sim epson --replay'."),
     ] = None,
     redact: Annotated[
         bool, CliOption(help="Leave names, serial numbers and addresses out.")
     ] = False,
 ) -> None:
-    """Find out what this controller does where documents are unsure.
+    """Find out how this controller behaves where its documents are unclear.
 
-    Reads only: nothing moves, nothing is written, and no statement is run that could leave
-    an error. While production runs only queries are sent, and less is found out. Of a PLC it
-    shows what its mailbox says of itself, and whether that is right.
+    Reads only: moves nothing, writes nothing, and runs no statement that could leave an error.
+    While production runs it sends only queries and finds out less. For a PLC it shows what its
+    mailbox reports about itself, and whether that is right.
     """
     from robolink.controllers.epson.verify import verify_epson
     from robolink.transport import parse_url
@@ -57,7 +57,7 @@ def verify_controller(
     if kind != "epson":
         if profile is not None or transcript is not None or redact:
             raise ConfigError(
-                tr("A profile and a transcript are made of EPSON controllers only."),
+                tr("Profiles and transcripts exist for EPSON controllers only."),
                 remedy=tr("Leave --profile, --transcript and --redact out."),
             )
         _verify_plc(context, url, kind)
@@ -91,7 +91,7 @@ def _verify_plc(context: CliContext, url: str, kind: str) -> None:
 
     if kind != "softmotion":
         raise ConfigError(
-            tr("There is nothing to find out about a PLC with registers of its own."),
+            tr("verify-controller does not apply to a PLC with its own registers."),
             remedy=tr('Compare its map instead: robolink -c "{url}" expert plc check-map', url=url),
         )
     # Nothing is written, so nothing is recorded.
@@ -160,7 +160,7 @@ def _show(found: "Verification") -> None:
     )
     say(
         tr(
-            "{settled} of {all} facts were found out. Nothing was written, and nothing moved.",
+            "{settled} of {all} facts found out. Nothing was written, and nothing moved.",
             settled=len(settled),
             all=len(found.facts),
         )

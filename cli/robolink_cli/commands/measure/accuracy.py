@@ -55,14 +55,14 @@ def accuracy(
         str | None,
         CliOption(
             metavar="NAME",
-            help="A controller with several robots: which one, as 'station list' names it.",
+            help="For a controller with several robots: the robot, as 'station list' names it.",
         ),
     ] = None,
 ) -> None:
-    """What a cell knows of the errors that no measurement shows by itself.
+    """Show what is known of a cell's errors that no single measurement shows.
 
-    Each row with its half width, what tells it, and the command that measures it where it is a
-    default. Reads cell file and journal only; no controller is asked.
+    For each row: its half width, its source and, if it is a default, the command that measures it.
+    Reads cell file and journal only; connects to no controller.
     """
     if click.get_current_context().invoked_subcommand is not None:
         return
@@ -73,7 +73,7 @@ def accuracy(
     emit("cell-accuracy", payload, lambda: show_accuracy(known))
 
 
-@accuracy.command("measure", short_help="Put a row on record that was measured.")
+@accuracy.command("measure", short_help="Record a measured row.")
 @controller_options
 def measure(
     context: CliContext,
@@ -97,16 +97,14 @@ def measure(
     ] = None,
     study: Annotated[
         Path | None,
-        CliOption(
-            help="touch_mm: a gauge study, as 'expert solve' takes it, in place of a gauge tip."
-        ),
+        CliOption(help="touch_mm: a gauge study, as for 'expert solve', instead of a gauge tip."),
     ] = None,
     station: Annotated[
         str | None,
         CliOption(
             metavar="ID",
             shell_complete=complete_station,
-            help="Only measurements at this station; the row then holds for it alone.",
+            help="Only measurements at this station; the row is then valid only there.",
         ),
     ] = None,
     nozzle: Annotated[
@@ -119,17 +117,18 @@ def measure(
         click.DateTime(["%Y-%m-%d", "%Y-%m-%dT%H:%M"]),
         CliOption(
             metavar="YYYY-MM-DD[THH:MM]",
-            help="Only measurements from then on, by this computer's clock; else of 24 hours.",
+            help="Only measurements since then, by this computer's clock; default: the "
+            "last 24 hours.",
         ),
     ] = None,
     yes: Yes = False,
 ) -> None:
-    """Calculate ROW from measurements that are on record, show it, and put it on record.
+    """Calculate ROW from measurements on record, show it, and record it.
 
-    touch_mm: mount a gauge tip whose offset is known, calibrate it five times or more as you
+    touch_mm: mount a gauge tip with a known offset, calibrate it five times or more as you
     calibrate any needle, then name its tool and its true X,Y here. Or give a gauge study.
 
-    tip_image_px: measure five nozzles of one kind or more by camera, each with its id, turn each
+    tip_image_px: measure five or more nozzles of one kind by camera, each with its id, turn each
     by half a turn in its mount, measure all again, then name the camera here.
 
     Other rows are learnt without this command, or stated; it says how.
@@ -243,13 +242,13 @@ def _checked(row: str, asked: Asked) -> tuple[float, float] | None:
     if asked.study is not None:
         if touching or asked.tool is not None or asked.nozzle or asked.since is not None:
             raise ConfigError(
-                tr("A gauge study stands in its file alone."),
+                tr("A gauge study takes all values from its file."),
                 remedy=tr("Leave --tool, --true, --nozzle and --since out."),
             )
         return None
     if asked.true is None or asked.tool is None:
         raise ConfigError(
-            tr("touch_mm needs a gauge tip whose offset is known, or a gauge study."),
+            tr("touch_mm needs a gauge tip with a known offset, or a gauge study."),
             remedy=measuring_step(row, station=asked.station, tool=asked.tool),
         )
     return _two(asked.true)
@@ -273,12 +272,12 @@ def _tip_image(controller: Controller, context: CliContext, asked: Asked) -> Mea
     pixel_mm = mm_per_px(camera)
     if pixel_mm is None:
         raise ConfigError(
-            tr("What a pixel of {station} means is not known.", station=asked.station),
+            tr("The pixel scale of {station} is not known.", station=asked.station),
             remedy=measuring_step("camera_scale_percent", station=asked.station, tool=asked.tool),
         )
     pairs = turned_pairs(_tips(controller, asked, by_camera=True))
     show_tips([tip for pair in pairs for tip in pair])
-    note(tr("Each nozzle has to be turned by half a turn in its mount between its two."))
+    note(tr("Between its two measurements, turn each nozzle by half a turn in its mount."))
     return tip_image_row(pairs, mm_per_px=pixel_mm, station=asked.station)
 
 

@@ -24,7 +24,7 @@ _A_DAY_S: Final = 86_400
 def cell_tools(context: CliContext) -> None:
     """Show each defined tool: its value, its last change and how old that is, and what is due.
 
-    Reads only. What is due comes from the recipes beside the cell file and from the record.
+    Reads only. The due dates come from the recipes beside the cell file and from the record.
     """
     from robolink_cli.session.context import find_tools
     from robolink_cli.views.cells import show_cell_tools

@@ -22,7 +22,7 @@ class _Components(NamedTuple):
 
     x: Annotated[
         float | None,
-        CliOption(metavar="MM", help="New offset, mm from the flange; left out: as stored."),
+        CliOption(metavar="MM", help="New offset, mm from the flange; default: as stored."),
     ] = None
     y: Annotated[float | None, CliOption(metavar="MM", help="mm from the flange.")] = None
     z: Annotated[float | None, CliOption(metavar="MM", help="mm from the flange.")] = None
@@ -45,16 +45,15 @@ def impact(
     ] = None,
     path: Annotated[
         Path | None,
-        CliOption("--pts", help="A .pts file of EPSON RC+ in place of the controller's points."),
+        CliOption("--pts", help="A .pts file of EPSON RC+ instead of the controller's points."),
     ] = None,
     report_path: ReportPath = None,
     force: ForceReport = False,
 ) -> None:
-    """Show how far the tip will move at taught points when a tool's offset is changed.
+    """Show how far the tip will move at taught points when a tool's offset changes.
 
-    The tip that is on the arm now goes to one place with the stored offset and to another with
-    the new one: the table shows how far these lie apart. Nothing is written; it works only while
-    no program runs.
+    The table shows the distance between where the present tip goes with the stored offset and
+    where it goes with the new one. Writes nothing; works only while no program runs.
     """
     from robolink.calibration import impact_on
     from robolink.errors import UndefinedToolError
@@ -73,7 +72,7 @@ def impact(
         if before is None:
             raise UndefinedToolError(
                 tr("Tool {tool} is not defined: no program can use it.", tool=tool),
-                remedy=tr("There is nothing that a new offset would move."),
+                remedy=tr("A new offset would move nothing."),
                 controller=controller.identity,
             )
         after = replace(before, **changes)

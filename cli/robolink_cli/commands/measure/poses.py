@@ -18,17 +18,17 @@ if TYPE_CHECKING:
 
 @click.group()
 def poses() -> None:
-    """Files of poses: what robolink understands of them."""
+    """Show how robolink reads files of poses."""
 
 
-@poses.command("show", short_help="Show the poses in a file, and how they were read.")
+@poses.command("show", short_help="Show the poses in a file, and how robolink read them.")
 @reading_options
 @json_option
 def show(*, file: Annotated[Path, CliArgument()], choices: "ReadingChoices") -> None:
-    """Show the poses in FILE in mm and EPSON's angles, and how they were read.
+    """Show the poses in FILE in mm and EPSON's angles, and how robolink read them.
 
     FILE may come from a robot of another maker, a spreadsheet or ROS; docs/poses.md lists them.
-    What it does not say is asked for and never guessed. No controller is asked.
+    If the file leaves something open, robolink asks and never guesses. Connects to no controller.
     """
     from robolink.pose_tables import read_poses
 
@@ -99,13 +99,13 @@ def _marks(entry: "TabledPose") -> tuple[str, str, str]:
 def _sentences(how: "HowRead", count: int) -> list[str]:
     said = {
         "file": tr("the file says so"),
-        "format": tr("as its format is defined"),
+        "format": tr("by definition of its format"),
         "option": tr("as you said"),
-        "default": tr("nothing else is said"),
+        "default": tr("no rotation stated"),
     }
     lines = [
         tr(
-            "{count} poses, read as: {layout}, {encoding}.",
+            "{count} poses read. Layout: {layout}, {encoding}.",
             count=count,
             layout=how.layout,
             encoding=how.encoding,

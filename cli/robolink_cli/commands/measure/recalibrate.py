@@ -31,7 +31,7 @@ AnswerTexts = Annotated[
     CliOption(
         "--answer",
         metavar="N=TEXT",
-        help="Answer to prompt number N of the recipe, counted from 1.",
+        help="Answer to prompt N of the recipe, counted from 1.",
     ),
 ]
 
@@ -65,7 +65,7 @@ def answers_from(
     heights = {number: parse_decimal(text) for number, text in _pairs(z_mm, "--z").items()}
     if heights and (recipe.z != "typed" or not heights.keys() <= tools):
         raise ConfigError(
-            tr("The recipe asks for no Z of tool {tool}.", tool=next(iter(heights))),
+            tr("The recipe does not ask for Z of tool {tool}.", tool=next(iter(heights))),
             remedy=tr('--z is for the tools of a recipe with z = "typed".'),
         )
     answers = _pairs(texts, "--answer")
@@ -113,7 +113,7 @@ def recalibrate(
         Path | None, CliArgument(metavar="RECIPE.toml", shell_complete=complete_recipe)
     ] = None,
     reference: Annotated[
-        bool, CliOption(help="Measure and record a reference for differences; nothing is written.")
+        bool, CliOption(help="Measure and record a reference for differences; writes nothing.")
     ] = False,
     accepted_change_mm: Annotated[
         float | None,
@@ -127,13 +127,14 @@ def recalibrate(
         str | None,
         CliOption(
             metavar="URL",
-            help="A simulator's assist or sim URL: its operator brings the tip onto the pin.",
+            help="A simulator's assist or sim URL: its simulated operator jogs the tip "
+            "onto the pin.",
         ),
     ] = None,
     sensor: Sensor = None,
     jsonl: Annotated[
         bool,
-        CliOption(help="One JSON line on stdout for every event, the last one result or error."),
+        CliOption(help="One JSON line on stdout for every event; the last is the result or error."),
     ] = False,
     answers: AnswerTexts = (),
     z_mm: TypedHeights = (),
@@ -144,11 +145,11 @@ def recalibrate(
     yes: Yes = False,
     _plain: Plain = False,
 ) -> None:
-    """Change a nozzle as a recipe says: measure, propose, write, prove, record.
+    """Change a nozzle by a recipe: measure, propose, write, test, record.
 
-    All tools of the recipe are measured before one is written; all are written or none. A
-    refusal, Ctrl-C or an emergency stop leaves the old values, and the tool that was selected.
-    Without RECIPE, on a terminal, cell and recipe are chosen from lists.
+    robolink measures all tools of the recipe before it writes one; it writes all or none. After a
+    refusal, Ctrl-C or an emergency stop the old values and the selected tool stay. Without RECIPE,
+    on a terminal, you choose cell and recipe from lists.
     """
     from robolink_cli.commands.measure.recalibration import EventStream, Recalibration, RunOptions
     from robolink_cli.commands.measure.recipe_choice import nobody_to_ask

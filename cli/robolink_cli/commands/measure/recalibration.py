@@ -89,7 +89,7 @@ class Progress(Listener):
         if not drawn_elsewhere():
             heading = _heading(moment, self.tool)
         elif self._tools > 1 and moment is Moment.BEFORE_MEASURE:
-            heading = tr("Tool {tool} is measured now.", tool=self.tool)
+            heading = tr("Measuring tool {tool}.", tool=self.tool)
         else:
             heading = ""  # the screen has one of its own
         if heading:
@@ -106,7 +106,7 @@ class Progress(Listener):
     def refused(self, tool: int, error: CalibrationError, *, again: bool) -> None:
         """Tell of a measurement that is not believed."""
         if again:
-            note(tr("Tool {tool}: {error} It is measured again.", tool=tool, error=error))
+            note(tr("Tool {tool}: {error} Measuring it again.", tool=tool, error=error))
         self._events.emit(
             "refused", tool=tool, code=error.code, what=error.what, remedy=error.remedy, again=again
         )
@@ -341,21 +341,21 @@ class Recalibration:
     def _explain_reference(self) -> None:
         note(
             tr(
-                "There is no reference yet. Taught points fit only the tool value that they "
-                "were taught with. So this first run measures and writes nothing: it records "
-                "where that tip is. Later changes are measured against it."
+                "There is no reference yet. Taught points fit only the tool value that "
+                "they were taught with. So this first run only records where that tip is, "
+                "and writes nothing. Later changes are measured against it."
             )
         )
         if not on_terminal():
             raise DeclinedError(
-                tr("A reference is needed first, but there is nobody to ask."),
+                tr("This needs a reference first, but there is nobody to ask."),
                 remedy=tr(
-                    "Mount the nozzle that the points were taught with, then give --reference."
+                    "Mount the nozzle with which the points were taught, then add --reference."
                 ),
             )
         if not asked(_which_is_mounted()):
             raise DeclinedError(
-                tr("The reference was not taken."),
+                tr("No reference was recorded."),
                 remedy=tr("Mount that nozzle, or restore the tool value that fits this one."),
             )
 
@@ -364,7 +364,7 @@ class Recalibration:
         nobody = not self.options.answers.yes and self.options.alone
         if nobody and not run.takes_reference:
             raise DeclinedError(
-                tr("Tools would be written, but there is nobody to ask."),
+                tr("This writes tools, but there is nobody to confirm it."),
                 remedy=tr("Nothing was written. Add --yes, or run it on a terminal."),
             )
 
@@ -423,7 +423,7 @@ class Recalibration:
 
 
 def _which_is_mounted() -> str:
-    return tr("Is the nozzle mounted that the points were taught with?")
+    return tr("Is the nozzle mounted with which the points were taught?")
 
 
 def _show_plan(payload: dict[str, object]) -> None:

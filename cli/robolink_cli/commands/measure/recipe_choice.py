@@ -158,8 +158,8 @@ def _loaded(desk: AskingDesk, paths: Sequence[Path]) -> "list[LoadedRecipe]":
             desk.tell(f"{path}: {error.what}")
     if not loaded:
         raise ConfigError(
-            tr("No recipe beside the cell file or in this folder is right."),
-            remedy=tr("'robolink recipe check FILE' says everything that is wrong with one."),
+            tr("No recipe beside the cell file or in this folder is valid."),
+            remedy=tr("To list the errors of one: robolink recipe check FILE"),
         )
     return loaded
 
@@ -187,13 +187,13 @@ def _copied(
     def ask() -> tuple[str, ChoiceSubject]:
         if head is not None:
             desk.regard(head())
-        said = tr("Its numbers are those of a simulated cell: you put in yours before it runs.")
+        said = tr("Its numbers are for a simulated cell: replace them before you run it.")
         rows = tuple(one.path.stem for one in fitting)
         details = tuple(
             (spoken(purpose_of(one.path)), *_needs_tilt(one, unknown=axes is None), said)
             for one in fitting
         )
-        question = tr("There is no recipe here yet. Which one is copied to begin with?")
+        question = tr("There is no recipe here yet. Which one do you want to start from?")
         return question, ChoiceSubject(
             tr("Choose"), (), rows, details=details, does=tr("Copy it"), enters=False
         )
@@ -202,10 +202,10 @@ def _copied(
     path = _folders(cell)[0] / f"{name}.toml"
     copy_recipe(name, path)
     return ConfigError(
-        tr("Written: {path}. It is not run yet: its numbers are of a simulated cell.", path=path),
+        tr("Written: {path}. Do not run it yet: its numbers are for a simulated cell.", path=path),
         remedy=tr(
-            "Put in those of your cell in the marked lines, delete the line 'numbers', then: "
-            "robolink recipe check {path}",
+            "Enter the numbers of your cell in the marked lines, delete the line "
+            "'numbers', then: robolink recipe check {path}",
             path=path,
         ),
     )
@@ -244,7 +244,7 @@ def _needs_tilt(loaded: "LoadedRecipe", *, unknown: bool) -> tuple[str, ...]:
     return (
         tr(
             "Needs a robot that tilts its tool. The cell file does not name the robot, so "
-            "whether it does shows after connecting."
+            "robolink checks this after connecting."
         ),
     )
 
@@ -269,7 +269,7 @@ def _of_this_kind(
         return fitting
     told = (f"{one.path.name}: {' '.join(why)}" for one, why in found)
     raise ConfigError(
-        tr("No recipe found here can be run on this controller. {recipes}", recipes=" ".join(told)),
+        tr("No recipe found here runs on this controller. {recipes}", recipes=" ".join(told)),
         remedy=tr("Write a recipe for this kind of controller: robolink recipe list"),
     )
 
@@ -323,7 +323,7 @@ def _told_of(loaded: "LoadedRecipe", past: "RecipePast") -> tuple[str, ...]:
     if past.elsewhere is not None:
         said.append(
             tr(
-                "Used so far on another robot only, {robot}, last {when}. Do its poses fit here?",
+                "Used so far only on another robot, {robot}, last {when}. Do its poses fit here?",
                 robot=past.elsewhere.controller,
                 when=local_label(past.elsewhere.at),
             )

@@ -15,14 +15,14 @@ from robolink_cli.session.context import CliContext, controller_options
 
 @click.group()
 def station() -> None:
-    """Pins, beams, surfaces and cameras of a cell: where, and how well known."""
+    """Show the pins, beams, surfaces and cameras of a cell: where, and how accurately known."""
 
 
 _Robot = Annotated[
     str | None,
     CliOption(
         metavar="NAME",
-        help="A controller with several robots: which one, as 'station list' names it.",
+        help="For a controller with several robots: the robot, as 'station list' names it.",
     ),
 ]
 
@@ -34,7 +34,7 @@ def list_stations(
     *,
     robot: _Robot = None,
 ) -> None:
-    """List the stations of a cell. Reads cell file and journal only; no controller is asked."""
+    """List the stations of a cell. Reads cell file and journal only; connects to no controller."""
     from robolink_cli.views.stations import known_stations, show_stations, station_payload
 
     known = known_stations(context, robot=robot)
@@ -50,7 +50,7 @@ def show(
     name: Annotated[str, CliArgument(metavar="ID", shell_complete=complete_station)],
     robot: _Robot = None,
 ) -> None:
-    """Show one station. Reads cell file and journal only; no controller is asked."""
+    """Show one station. Reads cell file and journal only; connects to no controller."""
     from robolink_cli.views.stations import known_station, show_station, station_payload
 
     found = known_station(context, name, robot=robot)
@@ -58,7 +58,7 @@ def show(
     emit("station", payload, lambda: show_station(found))
 
 
-@station.command("learn", short_help="Find a station with a tool whose offset is known.")
+@station.command("learn", short_help="Learn where a station is, with a tool whose offset is known.")
 @controller_options
 def learn(
     context: CliContext,
@@ -72,7 +72,7 @@ def learn(
     sigma_mm: Annotated[
         float | None,
         NumberInside(min=0, min_open=True),
-        CliOption(help="Standard deviation of one coordinate of one touch, where it is known."),
+        CliOption(help="Standard deviation of one coordinate of one touch, if known."),
     ] = None,
     speed_mm_s: Annotated[
         float,
@@ -82,32 +82,34 @@ def learn(
     box_mm: Annotated[
         float,
         NumberInside(min=1),
-        CliOption(help="How far, sideways, the flange may go from where it is."),
+        CliOption(help="How far the flange may move sideways from its present place."),
     ] = 150.0,
     assist: Annotated[
         str | None,
         CliOption(
             metavar="URL",
-            help="A simulator's assist or sim URL: its operator brings the tip onto the pin.",
+            help="A simulator's assist or sim URL: its simulated operator jogs the tip "
+            "onto the pin.",
         ),
     ] = None,
     contact_input: Annotated[
         int | None,
         click.IntRange(0, 0xFFFF),
         CliOption(
-            help="A pin: number of the input that shows contact of tip and pin, where there is one."
+            help="For a pin: number of the input that shows contact of tip and pin, if "
+            "there is one."
         ),
     ] = None,
     off_in_contact: Annotated[
-        bool, CliOption(help="Whether that input goes off, not on, in contact.")
+        bool, CliOption(help="The input goes off, not on, in contact.")
     ] = False,
     dry_run: DryRun = False,
     yes: Yes = False,
 ) -> None:
-    """Find a station with a tool whose offset is known, such as a gauge pin, and keep where it is.
+    """Learn where a station is, with a tool whose offset is known, such as a gauge pin.
 
-    A pin is touched by a person, twice; beams and surfaces are looked for near the place in the
-    cell file. No tool is written. An error in the tool's offset shifts the station by as much.
+    You touch a pin twice; robolink finds beams and surfaces near the place in the cell file.
+    Writes no tool. An error in the tool's offset shifts the station by the same amount.
     """
     from robolink.calibration_run import Limits, usual_box
     from robolink.model import InputEdge
@@ -119,7 +121,7 @@ def learn(
     if contact_input is not None:
         contact = InputEdge(contact_input, falling=off_in_contact)
     elif off_in_contact:
-        raise click.UsageError(tr("--off-in-contact goes with --contact-input."))
+        raise click.UsageError(tr("--off-in-contact needs --contact-input."))
     learn_it(
         context,
         name,

@@ -103,7 +103,7 @@ def learn(
             )
             found = _height_of_pin(controller, known, found, tool)
             _show(known, found)
-            if not yes and not bench.runner().confirm(tr("Keep this on record?")):
+            if not yes and not bench.runner().confirm(tr("Record this?")):
                 raise DeclinedError(
                     tr("You did not accept the place."), remedy=tr("Nothing was recorded.")
                 )
@@ -118,8 +118,8 @@ def _height_of_pin(controller: Controller, known: Station, found: Found, tool: i
         return found
     note(
         tr(
-            "Z of tool {tool} was never measured, calibrations left it as it was: the height "
-            "of {station} is not learnt from it.",
+            "Z of tool {tool} was never measured: robolink does not learn the height of "
+            "{station} from it.",
             tool=tool,
             station=found.id,
         )
@@ -140,7 +140,7 @@ def _known(context: CliContext, controller: Controller, name: str) -> Station:
         require_base_of(controller, known)
     note(
         tr(
-            "What is on record of station {id} was learnt in another base (Base), and is not used.",
+            "The record of station {id} was learnt in another base (Base) and is not used.",
             id=name,
         )
     )
@@ -151,14 +151,14 @@ def _tip(controller: Controller, tool: int) -> ToolOffset:
     offset = controller.tools.read(tool)
     if offset is None:
         raise UndefinedToolError(
-            tr("Tool {tool} is not defined, so no station can be found with it.", tool=tool),
-            remedy=tr("Use a tool whose offset is known well, such as a gauge pin."),
+            tr("Tool {tool} is not defined, so it cannot be used to learn a station.", tool=tool),
+            remedy=tr("Use a tool with an accurately known offset, such as a gauge pin."),
             controller=controller.identity,
         )
     if offset.v_deg or offset.w_deg:
         raise ConfigError(
             tr("Tool {tool} is tilted (V or W is not 0).", tool=tool),
-            remedy=tr("Use a tool that stands upright."),
+            remedy=tr("Use an upright tool."),
         )
     return offset
 

@@ -38,7 +38,7 @@ class _Wanted(NamedTuple):
 
     controller: OfController = None
     tool: Annotated[
-        int | None, CliOption(shell_complete=complete_tool, help="Only about this tool.")
+        int | None, CliOption(shell_complete=complete_tool, help="Only entries about this tool.")
     ] = None
     kinds: Annotated[
         tuple[str, ...],
@@ -46,10 +46,12 @@ class _Wanted(NamedTuple):
         CliOption(
             "--kind",
             metavar="KIND",
-            help="Only of this kind; a wrong name lists them all. May be repeated.",
+            help="Only entries of this kind; a wrong name lists all kinds. May be repeated.",
         ),
     ] = ()
-    change: Annotated[str | None, CliOption(metavar="ID", help="Only of this tool change.")] = None
+    change: Annotated[
+        str | None, CliOption(metavar="ID", help="Only entries of this tool change.")
+    ] = None
 
     def at_address(self) -> "_Wanted":
         """Return the same with the address of the controller, ``None`` for all."""
@@ -79,14 +81,14 @@ class _Wanted(NamedTuple):
 _BESIDES: Final = {
     "report": (
         "robolink_cli.commands.record.report:report",
-        declared("One page about one tool change, from the journal, to keep or print."),
+        declared("Write one page about a tool change, from the journal, to keep or print."),
     )
 }
 
 
 @click.group(cls=LazyGroup, lazy=_BESIDES)
 def journal() -> None:
-    """Look at what is on record about tools: values, proofs, people. Never changes it."""
+    """Read the record about tools: values, tests, people. Never changes it."""
 
 
 journal.add_command(drift)
@@ -97,7 +99,7 @@ journal.add_command(drift)
 def list_entries(
     *,
     meant: _Wanted,
-    limit: Annotated[int, click.IntRange(min=1), CliOption(help="At most this many.")] = 20,
+    limit: Annotated[int, click.IntRange(min=1), CliOption(help="Show at most this many.")] = 20,
 ) -> None:
     """Show the newest entries, newest first."""
     from robolink.journal import default_location, may_exist
@@ -110,7 +112,7 @@ def list_entries(
             emit_json("robolink/journal/1", {"entries": []})
         else:
             say(tr("There is no journal yet at {location}.", location=location))
-            say(tr("The first change that robolink makes starts it."))
+            say(tr("robolink creates it at the first change."))
         return
     entries = list(wanted.of(journal_to_read(), limit=limit))
     if json_is_on():
@@ -137,14 +139,14 @@ def show(
         show_entry(entry)
 
 
-@journal.command("diff", short_help="Show what differs between two entries or changes.")
+@journal.command("diff", short_help="Show the differences between two entries or changes.")
 @json_option
 def diff(
     *,
     a: Annotated[str, CliArgument(metavar="NUMBER|CHANGE")],
     b: Annotated[str, CliArgument(metavar="NUMBER|CHANGE")],
 ) -> None:
-    """Show what differs between two entries or changes: value, poses, tolerance, people."""
+    """Show the differences between two entries or changes: value, poses, tolerance, people."""
     from robolink_cli.views.journal import diff_payload, show_diff
 
     opened = journal_to_read()
@@ -159,12 +161,12 @@ def export(
     file: Annotated[Path, CliArgument()],
     form: Annotated[
         Literal["csv", "json", "jsonl"] | None,
-        CliOption("--format", help="Form of the file; by default what its name ends with."),
+        CliOption("--format", help="Format of the file; default: by the ending of its name."),
     ] = None,
     force: Overwrite = False,
     meant: _Wanted,
 ) -> None:
-    """Write entries to FILE, oldest first; all of them, or those that are meant."""
+    """Write entries to FILE, oldest first; all of them, or those that you choose."""
     from robolink.files.named import require_free, save_named
     from robolink_cli.commands.record.journal_export import FORMATS, Counted, form_of
 
@@ -183,12 +185,12 @@ def export(
 @journal.command("verify", short_help="Check that no entry was changed and none is missing.")
 @json_option
 def verify() -> int:
-    """Check that no entry was changed and none is missing; exit code 1 when one was.
+    """Check that no entry was changed and none is missing; exit code 1 otherwise.
 
-    The chain of hashes has no key. It shows what a disk, a program or a person did to single
-    entries. It cannot show that somebody who may write the whole journal rebuilt all of it,
-    or took the newest entries off and set the note of the last one back: for that, keep the
-    number and hash that this prints where that person cannot write, and compare.
+    The chain of hashes has no key. It shows changes of single entries by a disk, a program or a
+    person. It cannot show that somebody with access to the whole journal rebuilt all of it, or
+    removed the newest entries and reset the note of the last one: for that, keep the number and
+    hash that this prints where that person cannot write, and compare.
     """
     opened = journal_to_read()
     with _progress(opened) as progress:
@@ -207,9 +209,8 @@ def verify() -> int:
         if found.last_number:
             say(
                 tr(
-                    "The last one is {number}, {hash}. Without a key this cannot show that "
-                    "somebody rebuilt the whole journal: compare that hash with one kept "
-                    "elsewhere.",
+                    "The last one is {number}, {hash}. Without a key this cannot detect a "
+                    "rebuilt journal: compare the hash with one kept elsewhere.",
                     number=found.last_number,
                     hash=found.last_hash,
                 )

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from robolink.model import Recorded
 
 
-@click.command("drift", short_help="Show how each tool's offset moved, and what stands out.")
+@click.command("drift", short_help="Show how each tool's offset moved, and what is unusual.")
 @json_option
 def drift(
     *,
@@ -42,24 +42,25 @@ def drift(
         click.DateTime(["%Y-%m-%d"]),
         CliOption(
             metavar="YYYY-MM-DD",
-            help="Start again from this day, after a repair or with another kind of nozzle (UTC).",
+            help="Count only from this day on, after a repair or with another kind of "
+            "nozzle (UTC).",
         ),
     ] = None,
     baseline: Annotated[
         int,
         click.IntRange(min=20, max=1000),
-        CliOption(help="On how many of the first changes the limits rest."),
+        CliOption(help="How many of the first changes set the limits."),
     ] = 20,
-    plots: Annotated[bool, CliOption(help="Draw every chart, not only what stands out.")] = False,
+    plots: Annotated[bool, CliOption(help="Draw every chart, not only the unusual ones.")] = False,
     page: Annotated[
         Path | None, CliOption(help="Also write all charts to FILE, a page for a browser.")
     ] = None,
     force: Overwrite = False,
 ) -> int:
-    """Show how each tool's offset moved from change to change, and what stands out.
+    """Show how each tool's offset moved from change to change, and what is unusual.
 
-    Nozzles that wear, mounts that slip, pins that moved, a last change out of the ordinary. Only
-    changes that were measured and kept count. Exit code 1 when something stands out.
+    Nozzles that wear, mounts that slip, pins that moved, an unusual last change. Only changes that
+    were measured and kept count. Exit code 1 when something is unusual.
     """
     from robolink.journal import default_location, may_exist
 
@@ -145,7 +146,7 @@ def show_drift(cells: Sequence[CellDrift], *, all_plots: bool, called: str = "")
             say("")
         _show_cell(cell, called if len(cells) == 1 else "", all_plots=all_plots)
     if not any(cell.findings for cell in cells):
-        say(tr("Nothing stands out."))
+        say(tr("Nothing is unusual."))
 
 
 def _show_cell(cell: CellDrift, called: str, *, all_plots: bool) -> None:
@@ -162,15 +163,15 @@ def _show_cell(cell: CellDrift, called: str, *, all_plots: bool) -> None:
         table(title, columns, [_row(chart) for chart in cell.charts])
     else:
         say(title)
-        say(tr("A course shows from the second measured change of a tool on."))
+        say(tr("A trend needs two measured changes of a tool."))
     for sentence in last_statements(cell.changes):
         say(sentence)
     for chart in cell.charts:
         if chart.limits_mm is None:
             say(
                 tr(
-                    "Limits are drawn from 20 changes on; until then nothing is judged, except a "
-                    "nozzle that is measured again and again."
+                    "Limits need 20 changes; until then nothing is judged, except a nozzle "
+                    "that is measured repeatedly."
                 )
             )
             break

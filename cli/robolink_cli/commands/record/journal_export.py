@@ -88,8 +88,8 @@ def form_of(file: Path) -> str:
     form = file.suffix.removeprefix(".").lower()
     if form not in FORMATS:
         raise ConfigError(
-            tr("The name {file} does not say which form the export is to have.", file=file),
-            remedy=tr("Let it end with .csv, .json or .jsonl, or give --format."),
+            tr("The name {file} does not show the format of the export.", file=file),
+            remedy=tr("End it with .csv, .json or .jsonl, or give --format."),
         )
     return form
 

@@ -137,8 +137,8 @@ def change_named(entries: "Iterable[Recorded]", name: str) -> str:
     raise ConfigError(
         _what_is_wrong(name, list(ids)),
         remedy=tr(
-            "'robolink journal list' shows numbers and ids; {count} characters of an id are "
-            "enough where they name one change only.",
+            "'robolink journal list' shows numbers and ids; {count} characters of an id "
+            "are enough if only one change starts with them.",
             count=SHORTEST_ID,
         ),
     )

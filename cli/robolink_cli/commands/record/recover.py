@@ -69,7 +69,7 @@ def chosen_at_desk(controller: Controller) -> str | None:
     question = (
         tr("Look at the robot: which needle is mounted?")
         if written
-        else tr("Look at the robot: is all as it should be?")
+        else tr("Look at the robot: is everything as it should be?")
     )
     return answers[choose(desk, question, subject, controller.status)]
 
@@ -99,9 +99,9 @@ def _selected(controller: Controller) -> list[str]:
 
 def _option(answer: str, *, written: bool, tests: bool) -> str:
     if answer == BLOCKED:
-        return tr("I cannot tell. Stay blocked; call an engineer.")
+        return tr("I am not sure. Keep the robot blocked and call an engineer.")
     if not written:
-        return tr("All is as it should be. Work may go on.")
+        return tr("Everything is as it should be. Work can continue.")
     if answer == OLD:
         return tr("The old one. Put the old value back.")
     if tests:
@@ -120,31 +120,31 @@ def recover(
         bool,
         CliOption(
             late=True,
-            help="Keep new values that nobody tested; without it the old ones are written back.",
+            help="Keep untested new values; without it robolink writes the old ones back.",
         ),
     ] = False,
     choose: Annotated[
         Literal["old", "new", "blocked"] | None,
         CliOption(
             late=True,
-            help="Your answer to all of it: old values back; new values kept, on a terminal "
-            "after their "
-            "turn test; or everything left blocked as it is.",
+            help="Your answer to every question: old values back; new values kept, on a "
+            "terminal after their turn test; or everything left blocked.",
         ),
     ] = None,
     yes: Annotated[
         bool,
         CliOption(
             late=True,
-            help="Your answer where reading is not enough: you have looked, and work may go on.",
+            help="Confirms what robolink cannot read: you have looked at the robot, and "
+            "work can continue.",
         ),
     ] = False,
     forget: Annotated[
         bool,
         CliOption(
             late=True,
-            help="Drop everything that is open, without a check and without restoring; you "
-            "answer for it.",
+            help="Drop all unfinished jobs without a check and without restoring values; "
+            "you take responsibility.",
         ),
     ] = False,
     take_over: Annotated[
@@ -152,25 +152,23 @@ def recover(
         CliOption(
             late=True,
             metavar="REASON",
-            help="Take this controller over from the program that works on it, a PLC's mailbox "
-            "too, where "
-            "what moves is halted. That program is refused from then on. Your name and the "
-            "reason are "
-            "recorded.",
+            help="Take over this controller from the program that has it locked; also a "
+            "PLC's mailbox, where the PLC stops any movement. That program is refused "
+            "from then on. Your name and the reason are recorded.",
         ),
     ] = None,
 ) -> int:
-    """Put right what a stop, a crash or a lost link left open: what this PC cannot see, you decide.
+    """Finish or undo an interrupted job: after a stop, a crash or a lost link.
 
-    It finishes or takes back each tool change, selects the cell's own tool again, and says how
-    far the robot came. Each tool is written once at most. Nothing moves, but for the turn test of
-    a new value that you choose on the terminal, when you have agreed to it. What only a person
-    can judge is asked on a terminal; elsewhere it is left open, with exit code 6, unless --yes
-    answers for you. It may be run again at any time.
+    Reads the controller first, writes each tool at most once, asks you only what it cannot read.
+    Finishes or undoes each tool change, selects the cell's own tool again, and shows how far the
+    robot got. Moves nothing, except for a turn test that you choose and confirm on a terminal.
+    Questions for a person are asked on a terminal; elsewhere they stay open, with exit code 6,
+    unless --yes answers for you. You can run it again at any time.
     """
     if choose is not None and (keep or yes or forget):
         raise ConfigError(
-            tr("--choose says it all; it goes with none of --keep, --yes and --forget."),
+            tr("--choose cannot be combined with --keep, --yes or --forget."),
             remedy=tr("Nothing was sent."),
         )
 
@@ -208,7 +206,7 @@ def resolve(
     yes: Yes = False,
     forget: Annotated[bool, CliOption(late=True, help="As with 'robolink recover'.")] = False,
 ) -> int:
-    """Do what 'robolink recover' does; without a terminal the command itself is your answer."""
+    """Same as 'robolink recover'; without a terminal, giving the command is your answer."""
     with open_controller(context, quiet=True, changes=not dry_run) as controller:
         by = AnsweredBy.YES if yes else AnsweredBy.COMMAND
         guide = Guide(controller, keep=False, word=yes or not on_terminal(), by=by)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 DECLINED: Final = 9
 LEFT: Final = 6
-_NOTHING: Final = declared("Nothing is left unfinished on this controller.")
+_NOTHING: Final = declared("No job is left unfinished on this controller.")
 
 
 class Guide:
@@ -154,7 +154,7 @@ class Guide:
         _show(finding)
         if finding.marker.kind is MarkerKind.MOVE:
             self._show_where()
-        question = tr("Is that right, and may work go on?")
+        question = tr("Is that right, and can work continue?")
         if self._word:
             if self._by is not None:
                 keep_answer(question, True, self._by)
@@ -189,7 +189,7 @@ class Guide:
         elif finding.action:
             note(tr("  done: {action}", action=finding.action))
         else:
-            note(tr("  settled"))
+            note(tr("  finished"))
 
 
 def show_end(payload: dict[str, object]) -> None:
@@ -198,15 +198,15 @@ def show_end(payload: dict[str, object]) -> None:
     if left:
         say(
             tr(
-                "The rest only you can decide. Look at the robot and the controller, then "
+                "Only you can decide the rest. Look at the robot and the controller, then "
                 "run 'robolink recover' again on a terminal, or with --yes."
             )
         )
     elif payload["settled"]:
         say(
-            tr("Everything is settled.")
+            tr("All jobs are finished or undone.")
             if tool is None
-            else tr("Everything is settled; tool {tool} is selected.", tool=tool)
+            else tr("All jobs are finished or undone; tool {tool} is selected.", tool=tool)
         )
 
 

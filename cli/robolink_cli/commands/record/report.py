@@ -39,16 +39,16 @@ def report(
         str | None,
         CliOption(
             metavar="1-50",
-            help="Also show how far the tip moves at these taught points, read now from -c.",
+            help="Also show how far the tip moves at these taught points, read from -c now.",
         ),
     ] = None,
 ) -> int:
-    """Write one HTML page about CHANGE, to keep, to mail or to print.
+    """Write one HTML page about CHANGE, to keep, mail or print.
 
     CHANGE is the beginning of an id, or the number of an entry, as 'robolink journal list'
-    shows them; without it the newest change is meant, with -c the newest of that cell. The
-    page comes from the journal alone and needs no controller, except for --points. Exit code 1
-    when the check of the journal finds something wrong.
+    shows them; default: the newest change, with -c the newest of that cell. The page comes from
+    the journal alone and needs no controller, except for --points. Exit code 1 when the check of
+    the journal finds an error.
     """
     from robolink.files.named import require_free
     from robolink.report import save
@@ -103,7 +103,9 @@ def find_change(journal: Journal, name: str | None, *, controller: str | None) -
         if newest is None:
             raise ConfigError(
                 tr("No tool change is on record."),
-                remedy=tr("'robolink journal list' shows what is; -c names another cell."),
+                remedy=tr(
+                    "'robolink journal list' shows what is on record; -c names another cell."
+                ),
             )
         name = id_of_change(newest)
     return entries_of_change(journal, name, controller=meant)

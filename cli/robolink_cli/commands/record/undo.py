@@ -32,19 +32,17 @@ def undo(
     to: Annotated[
         int | None,
         click.IntRange(min=1),
-        CliOption(
-            metavar="NUMBER", help="Bring back the value that this entry of the journal proved."
-        ),
+        CliOption(metavar="NUMBER", help="Write back the value that this journal entry confirms."),
     ] = None,
     then_select: ThenSelect = None,
     dry_run: DryRun = False,
     yes: Yes = False,
 ) -> None:
-    """Put back what tools held before CHANGE; by default before the newest one.
+    """Undo CHANGE: write back what the tools held before it; default: the newest change.
 
     CHANGE is the beginning of an id, or the number of an entry, as 'robolink journal list'
-    shows them. It takes an engineer, is refused when somebody else wrote the tool since, and
-    can itself be undone. Nothing moves.
+    shows them. Needs an engineer, is refused when somebody else wrote the tool since, and can
+    itself be undone. Moves nothing.
     """
     from robolink.transaction import plan_undo
     from robolink_cli.commands.record.journal_lookup import change_named
@@ -52,7 +50,7 @@ def undo(
     if change is not None and to is not None:
         raise ConfigError(
             tr("Give CHANGE or --to, not both."),
-            remedy=tr("Name a change to undo, or an entry whose value is to come back."),
+            remedy=tr("Name a change to undo, or an entry whose value to write back."),
         )
     job = "" if dry_run else tr("undo a change of a tool")
     with open_controller(context, changes=not dry_run, job=job) as controller:
@@ -157,7 +155,7 @@ class Undoing:
         say(tr("Old values written and read back: tool {numbers}.", numbers=numbers))
         say(
             tr(
-                'To take it back: robolink -c "{cell}" undo {id}',
+                'To undo it: robolink -c "{cell}" undo {id}',
                 cell=cell,
                 id=self._done.change[:8],
             )

@@ -31,13 +31,13 @@ def docs(
     *,
     page: Annotated[str | None, CliArgument(shell_complete=_complete_page)] = None,
     only_path: Annotated[
-        bool, CliOption("--path", help="Show where the page is, not the page.")
+        bool, CliOption("--path", help="Show the path of the page, not the page.")
     ] = False,
 ) -> None:
-    """Read a PAGE of the documentation; without one, list them.
+    """Read a PAGE of the documentation; without PAGE, list the pages.
 
-    The pages come with the program, so they are of its version and need no network. Where a page
-    is there in the language of --lang, that one is shown.
+    The pages come with the program, so they match its version and need no network. A page is shown
+    in the language of --lang if it exists in it.
     """
     pages = _pages()
     if page is None:

@@ -60,7 +60,7 @@ def copy_recipe(name: str, path: Path, *, replace: bool = False) -> None:
         ConfigError: There is no such recipe, or the file is there or cannot be written.
     """
     found = models()
-    require_one_of(name, list(found), remedy=tr("'robolink recipe list' lists them."))
+    require_one_of(name, list(found), remedy=tr("'robolink recipe list' lists the recipes."))
     require_free(path, replace=replace)
     first, *lines = found[name].read_text(encoding="utf-8").splitlines()
     if not first.startswith("#:schema "):
@@ -85,7 +85,7 @@ def first_comment(path: Path) -> str:
 
 @click.group()
 def recipe() -> None:
-    """Recipes: copy one to begin with, and check your own."""
+    """Recipes: copy one to start from, and check your own."""
 
 
 def _complete_model(_: click.Context, __: click.Parameter, start: str) -> list[str]:
@@ -96,14 +96,14 @@ def _complete_model(_: click.Context, __: click.Parameter, start: str) -> list[s
 @recipe.command("list")
 @json_option
 def list_models() -> None:
-    """List the recipes that come with robolink, to begin with."""
+    """List the recipes that come with robolink."""
     purposes = {name: purpose_of(path) for name, path in models().items()}
     if json_is_on():
         entries = [{"name": name, "purpose": text} for name, text in purposes.items()]
         emit_json("robolink/recipes/1", {"recipes": entries})
         return
     say_listed({name: spoken(text) for name, text in purposes.items()})
-    say(tr("To begin with one: robolink recipe new NAME FILE"))
+    say(tr("To start from one: robolink recipe new NAME FILE"))
 
 
 @recipe.command("new", short_help="Copy a recipe to a file of your own.")
@@ -116,10 +116,9 @@ def new(
 ) -> None:
     """Copy the recipe NAME to FILE; without FILE to NAME.toml in the working folder.
 
-    Its numbers fit the simulated cell, and with them it runs on simulated controllers alone. Put in
-    those of your own in the marked lines, delete the line 'numbers', then 'robolink recipe check
-    FILE'.
-    Its first line tells an editor which keys there are.
+    Its numbers are for the simulated cell, and with them it runs only on simulated controllers.
+    Enter your own in the marked lines, delete the line 'numbers', then run 'robolink recipe check
+    FILE'. Its first line tells an editor the allowed keys.
     """
     wanted = name.removesuffix(".toml")
     path = file or Path(f"{wanted}.toml")
@@ -128,7 +127,7 @@ def new(
         emit_json("robolink/recipe-new/1", {"recipe": wanted, "path": str(path)})
     else:
         say(tr("Written: {path}", path=path))
-        say(tr("Put in the numbers of your cell, then: robolink recipe check {path}", path=path))
+        say(tr("Enter the numbers of your cell, then: robolink recipe check {path}", path=path))
 
 
 @recipe.command("check")
@@ -137,7 +136,7 @@ def check(
     *,
     file: Annotated[Path, CliArgument(shell_complete=complete_recipe)],
 ) -> int:
-    """Say everything that is wrong with the recipe FILE. No controller is asked."""
+    """List every error in the recipe FILE. Connects to no controller."""
     from robolink.recipe import check_recipe
 
     problems = check_recipe(file)
@@ -148,7 +147,7 @@ def check(
         for one in problems:
             say(": ".join(filter(None, (one.where, one.what))))
     else:
-        say(tr("The recipe {path} is right.", path=file))
+        say(tr("The recipe {path} is valid.", path=file))
     return 2 if problems else 0
 
 

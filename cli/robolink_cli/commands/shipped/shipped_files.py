@@ -36,9 +36,9 @@ def require_one_of(name: str, names: Sequence[str], *, remedy: str) -> None:
     if name in names:
         return
     near = get_close_matches(name, names, n=3) or [one for one in names if name in one][:3]
-    hint = tr("Is one of these meant: {names}?", names=", ".join(near)) if near else ""
+    hint = tr("Did you mean {names}?", names=", ".join(near)) if near else ""
     raise ConfigError(
-        tr("There is no {name!r} here.", name=name),
+        tr("There is no {name!r}.", name=name),
         remedy=joined(" ", filter(None, (hint, remedy))),
     )
 

@@ -206,7 +206,7 @@ def numbered(tables: Iterable[CellTable], object_to: CellObjection) -> tuple[Pla
     for table in tables:
         for cell in _one_by_one(table, object_to):
             if any(cell.name == other.name for other in cells[-1:]) or cell.name in places:
-                object_to(table.name, "", tr("two cells are called {name}", name=cell.name))
+                object_to(table.name, "", tr("two cells have the name {name}", name=cell.name))
                 break
             places[cell.name] = cell.name
             clash = next(
@@ -222,7 +222,7 @@ def numbered(tables: Iterable[CellTable], object_to: CellObjection) -> tuple[Pla
                 object_to(
                     table.name,
                     key,
-                    tr("{name} has it already; every cell needs its own", name=places[place]),
+                    tr("{name} uses it already; every cell needs its own", name=places[place]),
                 )
                 break
             cells.append(cell)
@@ -238,14 +238,14 @@ def _one_by_one(table: CellTable, object_to: CellObjection) -> Iterator[PlannedC
         for key in table.keys.addresses():
             option = str(table.keys.options[key].name)
             if given[option] is not None and (moved := _moved(given[option], number)) is None:
-                object_to(table.name, key, tr("there are not so many ports"))
+                object_to(table.name, key, tr("there are not that many ports"))
                 return
             elif given[option] is not None:
                 given[option] = moved
         if given.get("can") is not None:
             given["node"] += number
             if given["node"] > _LAST_NODE:
-                object_to(table.name, "count", tr("a bus has no more than 127 nodes"))
+                object_to(table.name, "count", tr("a bus has at most 127 nodes"))
                 return
         named = {key: _named(value, name) for key, value in given.items()}
         yield PlannedCell(name, table.name, table.kind, table.assist, named)
@@ -294,7 +294,7 @@ KINDS: Final[Mapping[str, SimulatedKind]] = {
 
 CELLS_FILE: Final = FileKind(
     named=lambda path: tr("The file of simulated cells {path}", path=path),
-    unreadable_remedy=lambda: tr("docs/simulated-fleet.md shows what such a file looks like."),
+    unreadable_remedy=lambda: tr("docs/simulated-fleet.md has an example."),
     wrong_remedy=lambda: tr("Correct it; docs/simulated-fleet.md explains every key."),
 )
 

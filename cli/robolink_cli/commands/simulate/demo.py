@@ -41,19 +41,21 @@ from robolink_cli.views.fit import report_payload, show_proposal, show_report
 @json_option
 def demo(
     *,
-    seed: Annotated[int, CliOption(help="Another cell, another tip.")] = 1,
+    seed: Annotated[
+        int, CliOption(help="Seed of the simulated cell; another seed has another tip.")
+    ] = 1,
     speed: Annotated[
         float,
         NumberInside(1, 100),
         CliOption(
-            metavar="FACTOR", help="How many times faster than real the simulated time passes."
+            metavar="FACTOR", help="How many times faster than real time the simulation runs."
         ),
     ] = 20.0,
     operator: Annotated[
         Literal["careful", "careless"],
         CliOption(
-            help="Who touches the pin; a careless person only presses Enter, and must not be "
-            "believed."
+            help="Who touches the pin; a careless person only presses Enter, and robolink "
+            "must refuse that."
         ),
     ] = "careful",
 ) -> None:
@@ -262,7 +264,7 @@ def require_refused(changes: Sequence[DemonstratedChange]) -> None:
     believed = [one.robot for one in changes if isinstance(one, AcceptedChange)]
     if believed:
         raise RuntimeError(
-            tr("The careless person was believed, on {robots}.", robots=", ".join(believed))
+            tr("robolink accepted the careless touches, on {robots}.", robots=", ".join(believed))
         )
 
 

@@ -183,7 +183,7 @@ def load_programs(
         if named is None and simulator.options.background_tasks:
             named = "--option background_tasks"
         if named is not None:
-            raise click.UsageError(tr("{option} goes with --program.", option=named))
+            raise click.UsageError(tr("{option} needs --program.", option=named))
         return
     runner = surroundings.load(simulator, programs, points)
     before = f"{cell}: " if cell else ""

@@ -96,7 +96,7 @@ class Termination:
         self._life = life
         if life is not None and life.with_parent and os.name == "nt":
             raise ConfigError(
-                tr("On Windows a simulator does not see that its parent has ended."),
+                tr("On Windows a simulator cannot detect that its parent process has ended."),
                 remedy=tr("Use --idle-exit there."),
             )
         self._parent = ParentWatch(life.parent) if life and life.with_parent else None
@@ -290,8 +290,8 @@ def _refuse_habits() -> None:
         given = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
         if given and parameter.expose_value and name not in _OF_A_REPLAY:
             raise ConfigError(
-                tr("{option} does not go with --replay.", option=parameter.opts[0]),
-                remedy=tr("A recording answers what was recorded, and nothing else."),
+                tr("{option} cannot be combined with --replay.", option=parameter.opts[0]),
+                remedy=tr("A replay gives only recorded answers."),
             )
 
 

@@ -55,7 +55,7 @@ def sim_plc(
 ) -> None:
     """Serve a simulated PLC with the registers of any map until Ctrl-C.
 
-    Both buses may be given; one PLC stands behind them.
+    You can give both buses; they belong to the same PLC.
     """
     from robolink_cli.commands.simulate.plc import PLC_KIND
     from robolink_cli.commands.simulate.simulated_kind import serve_alone
@@ -88,8 +88,8 @@ class _SoftMotionOptions(NamedTuple):
         str | None,
         CliOption(
             metavar="INTERFACE:CHANNEL",
-            help="Be a CANopen node, for example on udp_multicast:239.74.163.2:43113 or "
-            "socketcan:vcan0.",
+            help="Act as a CANopen node, for example on udp_multicast:239.74.163.2:43113 "
+            "or socketcan:vcan0.",
         ),
     ] = None
     unit: Annotated[
@@ -103,8 +103,8 @@ class _SoftMotionOptions(NamedTuple):
         CliOption(
             metavar="NAME[+ORIENTATION]",
             shell_complete=_complete_kinematics,
-            help="Kinematics of the axis group; TAB completes the names. Or module:Class for one "
-            "of your own, which may stand in the present folder.",
+            help="Kinematics of the axis group; TAB completes the names. Or module:Class "
+            "for your own, which may be in the present folder.",
         ),
     ] = "Kin_Scara3_Z"
     parameters: Annotated[
@@ -137,8 +137,8 @@ def softmotion(
 ) -> None:
     """Serve a simulated SoftMotion PLC with a mailbox until Ctrl-C.
 
-    Several buses may be given; one PLC stands behind them. The assist port stands in for the
-    person at the machine.
+    You can give several buses; they belong to the same PLC. The assist port plays the person at
+    the machine.
     """
     from robolink_cli.commands.simulate.simulated_kind import serve_alone
     from robolink_cli.commands.simulate.softmotion import SOFTMOTION_KIND
@@ -183,13 +183,13 @@ class _EpsonOptions(NamedTuple):
         Literal["pty"] | None,
         CliOption(
             callback=one_place,
-            help="Remote RS232 on a pseudo terminal, whose path is printed, in place of --tcp.",
+            help="Remote RS232 on a pseudo terminal, whose path is printed, instead of --tcp.",
         ),
     ] = None
     baud: Annotated[
         int,
         click.IntRange(0, 4_000_000),
-        CliOption(help="How slow that line is, in real time; 0 carries everything at once."),
+        CliOption(help="Baud rate of that line, in real time; 0 sends everything at once."),
     ] = 0
     robot: Annotated[
         str,
@@ -209,12 +209,12 @@ class _EpsonOptions(NamedTuple):
     profile: Annotated[
         Path | None,
         EXISTING_FILE,
-        CliOption(help="Cell profile written by verify-controller; --option overrules it."),
+        CliOption(help="Cell profile written by verify-controller; --option overrides it."),
     ] = None
     replay: Annotated[
         Path | None,
         EXISTING_FILE,
-        CliOption(help="Serve a dialogue that --record has written, in place of a simulator."),
+        CliOption(help="Replay a dialogue that --record has written, instead of a simulator."),
     ] = None
     programs: Annotated[
         tuple[Path, ...],
@@ -246,8 +246,8 @@ def epson(
 ) -> None:
     """Serve a simulated EPSON controller with Remote Ethernet, or RS232, until Ctrl-C.
 
-    A second port, assist, stands in for the person at the cell: it looks at the tip, knows
-    the truth, and presses the emergency stop.
+    A second port, assist, plays the person at the cell: it looks at the tip, knows its true
+    position, and presses the emergency stop.
     """
     if given.replay is not None:
         from robolink_cli.commands.simulate.service import (
@@ -270,7 +270,7 @@ def epson(
     serve_alone(EPSON_KIND, life, options)
 
 
-@sim.command(short_help="Be the person at a simulated cell.")
+@sim.command(short_help="Play the person at a simulated cell.")
 @json_option
 def assist(
     *,
@@ -278,18 +278,18 @@ def assist(
     act: Annotated[str, CliArgument()],
     values: Annotated[tuple[str, ...], CliArgument(metavar="[NAME=NUMBER]...")] = (),
 ) -> None:
-    """Be the person at a simulated cell: press its buttons, teach its points, see its truth.
+    """Play the person at a simulated cell: press its buttons, teach its points, see its true state.
 
     URL is the assist URL that 'robolink sim' prints. Acts are for example press_estop,
     release_estop, open_guard, teach, auto, teach_point number=901 u_deg=180, truth; an unknown
-    one lists them all.
+    one lists all of them.
     """
     from robolink_cli.commands.simulate.acts import do_act
 
     do_act(url, act, values)
 
 
-@sim.command(short_help="Do something to a simulated controller past the wire.")
+@sim.command(short_help="Change a simulated controller directly, not through its connection.")
 @json_option
 def ctl(
     *,
@@ -306,10 +306,10 @@ def ctl(
         ),
     ],
 ) -> None:
-    """Do something to a simulated controller and its cell past the wire.
+    """Change a simulated controller and its cell directly, not through its connection.
 
     ACT is for example truth, press_estop, add_fault action=drop_reply match=TLSet, log, reset,
-    set_clock factor=0, step seconds=2. An unknown one lists them all, and docs/control-api.md
+    set_clock factor=0, step seconds=2. An unknown one lists all of them, and docs/control-api.md
     explains each.
     """
     from robolink_cli.commands.simulate.acts import do_controlled

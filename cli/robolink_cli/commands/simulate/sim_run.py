@@ -28,7 +28,7 @@ from robolink_cli.options.shared import json_option
 from robolink_cli.options.simulation import ServedLife
 
 
-@click.command("run", short_help="Serve many simulated controllers, as a file says.")
+@click.command("run", short_help="Serve many simulated controllers, listed in a file.")
 @json_option
 def sim_run(
     *,
@@ -39,17 +39,16 @@ def sim_run(
     wait_ready: Annotated[
         bool,
         CliOption(
-            help="Serve in the background: print one JSON line once all cells listen, and end with "
-            "0; 'pid' in it is the process that serves, which SIGTERM ends."
+            help="Serve in the background: print one JSON line once all cells listen, and "
+            "end with 0. Its 'pid' is the serving process; SIGTERM ends it."
         ),
     ] = False,
     life: ServedLife,
 ) -> int:
-    """Serve many simulated controllers of all kinds, as a file says, until Ctrl-C.
+    """Serve many simulated controllers of all kinds, listed in a file, until Ctrl-C.
 
-    The first line names every cell with its URLs, its control URL and the folder for what its
-    clients keep on record; with --json it is one JSON document. docs/simulated-fleet.md explains
-    the file.
+    The first line names every cell with its URLs, its control URL and the folder for its clients'
+    records; with --json it is one JSON document. docs/simulated-fleet.md explains the file.
     """
     from robolink_cli.commands.simulate.cells_file import read_cells
 
@@ -59,7 +58,7 @@ def sim_run(
         if json_is_on():
             emit_json("robolink/sim-cells-check/1", {"file": str(file), "cells": names})
         else:
-            say(tr("{path} is right: {count} cells.", path=file, count=len(names)))
+            say(tr("{path} is valid: {count} cells.", path=file, count=len(names)))
         return 0
     if wait_ready:
         return start_and_wait([str(file), *_as_typed(life)])
@@ -241,7 +240,7 @@ def _first_line(process: "subprocess.Popen[bytes]", log: Path, errors: Path) -> 
         time.sleep(_LOOK_S)
     raise ConnectError(
         tr("The simulators did not listen within {seconds:g} s.", seconds=_MOST_S),
-        remedy=tr("What they said meanwhile is in {path}.", path=errors),
+        remedy=tr("Their output is in {path}.", path=errors),
     )
 
 

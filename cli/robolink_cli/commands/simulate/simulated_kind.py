@@ -136,7 +136,7 @@ def _told(served: ServedCell, document: Mapping[str, object]) -> list[str]:
     else:
         lines.append(tr('Try: robolink -c "{url}" status', url=document["url"]))
     if served.assist is not None:
-        lines.append(tr("From the tip to the pin, seen now: robolink sim assist ASSIST look"))
+        lines.append(tr("To see how far the tip is from the pin: robolink sim assist ASSIST look"))
     return [*lines, tr("Ctrl-C ends it.")]
 
 

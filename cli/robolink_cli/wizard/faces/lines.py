@@ -190,7 +190,7 @@ class LineFace:
             return
         for line in self._lines.forget(quiet_s):
             if line.strip():
-                _put(tr("Typed too early, so it was not taken: {line!r}", line=line))
+                _put(tr("Typed too early and ignored: {line!r}", line=line))
 
 
 def _put(text: str) -> None:

@@ -40,12 +40,12 @@ def done_lines(state: WizardState, report: ChangeReport) -> list[str]:
     if any(one.receipt is not None for one in report.tools):
         if report.role != PersonRole.OPERATOR:
             back = tr(
-                'To take it back: robolink -c "{cell}" undo {id}',
+                'To undo it: robolink -c "{cell}" undo {id}',
                 cell=state.header.cell,
                 id=report.change[:8],
             )
             lines.append(back)
-        lines.append(tr("Run the first part slowly and look at it."))
+        lines.append(tr("Run the first part slowly and watch it."))
     for one in report.tools:
         if one.receipt is not None:
             steps = next_steps(one.proposal.result, one.proposal.tool)
@@ -62,9 +62,7 @@ def _tool_lines(report: ToolReport, needle: str) -> list[str]:
     if proof is None:
         said = tr("Tool {t} is measured and written, not tested.", t=proposal.tool)
     elif not tested:
-        said = tr(
-            "Tool {t} is measured and written; its turn test leaves a doubt.", t=proposal.tool
-        )
+        said = tr("Tool {t} is measured and written; its turn test left a doubt.", t=proposal.tool)
     elif needle:
         said = tr(
             "Needle {id} on tool {t} is measured, written and tested.", id=needle, t=proposal.tool

@@ -159,7 +159,7 @@ def moving_screen(state: WizardState, now_s: float) -> Screen:
         for left, right in zip_longest(drawn, beside, fillvalue="")
     ]
     legend = tr("# base   O elbow   @ flange and its U direction   * where it goes")
-    unknown = tr("Picture of the start: this controller tells no position while it moves.")
+    unknown = tr("Picture of the start: this controller reports no position while it moves.")
     return Screen(
         title_row(state, tr("On the way"), step_of_movement(state)),
         (" " + tr("From above"), *lines, "", " " + legend, *([] if follows else [" " + unknown])),
@@ -220,11 +220,11 @@ def _way(subject: MoveSubject, way_mm: float, turn_deg: float, *, left: bool) ->
     values = {"mm": f"{way_mm:.1f}", "n": math.ceil(way_mm / subject.speed_mm_s)}
     straight = subject.path is Path.STRAIGHT and turn_deg < _TURNS_DEG
     if not left:
-        whole = tr("Way:   {mm} mm in all, about {n} s", **values)
-        return whole if straight else tr("Way:   {mm} mm in all", mm=values["mm"])
+        whole = tr("Path:  {mm} mm in all, about {n} s", **values)
+        return whole if straight else tr("Path:  {mm} mm in all", mm=values["mm"])
     if straight:
-        return tr("Still: {mm} mm, about {n} s", **values)
-    return tr("Still: {mm} mm", mm=values["mm"])
+        return tr("To go: {mm} mm, about {n} s", **values)
+    return tr("To go: {mm} mm", mm=values["mm"])
 
 
 def _how_fast(subject: MoveSubject, *, low_power: bool) -> str:

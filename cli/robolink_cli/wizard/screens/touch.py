@@ -75,7 +75,7 @@ def instruction(state: WizardState) -> str:
     if asks and (touch.surface or (touch.proof and touch.arrival is None)):
         return said
     if touch.proof:
-        return tr("Jog the tip onto the pin again. We measure how far it was off.")
+        return tr("Jog the tip onto the pin again. robolink measures how far off it was.")
     return tr("Jog the tip onto the pin.") if asks else said
 
 
@@ -84,7 +84,7 @@ def _what(state: WizardState, touch: TouchSubject | None) -> list[str]:
     if touch is not None and touch.limit_mm is not None:
         limit = mm(touch.limit_mm)
         lines.append(
-            tr("Limit {mm} mm. If it is off by more, the old value comes back by itself.", mm=limit)
+            tr("Limit {mm} mm. If it is off by more, robolink writes the old value back.", mm=limit)
         )
     return lines
 
@@ -106,7 +106,7 @@ def _angles(touch: TouchSubject | None, most: int) -> list[str]:
 def angle_word(shown: AngleShown) -> str:
     """Return what one angle of the turn test says by itself."""
     if shown.within is None:
-        return tr("too near to the limit")
+        return tr("too near the limit")
     return tr("OK") if shown.within else tr("over the limit")
 
 
@@ -229,5 +229,5 @@ def _actions(state: WizardState) -> tuple[tuple[str, str], ...]:
     if touch.number < 2:
         return take, stop
     if not touch.retakes:
-        return take, ("/", tr("Begin at touch 1 again")), stop
+        return take, ("/", tr("Start again at touch 1")), stop
     return take, ("/", tr("Touch {k} again", k=touch.number - 1)), stop

@@ -95,14 +95,14 @@ def _at_points(impact: "Impact | None", proposal: Proposal) -> str:
     )
     if impact is None or impact.largest is None:
         return tr(
-            "Where a program goes with tool {t}, the tip will be {d} mm from where the old value "
-            "puts it: that is the error this write removes.",
+            "Programs using tool {t} will now run {d} mm differently. This corrects the "
+            "present error.",
             t=proposal.tool,
             d=mm(moved),
         )
     return tr(
-        "{n} taught points use tool {t}. There the tip will be up to {d} mm (P{p}) from where the "
-        "old value puts it: that is the error this write removes.",
+        "{n} taught points use tool {t}. Programs will run up to {d} mm differently there "
+        "(most at P{p}). This corrects the present error.",
         n=len(impact.entries),
         t=proposal.tool,
         d=mm(impact.largest.distance_mm),

@@ -35,7 +35,7 @@ class MethodGroup(LazyGroup):
 @click.group(
     cls=MethodGroup,
     lazy={},
-    help=declared("Measure where a tool's tip is, propose the offset, write it and prove it."),
+    help=declared("Measure where a tool's tip is, propose the offset, write it and test it."),
 )
 def calibrate() -> None:
     """Root of the methods."""

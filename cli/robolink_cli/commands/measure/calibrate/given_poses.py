@@ -93,8 +93,8 @@ class _PosesListener(CalibrationListener):
         note(
             tr(
                 "Warning: these poses fit tool {better} much better than tool {taught}.\n"
-                "  Taught with tool {better}, tool {tool} would have changed by {small:.3f} mm; "
-                "taught with tool {taught}, by {large:.3f} mm.\n"
+                "  If taught with tool {better}, tool {tool} has changed by {small:.3f} "
+                "mm; if with tool {taught}, by {large:.3f} mm.\n"
                 "  If tool {better} was selected on the pendant, write nothing and give "
                 "--taught-tool {better}.",
                 better=better.tool,
@@ -230,10 +230,10 @@ def _show_dry_run(payload: Mapping[str, object]) -> None:
 
     def show() -> None:
         if requests:
-            say(tr("Dry run; this would be sent:"))
+            say(tr("Dry run; robolink would send:"))
             say("\n".join(f"  {request}" for request in requests))
         else:
-            say(tr("Dry run; the value is stored already, nothing would be sent."))
+            say(tr("Dry run; the value is stored already. robolink would send nothing."))
 
     emit("dry-run", payload, show)
 
@@ -244,13 +244,13 @@ def _agree_to_write(tool: int, *, yes: bool) -> None:
     Nobody watched these poses being taken, so the command alone is not the consent.
     """
     question = tr(
-        "Nobody saw these touches, and the new value is not tested. Write it to tool {tool} "
-        "all the same? 'robolink undo' takes it back.",
+        "robolink did not see these touches, and the new value is not tested. Write it to "
+        "tool {tool} anyway? 'robolink undo' undoes it.",
         tool=tool,
     )
     if not yes and not on_terminal():
         raise DeclinedError(
-            tr("Tool {tool} would be written, but there is nobody to ask.", tool=tool),
+            tr("This writes tool {tool}, but there is nobody to confirm it.", tool=tool),
             remedy=tr("Nothing was written. Add --yes, or run it on a terminal."),
         )
     agree(question, yes=yes)
@@ -261,7 +261,7 @@ def _show_end(report: ToolReport) -> None:
     if report.receipt is not None and report.receipt.skipped:
         say(tr("Tool {tool} has this value already. Nothing was written.", tool=tool))
     else:
-        say(tr("Tool {tool} is written and read back.", tool=tool))
+        say(tr("Written. The controller has stored tool {tool}.", tool=tool))
     say(
         tr(
             "Not tested yet. To test: robolink calibrate two-pose --tool {tool}",

@@ -66,9 +66,7 @@ def sigma_option(function: Callable[..., Any]) -> Callable[..., Any]:
         "sigma_mm",
         type=LENGTH,
         metavar="MM",
-        help=declared(
-            "Standard deviation of one coordinate of one measurement, where it is known."
-        ),
+        help=declared("Standard deviation of one coordinate of one measurement, if known."),
     )(function)
     return command
 
@@ -133,9 +131,7 @@ def _of_the_place(method: AnyMethod) -> list[Decorator]:
             motion_option(
                 "--at",
                 metavar="X,Y,Z",
-                help=declared(
-                    "Where the station is, in the base; without it, its place on record."
-                ),
+                help=declared("Where the station is, in the base; default: its place on record."),
             )
         )
     if method.from_poses is not None and method.pose_help is not None:
@@ -151,7 +147,7 @@ def _of_the_place(method: AnyMethod) -> list[Decorator]:
 def _station_option(method: AnyMethod) -> Decorator:
     needs = method.needs
     known = _STATIONS[needs.station]
-    found = tr("Name of the pin; its place is kept, so that one touch will do later.")
+    found = tr("Name of the pin; its place is recorded, so that later one touch is enough.")
     return click.option(
         "--station",
         metavar="ID",
@@ -240,7 +236,7 @@ def _parameters(method: AnyMethod, given: Mapping[str, Any], check: Check) -> Me
         raise ConfigError(
             "\n".join(f"{line}." for line in lines),
             remedy=tr(
-                "Nothing was sent. 'robolink calibrate {name} --help' shows what can be given.",
+                "Nothing was sent. For the options: robolink calibrate {name} --help",
                 name=method.name,
             ),
         )

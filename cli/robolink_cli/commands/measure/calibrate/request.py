@@ -170,43 +170,46 @@ def request_from(
     box_mm: Annotated[
         float,
         NumberInside(min=1),
-        CliOption(cls=MotionOption, help="How far, sideways, the flange may go from where it is."),
+        CliOption(
+            cls=MotionOption, help="How far the flange may move sideways from its present place."
+        ),
     ] = 150.0,
     max_change_mm: Annotated[
         float,
         LENGTH,
         CliOption(
-            help="Largest change against the stored offset that is accepted; more than the cell "
-            "allows takes an engineer."
+            help="Largest accepted change of the stored offset; more than the cell allows "
+            "needs an engineer."
         ),
     ] = USUAL_CHANGE_MM,
     rms_mm: Annotated[
         float | None,
         LENGTH,
-        CliOption("--max-rms", help="Largest rms of the residuals that is accepted."),
+        CliOption("--max-rms", help="Largest accepted rms of the residuals."),
     ] = None,
     residual_mm: Annotated[
         float | None,
         LENGTH,
-        CliOption("--max-residual", help="Largest residual of one pose that is accepted."),
+        CliOption("--max-residual", help="Largest accepted residual of one pose."),
     ] = None,
     interval_mm: Annotated[
         float | None,
         LENGTH,
-        CliOption("--max-interval", help="Accurate to this or better (95 %), or it is refused."),
+        CliOption(
+            "--max-interval", help="Refuse results that are not accurate to this or better (95 %)."
+        ),
     ] = None,
     tolerance_mm: Annotated[
         float, LENGTH, CliOption(cls=MotionOption, help="Largest drift that passes the turn test.")
     ] = 0.2,
-    no_verify: Annotated[
-        bool, CliOption(cls=MotionOption, help="Leave the turn test out.")
-    ] = False,
+    no_verify: Annotated[bool, CliOption(cls=MotionOption, help="Skip the turn test.")] = False,
     assist: Annotated[
         str | None,
         CliOption(
             cls=MotionOption,
             metavar="URL",
-            help="A simulator's assist or sim URL: its operator brings the tip onto the pin.",
+            help="A simulator's assist or sim URL: its simulated operator jogs the tip "
+            "onto the pin.",
         ),
     ] = None,
     impact: ImpactPoints = None,
@@ -287,9 +290,9 @@ def _refuse_to_show_nothing(impact: ImpactRequest | None, report: ReportRequest 
     given = "--impact" if impact is not None else "--report" if report is not None else None
     if given is not None:
         raise ConfigError(
-            tr("A dry run measures nothing, so there is nothing to show or report."),
+            tr("A dry run measures nothing, so it has nothing to show or report."),
             remedy=tr(
-                "Leave {option} out, or use 'robolink tool impact' with an offset.", option=given
+                "Leave out {option}, or use 'robolink tool impact' with an offset.", option=given
             ),
         )
 
@@ -336,7 +339,7 @@ def remark_on_pin(frame: CalibrationRequest, controller: Controller) -> None:
     else:
         note(
             tr(
-                "Station {station} is not known yet: a full calibration there finds it.",
+                "Station {station} is not known yet: run a full calibration there to find it.",
                 station=frame.pin,
             )
         )

@@ -86,7 +86,7 @@ def load(path: Path) -> Node:
         cause = error.strerror or str(error)
         raise unusable(str(path), tr("it cannot be read ({error})", error=cause)) from error
     except (ValueError, RecursionError) as error:
-        raise unusable(str(path), tr("it is not JSON ({error})", error=error)) from error
+        raise unusable(str(path), tr("it is not a JSON file ({error})", error=error)) from error
     return Node(value, "")
 
 
@@ -242,8 +242,11 @@ def table_case(
     if other is not None:
         raise CalibrationError(
             "tool_pose",
-            tr("The poses were taken with tool {other}, not {tool}.", other=other, tool=0),
-            remedy=tr("Take them with the flange, Tool 0; offline nothing knows another tool."),
+            tr("The poses belong to tool {other}, not {tool}.", other=other, tool=0),
+            remedy=tr(
+                "Record them with the flange, Tool 0; offline, the values of other "
+                "tools are not known."
+            ),
         )
     given: dict[str, object] = {"poses": [_as_case(one) for one in entries], "as_taught": True}
     given |= {} if sigma_mm is None else {"sigma_mm": sigma_mm}

@@ -57,7 +57,7 @@ class Node:
 
     def __init__(self, value: object, path: str, frames: "KnownFrames | None" = None) -> None:
         if not isinstance(value, dict):
-            raise unusable(path, tr("an object is expected here"))
+            raise unusable(path, tr("expected: an object"))
         self.frames = frames or KnownFrames()
         self._value: dict[str, object] = value
         self._read: set[str] = set()
@@ -128,14 +128,14 @@ class Node:
         """Return a whole number."""
         value = self.number(name)
         if value != int(value):
-            raise unusable(self.at(name), tr("a whole number is expected here"))
+            raise unusable(self.at(name), tr("expected: a whole number"))
         return int(value)
 
     def flag(self, name: str) -> bool:
         """Return whether true stands under ``name``; null is false."""
         value = self.raw(name)
         if not isinstance(value, (bool, type(None))):
-            raise unusable(self.at(name), tr("true or false is expected here"))
+            raise unusable(self.at(name), tr("expected: true or false"))
         return bool(value)
 
     def child(self, name: str) -> "Node":
@@ -146,7 +146,7 @@ class Node:
         """Yield what stands in the list under ``name``, each with its path."""
         value = self.raw(name)
         if not isinstance(value, list):
-            raise unusable(self.at(name), tr("a list is expected here"))
+            raise unusable(self.at(name), tr("expected: a list"))
         for index, item in enumerate(value):
             yield item, f"{self.at(name)}[{index}]"
 
@@ -210,7 +210,7 @@ class Node:
         """
         unknown = sorted(set(self._value) - self._read)
         if unknown:
-            raise unusable(self.at(unknown[0]), tr("this name is not known here"))
+            raise unusable(self.at(unknown[0]), tr("unknown name"))
 
 
 @cache
@@ -273,7 +273,7 @@ def read_facts(node: Node) -> cal.AccuracyFacts:
         raise unusable(node.at("months"), tr("it is below 0"))
     by_contact = node.optional("by_contact", node.raw) or False
     if not isinstance(by_contact, bool):
-        raise unusable(node.at("by_contact"), tr("true or false is expected here"))
+        raise unusable(node.at("by_contact"), tr("expected: true or false"))
     node.finish()
     return cal.AccuracyFacts(rows=rows, months=months, by_contact=by_contact)
 
@@ -281,7 +281,7 @@ def read_facts(node: Node) -> cal.AccuracyFacts:
 def _positive(node: Node, name: str) -> float:
     value = node.number(name)
     if value <= 0:
-        raise unusable(node.at(name), tr("a number above 0 is expected here"))
+        raise unusable(node.at(name), tr("expected: a number above 0"))
     return value
 
 
@@ -296,7 +296,7 @@ def _by_number(node: Node) -> dict[int, ToolOffset]:
     found = {}
     for name in node:
         if not name.isdecimal():
-            raise unusable(node.at(name), tr("the number of a tool or local is expected here"))
+            raise unusable(node.at(name), tr("expected: the number of a tool or local"))
         found[int(name)] = read_offset(node.child(name))
     return found
 
@@ -349,10 +349,10 @@ def _camera(node: Node) -> cal.CameraModel:
     matrix, origin = node.numbers("mm_per_px_matrix"), node.numbers("camera_origin")
     node.finish()
     if len(matrix) != 4 or len(origin) != 2:
-        raise unusable(node.path, tr("the matrix has four numbers, the origin two"))
+        raise unusable(node.path, tr("expected: four numbers for the matrix, two for the origin"))
     a, b, c, d = matrix
     if a * d == b * c:
-        raise unusable(node.at("mm_per_px_matrix"), tr("the matrix of a camera has an inverse"))
+        raise unusable(node.at("mm_per_px_matrix"), tr("the camera matrix has no inverse"))
     return cal.CameraModel(((a, b), (c, d)), (origin[0], origin[1]))
 
 
@@ -360,14 +360,14 @@ def _plane(node: Node) -> cal.TouchedPlane:
     normal, distance = node.numbers("normal"), node.number("distance_mm")
     node.finish()
     if len(normal) != 3 or not any(normal):
-        raise unusable(node.at("normal"), tr("three numbers are expected here, not all of them 0"))
+        raise unusable(node.at("normal"), tr("expected: three numbers, not all 0"))
     return cal.TouchedPlane((normal[0], normal[1], normal[2]), distance)
 
 
 def _crossing(node: Node) -> cal.Crossing:
     beam = node.whole("beam")
     if beam not in (1, 2):
-        raise unusable(node.at("beam"), tr("the beams are numbered 1 and 2"))
+        raise unusable(node.at("beam"), tr("expected: beams numbered 1 and 2"))
     return node.made(cal.Crossing, "entry exit", beam=beam - 1)
 
 

@@ -18,7 +18,7 @@ from robolink_cli.options.shared import json_option
 @click.option(
     "--method",
     type=click.Choice(["two_pose", "n_angle", "n_angle_robust", "pivot", "pivot_robust"]),
-    help="FILE holds poses only, of any kind that 'robolink expert poses show' reads.",
+    help="FILE holds only poses, in any format that 'robolink expert poses show' reads.",
 )
 @reading_options
 @click.option(
@@ -33,12 +33,12 @@ from robolink_cli.options.shared import json_option
     "threshold_mm",
     type=DECIMAL,
     metavar="MM",
-    help="Residual that a robust method rejects, mm.",
+    help="Residual above which a robust method rejects a pose, mm.",
 )
 @click.option(
     "--accept-residuals",
     is_flag=True,
-    help="Large residuals are no reason for the exit code 7.",
+    help="Do not end with exit code 7 because of large residuals.",
 )
 @json_option
 def solve(
@@ -51,9 +51,9 @@ def solve(
 ) -> int:
     """Calculate a tool offset from measurements in FILE, offline.
 
-    FILE is JSON: one case with method, units and input, or many under "vectors"; lengths are mm,
-    angles degrees. Or, with --method, it is any file of poses. The exit code is 7 when a case
-    gives no trustworthy result, or one whose residuals are beyond tolerance.
+    FILE is JSON: one case with method, units and input, or many under "vectors"; lengths in mm,
+    angles in degrees. With --method it is any file of poses. Exit code 7 when a case gives no
+    reliable result, or one with residuals beyond tolerance.
     """
     from robolink_cli.commands.measure.solve.answer import (
         exit_code,

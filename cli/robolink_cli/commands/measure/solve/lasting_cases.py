@@ -16,7 +16,7 @@ def length_change(node: Node) -> Payload:
     """Heights of the touches of two runs on one pin."""
     moved = node.optional("pin_moved", node.raw)
     if moved not in (None, True, False):
-        raise unusable(node.at("pin_moved"), tr("true or false is expected here"))
+        raise unusable(node.at("pin_moved"), tr("expected: true or false"))
     found = node.call(
         cal.length_change, "before_z after_z stored_z v w sigma_z_mm", pin_moved=bool(moved)
     )
@@ -31,8 +31,8 @@ def length_change(node: Node) -> Payload:
     if undecided:
         payload |= {
             "what": tr(
-                "The tip is {longer:+.3f} mm longer (+-{half}), and nobody decided what is "
-                "written.",
+                "The tip is {longer:+.3f} mm longer (+-{half}), and the case does not say "
+                "what to write.",
                 longer=found.longer_mm,
                 half=cal.stated_mm(found.half95_mm),
             ),
@@ -45,7 +45,7 @@ def station_shift(node: Node) -> Payload:
     """By how much a station seems to have moved, tool by tool."""
     shifts = [_shift(child) for child in node.children("shifts")]
     if not shifts:
-        raise unusable(node.at("shifts"), tr("at least one shift is needed"))
+        raise unusable(node.at("shifts"), tr("expected: at least one shift"))
     found = node.call(cal.judge_shifts, "seat_changes", shifts=shifts)
     assert found is not None  # noqa: S101 - there are shifts
     tolerance_mm = node.optional("tolerance_mm", node.number)
@@ -71,7 +71,7 @@ def needle_chain(node: Node) -> Payload:
     """Needle changes one after the other since a full calibration."""
     changes = node.whole("changes")
     if changes < 0:
-        raise unusable(node.at("changes"), tr("0 or more is expected"))
+        raise unusable(node.at("changes"), tr("expected: 0 or more"))
     # Whatever is no shared touch is two touches a change, which is the larger.
     shared = node.text("reference") == _SHARED
     u_mm = cal.chain_sigma_mm(
@@ -146,9 +146,9 @@ def _shift(node: Node) -> cal.TipShift:
     shift = node.made(cal.TipShift, "tool vector seat_sigma_mm touch_sigma_mm")
     seat, vector = shift.seat_sigma_mm, shift.vector_mm
     if len(vector) not in (1, 2, 3):
-        raise unusable(node.at("vector"), tr("one, two or three numbers are expected"))
+        raise unusable(node.at("vector"), tr("expected: one, two or three numbers"))
     if seat and len(seat) < len(vector):
-        raise unusable(node.at("seat_sigma_mm"), tr("one number for each axis is expected"))
+        raise unusable(node.at("seat_sigma_mm"), tr("expected: one number for each axis"))
     cal.require_positive(shift.touch_sigma_mm, "touch_sigma_mm")
     return shift
 
@@ -164,7 +164,7 @@ def _axes(node: Node, name: str) -> tuple[str, ...]:
     if not isinstance(value, list) or sorted(map(str, value)) != sorted(_AXES):
         raise unusable(
             node.at(name),
-            tr("these three are expected, in any order: {words}", words=", ".join(_AXES)),
+            tr("expected: these three, in any order: {words}", words=", ".join(_AXES)),
         )
     return tuple(map(str, value))
 
@@ -197,5 +197,5 @@ def _table(node: Node, axes: tuple[str, ...]) -> list[list[list[float]]]:
 
 def _list(value: object, path: str) -> list[object]:
     if not isinstance(value, list):
-        raise unusable(path, tr("a list is expected here"))
+        raise unusable(path, tr("expected: a list"))
     return value

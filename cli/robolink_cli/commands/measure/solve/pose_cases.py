@@ -57,7 +57,7 @@ def two_pose(node: Node) -> Payload:
     """Two flange poses on one point."""
     given = _given(node, turning=True)
     if len(given.poses) > 2:
-        raise unusable(node.at("poses"), tr("two poses are needed; n_angle takes more"))
+        raise unusable(node.at("poses"), tr("expected: two poses; n_angle takes more"))
     if len(given.poses) < 2:
         return result_payload(given.solved(cal.solve_n_angle))
     return result_payload(
@@ -150,9 +150,9 @@ def uncertainty_budget(node: Node) -> Payload:
             rows.append(row)
     probability = node.number_or("probability", 0.95)
     if not rows:
-        raise unusable(node.at("rows"), tr("at least one row with a value is needed"))
+        raise unusable(node.at("rows"), tr("expected: at least one row with a value"))
     if not 0 < probability < 1:
-        raise unusable(node.at("probability"), tr("a number between 0 and 1 is expected here"))
+        raise unusable(node.at("probability"), tr("expected: a number between 0 and 1"))
     budget = cal.UncertaintyBudget.of(rows, not_assessed=unknown, probability=probability)
     found = budget.as_json()
     return {
@@ -169,7 +169,7 @@ def uncertainty_budget(node: Node) -> Payload:
 def _robust(node: Node, solver: Callable[..., CalibrationResult], *, turning: bool) -> Payload:
     threshold = node.optional("inlier_threshold", node.number)
     if threshold is not None and threshold <= 0:
-        raise unusable(node.at("inlier_threshold"), tr("a positive number is expected here"))
+        raise unusable(node.at("inlier_threshold"), tr("expected: a positive number"))
     usual = cal.Robust(threshold)
     seeds = node.optional("seeds", lambda name: tuple(map(_seed, node.numbers(name))))
     one = node.optional("seed", node.whole)
@@ -242,7 +242,9 @@ def _row(node: Node) -> "cal.BudgetRow | None":
         return None
     dof = math.inf if nu is None else node.number("dof")
     if value < 0 or dof <= 0:
-        raise unusable(node.path, tr("an uncertainty and its degrees of freedom are positive"))
+        raise unusable(
+            node.path, tr("expected: a positive uncertainty and positive degrees of freedom")
+        )
     return cal.BudgetRow(name, value, dof, sensitivity, origin, "A" if kind == "A" else "B")
 
 

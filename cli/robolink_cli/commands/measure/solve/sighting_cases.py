@@ -42,7 +42,7 @@ def board(node: Node) -> Payload:
     """A held board, from two fiducials."""
     seen = node.each("fiducials", cal.Sighting)
     if len(seen) != 2:
-        raise unusable(node.at("fiducials"), tr("two fiducials are needed; board_fit takes more"))
+        raise unusable(node.at("fiducials"), tr("expected: two fiducials; board_fit takes more"))
     given = {"first": seen[0], "second": seen[1], "allow_mixed_hand": True, **_known_tip(node)}
     return result_payload(node.call(cal.solve_board, "spacing_mm sigma_mm", **given))
 
@@ -66,7 +66,7 @@ def crossed_beams(node: Node) -> Payload:
 
     beams = node.each("beams", cal.Beam)
     if len(beams) != 2:
-        raise unusable(node.at("beams"), tr("two beams are needed"))
+        raise unusable(node.at("beams"), tr("expected: two beams"))
     given = {"beams": beams, **_known_tip(node)}
     given["beams_may_have_moved"] = bool(node.optional("beams_may_have_moved", node.raw))
     result = node.call(cal.solve_crossed_beams, "crossings sigma_mm shaft step_mm", **given)

@@ -83,7 +83,7 @@ def verify_evidence(node: Node) -> Payload:
     tolerance, u = node.number("tolerance_mm"), node.number_or("u_drift_mm", cal.PERSON_U_DRIFT_MM)
     resolution = node.number_or("resolution_mm", 0.001)
     if tolerance <= 0 or u < 0:
-        raise unusable(node.path, tr("the tolerance is above 0, and u_drift_mm not below"))
+        raise unusable(node.path, tr("expected: a tolerance above 0, and u_drift_mm 0 or more"))
     drifts, made = [], []
     for child in node.children("touches"):
         place, found = read_pose(child.child("place")), read_pose(child.child("found"))
@@ -115,7 +115,7 @@ def _nothing_touched() -> CalibrationError:
     return CalibrationError(
         "too_few_poses",
         tr("No touch was given."),
-        remedy=tr("Touch the pin at one angle at least, better at two."),
+        remedy=tr("Touch the pin at one or more angles, better at two."),
     )
 
 
@@ -129,18 +129,18 @@ def _verdict(codes: tuple[str, ...], *, refuses: bool) -> Payload:
         "status": "error",
         "codes": list(codes),
         "what": " ".join(spoken(_GROUNDS[code]) for code in codes),
-        "remedy": tr("Touch the pin again, each time until the tip is on it."),
+        "remedy": tr("Touch the pin again. Each time, jog until the tip is on it."),
     }
 
 
 _GROUNDS: Final = {
-    "not_touched": declared("A touch was not made: the robot is where it stopped."),
-    "typed_ahead": declared("An answer came before its question could be read."),
+    "not_touched": declared("A touch was not made: the robot is still where it stopped."),
+    "typed_ahead": declared("An answer came before anybody could read its question."),
     "touch_heights_differ": declared(
         "Heights differ on one pin: at least one touch was in the air."
     ),
     "touch_not_proven": declared("The standoffs before the touches were not undone."),
     "large_residual": declared("One touch does not fit the others."),
     "large_drift": declared("The tip is too far off when the tool turns."),
-    "drift_undecided": declared("The drift is too near to the tolerance to decide."),
+    "drift_undecided": declared("The drift is too near the tolerance to decide."),
 }

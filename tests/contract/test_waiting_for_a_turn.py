@@ -358,3 +358,24 @@ def test_connecting_does_not_wait_for_ever():
         with runtime.replaced(time), pytest.raises(RobolinkError, match="does not answer"):
             robolink.connect(url, timeout_s=0.1, wait_s=2)
     assert time.slept_s == pytest.approx(2.0)
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("kind", ["epson", "softmotion"])
+def test_what_many_connections_add_up_one_after_another_is_all_there(kind, threads):
+    url = f"{kind}+sim://{new_operation()}"
+    with robolink.connect(url) as controller:
+        controller.tools.write(4, ToolOffset(), expected=ANY)
+
+    def add() -> None:
+        for _ in range(4):
+            with robolink.connect(url, timeout_s=1, wait_s=PATIENCE_S) as controller:
+                with controller.procedure("add 1 mm"):
+                    old = controller.tools.read(4)
+                    assert old is not None
+                    controller.tools.write(4, replace(old, x_mm=old.x_mm + 1), expected=old)
+
+    for end in [threads.submit(add) for _ in range(4)]:
+        end.result(PATIENCE_S)
+    with robolink.connect(url) as controller:
+        assert controller.tools.read(4) == ToolOffset(16.0)

@@ -169,7 +169,8 @@ def holders_of(keys: Set[str]) -> Iterator[ControllerHolder]:
     """Yield the processes on this computer that hold a controller, the latest first.
 
     Args:
-        keys: Its far end (:func:`~robolink.transport.far_end_of`), and its own name where known.
+        keys: Its far end (:func:`~robolink.transport.far_end_of`), and its own name where that is
+            known.
 
     What a process that is gone has left is taken away.
     """

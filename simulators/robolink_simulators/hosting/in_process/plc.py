@@ -36,9 +36,7 @@ def open_plc(
     """
     require_known(link_url.options, (), kind="PLC")
     simulator = _named.simulator(link_url.host)
-    transport = InProcessTransport(
-        link_url, simulator, _named.clock(link_url.host), simulator.lock
-    )
+    transport = InProcessTransport(link_url, simulator, _named.clock(link_url.host), simulator.lock)
     identity = link_url.identity
     return ModbusClient(
         transport,

@@ -11,7 +11,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import count
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any, ClassVar, Final, Literal, TypeVar, get_args
@@ -21,10 +20,9 @@ from robolink_cli import main
 from robolink_simulators.cell.clock import ManualClock, ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.hosting.in_process import epson
-from robolink_simulators.hosting.streams.epson import serve_serial, serve_tcp
 from robolink_simulators.plc import PlcSimulator
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+from robolink_simulators.testkit.media import served
 
 import robolink
 from robolink.journal import Journal, memory_journal, open_journal
@@ -38,7 +36,6 @@ Moment = Literal["before it is carried out", "before its answer leaves"]
 MOMENTS: Final[tuple[Moment, Moment]] = get_args(Moment)
 EpsonWire = Literal["sim", "tcp", "serial"]
 
-_names = count()
 _WRITE = re.compile(r'\$Execute,"TL(?:Set (\d+), XY|Clr (\d+))')
 
 
@@ -286,9 +283,13 @@ def change_cell(
     for tool, offset in OLD.items():
         simulator.machine.tools.set(tool, offset)
     simulator.machine.tools.flash_writes = 0
-    with _epson_at(wire, simulator) as url, kept(EpsonChangeCell(simulator, url, folder)) as cell:
-        if wire == "sim":
-            cell.skip = epson.clock_of(url.partition("://")[2]).sleep
+    clock = ManualClock() if wire == "sim" else ScaledClock(200.0)
+    with (
+        served(simulator, wire, clock=clock) as url,
+        kept(EpsonChangeCell(simulator, url, folder)) as cell,
+    ):
+        if isinstance(clock, ManualClock):
+            cell.skip = clock.sleep
         yield cell
 
 
@@ -300,17 +301,3 @@ def kept(cell: Cell) -> Iterator[Cell]:
         yield cell
     finally:
         cell.journal.close()
-
-
-@contextmanager
-def _epson_at(wire: EpsonWire, simulator: EpsonSimulator) -> Iterator[str]:
-    if wire == "sim":
-        name = f"changes-{next(_names)}"
-        try:
-            yield epson.register(name, simulator)
-        finally:
-            epson.unregister(name)
-        return
-    serve = serve_serial if wire == "serial" else serve_tcp
-    with serve(simulator, clock=ScaledClock(200.0)) as host:
-        yield host.url

@@ -290,6 +290,31 @@ def make_plc(
     return _furnished(own, simulator, time, {medium: url}, request, person=False)
 
 
+def serve_made(
+    own: OwnFolder,
+    simulator: Any,  # noqa: ANN401 - of any kind
+    medium: str,
+    clock: Any,  # noqa: ANN401 - stepped or steered
+    map_file: Path | None,
+) -> SimulatedCell:
+    """Serve a simulator that the test has made; see :func:`~.media.served`.
+
+    Args:
+        own: Where.
+        simulator: Of any kind.
+        medium: How it is reached.
+        clock: Its time; that of a cell by default.
+        map_file: The file of the map of a PLC that has one.
+
+    Raises:
+        ConfigError: There is no such medium.
+    """
+    time = clock or _time(CellRequest(), medium, None)
+    url = own.stack.enter_context(served(simulator, medium, clock=time, map_file=map_file))
+    own.stack.callback(_forget_record, url)
+    return own.keep(simulator, time, {medium: url})
+
+
 def _furnished(
     own: OwnFolder,
     simulator: Any,  # noqa: ANN401 - of any kind

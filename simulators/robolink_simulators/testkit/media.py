@@ -57,7 +57,7 @@ def served(
             tr("A simulator cannot be served over {medium!r}.", medium=medium),
             remedy=tr("These are known: {known}.", known=", ".join(known)),
         )
-    given = {} if map_file is None else {"map_file": map_file}
+    given: dict[str, Any] = {} if map_file is None else {"map_file": map_file}
     if medium == "sim":
         module: Any = _in_process(simulator.kind)
         name = free_name()
@@ -84,16 +84,16 @@ def _in_process(kind: str) -> Any:  # noqa: ANN401 - a module
         from robolink_simulators.hosting.in_process import softmotion
 
         return softmotion
-    from robolink_simulators.hosting.in_process import plc
+    from robolink_simulators.plc import in_process
 
-    return plc
+    return in_process
 
 
 def _host(
     simulator: Any,  # noqa: ANN401 - of any kind
     medium: str,
     clock: Any,  # noqa: ANN401 - scaled
-    given: dict[str, Path],
+    given: dict[str, Any],
 ) -> Any:  # noqa: ANN401 - of any kind
     if simulator.kind == "epson":
         from robolink_simulators.hosting.streams.epson import serve_serial, serve_tcp

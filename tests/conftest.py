@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from tests import _warm_process
 from tests._canary import Watch, install
 from tests._documents import DOCUMENTS
 from tests._processes import pytest_addoption, pytest_runtestloop  # noqa: F401 - hooks
@@ -49,6 +50,12 @@ def pytest_sessionstart():
     hear_signals()
     install(CANARIES)
     DOCUMENTS.install()
+    _warm_process.install()
+
+
+def pytest_sessionfinish():
+    """End what this process started for its tests."""
+    _warm_process.end()
 
 
 def hear_signals():

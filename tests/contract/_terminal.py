@@ -11,12 +11,6 @@ import time
 LONGEST_S = 20.0
 
 
-OWN_THE_WINDOW = (
-    "import fcntl, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); "
-    "from robolink_cli.main import main; main()"
-)
-
-
 class Terminal:
     """The far end of a pseudo terminal on which a command runs.
 
@@ -30,9 +24,9 @@ class Terminal:
         self.before = termios.tcgetattr(near)
         paths = os.pathsep.join(path for path in sys.path if path)
         environment = {**os.environ, "PYTHONPATH": paths, "COLUMNS": "200", "TERM": "dumb"}
-        how = ("-c", OWN_THE_WINDOW) if controlling else ("-m", "robolink_cli")
+        program = "tests.contract._own_window" if controlling else "robolink_cli"
         self.command = subprocess.Popen(
-            [sys.executable, *how, *words],
+            [sys.executable, "-m", program, *words],
             stdin=near,
             stdout=near,
             stderr=near,

@@ -4,6 +4,7 @@ import doctest
 import enum
 import importlib
 import inspect
+import linecache
 import re
 import shlex
 from collections.abc import Iterator
@@ -129,6 +130,8 @@ def test_every_example_of_a_docstring_runs(tmp_path, monkeypatch):
     finder = doctest.DocTestFinder(exclude_empty=True)
     runner = doctest.DocTestRunner(verbose=False)
     shown: list[str] = []
+    # Else each docstring has every file looked at that was ever read for a traceback.
+    monkeypatch.setattr(linecache, "checkcache", lambda *_: None)
     for module in modules():
         for number, test in enumerate(finder.find(importlib.import_module(module), globs={})):
             folder = tmp_path / f"{module}-{number}"

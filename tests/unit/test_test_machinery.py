@@ -43,6 +43,37 @@ def test_what_is_started_hears_signals_that_this_process_was_started_without():
             signal.signal(number, handler)
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_a_command_that_is_started_is_a_child_of_this_process_with_all_imported(tmp_path):
+    command = [sys.executable, "-m", "robolink_cli"]
+    with subprocess.Popen(
+        [*command, "sim", "epson", "--tcp", "127.0.0.1:0", "--json"],
+        stdout=subprocess.PIPE,
+        cwd=tmp_path,
+        start_new_session=True,
+    ) as started:
+        assert started.stdout is not None
+        assert b"epson+tcp" in started.stdout.readline()
+        process = Path(f"/proc/{started.pid}")
+        assert b"tests._warm_process" in (process / "cmdline").read_bytes()
+        assert f"\nPPid:\t{os.getpid()}\n" in (process / "status").read_text()
+        assert (process / "cwd").readlink() == tmp_path
+        assert os.getsid(started.pid) == started.pid
+        started.terminate()
+    assert started.returncode == 0
+    refused = subprocess.run([*command, "no-such-word"], capture_output=True, check=False)
+    assert refused.returncode == 2
+    assert b"no-such-word" in refused.stderr
+    told = subprocess.run(
+        [*command, "expert", "docs", "--help"],
+        env=os.environ | {"COLUMNS": "50"},
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    assert max(map(len, told.splitlines())) <= 50
+
+
 SHARED = {
     "test_a.py": "def test_well(tmp_path): pass\ndef test_wrong(): assert not 1",
     "test_b.py": "import os\ndef test_ends_its_process(): os._exit(0)",

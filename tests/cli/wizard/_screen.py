@@ -39,13 +39,7 @@ class ScreenHand(HandAtScreen):
         for name in ("COLUMNS", "LINES", "ROBOLINK_PLAIN"):
             environment.pop(name, None)
         self.command = subprocess.Popen(
-            [
-                sys.executable,
-                "-c",
-                "import fcntl, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); "
-                "from robolink_cli.main import main; main()",
-                *words,
-            ],
+            [sys.executable, "-m", "tests.contract._own_window", *words],
             stdin=near,
             stdout=near,
             stderr=near,

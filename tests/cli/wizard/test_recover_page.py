@@ -70,10 +70,9 @@ def killed_in_its_proof(simulator, words):
 
     with simulator.lock:
         simulator.on_request = hold
-    code = "from robolink_cli.main import main; main()"
     paths = {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     process = subprocess.Popen(
-        [sys.executable, "-c", code, *words],
+        [sys.executable, "-m", "robolink_cli", *words],
         env=os.environ | paths,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,

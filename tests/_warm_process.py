@@ -1,0 +1,225 @@
+"""Starts ``python -m robolink_cli`` by a fork of a process that has imported it already.
+
+Two of three seconds of a command that a test starts went into imports. What is started here is a
+process all the same: a child of the test's process, with a number, descriptors, signals, session
+and environment of its own; it ends as any Python does. Only how Python begins is not shown, so
+that is asked with ``-c``. Where the interpreter would begin otherwise (other ``PYTHON`` variables
+or locale), for more than descriptors 0 to 2, and on other systems than Linux, a new Python starts.
+"""
+
+import atexit
+import ctypes
+import gc
+import io
+import json
+import os
+import pkgutil
+import runpy
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+import traceback
+from contextlib import suppress
+from importlib import import_module
+from typing import Any, Final, NoReturn
+
+_BECOME_PARENT_OF_ORPHANS: Final = 36  # PR_SET_CHILD_SUBREAPER
+_LONGEST: Final = 1 << 20
+_PROGRAMS: Final = ("robolink_cli", "tests.contract._own_window")
+_started: dict[int, "_WarmProcess"] = {}
+
+
+def install() -> None:
+    """Let every command that this process starts from here on be forked, where that can be."""
+    if sys.platform != "linux":
+        return
+    usual: Any = subprocess.Popen._execute_child  # type: ignore[attr-defined]
+
+    def execute(popen: Any, *given: Any) -> None:
+        args, executable, before, closes, kept, cwd, env, _, _, shell = given[:10]
+        pipes, (*_, umask, new_session, group) = given[10:16], given[16:]
+        environment = dict(os.environ if env is None else env)
+        words = [] if isinstance(args, str | bytes | os.PathLike) else list(map(os.fspath, args))
+        if (
+            words[:2] != [sys.executable, "-m"]
+            or words[2] not in _PROGRAMS
+            or (executable, before, closes, kept, shell) != (None, None, True, (), False)
+            or (umask, group) != (-1, -1)
+            or (warm := _warm(environment)) is None
+        ):
+            usual(popen, *given)
+            return
+        ends = [own if end == -1 else end for own, end in enumerate((pipes[0], *pipes[3::2]))]
+        where = os.getcwd() if cwd is None else os.fspath(cwd)
+        popen.pid = warm.fork(words[2:], where, environment, new_session, ends)
+        popen._child_created = True
+        popen._close_pipe_fds(*pipes)
+
+    subprocess.Popen._execute_child = execute  # type: ignore[attr-defined]
+
+
+def end() -> None:
+    """End what this process forks from, so that what it cost is counted."""
+    if (warm := _started.pop(os.getpid(), None)) is not None:
+        warm.end()
+
+
+def _warm(environment: dict[str, str]) -> "_WarmProcess | None":
+    """Return what begins with such an environment as a Python would."""
+    warm = _started.get(os.getpid())
+    if warm is None:
+        warm = _started[os.getpid()] = _WarmProcess()
+    return warm if warm.begins_as(environment) else None
+
+
+class _WarmProcess:
+    """A process that has imported the command, waits, and is forked."""
+
+    def __init__(self) -> None:
+        self._own, far = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        path = os.pathsep.join(path for path in sys.path if path)
+        environment = {**os.environ, "PYTHONPATH": path}
+        self._begun = _of_the_beginning(environment)
+        self._path = {"", os.getcwd(), *sys.path}
+        with far:
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", __name__, str(far.fileno())],
+                env=environment,
+                pass_fds=[far.fileno()],
+                stdin=subprocess.DEVNULL,
+            )
+
+    def begins_as(self, environment: dict[str, str]) -> bool:
+        """Whether a new Python with this environment would begin as this one did."""
+        path = environment.get("PYTHONPATH", "").split(os.pathsep)
+        return _of_the_beginning(environment) == self._begun and self._path.issuperset(path)
+
+    def fork(
+        self, words: list[str], cwd: str, env: dict[str, str], new_session: bool, ends: list[int]
+    ) -> int:
+        """Start a command; return the number of its process, a child of this one."""
+        asked = json.dumps([os.getpid(), words, cwd, env, new_session]).encode()
+        assert len(asked) < _LONGEST
+        _take_orphans(True)
+        try:
+            socket.send_fds(self._own, [asked], ends)
+            return int(self._own.recv(64))
+        finally:
+            _take_orphans(False)
+
+    def end(self) -> None:
+        self._own.shutdown(socket.SHUT_RDWR)  # whatever else holds it
+        self._own.close()
+        self._process.wait()
+
+
+def _of_the_beginning(environment: dict[str, str]) -> dict[str, str]:
+    """Return what of an environment a Python heeds when it begins."""
+    return {
+        name: value
+        for name, value in environment.items()
+        if name.startswith(("PYTHON", "LC_", "LANG")) and name != "PYTHONPATH"
+    }
+
+
+def _take_orphans(yes: bool) -> None:
+    ctypes.CDLL(None).prctl(_BECOME_PARENT_OF_ORPHANS, int(yes), 0, 0, 0)
+
+
+def _serve(requests: socket.socket) -> None:
+    """Fork a command for each request, until nobody is left to ask."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the commands
+    _import_all()
+    gc.collect()
+    gc.freeze()
+    while True:
+        asked, ends, _, _ = socket.recv_fds(requests, _LONGEST, 3)
+        if not asked:
+            return
+        reading, writing = os.pipe()
+        if between := os.fork():
+            os.close(writing)
+            number = os.read(reading, 64)
+            os.waitpid(between, 0)  # from here on its child is one of the test's process
+            requests.send(number)
+            for descriptor in (*ends, reading):
+                os.close(descriptor)
+        elif child := os.fork():
+            os.write(writing, str(child).encode())
+            os._exit(0)
+        else:
+            for descriptor in (reading, writing, requests.detach()):
+                os.close(descriptor)
+            _become(json.loads(asked), ends)
+
+
+def _import_all() -> None:
+    for name in ("robolink_cli", "robolink_simulators.epson", "robolink_simulators.softmotion"):
+        package = import_module(name)
+        for module in pkgutil.walk_packages(package.__path__, f"{name}."):
+            if not module.name.endswith("__main__"):
+                with suppress(ImportError):  # of another system
+                    import_module(module.name)
+    from robolink_simulators.epson.spel.parser import parse
+
+    parse("Motor On")  # its grammar is read once
+
+
+def _become(asked: tuple[int, list[str], str, dict[str, str], bool], ends: list[int]) -> NoReturn:
+    """Be a Python that was just started with a command line."""
+    parent, words, cwd, env, new_session = asked
+    while os.getppid() != parent:
+        time.sleep(0.0002)
+    for own, descriptor in enumerate(ends):
+        os.dup2(descriptor, own)
+        os.close(descriptor)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    if new_session:
+        os.setsid()
+    os.chdir(cwd)
+    os.environ.clear()
+    os.environ.update(env)
+    for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
+        opened = _opened(getattr(sys, name), descriptor)
+        setattr(sys, name, opened)
+        setattr(sys, f"__{name}__", opened)
+    program, *sys.argv[1:] = words
+    code: Any = 1
+    try:
+        runpy.run_module(program, run_name="__main__", alter_sys=True)
+    except SystemExit as end:
+        code = end.code
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        threading._shutdown()  # type: ignore[attr-defined]
+        atexit._run_exitfuncs()
+        for stream in (sys.stdout, sys.stderr):
+            with suppress(OSError, ValueError):
+                stream.flush()
+        os._exit(code if isinstance(code, int) else int(code is not None))
+
+
+def _opened(before: Any, descriptor: int) -> io.TextIOWrapper:
+    """Open a stream as Python does when it begins."""
+    binary: Any = open(  # noqa: SIM115 - as long as the process runs
+        descriptor,
+        "wb" if descriptor else "rb",
+        buffering=0 if descriptor and os.environ.get("PYTHONUNBUFFERED") else -1,
+        closefd=False,
+    )
+    return io.TextIOWrapper(
+        binary,
+        encoding=before.encoding,
+        errors=before.errors,
+        newline="\n" if descriptor else None,
+        line_buffering=descriptor == 2 or os.isatty(descriptor),
+        write_through=bool(os.environ.get("PYTHONUNBUFFERED")),
+    )
+
+
+if __name__ == "__main__":
+    _serve(socket.socket(fileno=int(sys.argv[1])))

@@ -89,3 +89,12 @@ def serve(request):
 def options():
     """The class of habits, for tests that vary them."""
     return EpsonOptions
+
+
+@pytest.fixture
+def arm(tmp_path, monkeypatch):
+    """An EPSON cell whose methods are run from commands: for what is the same for all kinds."""
+    from tests.contract._method_cell import method_cell
+
+    with method_cell("epson", tmp_path, monkeypatch) as cell:
+        yield cell

@@ -1,13 +1,9 @@
 """``calibrate pivot`` live, on a PLC whose flange leaves the vertical; and what cannot tilt."""
 
-import contextlib
-import io
-import json
 from dataclasses import replace
 from functools import partial
 
 import pytest
-from robolink_cli import main
 from robolink_cli.prompts.operator import AssistedOperator
 from robolink_simulators.control.assist import InProcessEyes
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
@@ -26,6 +22,7 @@ from robolink.methods import PivotSource, informative_tilts
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import TouchPlan
 from robolink.runner import Ask
+from tests._commands import run_command
 from tests.contract._method_cell import method_cell
 from tests.contract._softmotion_cell import served
 
@@ -50,10 +47,8 @@ def plc(serve_simulator, monkeypatch):
 
 def run(url, *words):
     """Run a command; return its exit code, its document and what it said."""
-    out, err = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        code = main.run(["-c", url, *words, "--json"])
-    return code, json.loads(out.getvalue()), err.getvalue()
+    ended = run_command("-c", url, *words, "--json")
+    return ended.code, ended.document, ended.err
 
 
 def slot(simulator, number=1):

@@ -1,19 +1,16 @@
 """``plane-touch`` and ``sphere-touch`` live, on a PLC whose flange leaves the vertical."""
 
-import contextlib
-import io
-import json
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import pytest
-from robolink_cli import main
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.calibration_run import Limits
+from tests._commands import run_command
 from tests.calibration._surface_person import Ball, Plate, touches_of, touches_of_ball
 
 pytestmark = pytest.mark.simulator_only
@@ -39,10 +36,8 @@ def plc(serve_simulator, monkeypatch):
 
 def run(simulator, *words):
     """Run a command; return its exit code, its document and what it said."""
-    out, err = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        code = main.run(["-c", simulator.url, *words, "--json"])
-    return code, json.loads(out.getvalue()), err.getvalue()
+    ended = run_command("-c", simulator.url, *words, "--json")
+    return ended.code, ended.document, ended.err
 
 
 def calibrate(simulator, method, *more):

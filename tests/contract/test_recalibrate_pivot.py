@@ -1,17 +1,14 @@
 """``recalibrate`` with tilted touches, on a PLC whose flange leaves the vertical."""
 
-import contextlib
-import io
-import json
 import sys
 from pathlib import Path
 
 import pytest
-from robolink_cli import main
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.journal import memory_journal
 from robolink.model import EntryKind
+from tests._commands import run_command
 
 pytestmark = pytest.mark.simulator_only
 
@@ -34,10 +31,8 @@ def machine(serve_simulator):
 def recalibrate(simulator, path, *more):
     """Run a recipe with the simulated person; return exit code, document and messages."""
     words = ("recalibrate", str(path), "--assist", simulator.url, "--yes", "--json", *more)
-    out, err = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        code = main.run(["-c", simulator.url, *words])
-    return code, json.loads(out.getvalue()), err.getvalue()
+    ended = run_command("-c", simulator.url, *words)
+    return ended.code, ended.document, ended.err
 
 
 def slot(simulator):

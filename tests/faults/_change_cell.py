@@ -3,8 +3,6 @@
 It is served, for programs that are processes of their own, or lives in this process.
 """
 
-import contextlib
-import io
 import re
 import threading
 from abc import ABC, abstractmethod
@@ -16,7 +14,6 @@ from queue import SimpleQueue
 from typing import Any, ClassVar, Final, Literal, TypeVar, get_args
 
 import pytest
-from robolink_cli import main
 from robolink_simulators.cell.clock import ManualClock, ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
@@ -28,6 +25,7 @@ import robolink
 from robolink.journal import Journal, memory_journal, open_journal
 from robolink.model import EntryKind, MarkerKind, ToolOffset
 from robolink.transaction import changed_since
+from tests._commands import run_command
 from tests._patience import PATIENCE_S
 from tests.faults._change_process import OLD, PROGRAMS, CommitStep, ProgramProcess, acknowledged
 from tests.faults._recipe_instants import Instants, exchanges_and_commits
@@ -155,17 +153,12 @@ class ChangeCell(ABC):
 
     def command(self, *words: str) -> str:
         """Run a command that ends well, and return what it said."""
-        said = io.StringIO()
-        with (
-            pytest.MonkeyPatch.context() as environment,
-            contextlib.redirect_stdout(said),
-            contextlib.redirect_stderr(said),
-        ):
+        with pytest.MonkeyPatch.context() as environment:
             environment.setenv("ROBOLINK_JOURNAL", str(self.folder / "journal.db"))
             environment.setenv("ROBOLINK_STATE_DIR", str(self.folder))
-            code = main.run(["-c", self.url, *words])
-        assert code == 0, said.getvalue()
-        return said.getvalue()
+            ended = run_command("-c", self.url, *words)
+        assert ended.code == 0, ended.err
+        return ended.out + ended.err
 
     def check_what_was_acknowledged_is_there(self) -> None:
         """Every entry that a process was told is durable is in the journal, which is whole."""

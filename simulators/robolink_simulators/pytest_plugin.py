@@ -200,6 +200,27 @@ def plc_factory(request: pytest.FixtureRequest, _robolink_own: "OwnFolder") -> F
 
 
 @pytest.fixture
+def serve_simulator(request: pytest.FixtureRequest, _robolink_own: "OwnFolder") -> Factory:
+    """Serves a simulator of your own, furnished as you like: ``serve_simulator(EpsonSimulator())``.
+
+    It takes ``medium``, ``clock``, and ``map_file`` for a PLC with a register map.
+    """
+    from robolink_simulators.testkit.making import serve_made
+
+    def serve(
+        simulator: Any,  # noqa: ANN401 - of any kind
+        *,
+        medium: str = "sim",
+        clock: Any = None,  # noqa: ANN401 - stepped or steered
+        map_file: Path | None = None,
+    ) -> "SimulatedCell":
+        time = clock or (_clock_of(request) if medium == "sim" else None)
+        return serve_made(_robolink_own, simulator, medium, time, map_file)
+
+    return serve
+
+
+@pytest.fixture
 def epson_sim(request: pytest.FixtureRequest, epson_factory: Factory) -> "SimulatedCell":
     """A simulated EPSON controller in this process, whose time passes only while you wait.
 

@@ -9,7 +9,6 @@ import random
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, field, replace
-from itertools import count
 from types import SimpleNamespace
 from typing import Any, Final
 
@@ -17,8 +16,8 @@ from robolink_cli.prompts.operator import AssistedOperator
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.tip_switches import TouchPlate
 from robolink_simulators.control.assist import InProcessEyes
-from robolink_simulators.hosting.in_process import softmotion
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+from robolink_simulators.testkit.media import served
 
 import robolink
 from robolink.calibration import BoardDrawing, Pin, RowFact, VerifyResult, carrying
@@ -73,8 +72,6 @@ PERSON_SIGMA_MM: Final = 0.01
 ABOVE_BALL_MM: Final = 15.0
 CONTACT: Final = 9
 """The input that nozzle and pin switch, where they are wired."""
-
-_names = count()
 
 
 @dataclass(frozen=True)
@@ -296,15 +293,11 @@ def _ended(
 @contextmanager
 def tilting(seed: int, **world: Any) -> Iterator[Any]:
     """Set a PLC up whose flange leaves the vertical."""
-    name, simulator = f"certificate-{next(_names)}", SoftMotionSimulator("Kin_5Axes", seed=seed)
-    clock = ManualClock()
-    url = softmotion.register(name, simulator, clock=clock)
-    cell: Any = SimpleNamespace(simulator=simulator, url=url, clock=clock)
-    furnish(cell, **world)
-    try:
+    simulator, clock = SoftMotionSimulator("Kin_5Axes", seed=seed), ManualClock()
+    with served(simulator, clock=clock) as url:
+        cell: Any = SimpleNamespace(simulator=simulator, url=url, clock=clock)
+        furnish(cell, **world)
         yield cell
-    finally:
-        softmotion.unregister(name)
 
 
 @contextmanager

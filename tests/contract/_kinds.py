@@ -5,9 +5,8 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.in_process import epson as in_process
-from robolink_simulators.hosting.in_process import softmotion as plc_in_process
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+from robolink_simulators.testkit.media import served
 
 import robolink
 from robolink.controllers import ConnectionTerms, PlcMapController, SimpleController, SimpleMachine
@@ -155,29 +154,23 @@ def memory() -> Iterator[Kind]:
 @contextmanager
 def epson() -> Iterator[Kind]:
     """A simulated EPSON controller."""
-    in_process.register("contract", EpsonSimulator(seed=3))
-    try:
+    with served(EpsonSimulator(seed=3)) as url:
         yield Kind(
-            lambda outcomes: robolink.connect("epson+sim://contract", outcomes=outcomes),
+            lambda outcomes: robolink.connect(url, outcomes=outcomes),
             prepare=_switch_on,
             more={"output": _epson_output, "raw": _raw},
         )
-    finally:
-        in_process.unregister("contract")
 
 
 @contextmanager
 def softmotion() -> Iterator[Kind]:
     """A simulated PLC with a mailbox."""
-    plc_in_process.register("contract", SoftMotionSimulator(seed=3))
-    try:
+    with served(SoftMotionSimulator(seed=3)) as url:
         yield Kind(
-            lambda outcomes: robolink.connect("softmotion+sim://contract", outcomes=outcomes),
+            lambda outcomes: robolink.connect(url, outcomes=outcomes),
             prepare=_switch_on,
             more={"output": _output, "jog": _jog, "kinematics": _kinematics},
         )
-    finally:
-        plc_in_process.unregister("contract")
 
 
 @contextmanager

@@ -1,21 +1,18 @@
 """A cell of each controller kind in which every calibration method can be run from commands."""
 
-import contextlib
-import io
-import json
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
-from robolink_cli import main
 from robolink_simulators.cell.clock import ManualClock
 
 from robolink.journal import memory_journal
 from robolink.model import EntryKind, Recorded, ToolOffset
+from tests._commands import Ended, run_command
 from tests.contract._sensor_cell import SensorCell, plc_sensor_cell, sensor_cell
 
 KINDS = ("epson", "plc")
@@ -55,21 +52,6 @@ input = {plate.input}
 """
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """How a command ended and what it showed."""
-
-    code: int
-    out: str
-    err: str
-
-    @property
-    def document(self) -> dict[str, Any]:
-        """The JSON document."""
-        found: dict[str, Any] = json.loads(self.out)
-        return found
-
-
 class MethodCell:
     """A cell, and commands that are run on it."""
 
@@ -104,14 +86,11 @@ class MethodCell:
         self.cell.mount_beams(self.cell.beams())
         self.cell.mount_plate()
 
-    def run(self, *words: str) -> Outcome:
+    def run(self, *words: str) -> Ended:
         """Run a command on the cell."""
-        out, err = io.StringIO(), io.StringIO()
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            code = main.run(["-c", "a", *words])
-        return Outcome(code, out.getvalue(), err.getvalue())
+        return run_command("-c", "a", *words)
 
-    def calibrate(self, method: str, *more: str, tool: int = 1) -> Outcome:
+    def calibrate(self, method: str, *more: str, tool: int = 1) -> Ended:
         """Calibrate with the simulated person, who says yes to everything; with the document."""
         assist = ("--assist", self.cell.url, "--yes", "--json", "--speed", "100")
         return self.run("calibrate", method, "--tool", str(tool), *assist, *more)

@@ -4,16 +4,14 @@ import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from itertools import count
 from typing import Any
 
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.tip_switches import STANDING, LightBeam, TipSwitch, TouchPlate
 from robolink_simulators.cell.workplace import XyzMm
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.in_process import softmotion
-from robolink_simulators.hosting.in_process.epson import register, unregister
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
+from robolink_simulators.testkit.media import served
 
 import robolink
 from robolink.calibration import Beam
@@ -35,8 +33,6 @@ TOOL = 1
 HEADINGS = (3.0, 88.0)
 BEAM_INPUTS = (3, 4)
 PLATE_INPUT = 5
-
-_names = count()
 
 
 class NobodyThere:
@@ -200,25 +196,17 @@ class SensorCell:
 @contextmanager
 def sensor_cell(seed: int = 3, **habits: Any) -> Iterator[SensorCell]:
     """Set a cell up around an EPSON controller; ``habits`` are arguments of its simulator."""
-    clock, name = ManualClock(), f"sensors-{next(_names)}"
-    simulator = EpsonSimulator(seed=seed, **habits)
-    url = register(name, simulator, clock=clock)
-    try:
+    simulator, clock = EpsonSimulator(seed=seed, **habits), ManualClock()
+    with served(simulator, clock=clock) as url:
         yield SensorCell(simulator, url, clock)
-    finally:
-        unregister(name)
 
 
 @contextmanager
 def plc_sensor_cell(seed: int = 3) -> Iterator[SensorCell]:
     """Set a cell up around a PLC."""
-    clock, name = ManualClock(), f"sensors-{next(_names)}"
-    simulator = SoftMotionSimulator(seed=seed)
-    url = softmotion.register(name, simulator, clock=clock)
-    try:
+    simulator, clock = SoftMotionSimulator(seed=seed), ManualClock()
+    with served(simulator, clock=clock) as url:
         yield SensorCell(simulator, url, clock)
-    finally:
-        softmotion.unregister(name)
 
 
 def miss_mm(found: ToolOffset, true: ToolOffset) -> float:

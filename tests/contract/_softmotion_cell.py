@@ -3,7 +3,7 @@
 import socket
 import time
 from collections.abc import Iterator
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from dataclasses import replace
 from itertools import count
 from typing import Any, Final
@@ -11,9 +11,8 @@ from typing import Any, Final
 import pytest
 from robolink_simulators.cell.clock import ManualClock, ScaledClock
 from robolink_simulators.hosting.fieldbus.canopen_node import CanPlace, serve_canopen
-from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_rtu, serve_modbus_tcp
-from robolink_simulators.hosting.in_process.softmotion import clock_of, register, unregister
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+from robolink_simulators.testkit import media
 
 import robolink
 from robolink.controllers import SoftMotionController
@@ -122,32 +121,26 @@ class PlcCell:
 def served(backend: str, simulator: SoftMotionSimulator | None = None) -> Iterator[PlcCell]:
     """Offer a PLC, in real time wherever there is a real link."""
     simulator = simulator or SoftMotionSimulator(seed=7)
-    if backend == "sim":
-        name = f"contract-plc-{next(_names)}"
-        url = register(name, simulator)
-        try:
-            yield PlcCell(url, simulator, clock_of(name))
-        finally:
-            unregister(name)
-        return
-    clock = SkippingClock()
-    with hosted(backend, simulator, ScaledClock(base=clock)) as host:
-        yield PlcCell(host.url, simulator, clock)
+    clock: ManualClock | SkippingClock = ManualClock() if backend == "sim" else SkippingClock()
+    simulated = clock if isinstance(clock, ManualClock) else ScaledClock(base=clock)
+    with hosted(backend, simulator, simulated) as url:
+        yield PlcCell(url, simulator, clock)
 
 
+@contextmanager
 def hosted(
-    backend: str, simulator: SoftMotionSimulator, clock: ScaledClock
-) -> AbstractContextManager[Any]:
-    """Serve a PLC on one of the links that are no simulated ones."""
-    if backend == "modbus-tcp":
-        return serve_modbus_tcp(simulator, clock=clock)
-    if backend == "modbus-rtu":
-        return serve_modbus_rtu(simulator, clock=clock)
-    if backend == "can-virtual":
-        place = CanPlace("virtual", f"contract-plc-{next(_names)}")
-    else:
-        place = CanPlace("udp_multicast", _GROUP, port=_free_port())
-    return serve_canopen(simulator, place, clock=clock)
+    backend: str, simulator: SoftMotionSimulator, clock: ManualClock | ScaledClock
+) -> Iterator[str]:
+    """Serve a PLC on one of the links; yields its URL."""
+    if backend != "can-multicast":
+        medium = "can" if backend == "can-virtual" else backend
+        with media.served(simulator, medium, clock=clock) as url:
+            yield url
+        return
+    assert isinstance(clock, ScaledClock)
+    place = CanPlace("udp_multicast", _GROUP, port=_free_port())
+    with serve_canopen(simulator, place, clock=clock) as host:
+        yield host.url
 
 
 def _free_port() -> int:

@@ -4,14 +4,12 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import count
 
 import pytest
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.hosting.in_process.epson import register, unregister
-from robolink_simulators.hosting.streams.epson import serve_serial, serve_tcp
+from robolink_simulators.testkit import media
 
 import robolink
 
@@ -19,8 +17,6 @@ SPEED = 40.0
 """Simulated seconds per real second on the socket."""
 
 PSEUDO_TERMINALS = hasattr(os, "openpty")
-
-_names = count()
 
 
 @dataclass
@@ -37,19 +33,10 @@ class Cell:
 @contextmanager
 def served(backend: str, simulator: EpsonSimulator) -> Iterator[Cell]:
     """Offer ``simulator`` on ``backend``."""
-    if backend == "pty":
-        with serve_serial(simulator, clock=ScaledClock(SPEED)) as line:
-            yield Cell(line.url, simulator)
-    elif backend == "sim":
-        name = f"contract-{next(_names)}"
-        register(name, simulator)
-        try:
-            yield Cell(f"epson+sim://{name}", simulator)
-        finally:
-            unregister(name)
-    else:
-        with serve_tcp(simulator, clock=ScaledClock(SPEED)) as host:
-            yield Cell(host.url, simulator)
+    medium = "serial" if backend == "pty" else backend
+    clock = None if backend == "sim" else ScaledClock(SPEED)
+    with media.served(simulator, medium, clock=clock) as url:
+        yield Cell(url, simulator)
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -102,3 +89,12 @@ def serve(request):
 def options():
     """The class of habits, for tests that vary them."""
     return EpsonOptions
+
+
+@pytest.fixture
+def arm(tmp_path, monkeypatch):
+    """An EPSON cell whose methods are run from commands: for what is the same for all kinds."""
+    from tests.contract._method_cell import method_cell
+
+    with method_cell("epson", tmp_path, monkeypatch) as cell:
+        yield cell

@@ -12,7 +12,6 @@ from robolink_simulators.control.assist import open_eyes
 
 from robolink.model import AnsweredBy, EntryKind
 from robolink.report import reports_of
-from tests.contract._method_cell import method_cell
 
 pytestmark = pytest.mark.simulator_only
 
@@ -53,12 +52,6 @@ at = "start"
 text = "Which lot of glue?"
 answer = "text"
 """
-
-
-@pytest.fixture
-def arm(tmp_path, monkeypatch):
-    with method_cell("epson", tmp_path, monkeypatch) as cell:
-        yield cell
 
 
 class Person(_operator.AssistedOperator):

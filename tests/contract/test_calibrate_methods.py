@@ -18,13 +18,6 @@ def cell(request, tmp_path, monkeypatch):
         yield cell
 
 
-@pytest.fixture
-def arm(tmp_path, monkeypatch):
-    """An EPSON cell alone: what does not depend on the kind is shown once."""
-    with method_cell("epson", tmp_path, monkeypatch) as cell:
-        yield cell
-
-
 def within(document, truth, *, axes="xy"):
     """Tell whether the truth lies in the stated interval, four times as wide for safety."""
     half = document["fit"]["half_width95"]

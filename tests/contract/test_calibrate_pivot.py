@@ -1,18 +1,11 @@
 """``calibrate pivot`` live, on a PLC whose flange leaves the vertical; and what cannot tilt."""
 
-import contextlib
-import io
-import json
 from dataclasses import replace
 from functools import partial
-from itertools import count
 
 import pytest
-from robolink_cli import main
 from robolink_cli.prompts.operator import AssistedOperator
-from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.control.assist import InProcessEyes
-from robolink_simulators.hosting.in_process import softmotion
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.calibration_run import (
@@ -29,6 +22,7 @@ from robolink.methods import PivotSource, informative_tilts
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import TouchPlan
 from robolink.runner import Ask
+from tests._commands import run_command
 from tests.contract._method_cell import method_cell
 from tests.contract._softmotion_cell import served
 
@@ -38,31 +32,23 @@ FIVE = "Kin_5Axes"
 STORED = (12.0, -3.5, -20.0)
 QUICK = Limits(speed_percent=100, speed_mm_s=2000.0)
 
-_names = count()
-
 
 @pytest.fixture
-def plc(tmp_path, monkeypatch):
+def plc(serve_simulator, monkeypatch):
     """A simulated machine of five axes, in process; its URL stands in ``url``.
 
     It moves faster than commands let it, which changes nothing but how long a test takes.
     """
     monkeypatch.setattr("robolink.calibration_run.Limits", partial(Limits, speed_percent=100))
-    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
-    name, simulator = f"five-axes-{next(_names)}", SoftMotionSimulator(FIVE, seed=4)
-    simulator.url = softmotion.register(name, simulator, clock=ManualClock())
-    try:
-        yield simulator
-    finally:
-        softmotion.unregister(name)
+    simulator = SoftMotionSimulator(FIVE, seed=4)
+    serve_simulator(simulator)
+    return simulator
 
 
 def run(url, *words):
     """Run a command; return its exit code, its document and what it said."""
-    out, err = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        code = main.run(["-c", url, *words, "--json"])
-    return code, json.loads(out.getvalue()), err.getvalue()
+    ended = run_command("-c", url, *words, "--json")
+    return ended.code, ended.document, ended.err
 
 
 def slot(simulator, number=1):

@@ -9,7 +9,6 @@ from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.control.assist import serve_assist
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.memory.points import Point
-from robolink_simulators.hosting.in_process.epson import register, unregister
 from robolink_simulators.hosting.streams.epson import serve_tcp
 
 from robolink.model import Pose, ToolOffset
@@ -35,8 +34,8 @@ def simulator():
 
 
 @pytest.fixture
-def command(simulator, capsys):
-    url = register("report", simulator)
+def command(simulator, serve_simulator, capsys):
+    url = serve_simulator(simulator).url
 
     def run(*words):
         capsys.readouterr()
@@ -44,8 +43,7 @@ def command(simulator, capsys):
         shown = capsys.readouterr()
         return code, shown.out, shown.err
 
-    yield run
-    unregister("report")
+    return run
 
 
 def page_of(path):

@@ -1,22 +1,16 @@
 """``plane-touch`` and ``sphere-touch`` live, on a PLC whose flange leaves the vertical."""
 
-import contextlib
-import io
-import json
 from dataclasses import replace
 from functools import partial
-from itertools import count
 from pathlib import Path
 
 import pytest
-from robolink_cli import main
-from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.in_process import epson, softmotion
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.calibration_run import Limits
+from tests._commands import run_command
 from tests.calibration._surface_person import Ball, Plate, touches_of, touches_of_ball
 
 pytestmark = pytest.mark.simulator_only
@@ -26,34 +20,24 @@ BALL = PLATE.with_name("sphere.toml")
 STORED = (12.0, -3.5, -20.0)
 LEANING = WorldParameters(person_touches="plane", plane_lean_deg=20.0, plane_lean_toward_deg=30.0)
 
-_names = count()
-
 
 @pytest.fixture
-def plc(tmp_path, monkeypatch):
+def plc(serve_simulator, monkeypatch):
     """Opens a simulated machine of five axes, in process; its URL stands in ``url``."""
     monkeypatch.setattr("robolink.calibration_run.Limits", partial(Limits, speed_percent=100))
-    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
-    opened = []
 
     def open_machine(world=LEANING, kinematics="Kin_5Axes"):
-        name = f"surface-{next(_names)}"
         simulator = SoftMotionSimulator(kinematics, seed=4, world=world)
-        simulator.url = softmotion.register(name, simulator, clock=ManualClock())
-        opened.append(name)
+        serve_simulator(simulator)
         return simulator
 
-    yield open_machine
-    for name in opened:
-        softmotion.unregister(name)
+    return open_machine
 
 
 def run(simulator, *words):
     """Run a command; return its exit code, its document and what it said."""
-    out, err = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        code = main.run(["-c", simulator.url, *words, "--json"])
-    return code, json.loads(out.getvalue()), err.getvalue()
+    ended = run_command("-c", simulator.url, *words, "--json")
+    return ended.code, ended.document, ended.err
 
 
 def calibrate(simulator, method, *more):
@@ -168,18 +152,13 @@ def test_poses_of_a_file_give_the_tip_of_a_flange_that_points_down_and_leans(plc
 
 
 @pytest.mark.soak
-def test_six_axes_find_the_tip_on_a_level_plane_by_its_contact(tmp_path, monkeypatch):
-    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
+def test_six_axes_find_the_tip_on_a_level_plane_by_its_contact(serve_simulator):
     world = WorldParameters(person_touches="plane", contact_input=7)
     simulator = EpsonSimulator("C8-C901S", seed=4, world=world)
     simulator.machine.motors_on = True
-    name = f"surface-{next(_names)}"
-    simulator.url = epson.register(name, simulator, clock=ManualClock())
-    try:
-        words = ("--contact-input", "7", "--count", "9", "--no-verify")
-        code, document, said = calibrate(simulator, "plane-touch", *words)
-    finally:
-        epson.unregister(name)
+    serve_simulator(simulator)
+    words = ("--contact-input", "7", "--count", "9", "--no-verify")
+    code, document, said = calibrate(simulator, "plane-touch", *words)
     assert code == 0, said
     truth, half = simulator.world.tips[1].components()[:3], document["fit"]["half_width95"]
     held = simulator.machine.tools.get(1)

@@ -1,13 +1,12 @@
 """Two poses and many poses find the true tip on arms that share no kinematics."""
 
 import sys
-from itertools import count, product
+from itertools import product
 from pathlib import Path
 
 import pytest
 from robolink_cli.prompts.operator import AssistedOperator
 from robolink_simulators.control.assist import InProcessEyes
-from robolink_simulators.hosting.in_process.softmotion import register, unregister
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 import robolink
@@ -31,24 +30,19 @@ SOURCES: dict[str, TipSource] = {
     "two-pose": TwoPoseSource(),
     "n-angle": NAngleSource((60.0, 120.0, 180.0)),
 }
-_names = count()
 
 
 @pytest.fixture
-def cell(monkeypatch):
+def cell(serve_simulator, monkeypatch):
     """Makes a PLC by the name of its kinematics, in virtual time."""
     monkeypatch.syspath_prepend(EXAMPLES)
-    names = []
 
     def made(kinematics):
-        names.append(f"arm-{next(_names)}")
         simulator = SoftMotionSimulator(kinematics, seed=5)
-        simulator.url = register(names[-1], simulator)
+        serve_simulator(simulator)
         return simulator
 
     yield made
-    for name in names:
-        unregister(name)
     sys.modules.pop("double_scara", None)
 
 

@@ -6,6 +6,7 @@ from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.faults import Fault, FaultAction, FaultPlan
 from robolink_simulators.hosting.in_process.epson import register, unregister
 from robolink_simulators.hosting.streams.epson import serve_serial, serve_tcp
+from robolink_simulators.testkit.media import served
 
 import robolink
 from robolink.errors import OutcomeUnknownError
@@ -141,8 +142,7 @@ def test_older_firmware_is_asked_in_its_command_window_once_it_is_ready(options)
 
 def test_a_controller_that_is_busy_is_taken_for_whom_it_was_the_last_time(simulator):
     clock = ManualClock()
-    url = register("busy-identity", simulator, clock=clock)
-    try:
+    with served(simulator, clock=clock) as url:
         with robolink.connect(url) as controller:
             name = controller.outcomes.identity
         # An Execute of a client that has gone keeps the controller from answering.
@@ -151,8 +151,6 @@ def test_a_controller_that_is_busy_is_taken_for_whom_it_was_the_last_time(simula
         link.receive(b"", clock.now_ns())
         with robolink.connect(url) as controller:
             assert controller.outcomes.identity == name
-    finally:
-        unregister("busy-identity")
 
 
 def test_an_unconditional_write_goes_on_record_under_the_identity(simulator):

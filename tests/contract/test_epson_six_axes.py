@@ -1,16 +1,13 @@
 """The driver on a six-axis robot: points with flags, the short way round, singular places."""
 
 from dataclasses import replace
-from itertools import count
 
 import pytest
-from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.frames import transposed
 from robolink_simulators.epson import EpsonSimulator
 from robolink_simulators.epson.arm.kinematics import continued, forward, frame_of
 from robolink_simulators.epson.arm.robots import Joints
 from robolink_simulators.epson.memory.points import Point
-from robolink_simulators.hosting.in_process.epson import register, unregister
 
 import robolink
 from robolink.errors import LimitError
@@ -22,21 +19,15 @@ pytestmark = pytest.mark.simulator_only
 ANYWHERE = WorkBox()
 STRAIGHT = MotionProfile(Path.STRAIGHT, speed_mm_s=250.0)
 JOINT = MotionProfile(Path.JOINT, speed_percent=5)
-_names = count()
 
 
 @pytest.fixture(params=["C8-C901S", "C8-C901SR"])
-def arm(request, tmp_path, monkeypatch):
+def arm(request, serve_simulator):
     """A simulator and a controller connected to it."""
-    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
-    name, simulator = f"six-axes-{next(_names)}", EpsonSimulator(request.param, seed=2)
-    url = register(name, simulator, clock=ManualClock())
-    try:
-        with robolink.connect(url) as controller:
-            controller.tools.select(0)
-            yield simulator, controller
-    finally:
-        unregister(name)
+    simulator = EpsonSimulator(request.param, seed=2)
+    with robolink.connect(serve_simulator(simulator).url) as controller:
+        controller.tools.select(0)
+        yield simulator, controller
 
 
 def go(controller, target, profile=JOINT):

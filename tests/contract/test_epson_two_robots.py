@@ -1,12 +1,9 @@
 """Two robots on one controller: a SCARA and six axes, each with its tools, points and world."""
 
 from dataclasses import replace
-from itertools import count
 
 import pytest
-from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.epson import EpsonSimulator
-from robolink_simulators.hosting.in_process.epson import register, unregister
 
 import robolink
 from robolink.controllers import EpsonController
@@ -29,16 +26,13 @@ from tests.contract._method_cell import method_cell
 pytestmark = pytest.mark.simulator_only
 
 BOTH = "GX4-C351S,C8-C901SR"
-_names = count()
 
 
 @pytest.fixture
-def cell(tmp_path, monkeypatch):
-    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
-    name, simulator = f"two-robots-{next(_names)}", EpsonSimulator(BOTH, seed=5)
-    simulator.url = register(name, simulator, clock=ManualClock())
-    yield simulator
-    unregister(name)
+def cell(serve_simulator):
+    simulator = EpsonSimulator(BOTH, seed=5)
+    serve_simulator(simulator)
+    return simulator
 
 
 def test_what_belongs_to_a_robot_is_that_of_the_robot_in_force(cell):

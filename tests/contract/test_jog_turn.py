@@ -18,12 +18,6 @@ def cell(request, tmp_path, monkeypatch):
         yield cell
 
 
-@pytest.fixture
-def arm(tmp_path, monkeypatch):
-    with method_cell("epson", tmp_path, monkeypatch) as cell:
-        yield cell
-
-
 def where(cell):
     with cell.cell.connected() as controller:
         return controller.groups[0].pose()

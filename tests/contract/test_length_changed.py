@@ -6,7 +6,6 @@ import pytest
 from robolink_cli.prompts import operator as _operator
 
 from robolink.model import EntryKind, ToolOffset
-from tests.contract._method_cell import method_cell
 
 pytestmark = pytest.mark.simulator_only
 
@@ -15,12 +14,6 @@ THREE = ("--count", "3", *AT_PIN)
 TWO = ("two-pose", *AT_PIN)
 NO_PROOF = "--no-verify"
 """Where a run only puts touches on record, or is refused: what follows a length is proved."""
-
-
-@pytest.fixture
-def arm(tmp_path, monkeypatch):
-    with method_cell("epson", tmp_path, monkeypatch) as cell:
-        yield cell
 
 
 def seen_at_touch_1(err):

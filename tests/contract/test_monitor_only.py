@@ -8,8 +8,8 @@ import pytest
 from robolink_simulators.cell.clock import ManualClock, ScaledClock
 from robolink_simulators.epson.condition import Task
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.in_process.epson import register, unregister
 from robolink_simulators.hosting.streams.epson import serve_tcp
+from robolink_simulators.testkit.media import served
 
 import robolink
 from robolink.errors import NotReadyError, ToolError, TransportError
@@ -92,9 +92,8 @@ def serve(request):
     def offered(simulator):
         if request.param == "sim":
             clock = ManualClock()
-            url = register(f"monitored-{id(simulator):x}", simulator, clock=clock)
-            yield Cell(url, simulator, clock.advance)
-            unregister(url.rpartition("/")[2])
+            with served(simulator, clock=clock) as url:
+                yield Cell(url, simulator, clock.advance)
             return
         base = SkippingClock()
 

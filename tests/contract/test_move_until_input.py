@@ -8,8 +8,8 @@ import pytest
 from robolink_simulators.cell.tip_switches import TouchPlate
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.hosting.in_process.softmotion import register, unregister
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
+from robolink_simulators.testkit import media
 
 import robolink
 from robolink.controllers import SoftMotionController
@@ -60,14 +60,10 @@ class Bench:
 @contextmanager
 def plc_bench():
     simulator = SoftMotionSimulator(seed=2)
-    url = register("until-input", simulator)
-    try:
-        with robolink.connect(url) as controller:
-            assert isinstance(controller, SoftMotionController)
-            controller.take()
-            yield controller, simulator
-    finally:
-        unregister("until-input")
+    with media.served(simulator) as url, robolink.connect(url) as controller:
+        assert isinstance(controller, SoftMotionController)
+        controller.take()
+        yield controller, simulator
 
 
 @contextmanager

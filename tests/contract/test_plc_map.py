@@ -1,7 +1,6 @@
 """The tool table of a PLC with a map keeps the promises of every tool table, on each wire."""
 
 import socket
-import threading
 from pathlib import Path
 
 import pytest
@@ -15,16 +14,12 @@ import robolink
 from robolink import ANY, ToolOffset
 from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
 from robolink.errors import (
-    BusyError,
     ConfigError,
     ConnectError,
     OutcomeUnknownError,
     ReadBackError,
     RejectedError,
     RemoteProtocolError,
-    ReservedToolError,
-    ToolChangedError,
-    ToolIndexError,
     TransportTimeoutError,
 )
 from robolink.methods import PointsSource
@@ -88,68 +83,12 @@ def test_the_map_says_which_tools_there_are_and_the_flange_reads_as_zero(control
     assert controller.tools.read(0) == ToolOffset()
 
 
-def test_a_listing_and_single_reads_agree(controller):
-    listed = controller.tools.read_all()
-    assert all(listed[tool] == controller.tools.read(tool) for tool in (1, 2))
-
-
 def test_a_write_is_read_back_and_receipted(served, controller):
     before = controller.tools.read(1)
     receipt = controller.tools.write(1, NEW, expected=before)
     assert (receipt.before, receipt.requested, receipt.skipped) == (before, NEW, False)
     assert receipt.read_back == NEW
     assert served.plc.program.in_force[1]["x"] == NEW.x_mm
-
-
-def test_an_equal_value_is_not_written_again_whatever_was_expected(served, controller):
-    controller.tools.write(1, NEW, expected=ANY)
-    written = len(served.plc.writes)
-    assert controller.tools.write(1, NEW, expected=ToolOffset(9, 9)).skipped
-    assert len(served.plc.writes) == written
-
-
-def test_a_write_is_refused_when_another_value_is_stored(controller):
-    controller.tools.write(1, NEW, expected=ANY)
-    with pytest.raises(ToolChangedError, match=r"holds X 11\.250"):
-        controller.tools.write(1, ToolOffset(1), expected=ToolOffset(5))
-    assert controller.tools.read(1) == NEW
-
-
-def test_an_unconditional_write_says_so(controller):
-    assert controller.tools.write(1, NEW, expected=ANY).unconditional
-
-
-@pytest.mark.parametrize("tool", [3, -1, 100, True])
-def test_a_tool_that_the_map_lacks_is_refused_before_anything_is_sent(controller, tool):
-    sent = controller.exchanges
-    with pytest.raises(ToolIndexError):
-        controller.tools.write(tool, NEW, expected=ANY)
-    assert controller.exchanges == sent
-
-
-def test_tool_0_is_never_written(controller):
-    sent = controller.exchanges
-    with pytest.raises(ReservedToolError):
-        controller.tools.write(0, NEW, expected=ANY)
-    with pytest.raises(ReservedToolError):
-        controller.tools.clear(0, expected=ANY)
-    assert controller.exchanges == sent
-
-
-def test_a_second_thread_is_told_at_once_that_a_procedure_is_under_way(controller):
-    found = []
-
-    def intrude():
-        try:
-            controller.tools.write(1, NEW, expected=ANY)
-        except BusyError as error:
-            found.append(error)
-
-    with controller.preserved("a procedure"):
-        thread = threading.Thread(target=intrude)
-        thread.start()
-        thread.join()
-    assert len(found) == 1
 
 
 def test_a_preview_is_what_is_sent_first_and_sends_nothing(served, controller):

@@ -7,7 +7,6 @@ open, with its proof in the durable record, and makes that one.
 from collections.abc import Callable
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from itertools import count
 from types import SimpleNamespace
 from typing import Any
 
@@ -16,8 +15,8 @@ from robolink_cli.prompts.operator import AssistedOperator
 from robolink_simulators.cell.clock import ManualClock
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.control.assist import InProcessEyes
-from robolink_simulators.hosting.in_process import softmotion
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+from robolink_simulators.testkit.media import served
 
 import robolink
 from robolink.calibration import BoardDrawing, Pin
@@ -68,18 +67,13 @@ pytestmark = pytest.mark.simulator_only
 
 ON_A_SURFACE = TouchPlan(lift_mm=15.0)
 TILTS = informative_tilts(4, 20.0)
-_names = count()
 
 
 @contextmanager
 def tilting(world=None):
-    name, simulator = f"break-{next(_names)}", SoftMotionSimulator(FIVE, seed=4, world=world)
-    clock = ManualClock()
-    url = softmotion.register(name, simulator, clock=clock)
-    try:
+    simulator, clock = SoftMotionSimulator(FIVE, seed=4, world=world), ManualClock()
+    with served(simulator, clock=clock) as url:
         yield SimpleNamespace(simulator=simulator, url=url, clock=clock)
-    finally:
-        softmotion.unregister(name)
 
 
 @contextmanager

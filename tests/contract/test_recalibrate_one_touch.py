@@ -54,12 +54,6 @@ def cell(request, tmp_path, monkeypatch):
         yield cell
 
 
-@pytest.fixture
-def arm(tmp_path, monkeypatch):
-    with method_cell("epson", tmp_path, monkeypatch) as cell:
-        yield cell
-
-
 def recalibrate(cell, path, *more):
     assist = ("--assist", cell.cell.url, "--yes", "--json")
     return cell.run("recalibrate", str(path), *assist, *more)

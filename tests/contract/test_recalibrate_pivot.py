@@ -1,54 +1,38 @@
 """``recalibrate`` with tilted touches, on a PLC whose flange leaves the vertical."""
 
-import contextlib
-import io
-import json
 import sys
-from itertools import count
 from pathlib import Path
 
 import pytest
-from robolink_cli import main
-from robolink_simulators.cell.clock import ManualClock
-from robolink_simulators.hosting.in_process import softmotion
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.journal import memory_journal
 from robolink.model import EntryKind
+from tests._commands import run_command
 
 pytestmark = pytest.mark.simulator_only
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "recipes" / "five-axes-pivot.toml"
 STORED = (12.0, -3.5, -20.0)
 
-_names = count()
-
 
 @pytest.fixture
-def machine(tmp_path, monkeypatch):
+def machine(serve_simulator):
     """Opens a simulated machine in virtual time; its URL stands in ``url``."""
-    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
-    opened = []
 
     def open_machine(kinematics="Kin_5Axes"):
-        name = f"pivot-recipe-{next(_names)}"
         simulator = SoftMotionSimulator(kinematics, seed=1)
-        simulator.url = softmotion.register(name, simulator, clock=ManualClock())
-        opened.append(name)
+        serve_simulator(simulator)
         return simulator
 
-    yield open_machine
-    for name in opened:
-        softmotion.unregister(name)
+    return open_machine
 
 
 def recalibrate(simulator, path, *more):
     """Run a recipe with the simulated person; return exit code, document and messages."""
     words = ("recalibrate", str(path), "--assist", simulator.url, "--yes", "--json", *more)
-    out, err = io.StringIO(), io.StringIO()
-    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-        code = main.run(["-c", simulator.url, *words])
-    return code, json.loads(out.getvalue()), err.getvalue()
+    ended = run_command("-c", simulator.url, *words)
+    return ended.code, ended.document, ended.err
 
 
 def slot(simulator):
@@ -72,7 +56,7 @@ def test_the_example_finds_the_whole_tip_as_the_interval_leads_to_expect(machine
         assert abs(found - true) <= 2 * half < 0.1
     assert tool["verification"]["passed"]
     with capsys.disabled():
-        took_s = softmotion.clock_of(simulator.url.partition("://")[2]).now_ns() / 1e9
+        took_s = simulator.now_ns / 1e9
         sys.stdout.write(f"\nfive axes, pivot recipe: {took_s:.1f} s of robot time\n")
     (pin,) = memory_journal(simulator.url).entries(kinds=[EntryKind.STATION])
     place = [pin.details[name] for name in ("x_mm", "y_mm", "z_mm")]

@@ -13,10 +13,8 @@ from robolink.errors import (
     NotReadyReason,
     ReadBackError,
     RejectedError,
-    ReservedToolError,
     SelectedToolError,
     ToolChangedError,
-    ToolIndexError,
     UndefinedToolError,
 )
 from robolink.model import ANY, ToolOffset, WorkBox
@@ -191,16 +189,6 @@ def test_a_tool_that_the_kinematics_cannot_carry_is_refused_and_changes_nothing(
             assert controller.tools.same(controller.tools.read(1), before)
         assert cell.slot_changes(1) == changes
         assert cell.open_requests == []
-
-
-@pytest.mark.parametrize("tool", [16, -1, True])
-def test_a_number_that_is_no_slot_is_refused_before_anything_is_sent(controller, tool):
-    sent = controller.exchanges
-    with pytest.raises(ToolIndexError):
-        controller.tools.write(tool, NEW, expected=ANY)
-    with pytest.raises(ReservedToolError):
-        controller.tools.clear(0, expected=ANY)
-    assert controller.exchanges == sent
 
 
 def test_the_group_tells_the_tools_of_the_running_and_of_the_last_movement(controller):

@@ -15,7 +15,6 @@ from robolink.stations import (
     require_base_of,
     station_entry,
 )
-from tests.contract._method_cell import method_cell
 
 pytestmark = pytest.mark.simulator_only
 
@@ -39,12 +38,6 @@ id = "PIN-07"
 [[tools]]
 number = 1
 """
-
-
-@pytest.fixture
-def arm(tmp_path, monkeypatch):
-    with method_cell("epson", tmp_path, monkeypatch) as cell:
-        yield cell
 
 
 @pytest.fixture

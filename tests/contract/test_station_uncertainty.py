@@ -16,15 +16,8 @@ from robolink.stations import (
     pin_of,
     station_entry,
 )
-from tests.contract._method_cell import method_cell
 
 pytestmark = pytest.mark.simulator_only
-
-
-@pytest.fixture
-def arm(tmp_path, monkeypatch):
-    with method_cell("epson", tmp_path, monkeypatch) as cell:
-        yield cell
 
 
 @pytest.mark.parametrize("shaft_mm", ["0", pytest.param("3", marks=pytest.mark.soak)])

@@ -51,10 +51,9 @@ def cell(kind, tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def arm(tmp_path, monkeypatch):
-    with method_cell("epson", tmp_path, monkeypatch) as cell:
-        cell.lengthen(0.0, 0.4, -0.3)
-        yield cell
+def arm(arm):
+    arm.lengthen(0.0, 0.4, -0.3)
+    return arm
 
 
 def has_habit(cell, **habits):

@@ -12,7 +12,6 @@ from robolink_simulators.epson.options import (
 )
 from robolink_simulators.epson.spel.expressions.machine_functions import MACHINE_FUNCTIONS
 from robolink_simulators.faults import Fault, FaultAction
-from robolink_simulators.hosting.in_process.epson import register, unregister
 from robolink_simulators.hosting.streams.epson import serve_serial, serve_tcp
 
 from robolink.controllers.epson.verify import redacted, verify_epson
@@ -81,17 +80,9 @@ PREFERENCES = {
 
 
 @pytest.fixture
-def cell():
+def cell(serve_simulator):
     """A maker of simulators in this process."""
-    names = []
-
-    def serve(simulator):
-        names.append(f"verify-{id(simulator):x}")
-        return register(names[-1], simulator)
-
-    yield serve
-    for name in names:
-        unregister(name)
+    return lambda simulator: serve_simulator(simulator).url
 
 
 @pytest.mark.parametrize("habit", HABITS, ids=lambda habit: ",".join(map(str, habit)) or "defaults")

@@ -3,33 +3,29 @@
 It is served, for programs that are processes of their own, or lives in this process.
 """
 
-import contextlib
-import io
 import re
 import threading
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import count
 from pathlib import Path
 from queue import SimpleQueue
 from typing import Any, ClassVar, Final, Literal, TypeVar, get_args
 
 import pytest
-from robolink_cli import main
 from robolink_simulators.cell.clock import ManualClock, ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.hosting.in_process import epson
-from robolink_simulators.hosting.streams.epson import serve_serial, serve_tcp
 from robolink_simulators.plc import PlcSimulator
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+from robolink_simulators.testkit.media import served
 
 import robolink
 from robolink.journal import Journal, memory_journal, open_journal
 from robolink.model import EntryKind, MarkerKind, ToolOffset
 from robolink.transaction import changed_since
+from tests._commands import run_command
 from tests._patience import PATIENCE_S
 from tests.faults._change_process import OLD, PROGRAMS, CommitStep, ProgramProcess, acknowledged
 from tests.faults._recipe_instants import Instants, exchanges_and_commits
@@ -38,7 +34,6 @@ Moment = Literal["before it is carried out", "before its answer leaves"]
 MOMENTS: Final[tuple[Moment, Moment]] = get_args(Moment)
 EpsonWire = Literal["sim", "tcp", "serial"]
 
-_names = count()
 _WRITE = re.compile(r'\$Execute,"TL(?:Set (\d+), XY|Clr (\d+))')
 
 
@@ -158,17 +153,12 @@ class ChangeCell(ABC):
 
     def command(self, *words: str) -> str:
         """Run a command that ends well, and return what it said."""
-        said = io.StringIO()
-        with (
-            pytest.MonkeyPatch.context() as environment,
-            contextlib.redirect_stdout(said),
-            contextlib.redirect_stderr(said),
-        ):
+        with pytest.MonkeyPatch.context() as environment:
             environment.setenv("ROBOLINK_JOURNAL", str(self.folder / "journal.db"))
             environment.setenv("ROBOLINK_STATE_DIR", str(self.folder))
-            code = main.run(["-c", self.url, *words])
-        assert code == 0, said.getvalue()
-        return said.getvalue()
+            ended = run_command("-c", self.url, *words)
+        assert ended.code == 0, ended.err
+        return ended.out + ended.err
 
     def check_what_was_acknowledged_is_there(self) -> None:
         """Every entry that a process was told is durable is in the journal, which is whole."""
@@ -286,9 +276,13 @@ def change_cell(
     for tool, offset in OLD.items():
         simulator.machine.tools.set(tool, offset)
     simulator.machine.tools.flash_writes = 0
-    with _epson_at(wire, simulator) as url, kept(EpsonChangeCell(simulator, url, folder)) as cell:
-        if wire == "sim":
-            cell.skip = epson.clock_of(url.partition("://")[2]).sleep
+    clock = ManualClock() if wire == "sim" else ScaledClock(200.0)
+    with (
+        served(simulator, wire, clock=clock) as url,
+        kept(EpsonChangeCell(simulator, url, folder)) as cell,
+    ):
+        if isinstance(clock, ManualClock):
+            cell.skip = clock.sleep
         yield cell
 
 
@@ -300,17 +294,3 @@ def kept(cell: Cell) -> Iterator[Cell]:
         yield cell
     finally:
         cell.journal.close()
-
-
-@contextmanager
-def _epson_at(wire: EpsonWire, simulator: EpsonSimulator) -> Iterator[str]:
-    if wire == "sim":
-        name = f"changes-{next(_names)}"
-        try:
-            yield epson.register(name, simulator)
-        finally:
-            epson.unregister(name)
-        return
-    serve = serve_serial if wire == "serial" else serve_tcp
-    with serve(simulator, clock=ScaledClock(200.0)) as host:
-        yield host.url

@@ -3,14 +3,13 @@
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from itertools import count
 from pathlib import Path
 from typing import Final
 
 import pytest
-from robolink_simulators.cell.clock import ScaledClock
-from robolink_simulators.hosting.in_process import plc
-from robolink_simulators.plc import PlcSimulator, serve_plc
+from robolink_simulators.cell.clock import ManualClock, ScaledClock
+from robolink_simulators.plc import PlcSimulator
+from robolink_simulators.testkit.media import served
 
 import robolink
 from robolink.model import ToolOffset
@@ -25,8 +24,6 @@ _FIRST_ADDRESS: Final = {"fc16 100": 1, "fc16 110": 2}
 
 _TAKEN_OVER_S: Final = 0.5
 """In this time the PLC takes over what it was asked to."""
-
-_names = count()
 
 
 class MappedChangeCell(ChangeCell):
@@ -71,28 +68,19 @@ def mapped_change_cell(folder: Path, *, wire: str = "sim") -> Iterator[MappedCha
     for tool, offset in OLD.items():
         x, y, z, u, *_ = offset.components()
         simulator.program.set_tool(tool, {"x": x, "y": y, "z": z, "u": u})
-    with pytest.MonkeyPatch.context() as environment, _plc_at(wire, simulator) as url:
+    clock = ManualClock() if wire == "sim" else ScaledClock(20.0)
+    with (
+        pytest.MonkeyPatch.context() as environment,
+        served(simulator, wire, clock=clock, map_file=MAP) as url,
+    ):
         environment.setenv("ROBOLINK_STATE_DIR", str(folder))
         with robolink.connect(url) as controller:
             confirm_whole_map(controller)
         with kept(MappedChangeCell(simulator, url, folder)) as cell:
-            if wire == "sim":
-                cell.skip = plc.clock_of(url.partition("://")[2].partition("?")[0]).sleep
+            if isinstance(clock, ManualClock):
+                cell.skip = clock.sleep
             assert cell.tools == OLD
             yield cell
-
-
-@contextmanager
-def _plc_at(wire: str, simulator: PlcSimulator) -> Iterator[str]:
-    if wire == "sim":
-        name = f"changes-{next(_names)}"
-        try:
-            yield plc.register(name, simulator, MAP)
-        finally:
-            plc.unregister(name)
-        return
-    with serve_plc(simulator, MAP, clock=ScaledClock(20.0)) as host:
-        yield host.url
 
 
 def _offset(values: dict[str, float]) -> ToolOffset:

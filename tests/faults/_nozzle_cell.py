@@ -1,16 +1,12 @@
 """A served cell whose nozzle was changed, and what may be found in it after a mishap."""
 
-import contextlib
-import io
 import re
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from robolink_cli import main
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.control.assist import serve_assist
 from robolink_simulators.epson.device import EpsonSimulator
@@ -20,6 +16,7 @@ from robolink_simulators.hosting.streams.epson import serve_tcp
 
 from robolink.journal import open_journal
 from robolink.model import Marker, Secret, ToolOffset
+from tests._commands import Ended, run_command
 from tests.faults._client_process import ClientProcess
 from tests.faults._requests import changes
 
@@ -38,15 +35,6 @@ OF_A_CALIBRATION = re.compile(
     r'|(Move|Go) XY\(.*\).*)"|\$Abort'
 )
 """All that a calibration of tool 1 may ask of a controller besides reading."""
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """How a command ended and what it showed."""
-
-    code: int
-    out: str
-    err: str
 
 
 class NozzleCell:
@@ -77,12 +65,9 @@ class NozzleCell:
             folder=self.folder,
         )
 
-    def run(self, *arguments: str) -> Outcome:
+    def run(self, *arguments: str) -> Ended:
         """Run another command, in this process."""
-        out, err = io.StringIO(), io.StringIO()
-        with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
-            code = main.run(["-c", self.url, *arguments])
-        return Outcome(code, out.getvalue(), err.getvalue())
+        return run_command("-c", self.url, *arguments)
 
     def wait_at_rest(self) -> None:
         """Wait until a movement that goes on without its client has ended."""

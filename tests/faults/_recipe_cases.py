@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from tests._commands import Ended
 from tests.faults._epson_recipe_cell import EpsonRecipeCell
-from tests.faults._recipe_cell import Ended, RecipeCell
+from tests.faults._recipe_cell import RecipeCell
 from tests.faults._recipe_instants import Instants
 from tests.faults._recipes import EXAMPLES, ON_THE_PLC, TWO_NOZZLES, TWO_ON_THE_PLC
 from tests.faults._softmotion_recipe_cell import PlcRecipeCell

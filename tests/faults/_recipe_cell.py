@@ -1,23 +1,21 @@
 """A cell in this process on which whole recipes run, and what may be found in it after a mishap."""
 
-import contextlib
 import io
 import re
 import sys
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from itertools import count
 from typing import ClassVar
 
 import pytest
-from robolink_cli import main
 from robolink_simulators.device.wire_record import WireRecord
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
 from robolink.journal import Journal, memory_journal
 from robolink.model import Marker, ToolOffset
+from tests._commands import Ended, run_command
 from tests.faults._recipe_instants import (
     Instants,
     WatchedClock,
@@ -26,15 +24,6 @@ from tests.faults._recipe_instants import (
 )
 
 _names = count()
-
-
-@dataclass(frozen=True)
-class Ended:
-    """How a command ended and what it showed."""
-
-    code: int
-    out: str
-    err: str
 
 
 class _Terminal(io.StringIO):
@@ -184,11 +173,8 @@ class RecipeCell(ABC):
             asks: Whether a person sits at a terminal, and says yes to everything.
         """
         seen = Instants() if instants is None else instants
-        out, err = io.StringIO(), (_Terminal if asks else io.StringIO)()
         simulator = self._hosted
         with (
-            contextlib.redirect_stdout(out),
-            contextlib.redirect_stderr(err),
             questions(seen),
             exchanges_and_commits(simulator, seen),
             pytest.MonkeyPatch.context() as patch,
@@ -197,5 +183,5 @@ class RecipeCell(ABC):
             # A run is taken again, up to each of its instants: the same one.
             patch.setattr("robolink.procedures.witnessed_touches.fresh_seed", lambda: 7)
             patch.setattr(self.clock, "on_wait", lambda: seen.pass_by("wait"))
-            code = main.run(["-c", self.url, *words])
-        return Ended(code, out.getvalue(), err.getvalue())
+            err = _Terminal() if asks else None
+            return run_command("-c", self.url, *words, err=err)

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from robolink.model import EntryKind, Marker, MarkerKind, begun_in_words
-from tests.faults._recipe_cell import Ended, RecipeCell
+from tests._commands import Ended
+from tests.faults._recipe_cell import RecipeCell
 
 
 @dataclass

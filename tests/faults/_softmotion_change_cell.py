@@ -3,12 +3,10 @@
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from itertools import count
 from pathlib import Path
 from typing import Final
 
-from robolink_simulators.cell.clock import ScaledClock
-from robolink_simulators.hosting.in_process import softmotion
+from robolink_simulators.cell.clock import ManualClock, ScaledClock
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 from robolink_simulators.softmotion.mailbox.plc import Plc
 
@@ -18,7 +16,6 @@ from tests.contract._softmotion_cell import hosted
 from tests.faults._change_cell import ChangeCell, kept
 from tests.faults._change_process import OLD
 
-_names = count()
 _UNIT_UM: Final = 1000.0
 _WRITE: Final = re.compile("write_command (WRITE|CLEAR)_TOOL")
 _CYCLES_S: Final = 0.05
@@ -118,27 +115,14 @@ def plc_change_cell(
     """
     folder.mkdir(parents=True)
     simulator = SoftMotionSimulator(seed=1)
-    hastened = clock or _HastenedSilence(_SPEED)
-    with _plc_at(wire, simulator, hastened) as url:
+    time = ManualClock() if wire == "sim" else clock or _HastenedSilence(_SPEED)
+    with hosted(wire, simulator, time) as url:
         cell = PlcChangeCell(simulator, url, folder)
-        if wire == "sim":
-            cell.skip = softmotion.clock_of(url.partition("://")[2]).sleep
+        if isinstance(time, ManualClock):
+            cell.skip = time.sleep
         assert cell.tools == OLD
         with kept(cell):
             yield cell
-
-
-@contextmanager
-def _plc_at(wire: str, simulator: SoftMotionSimulator, clock: ScaledClock) -> Iterator[str]:
-    if wire == "sim":
-        name = f"changes-{next(_names)}"
-        try:
-            yield softmotion.register(name, simulator)
-        finally:
-            softmotion.unregister(name)
-        return
-    with hosted(wire, simulator, clock) as host:
-        yield host.url
 
 
 def _offset(tool: Six) -> ToolOffset:

@@ -16,9 +16,10 @@ from robolink_simulators.faults import Fault, FaultAction, PlcFault, PlcFaultAct
 
 from robolink.journal.store.store import Store, Tables
 from robolink.model import EntryKind, MarkerKind
+from tests._commands import Ended
 from tests.faults._epson_recipe_cell import EpsonRecipeCell
 from tests.faults._recipe_cases import CASES, Case
-from tests.faults._recipe_cell import Ended, RecipeCell
+from tests.faults._recipe_cell import RecipeCell
 from tests.faults._softmotion_recipe_cell import PlcRecipeCell
 
 

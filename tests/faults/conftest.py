@@ -1,14 +1,8 @@
 """Simulators with a plan of faults, in process and on a socket."""
 
-from contextlib import contextmanager
-from itertools import count
-
 import pytest
 from robolink_simulators.cell.clock import ScaledClock
-from robolink_simulators.hosting.in_process.epson import register, unregister
-from robolink_simulators.hosting.streams.epson import serve_tcp
-
-_names = count()
+from robolink_simulators.testkit.media import served
 
 
 @pytest.fixture(autouse=True)
@@ -20,17 +14,5 @@ def _own_state_folder(tmp_path, monkeypatch):
 def serve(request):
     """A maker of URLs for a simulator of the test's own."""
 
-    @contextmanager
-    def offered(simulator):
-        if request.param == "sim":
-            name = f"faults-{next(_names)}"
-            register(name, simulator)
-            try:
-                yield f"epson+sim://{name}"
-            finally:
-                unregister(name)
-        else:
-            with serve_tcp(simulator, clock=ScaledClock(40.0)) as host:
-                yield host.url
-
-    return offered
+    clock = None if request.param == "sim" else ScaledClock(40.0)
+    return lambda simulator: served(simulator, request.param, clock=clock)

@@ -6,13 +6,11 @@ there, and says so.
 
 import threading
 import time
-from itertools import count
 
 import pytest
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.faults import Fault, FaultAction
-from robolink_simulators.hosting.in_process.epson import register, unregister
 from robolink_simulators.hosting.streams.epson import serve_tcp
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
 
@@ -35,17 +33,14 @@ OLD, NEW = ToolOffset(12.5, -3.25, -20.0), ToolOffset(12.75, -3.0, -20.5)
 WRITE = "TLSet 1, XY"
 SLOT = 15
 TIMEOUT_S = 2.0
-_names = count()
 
 
 @pytest.fixture
-def controlled():
+def controlled(serve_simulator):
     """A controller in process, in simulated time, and what it is connected by."""
-    simulator, name = EpsonSimulator(seed=5), f"dead-{next(_names)}"
+    simulator = EpsonSimulator(seed=5)
     simulator.machine.tools.set(1, OLD)
-    register(name, simulator)
-    yield simulator, f"epson+sim://{name}"
-    unregister(name)
+    return simulator, serve_simulator(simulator).url
 
 
 def requests(simulator, text):

@@ -16,8 +16,8 @@ from robolink_simulators.faults import (
     drawn_faults,
     drawn_plc_faults,
 )
-from robolink_simulators.hosting.in_process import epson, softmotion
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+from robolink_simulators.testkit.media import served
 
 import robolink
 from robolink.errors import RemoteProtocolError, RobolinkError
@@ -31,7 +31,7 @@ BENT = (FaultAction.GARBLE_REPLY, FaultAction.SWAP_BYTES)
 def epson_cell(seed):
     faults = drawn_faults(seed, LinkKind.EPSON_SIM, RATES)
     simulator = EpsonSimulator(seed=seed, faults=faults)
-    return simulator, epson, lambda: simulator.machine.tools.get(3)
+    return simulator, lambda: simulator.machine.tools.get(3)
 
 
 def softmotion_cell(seed):
@@ -42,7 +42,7 @@ def softmotion_cell(seed):
         slot = simulator.plc.memory.defined().get(3)
         return slot and ToolOffset(*slot.tool[:4])
 
-    return simulator, softmotion, stored
+    return simulator, stored
 
 
 CELLS = {"epson": epson_cell, "softmotion": softmotion_cell}
@@ -55,11 +55,10 @@ def bent(simulator):
 
 def changed(cell, seed):
     """Change a tool a few times; return how many changes were reported done, and the fired."""
-    simulator, hosting, stored = CELLS[cell](seed)
-    url = hosting.register(f"drawn-{cell}-{seed}", simulator)
+    simulator, stored = CELLS[cell](seed)
     done = 0
     try:
-        with robolink.connect(url) as controller:
+        with served(simulator) as url, robolink.connect(url) as controller:
             for number in range(CHANGES):
                 wanted = ToolOffset(10.5 + number, -3.25, -50)
                 before = controller.tools.read(3)
@@ -69,8 +68,6 @@ def changed(cell, seed):
                 done += 1
     except RobolinkError:
         pass
-    finally:
-        hosting.unregister(f"drawn-{cell}-{seed}")
     return done, [fault.action.name for fault in simulator.faults.fired]
 
 
@@ -110,12 +107,8 @@ def test_what_is_reported_done_is_done_with_thousands_of_plans(cell, robolink_st
 def test_a_slot_in_another_order_is_no_tool(order, robolink_state):
     """A program that was changed while it ran has the same boot number, and a right checksum."""
     simulator = SoftMotionSimulator()
-    url = softmotion.register("reordered", simulator)
-    try:
-        with robolink.connect(url) as controller:
-            controller.tools.write(3, ToolOffset(10.5, -3.25, -50), expected=None)
-            simulator.panel.lay_words(order)
-            with pytest.raises(RemoteProtocolError, match="word order"):
-                controller.tools.read(3)
-    finally:
-        softmotion.unregister("reordered")
+    with served(simulator) as url, robolink.connect(url) as controller:
+        controller.tools.write(3, ToolOffset(10.5, -3.25, -50), expected=None)
+        simulator.panel.lay_words(order)
+        with pytest.raises(RemoteProtocolError, match="word order"):
+            controller.tools.read(3)

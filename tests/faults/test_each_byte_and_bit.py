@@ -3,13 +3,10 @@
 Text has no checksum (docs/reference/epson.md 1.1). What no check can see is found by reading back.
 """
 
-from itertools import count
-
 import pytest
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.faults import Fault, FaultAction
-from robolink_simulators.hosting.in_process.epson import register, unregister
 from robolink_simulators.hosting.streams.epson import serve_tcp
 
 import robolink
@@ -27,17 +24,14 @@ from tests.faults._bending_relay import BendingRelay
 OLD, NEW = ToolOffset(12.5, -3.25, -20.0), ToolOffset(12.75, -3.0, -20.5)
 READ, WRITE = "TLSet(1)", "TLSet 1"
 WRITTEN = b"#Execute,0\r\n"
-_names = count()
 
 
 @pytest.fixture
-def controlled():
+def controlled(serve_simulator):
     """A controller in process, in simulated time, and what it is connected by."""
-    simulator, name = EpsonSimulator(seed=5), f"bytes-{next(_names)}"
+    simulator = EpsonSimulator(seed=5)
     simulator.machine.tools.set(1, OLD)
-    register(name, simulator)
-    yield simulator, f"epson+sim://{name}"
-    unregister(name)
+    return simulator, serve_simulator(simulator).url
 
 
 def length_of(simulator, url, text):

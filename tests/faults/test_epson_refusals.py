@@ -1,13 +1,11 @@
 """What an EPSON controller refuses, gives up or suffers while it is commanded (F17 to F20)."""
 
 from dataclasses import replace
-from itertools import count
 
 import pytest
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import EpsonOptions
-from robolink_simulators.hosting.in_process.epson import register, unregister
 from robolink_simulators.hosting.streams.epson import serve_tcp
 
 import robolink
@@ -29,24 +27,18 @@ from tests.faults._bending_relay import BendingRelay
 
 OLD, NEW = ToolOffset(12.5, -3.25, -20.0), ToolOffset(12.75, -3.0, -20.5)
 SLOW = MotionProfile(Path.STRAIGHT, 1, 1.0)
-_names = count()
 
 
 @pytest.fixture
-def make():
+def make(serve_simulator):
     """A maker of controllers in process, in simulated time, and what they are connected by."""
-    named = []
 
     def made(**options):
         simulator = EpsonSimulator(seed=5, options=replace(EpsonOptions(), **options))
         simulator.machine.tools.set(1, OLD)
-        named.append(f"refusing-{next(_names)}")
-        register(named[-1], simulator)
-        return simulator, f"epson+sim://{named[-1]}"
+        return simulator, serve_simulator(simulator).url
 
-    yield made
-    for name in named:
-        unregister(name)
+    return made
 
 
 def lift(controller, dz_mm=30.0, profile=SLOW):

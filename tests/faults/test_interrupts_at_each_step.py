@@ -15,12 +15,12 @@ import pytest
 
 from robolink.interrupts import InterruptGate
 from robolink.model import ToolOffset, describe_offset
+from tests._commands import Ended
 from tests._patience import PATIENCE_S
 from tests.faults import _killed_calibrations as calibrations
 from tests.faults._client_process import ClientProcess
 from tests.faults._epson_recipe_cell import EpsonRecipeCell
 from tests.faults._nozzle_cell import MOVE, OLD_TIP, served_cell
-from tests.faults._recipe_cell import Ended
 from tests.faults._recipe_instants import Instant, Instants
 from tests.faults._worlds import Worlds
 

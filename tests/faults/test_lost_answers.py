@@ -1,11 +1,12 @@
 """What a lost, late, doubled or mangled answer may cost: never a second move, never a lie."""
 
+from contextlib import suppress
 from dataclasses import replace
 
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.faults import Fault, FaultAction, FaultPlan
-from robolink_simulators.hosting.in_process.epson import register, unregister
+from robolink_simulators.testkit.media import served
 
 import robolink
 from robolink import ToolOffset
@@ -103,17 +104,13 @@ def test_f25_a_lost_answer_to_a_move_is_unknown_and_the_move_is_never_sent_twice
 def test_a_time_out_ends_the_link_and_not_only_the_request():
     """A late answer could be taken for that of the next question."""
     simulator = simulator_with(FaultAction.DROP_REPLY, "GetStatus")
-    register("lost-one", simulator)
-    try:
-        with robolink.connect("epson+sim://lost-one", timeout_s=0.3) as controller:
-            with pytest.raises(TransportTimeoutError):
-                controller.status()
-            asked = controller.exchanges
-            with pytest.raises(TransportClosedError):
-                controller.status()
-            assert controller.exchanges == asked
-    finally:
-        unregister("lost-one")
+    with served(simulator) as url, robolink.connect(url, timeout_s=0.3) as controller:
+        with pytest.raises(TransportTimeoutError):
+            controller.status()
+        asked = controller.exchanges
+        with pytest.raises(TransportClosedError):
+            controller.status()
+        assert controller.exchanges == asked
 
 
 @pytest.mark.fault("F26")
@@ -122,14 +119,12 @@ def test_f26_whichever_answer_is_lost_a_movement_is_begun_once():
     for lost in range(100):
         fault = Fault(FaultAction.DROP_REPLY, on_exchange=lost)
         simulator = EpsonSimulator(seed=5, faults=[fault])
-        register("lost-one", simulator)
-        try:
-            with robolink.connect("epson+sim://lost-one", timeout_s=0.3) as controller:
-                lift(controller).wait(timeout_s=60)
-        except RobolinkError:
-            pass
-        finally:
-            unregister("lost-one")
+        with (
+            served(simulator) as url,
+            suppress(RobolinkError),
+            robolink.connect(url, timeout_s=0.3) as controller,
+        ):
+            lift(controller).wait(timeout_s=60)
         assert simulator.machine.arm.moves_started <= 1, f"answer {lost}"
         sent = [text for _, way, text in simulator.log if way == ">" and MOVE in text]
         assert len(sent) <= 1, f"answer {lost}"
@@ -367,14 +362,10 @@ def test_ctrl_c_while_leave_is_taken_tells_what_the_work_before_left():
         if "Logout" in request:
             raise KeyboardInterrupt
 
-    register("leaving", simulator)
-    try:
-        with pytest.raises(KeyboardInterrupt) as caught:
-            with robolink.connect("epson+sim://leaving") as controller:
-                before = write(controller).before
-                simulator.on_request = interrupt
-        stands = outcome_after(caught.value).tools[1]
-        assert (stands.before, stands.holds) == (before.components(), NEW.components())
-        assert simulator.machine.tools.get(1) == NEW
-    finally:
-        unregister("leaving")
+    with served(simulator) as url, pytest.raises(KeyboardInterrupt) as caught:
+        with robolink.connect(url) as controller:
+            before = write(controller).before
+            simulator.on_request = interrupt
+    stands = outcome_after(caught.value).tools[1]
+    assert (stands.before, stands.holds) == (before.components(), NEW.components())
+    assert simulator.machine.tools.get(1) == NEW

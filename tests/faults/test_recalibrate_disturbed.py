@@ -16,8 +16,8 @@ from typing import Final
 
 import pytest
 
+from tests._commands import Ended
 from tests.faults._recipe_cases import CASES
-from tests.faults._recipe_cell import Ended
 from tests.faults._recipe_ends import (
     Disturbance,
     check_interrupted,

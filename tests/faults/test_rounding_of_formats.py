@@ -1,15 +1,14 @@
 """What a format rounds is no difference, and the next number that it can hold is one."""
 
 from contextlib import contextmanager
-from itertools import count
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.faults import Fault, FaultAction, PlcFault, PlcFaultAction
-from robolink_simulators.hosting.in_process.epson import register, unregister
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+from robolink_simulators.testkit import media
 
 import robolink
 from robolink import ToolOffset
@@ -19,18 +18,12 @@ from tests.contract._softmotion_cell import served
 LAST_DIGIT_MM = 0.001
 """Of EPSON's text: three decimals leave."""
 SLOT = 15
-_names = count()
 
 
 @contextmanager
 def epson(simulator):
-    name = f"rounding-{next(_names)}"
-    register(name, simulator)
-    try:
-        with robolink.connect(f"epson+sim://{name}") as controller:
-            yield controller
-    finally:
-        unregister(name)
+    with media.served(simulator) as url, robolink.connect(url) as controller:
+        yield controller
 
 
 @pytest.mark.fault("F36")

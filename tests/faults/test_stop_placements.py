@@ -16,8 +16,9 @@ from dataclasses import dataclass, field
 import pytest
 
 from robolink.model import MarkerKind
+from tests._commands import Ended
 from tests.faults._recipe_cases import CASES, Case
-from tests.faults._recipe_cell import Ended, RecipeCell
+from tests.faults._recipe_cell import RecipeCell
 from tests.faults._recipe_ends import check_markers_are_named, kept
 from tests.faults._recipe_instants import Instants
 from tests.faults._stop_placements import Placement, Placements

@@ -1,14 +1,12 @@
 """A nozzle change that is refused leaves the old tool in place, and why is on record."""
 
 from dataclasses import replace
-from itertools import count
 
 import pytest
 from robolink_cli.prompts.operator import AssistedOperator
 from robolink_simulators.control.assist import InProcessEyes
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.world import STORED
-from robolink_simulators.hosting.in_process.epson import register, unregister
 
 import robolink
 from robolink.calibration_run import ChangePlan, Listener, NozzleChange, ToolPlan
@@ -16,8 +14,6 @@ from robolink.errors import CalibrationError, DeclinedError, VerifyError
 from robolink.journal import memory_journal
 from robolink.model import EntryKind, Signature, ToolReceipt, read_offset
 from robolink.transaction import earlier_corrections
-
-_names = count()
 
 
 class Cell:
@@ -55,13 +51,12 @@ class Cell:
 
 
 @pytest.fixture
-def cell():
+def cell(serve_simulator):
     simulator = EpsonSimulator(seed=3)
-    name = f"refusals-{next(_names)}"
-    outcomes = memory_journal(name).log(name, signature=Signature(nozzle="N-7"))
-    with robolink.connect(register(name, simulator), outcomes=outcomes) as controller:
+    url = serve_simulator(simulator).url
+    outcomes = memory_journal(url).log(url, signature=Signature(nozzle="N-7"))
+    with robolink.connect(url, outcomes=outcomes) as controller:
         yield Cell(simulator, controller)
-    unregister(name)
 
 
 def test_a_nozzle_that_is_too_far_off_is_refused(cell):

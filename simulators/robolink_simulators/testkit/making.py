@@ -1,7 +1,5 @@
 """Makes simulated controllers of each kind and serves them, as a test asks for."""
 
-import itertools
-import os
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields
@@ -16,6 +14,7 @@ from robolink_simulators.cell.clock import EXCHANGE_S, ManualClock, SteeredClock
 from robolink_simulators.cell.workplace import MOUNTED_TOOL
 from robolink_simulators.cell.world_parameters import WorldParameters, parameters_from_text
 from robolink_simulators.faults import LinkKind, faults_of_table, read_fault_file
+from robolink_simulators.testkit.media import served
 from robolink_simulators.testkit.operator import written_map, written_recipe
 from robolink_simulators.testkit.served import OwnFolder, SimulatedCell
 
@@ -195,8 +194,6 @@ the build machine is busy."""
 PROGRAM_EXCHANGE_S: Final = 0.005
 """What each request takes there, a hundredth of that patience."""
 
-_count = itertools.count(1)
-
 
 def make_epson(
     own: OwnFolder,
@@ -228,25 +225,8 @@ def make_epson(
         options=options_from_text(request.texts("options")),
         world=_world(request),
     )
-    time: Any
-    if medium == "sim":
-        from robolink_simulators.hosting.in_process.epson import register, unregister
-
-        name, time = _name(), clock or ManualClock()
-        url = register(name, simulator, clock=time)
-        own.stack.callback(unregister, name)
-    else:
-        time = _served_clock(request, SERVED_SPEED)
-        if medium == "tcp":
-            from robolink_simulators.hosting.streams.epson import serve_tcp
-
-            url = own.stack.enter_context(serve_tcp(simulator, clock=time)).url
-        elif medium == "serial":
-            from robolink_simulators.hosting.streams.epson import serve_serial
-
-            url = own.stack.enter_context(serve_serial(simulator, clock=time)).url
-        else:
-            raise _no_medium(medium, ("sim", "tcp", "serial"))
+    time = _time(request, medium, clock)
+    url = own.stack.enter_context(served(simulator, medium, clock=time))
     return _furnished(own, simulator, time, {medium: url}, request, person=person)
 
 
@@ -281,35 +261,9 @@ def make_softmotion(
         world=_world(request),
         make_plc=plc_maker(None if request.program is None else Path(request.program)),
     )
-    time: Any
-    if medium == "sim":
-        from robolink_simulators.hosting.in_process.softmotion import register, unregister
-
-        name, time = _name(), clock or ManualClock()
-        url = register(name, simulator, clock=time)
-        own.stack.callback(unregister, name)
-    else:
-        pace = (PROGRAM_SPEED, PROGRAM_EXCHANGE_S) if request.program else (SERVED_SPEED,)
-        time = _served_clock(request, *pace)
-        url = _on_bus(own, simulator, medium, time)
+    time = _time(request, medium, clock)
+    url = own.stack.enter_context(served(simulator, medium, clock=time))
     return _furnished(own, simulator, time, {medium: url}, request, person=person)
-
-
-def _on_bus(own: OwnFolder, simulator: Any, medium: str, clock: SteeredClock) -> str:  # noqa: ANN401 - imported where it is made
-    host: Any
-    if medium == "can":
-        from robolink_simulators.hosting.fieldbus.canopen_node import CanPlace, serve_canopen
-
-        host = serve_canopen(simulator, CanPlace("virtual", _name()), clock=clock)
-    elif medium in ("modbus-tcp", "modbus-rtu"):
-        from robolink_simulators.hosting.fieldbus.modbus import serve_modbus_rtu, serve_modbus_tcp
-
-        serve = serve_modbus_tcp if medium == "modbus-tcp" else serve_modbus_rtu
-        host = serve(simulator, clock=clock)
-    else:
-        raise _no_medium(medium, ("sim", "modbus-tcp", "modbus-rtu", "can"))
-    url: str = own.stack.enter_context(host).url
-    return url
 
 
 def make_plc(
@@ -327,28 +281,38 @@ def make_plc(
         ConfigError: What is asked for does not exist.
     """
     from robolink.register_maps import load_map
-    from robolink_simulators.plc import PlcSimulator, serve_plc, serve_plc_line
+    from robolink_simulators.plc import PlcSimulator
 
     path = written_map(own.folder) if request.map is None else Path(request.map)
     simulator = PlcSimulator(load_map(path), seed=_seed(own, request))
-    time: Any
-    if medium == "sim":
-        from robolink_simulators.hosting.in_process.plc import register, unregister
-
-        name, time = _name(), clock or ManualClock()
-        url = register(name, simulator, path, clock=time)
-        own.stack.callback(unregister, name)
-    else:
-        time = _served_clock(request, SERVED_SPEED)
-        host: Any
-        if medium == "modbus-tcp":
-            host = serve_plc(simulator, path, clock=time)
-        elif medium == "modbus-rtu":
-            host = serve_plc_line(simulator, path, clock=time)
-        else:
-            raise _no_medium(medium, ("modbus-tcp", "modbus-rtu", "sim"))
-        url = own.stack.enter_context(host).url
+    time = _time(request, medium, clock)
+    url = own.stack.enter_context(served(simulator, medium, clock=time, map_file=path))
     return _furnished(own, simulator, time, {medium: url}, request, person=False)
+
+
+def serve_made(
+    own: OwnFolder,
+    simulator: Any,  # noqa: ANN401 - of any kind
+    medium: str,
+    clock: Any,  # noqa: ANN401 - stepped or steered
+    map_file: Path | None,
+) -> SimulatedCell:
+    """Serve a simulator that the test has made; see :func:`~.media.served`.
+
+    Args:
+        own: Where.
+        simulator: Of any kind.
+        medium: How it is reached.
+        clock: Its time; that of a cell by default.
+        map_file: The file of the map of a PLC that has one.
+
+    Raises:
+        ConfigError: There is no such medium.
+    """
+    time = clock or _time(CellRequest(), medium, None)
+    url = own.stack.enter_context(served(simulator, medium, clock=time, map_file=map_file))
+    own.stack.callback(_forget_record, url)
+    return own.keep(simulator, time, {medium: url})
 
 
 def _furnished(
@@ -392,10 +356,13 @@ def _plan(simulator: Any, request: CellRequest, link: LinkKind) -> None:  # noqa
         simulator.faults.plan(faults_of_table(request.faults, link), simulator.seed, {link})
 
 
-def _served_clock(
-    request: CellRequest, speed: float, exchange_s: float = EXCHANGE_S
-) -> SteeredClock:
-    """Return the time on a port; in real time, which a test asked for, requests take none."""
+def _time(request: CellRequest, medium: str, clock: ManualClock | None) -> Any:  # noqa: ANN401 - stepped or steered
+    """Return the time of a cell; in real time, which a test asked for, requests take none."""
+    if medium == "sim":
+        return clock or ManualClock()
+    speed, exchange_s = SERVED_SPEED, EXCHANGE_S
+    if request.program is not None:
+        speed, exchange_s = PROGRAM_SPEED, PROGRAM_EXCHANGE_S
     factor = speed if request.speed is None else request.speed
     return SteeredClock(factor, exchange_s=0.0 if request.speed == 1 else exchange_s)
 
@@ -406,15 +373,3 @@ def _world(request: CellRequest) -> WorldParameters:
 
 def _seed(own: OwnFolder, request: CellRequest) -> int:
     return own.seed if request.seed is None else request.seed
-
-
-def _name() -> str:
-    """Return a name that no other cell of this machine has."""
-    return f"pytest-{os.getpid()}-{next(_count)}"
-
-
-def _no_medium(medium: str, known: tuple[str, ...]) -> ConfigError:
-    return ConfigError(
-        tr("A simulator cannot be served over {medium!r}.", medium=medium),
-        remedy=tr("These are known: {known}.", known=", ".join(known)),
-    )

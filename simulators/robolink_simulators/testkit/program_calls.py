@@ -38,7 +38,7 @@ class CallFault:
     cut_after: bool = False
 
 
-class Answers(Protocol):
+class ProgramAnswers(Protocol):
     """Who answers one program, as ``CallbackConversation`` does."""
 
     @property
@@ -52,7 +52,7 @@ class Answers(Protocol):
         """End."""
 
 
-class FarEnd(Protocol):
+class CallPartner(Protocol):
     """The other end of one connection of a program."""
 
     def ask(self, question: bytes, /) -> bytes:
@@ -69,13 +69,13 @@ class AnsweredHere:
         answers: Who answers, with whom the connection ends.
     """
 
-    def __init__(self, answers: Answers) -> None:
+    def __init__(self, answers: ProgramAnswers) -> None:
         self._answers = answers
         self._codec = CallbackCodec()
         self.close = answers.close
 
     def ask(self, question: bytes) -> bytes:
-        """See :class:`FarEnd`."""
+        """See :class:`CallPartner`."""
         if self._answers.over:
             return b""
         try:
@@ -100,7 +100,7 @@ class AnsweredAt:
         self.close = self._link.close
 
     def ask(self, question: bytes) -> bytes:
-        """See :class:`FarEnd`."""
+        """See :class:`CallPartner`."""
         answer = b""
         try:
             self._link.sendall(question + _END)
@@ -157,7 +157,7 @@ class ProgramCalls:
         ([b'a line with a wrong sum'], '-1')
     """
 
-    def __init__(self, far: Callable[[], FarEnd]) -> None:
+    def __init__(self, far: Callable[[], CallPartner]) -> None:
         self.questions: list[bytes] = []
         self.answers: list[bytes] = []
         self.fault: Callable[[int, bytes], CallFault | None] = lambda _number, _question: None
@@ -179,7 +179,7 @@ class ProgramCalls:
             self._call.close()
         self._call = None
 
-    def asked(self, line: bytes, far: FarEnd) -> bytes | None:
+    def asked(self, line: bytes, far: CallPartner) -> bytes | None:
         """Return what the program is sent for a question; ``None`` cuts it off."""
         self.questions.append(line)
         fault = self.fault(len(self.questions) - 1, line) or CallFault()
@@ -199,7 +199,7 @@ class ProgramCalls:
 class _Call:
     """One connection; see ``epson.spel.tasks.ports.PortLink``."""
 
-    def __init__(self, calls: ProgramCalls, far: FarEnd | None) -> None:
+    def __init__(self, calls: ProgramCalls, far: CallPartner | None) -> None:
         self._calls = calls
         self._far, self._there = far, far is not None
         self._asked = self._received = b""

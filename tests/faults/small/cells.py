@@ -11,8 +11,9 @@ from robolink_simulators.hosting.in_process.transport import InProcessTransport
 
 from robolink.checkpoints import Checkpoint, observed
 from robolink.transport import LinkUrl, _registry
+from tests._commands import Ended
 from tests.faults._epson_recipe_cell import EpsonRecipeCell
-from tests.faults._recipe_cell import Ended, RecipeCell
+from tests.faults._recipe_cell import RecipeCell
 from tests.faults._softmotion_recipe_cell import PlcRecipeCell
 from tests.faults.small.modbus_far_end import open_wired, plc_wire
 from tests.faults.small.wire import TextLines, Wire

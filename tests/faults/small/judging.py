@@ -8,7 +8,7 @@ from typing import Any, Final
 import pytest
 
 from robolink.model import MarkerKind, ToolOffset
-from tests.faults._recipe_cell import Ended
+from tests._commands import Ended
 from tests.faults.small.cells import WiredEpsonCell, WiredPlcCell
 
 _PROOF_MM: Final = 0.2

@@ -60,7 +60,7 @@ def register(
         >>> from pathlib import Path
         >>> import robolink
         >>> from robolink.register_maps import load_map
-        >>> from robolink_simulators.hosting.in_process.plc import register, unregister
+        >>> from robolink_simulators.plc.in_process import register, unregister
         >>> from robolink_simulators.plc import PlcSimulator
         >>> from robolink_simulators.testkit.operator import written_map
         >>> path = written_map(Path.cwd())

@@ -70,7 +70,7 @@ class ProcedureLock:
         checkpoint(Checkpoint.PROCEDURE, request)
         if not self._lock.acquire(blocking=False):
             raise BusyError(
-                tr("{request} has to wait: another operation is under way.", request=request),
+                tr("{request} must wait: another operation is running.", request=request),
                 remedy=tr("Wait for it to end; stopping is possible at any time."),
             )
         try:
@@ -257,7 +257,7 @@ class MarkerStore:
         if self.moving:
             raise BusyError(
                 tr(
-                    "{request} has to wait: the end of a movement has not been seen.",
+                    "{request} must wait: robolink has not seen the end of a movement.",
                     request=request,
                 ),
                 remedy=tr("Wait until the movement has ended, or stop it."),

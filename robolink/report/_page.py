@@ -177,7 +177,7 @@ def render_drift(cells: Sequence[CellDrift], *, made_at: str, robolink_version: 
     """
     band = simulated_band(any(cell.simulated for cell in cells))
     found = sum(len(cell.findings) for cell in cells)
-    verdict = tr("To look at: {count}", count=found) if found else tr("Nothing stands out")
+    verdict = tr("Unusual: {count}", count=found) if found else tr("Nothing is unusual")
     style = files("robolink.report").joinpath("style.css").read_text(encoding="utf-8")
     return (
         templates()

@@ -502,7 +502,7 @@ BOTH = pytest.mark.parametrize("at", [pytest.param(PIN, id="pin"), pytest.param(
 
 WIDER = "Keep the value with a wider"
 KEEPS = "Keep the value: it is"
-AGAIN = "Touch once more.", "Look once more."
+AGAIN = "Make one more touch.", "Measure once more with the camera."
 
 
 class Answers:

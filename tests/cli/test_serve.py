@@ -102,7 +102,7 @@ def test_who_is_not_on_the_list_is_cut_off_unheard():
             assert link.recv(1) == b""
     finally:
         server.close()
-    assert told == ["127.0.0.1 may not call and was cut off."]
+    assert told == ["127.0.0.1 may not connect; robolink disconnected it."]
 
 
 @pytest.fixture
@@ -140,7 +140,9 @@ def test_who_finds_no_room_is_told_so_and_not_that_it_may_not_call(listening):
         )
         assert greeted(last)
         assert ninth.recv(1) == b""
-        assert told == ["127.0.0.1 was cut off: 8 programs call already, and no more may."]
+        assert told == [
+            ("robolink disconnected 127.0.0.1: 8 programs are connected already, the most allowed.")
+        ]
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
@@ -192,8 +194,8 @@ def test_an_error_of_the_system_does_not_end_the_listening(listening, monkeypatc
     assert waits == [1.0, 1.0, 1.0]
     # The same trouble is told once.
     assert told == [
-        "No program can call just now: too many files. It is tried again each second.",
-        "No program can call just now: aborted. It is tried again each second.",
+        "No program can connect now: too many files. robolink tries again every second.",
+        "No program can connect now: aborted. robolink tries again every second.",
     ]
 
 
@@ -410,7 +412,7 @@ def test_f79_an_order_delivered_again_reports_the_first_result_and_writes_nothin
     code, out, _ = run(*SET, "--json")
     assert (code, json.loads(out)) == (0, {**first, "already_done": True})
     assert first["read_back"]["x_mm"] == 12.5
-    assert "nothing was moved or written now" in run(*SET)[1]
+    assert "Nothing was moved or written now" in run(*SET)[1]
     assert (simulator.machine.flash_writes, open_journal().count()) == (written, entries)
 
 
@@ -418,7 +420,7 @@ def test_f79_an_order_delivered_again_reports_the_first_result_and_writes_nothin
 @pytest.mark.parametrize(
     ("between", "code", "said"),
     [
-        (("undo", "--yes"), 2, "What order A-17 did was taken back"),
+        (("undo", "--yes"), 2, "Order A-17 was undone"),
         (("tool", "set", "1", "--x", "13", "--yes"), 5, "it holds X 13.000"),
     ],
 )

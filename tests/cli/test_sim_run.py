@@ -161,7 +161,7 @@ tcp = "127.0.0.1:6012"
         ('[cells.a]\nkind = "epson"\nserial = "com"', "line 4, cells.a.serial: 'com' is not 'pty'"),
         (
             '[cells.a]\nkind = "epson"\ntcp = "127.0.0.1:0"\nserial = "pty"',
-            "line 2, cells.a: --serial stands in place of --tcp",
+            "line 2, cells.a: --serial and --tcp cannot be combined",
         ),
         ('[cells.a]\nkind = "epson"\nallow_remote = 1', "line 4, cells.a.allow_remote: must be"),
         ('[cells.a]\nkind = "epson"\noption = ["a=1"]', "line 4, cells.a.option: must be a table"),

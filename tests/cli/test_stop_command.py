@@ -70,8 +70,8 @@ def stop(moving, capsys):
 def test_it_stops_and_says_that_it_stands(moving, stop):
     code, out, err = stop()
     assert code == 0
-    assert out == f"{moving.url} stands still; its state is: ready.\n"
-    assert "Nothing moves with --yes until" in err
+    assert out == f"{moving.url}: the robot has stopped (confirmed). State: ready.\n"
+    assert "Commands with --yes are blocked until" in err
     assert "without a clear answer" in err  # the movement of the client that died
 
 
@@ -121,7 +121,7 @@ def test_a_cell_file_that_is_broken_leaves_the_address_of_the_last_connection(mo
     assert code == 0
     assert moving.url in out
     assert "robolink.toml cannot be read" in err
-    assert f"The address is that of the last connection: {moving.url}." in err
+    assert f"The address is from the last connection: {moving.url}." in err
 
 
 @pytest.mark.parametrize("command", [["status"], ["where"], ["motors", "off"], ["reset", "--yes"]])
@@ -153,7 +153,7 @@ def test_a_state_folder_that_is_none_is_no_matter(moving, stop, tmp_path, monkey
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "file"))
     code, out, err = stop()
     assert (code, "stands" in out) == (0, True)
-    assert "The note of this stop could not be kept" in err
+    assert "This stop could not be recorded" in err
 
 
 def test_a_password_file_that_others_may_read_does_not_keep_it_back(moving, stop, tmp_path):

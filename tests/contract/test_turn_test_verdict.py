@@ -40,7 +40,7 @@ def newest(controller: SimpleController):
 
 
 TAKES_BACK = "Put the old value back."
-AGAIN = "Touch once more."
+AGAIN = "Make one more touch."
 LEARNS = "Learn the station again."
 MOUNT = "Check the mount of the nozzle."
 KEEPS = "Keep the value"
@@ -159,7 +159,7 @@ def test_a_sensor_looks_once_more_and_nothing_is_offered_that_cannot_be_done():
     looking = Person(TAKES_BACK, again=[shown(0.1)], relearning=())
     with pytest.raises(VerifyError):
         concluded(shown(0.1), looking)
-    assert looking.asked[0][1][1] == "Look once more."
+    assert looking.asked[0][1][1] == "Measure once more with the camera."
     assert LEARNS not in looking.asked[0][1]
 
     once = Person(TAKES_BACK)
@@ -205,7 +205,7 @@ def test_a_doubt_that_the_accuracy_covers_may_be_kept_as_stated():
     ("answer", "chosen", "remedy", "commands"),
     [
         (TAKES_BACK, "take_back", "Check the mount of the nozzle and", ()),
-        (MOUNT, "check_mount", "measured anew", ()),
+        (MOUNT, "check_mount", "measure the tip anew", ()),
         (LEARNS, "learn_station", "'robolink cell station learn BEAMS-02 --tool 15'", RELEARN),
     ],
 )
@@ -250,7 +250,7 @@ def test_whoever_looks_until_it_fits_gets_no_pass():
 
     assert refused.value.code == "proof_contradicts_repeatability"
     assert "0.100 mm apart" in person.asked[-1][0]
-    assert "Look once more." not in person.asked[-1][1], "twice at most"
+    assert "Measure once more with the camera." not in person.asked[-1][1], "twice at most"
     widened = person.asked[-1][1][-1]
     assert "+-0.107 mm" in widened, "the worst look counts"
 

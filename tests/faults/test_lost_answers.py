@@ -319,7 +319,7 @@ def test_a_garbled_acknowledgement_keeps_nothing_from_being_put_back(serve, uncl
 def test_a_movement_whose_end_was_garbled_is_not_called_refused(serve, unclear):
     simulator = unclear(MOVE, 9, "#Execute,")
     with serve(simulator) as url, robolink.connect(url, timeout_s=0.5) as controller:
-        with pytest.raises(UnclearAnswerError, match="Read what it should have changed"):
+        with pytest.raises(UnclearAnswerError, match="Check what it should have changed"):
             lift(controller).wait(timeout_s=60)
         assert simulator.machine.arm.moves_started == 1
 

@@ -114,7 +114,7 @@ def test_a_frozen_holder_is_replaced_and_told_so_when_it_comes_back(leases):
     (entry,) = leases.entries()
     assert entry.details["holder"]["operator"] == "Anna"
     assert entry.details["epoch"] == 2
-    assert "no sign of life" in entry.verdict
+    assert "did not respond" in entry.verdict
     for _ in range(2):
         with pytest.raises(LeaseLostError):
             anna.begin(marker("c"))

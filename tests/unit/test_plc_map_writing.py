@@ -259,7 +259,7 @@ def test_a_preview_names_everything_that_would_be_written(commit_bit, level):
 def test_registers_that_cannot_be_put_back_leave_the_outcome_unknown(commit_bit):
     with commit_bit.connect() as controller:
         commit_bit.client.refuse = {1, 2}
-        with pytest.raises(OutcomeUnknownError, match="could not be put back"):
+        with pytest.raises(OutcomeUnknownError, match="could not restore the registers"):
             controller.tools.write(1, NEW, expected=ANY)
         assert len(controller.outcomes.open_markers()) == 1
 
@@ -451,7 +451,7 @@ def test_registers_that_change_between_two_looks_are_looked_at_again(commit_bit)
         assert controller.tools.read(1) == wanted
         turns = count()
         commit_bit.client.read_holding = lambda address, n: (next(turns) % 7,) * n
-        with pytest.raises(RemoteProtocolError, match="are different at every reading"):
+        with pytest.raises(RemoteProtocolError, match="change at every reading"):
             controller.tools.read(1)
 
 

@@ -280,7 +280,7 @@ def test_a_missing_basis_says_what_both_mean(problems):
         ("[tolerances]\ndrfit_mm = 1", "tolerances.drfit_mm", "is not known; is drift_mm meant?"),
         ("[box]\nq = 1", "box.q", "is not known; these are: sideways_mm, down_mm, up_mm"),
         ("nots = ''", "nots", "is not known; is notes meant?"),
-        ("[box]\nverify = false", "box.verify", "belongs at the top of the file, above the first"),
+        ("[box]\nverify = false", "box.verify", "must be at the top of the file, above the first"),
     ],
 )
 def test_a_key_that_is_wrong_is_told_by_its_path(problems, lines, where, what):

@@ -200,7 +200,7 @@ def test_a_stand_in_that_sees_another_way_each_time_gives_up():
     seen = cycle([(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)])
     operator = AssistedOperator(lambda: next(seen), lambda _text: None)
     operator.ask("Onto the pin.", Question.PLACE)
-    with pytest.raises(DeclinedError, match="did not get there"):
+    with pytest.raises(DeclinedError, match="did not reach the pin"):
         for _ in range(MOST_STEPS + 1):
             operator.poll(0)
 
@@ -257,7 +257,7 @@ def test_an_answer_that_nobody_can_have_read_the_question_for_is_asked_again(con
 
 
 def test_whoever_keeps_answering_too_early_is_refused(controller):
-    with pytest.raises(CalibrationError, match="before anybody could have read it") as refused:
+    with pytest.raises(CalibrationError, match="too early for anybody to have read it") as refused:
         shown_to(controller, 0.0, 0.1, 0.2, 1.0)
     assert refused.value.code == "typed_ahead"
 

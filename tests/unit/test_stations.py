@@ -311,8 +311,8 @@ def test_a_station_that_only_the_journal_knows_has_the_sensor_of_then():
 @pytest.mark.parametrize(
     ("more", "where", "what"),
     [
-        ("mm_per_px = [[0.02, 0.0], [0.0, 0.02]]", "origin_mm", "goes with mm_per_px"),
-        ("origin_mm = [1, 2]", "origin_mm", "goes with mm_per_px"),
+        ("mm_per_px = [[0.02, 0.0], [0.0, 0.02]]", "origin_mm", "needs mm_per_px"),
+        ("origin_mm = [1, 2]", "origin_mm", "needs mm_per_px"),
         ("mm_per_px = [[0.02, 0.0]]\norigin_mm = [1, 2]", "mm_per_px", "must hold at least 2"),
         ("sensors = 'x'", "sensors", "is not known"),
     ],

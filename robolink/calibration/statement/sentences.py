@@ -330,13 +330,13 @@ def turn_test_sentences(
         return
     if judgement.tests > 1:
         yield tr(
-            "The turn test was made {count} times, because the first contradicted the measurement; "
-            "all its looks count together.",
+            "The turn test was made {count} times, because the first contradicted the "
+            "measurement; all results count together.",
             count=judgement.tests,
         )
     if judgement.apart_mm is not None:
         yield tr(
-            "At one angle its looks lie {mm} mm apart: it does not repeat as stated.",
+            "Results at the same angle differ by {mm} mm: more than the stated repeatability.",
             mm=stated_mm(judgement.apart_mm),
         )
     yield from _explained(judgement)
@@ -344,7 +344,7 @@ def turn_test_sentences(
         yield from _causes(None if measured is None else measured.accuracy)
     if judgement.small_angle:
         yield tr(
-            "The tool was turned by {turn:.0f} degrees; less than 90 is not called tested.",
+            "The tool turned by {turn:.0f} degrees; less than 90 does not count as tested.",
             turn=max(one.turn_deg for one in judgement.limits),
         )
     yield from _not_shown(judgement)
@@ -375,7 +375,7 @@ def _not_shown(judgement: TurnJudgement) -> Iterator[str]:
             shifts=", ".join(shifts),
         )
     if judgement.misses_z:
-        yield tr("This test tells no height: a shift in Z would not show.")
+        yield tr("This test does not measure height: a shift in Z would not show.")
 
 
 def _explained(judgement: TurnJudgement) -> Iterator[str]:
@@ -383,17 +383,17 @@ def _explained(judgement: TurnJudgement) -> Iterator[str]:
     limit = judgement.limits[judgement.worst]
     if judgement.contradicts_accuracy:
         yield tr(
-            "All that is stated explains {mm} mm, no more: the tip is not where it was measured.",
+            "The stated errors explain only {mm} mm: the tip is not where it was measured.",
             mm=stated_mm(limit.accurate_mm),
         )
     elif judgement.contradicts_repeatability and judgement.apart_mm is None:
         yield tr(
-            "Scatter alone explains {mm} mm, no more: it does not repeat as stated.",
+            "Scatter alone explains only {mm} mm: it does not repeat as stated.",
             mm=stated_mm(limit.repeatable_mm),
         )
     elif not judgement.code and not judgement.small_angle:
         yield tr(
-            "It contradicts nothing that is stated: scatter alone explains {mm} mm.",
+            "It agrees with the stated accuracy: scatter alone explains {mm} mm.",
             mm=stated_mm(limit.repeatable_mm),
         )
 
@@ -453,5 +453,5 @@ def _causes(accuracy: Accuracy | None) -> Iterator[str]:
         )
         yield tr("To find out: check the mount, then learn the station again.")
     else:
-        yield tr("Possible causes: the nozzle is loose, or what it was measured at has moved.")
+        yield tr("Possible causes: the nozzle is loose, or the station has moved.")
         yield tr("To find out: check the mount, then measure again.")

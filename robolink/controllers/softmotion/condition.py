@@ -60,7 +60,7 @@ def require_permit(now: Response) -> None:
     """
     if not now.bits & Bits.PERMITTED:
         raise NotReadyError(
-            tr("The machine does not permit it now."),
+            tr("The machine does not allow it now."),
             reason=NotReadyReason.NOT_REMOTE,
             remedy=tr(
                 "The machine's program gives the permit (xPermit); bring it to its service state."
@@ -81,7 +81,7 @@ def require_beats(whole_look_s: float) -> None:
         raise ConfigError(
             tr(
                 "This line is too slow for movements: one reading of the PLC takes "
-                "{look:.2f} s, and a movement is halted after 0.5 s without a sign "
+                "{look:.2f} s, and the PLC stops a movement after 0.5 s without a signal "
                 "from this computer.",
                 look=whole_look_s,
             ),
@@ -109,7 +109,7 @@ def require_still(now: Response) -> None:
         raise NotReadyError(
             tr("An interrupted movement is waiting to continue."),
             reason=NotReadyReason.PAUSED,
-            remedy=tr("Let it continue to its end, or halt it."),
+            remedy=tr("Let it finish, or stop it."),
         )
 
 
@@ -168,7 +168,7 @@ def _obstacle(now: Response) -> tuple[NotReadyReason, str, str] | None:
     if now.group_state == GroupState.STOPPING:
         return (
             NotReadyReason.PAUSED,
-            tr("The axis group is held by a stop."),
+            tr("A stop holds the axis group."),
             tr("Run 'robolink robot reset' to release the stop when the cell is clear."),
         )
     if now.group_state == GroupState.DISABLED:

@@ -538,7 +538,7 @@ def test_how_long_a_movement_takes_is_said_where_it_is_known():
     def shown(hand, later_s=0.0):
         return "\n".join(screen_of(hand.state, hand.now + later_s).rows())
 
-    assert "Still: 23.0 mm, about 3 s" in shown(coming_down())
+    assert "To go: 23.0 mm, about 3 s" in shown(coming_down())
     # A controller that tells no position meanwhile: the whole way, from where it began.
     assert "Way:   60.0 mm in all, about 8 s" in shown(coming_down(reads=False))
     assert "Still" not in shown(coming_down(), later_s=1.5), "where it is now, nobody knows"

@@ -172,7 +172,7 @@ def test_a_jog_that_another_program_takes_over_is_said_to_be_and_what_he_moves_i
     assert failure.value.code == ErrorClass.NOT_OWNER
     assert plc.opcodes() == [Opcode.JOG]
     assert cell.open_requests() == []
-    with pytest.raises(LeaseLostError, match="another client took the mailbox"):
+    with pytest.raises(LeaseLostError, match="another client has taken over the mailbox"):
         jog(controller)
     assert plc.opcodes() == [Opcode.JOG]
 

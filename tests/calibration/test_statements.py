@@ -123,12 +123,12 @@ def judged(code="", *, small=False, covered=False):
         (
             judged("proof_contradicts_repeatability", covered=True),
             "Turn test within its limit, with a doubt: 0.012",
-            "Scatter alone explains 0.016 mm, no more",
+            "Scatter alone explains only 0.016 mm",
         ),
         (
             judged("proof_contradicts_repeatability"),
             "Turn test contradicts the measurement: 0.012",
-            "Scatter alone explains 0.016 mm, no more",
+            "Scatter alone explains only 0.016 mm",
         ),
         (
             judged("proof_contradicts_accuracy"),

@@ -286,7 +286,7 @@ def test_an_entry_says_both_statements_its_rows_and_the_seating(shown):
 
 def test_the_entry_of_a_turn_test_says_what_it_contradicts(shown):
     text = shown("journal", "show", str(recorded(sigma_mm=0.02) + 4))
-    assert "Scatter alone explains 0.0" in text
+    assert "Scatter alone explains only 0.0" in text
     assert "it does not repeat as stated" in text
 
 

@@ -59,7 +59,7 @@ def test_a_person_sees_a_table_and_how_it_was_read(shown):
     assert code == 0
     assert "T 1" in out
     assert "405.800" in out
-    assert "1 poses, read as: table, utf-8." in out
+    assert "1 poses read. Layout: table, utf-8." in out
     assert "Lengths were in mm (no rotation stated)." in out
     assert "R = Rz(W) Ry(P) Rx(R) deg" in out
     assert "Not used: Remark." in out

@@ -163,7 +163,7 @@ def test_programs_that_cannot_be_answered_take_no_place_away(listening, error):
             assert link.recv(1) == b""
     with socket.create_connection(server.address, timeout=10) as link:
         assert greeted(link)
-    expected = "127.0.0.1 was cut off: no journal"
+    expected = "robolink disconnected 127.0.0.1: no journal"
     assert told == ([expected] * MOST_PROGRAMS if isinstance(error, JournalError) else [])
 
 
@@ -216,7 +216,7 @@ def test_a_system_without_a_further_thread_does_not_end_the_listening(listening,
             assert link.recv(1) == b""
     with socket.create_connection(server.address, timeout=10) as link:
         assert greeted(link)
-    assert told == ["127.0.0.1 was cut off: can't start new thread"] * (MOST_PROGRAMS + 1)
+    assert told == ["robolink disconnected 127.0.0.1: can't start new thread"] * (MOST_PROGRAMS + 1)
 
 
 def test_an_address_that_is_taken_is_told_once():
@@ -312,7 +312,7 @@ def test_whoever_watches_reads_why_a_program_was_refused_and_what_to_do(monkeypa
     line = ["expert", "serve", "--spel", "127.0.0.1:5001", *(["--json"] if as_json else [])]
     result = CliRunner().invoke(cli, line)
     assert result.exit_code == 0, result.output
-    sentence = "10.0.0.7 is answered journal: The journal is damaged. Move the file away."
+    sentence = "10.0.0.7 gets the answer journal: The journal is damaged. Move the file away."
     assert sentence in " ".join(result.stderr.split())
     if as_json:
         event, _ = map(json.loads, result.stdout.splitlines())

@@ -94,7 +94,7 @@ def test_a_journal_of_garbage_is_told_afterwards_and_truly(moving, stop, state_f
     (state_folder / "journal.db").write_bytes(b"no database" * 100)
     code, out, err = stop()
     assert code == 0
-    assert "stands" in out
+    assert "has stopped" in out
     assert "journal" in err
     assert "The stop went out anyway." in err
     assert "not touched" not in out + err
@@ -152,7 +152,7 @@ def test_a_state_folder_that_is_none_is_no_matter(moving, stop, tmp_path, monkey
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "file"))
     code, out, err = stop()
-    assert (code, "stands" in out) == (0, True)
+    assert (code, "has stopped" in out) == (0, True)
     assert "This stop could not be recorded" in err
 
 
@@ -458,7 +458,7 @@ def test_a_look_that_does_not_check_the_cell_file_heeds_what_it_says(moving, sto
         assert main.run(["-c", "a", "status"]) == 0
         told = capsys.readouterr().err
         assert "The cell a has a robot LS10-B" in told
-        assert "the cell a works with tool 2" in told
+        assert "the cell a uses tool 2" in told
         assert main.run(["-c", "a", "--operator", "Anna", "status"]) == 0
         assert main.run(["-c", "a", "--operator", "nobody", "status"]) == 2
         assert "not among the people of this cell" in capsys.readouterr().err

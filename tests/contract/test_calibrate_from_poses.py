@@ -186,8 +186,8 @@ def test_on_a_terminal_a_no_writes_nothing(command, simulator, monkeypatch):
     monkeypatch.setattr(given_poses, "agree", decline)
     assert command(*calibrate("--points", "901,902", "--axes-held"))[0] == 9
     (question,) = asked
-    assert "Write it to tool 1 all the same?" in question
-    assert "robolink did not see these touches" in question
+    assert "Write it to tool 1 anyway?" in question
+    assert "not seen by robolink" in question
     assert stored(simulator) == STORED
 
 
@@ -490,7 +490,7 @@ def test_a_pin_that_was_touched_in_a_local_is_not_kept_as_one_of_the_base(comman
 def test_that_nobody_saw_the_touches_is_said_though_yes_was_said_beforehand(command, simulator):
     code, out, err = command(*calibrate("--points", "901,902", "--yes"))
     assert code == 0
-    assert "robolink did not see these touches" in out
+    assert "not seen by robolink" in out
     assert "Not tested yet" in out + err
     assert "verified" not in out + err
     assert stored(simulator) != STORED

@@ -200,7 +200,7 @@ def test_a_person_insists_and_the_old_holder_is_refused_from_then_on(plc):
             broken = isinstance(told.value, TransportClosedError | RemoteProtocolError)
             assert (broken and "can" in plc.cell.url) or dispossessed(told.value)
     taken, insisted = plc.shared.entries(kinds=(EntryKind.LEASE,))
-    assert insisted.verdict.startswith("bob (process 22 on pc-2) insisted on taking")
+    assert insisted.verdict.startswith("bob (process 22 on pc-2) took over")
     assert "ann (process 11 on pc-1)" in insisted.verdict
     assert "ann went home" in insisted.verdict
     assert taken.details == {"taken_from": owner, "reason": "ann went home"}

@@ -149,7 +149,7 @@ def test_every_error_is_told_at_once_with_its_path_and_file(places):
         "cells.line3.clearance_mm: must be at least 0.5",
         "cells.line3.password_env: must be the name of a variable that begins with ROBOLINK_",
         "cells.line3.password_file: must not be empty",
-        "cells.line3.max_chagne_mm: is not known; is max_change_mm meant?",
+        "cells.line3.max_chagne_mm: is not known; did you mean max_change_mm?",
         "cells.b: must be a table",
     ):
         assert f"    {line}" in told

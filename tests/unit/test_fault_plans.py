@@ -130,7 +130,7 @@ def test_what_is_wrong_is_told_with_its_line_and_key(written, text, told):
 
 def test_all_that_is_wrong_is_told_at_once(written):
     text = "[[fault]]\naction = 'dely'\nsecond = 1\n[[fault]]\naction = 'reset'\nbit = 9"
-    with pytest.raises(ConfigError, match=r"(?s)3 places.*line 4.*line 5.*line 8"):
+    with pytest.raises(ConfigError, match=r"(?s)3 errors.*line 4.*line 5.*line 8"):
         read_fault_file(written(HEAD + text))
 
 

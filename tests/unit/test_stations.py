@@ -206,7 +206,7 @@ def test_a_nearer_file_adds_stations_and_takes_none_away(tmp_path, monkeypatch):
     [
         ('kind = "laser"', "cells.a.stations.S", "needs a kind: pin, beams, touch"),
         ("x_mm = 1.0", "cells.a.stations.S", "needs a kind"),
-        ('kind = "pin"\nguage = "G"', "cells.a.stations.S.guage", "is gauge meant?"),
+        ('kind = "pin"\nguage = "G"', "cells.a.stations.S.guage", "did you mean gauge?"),
         ('kind = "pin"\nx_mm = "1"', "cells.a.stations.S.x_mm", "must be a number"),
         ('kind = "pin"\ncheck_every_days = 0', "cells.a.stations.S.check_every_days", "more than"),
         (

@@ -210,7 +210,7 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
         "Drift during the measurement cannot be checked with fewer than six touches."
     ),
     "touches_not_witnessed": lambda: tr(
-        "robolink did not see these touches: the poses were taught, typed or read from a file."
+        "These touches were not seen by robolink: the poses were taught, typed or read from a file."
     ),
     "proof_contradicts_repeatability": lambda: tr(
         "The turn test differs from the measurement by more than its repeatability: was "

@@ -127,7 +127,7 @@ def largest_row_sentence(accuracy: Accuracy) -> str:
         >>> touches = Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)
         >>> found = assessed(solve_two_pose(*touches, sigma_mm=0.02), AccuracyFacts())
         >>> largest_row_sentence(found.accuracy)
-        'Largest row: how a person sees contact, +-0.05 mm (default, not measured).'
+        'Largest row: judging contact by eye, +-0.05 mm (default, not measured).'
     """
     row = accuracy.largest
     facts = {"row": row_title(row), "basis": basis_in_words(row)}
@@ -153,7 +153,7 @@ def statement_sentences(result: "CalibrationResult") -> Iterator[str]:
         ...     print(sentence)
         Repeatable: not known (two touches cannot check each other).
         X, Y: accurate to +-0.088 mm (95 %).
-        Largest row: how a person sees contact, +-0.05 mm (default, not measured).
+        Largest row: judging contact by eye, +-0.05 mm (default, not measured).
     """
     for sentence in (repeatable_sentence(result), accurate_sentence(result)):
         if sentence:

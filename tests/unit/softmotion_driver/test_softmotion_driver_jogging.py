@@ -51,7 +51,7 @@ def test_a_jog_whose_end_is_refused_is_halted(cell, plc, controller):
 
 def test_a_jog_whose_end_is_not_acknowledged_is_halted(cell, plc, controller):
     plc.overhears = ends_a_jog
-    with pytest.raises(ControllerFaultError, match=r"not acknowledged.*stands still"):
+    with pytest.raises(ControllerFaultError, match=r"did not acknowledge.*was stopped"):
         jog(controller)
     assert plc.opcodes() == [Opcode.JOG, Opcode.HALT]
     assert moves_nothing(plc)
@@ -62,7 +62,7 @@ def test_a_jog_whose_end_is_not_acknowledged_is_halted(cell, plc, controller):
 
 def test_a_jog_whose_end_and_halt_are_not_acknowledged_is_stopped(plc, controller):
     plc.overhears = lambda command: ends_a_jog(command) or command.opcode == Opcode.HALT
-    with pytest.raises(ControllerFaultError, match=r"not acknowledged.*stands still"):
+    with pytest.raises(ControllerFaultError, match=r"did not acknowledge.*was stopped"):
         jog(controller)
     assert plc.opcodes() == [Opcode.JOG, Opcode.STOP]
     assert moves_nothing(plc)

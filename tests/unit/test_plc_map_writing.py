@@ -160,7 +160,7 @@ def test_registers_alone_do_not_prove_a_takeover_and_recovery_asks_once_more(com
         (marker,) = controller.outcomes.open_markers()
         finding = controller.resolver.examine(marker)
         assert finding.verdict is Verdict.NOT_FINISHED
-        assert "take" in finding.action
+        assert "accept" in finding.action
         recovery = recover(controller)
         assert not recovery.left
         assert not controller.outcomes.open_markers()

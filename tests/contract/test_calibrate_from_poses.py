@@ -154,7 +154,7 @@ def test_points_are_a_method_of_their_own(command, simulator, points, more, firs
     ("words", "code", "said"),
     [
         ((), 2, "Missing option '--points'"),
-        (("--points", "901,902", "--speed", "5"), 2, "--speed says how to move"),
+        (("--points", "901,902", "--speed", "5"), 2, "--speed is for movements"),
         (("--points", "901,902,951"), 2, "--points: must hold two points; more are for"),
         (("--points", "901,902", "--method", "n-angle"), 2, "--points: must hold three points"),
         (("--points", "901,902", "--pose", "1,2,3"), 2, "No such option"),
@@ -187,7 +187,7 @@ def test_on_a_terminal_a_no_writes_nothing(command, simulator, monkeypatch):
     assert command(*calibrate("--points", "901,902", "--axes-held"))[0] == 9
     (question,) = asked
     assert "Write it to tool 1 anyway?" in question
-    assert "not seen by robolink" in question
+    assert "did not see these touches" in question
     assert stored(simulator) == STORED
 
 

@@ -266,7 +266,7 @@ def test_a_write_whose_acknowledgement_was_garbled_is_told_as_that(serve, unclea
             change_tools(controller, [Wanted(1, NEW, old)], tell=told.append)
         assert simulator.machine.tools.get(1) == old
         assert controller.outcomes.open_markers() == ()
-    assert "did run. The old value of tool 1 is back." in str(caught.value)
+    assert "it ran. The old value of tool 1 is back." in str(caught.value)
     assert told == ["The old value of tool 1 is back."]
     assert len([text for _, _, text in simulator.log if WRITE in text]) == 2
 

@@ -318,12 +318,12 @@ def turn_test_sentences(
         >>> limits = DriftLimits(repeatable_mm=0.016, accurate_mm=0.09, turn_deg=180.0)
         >>> for sentence in turn_test_sentences(TurnJudgement("", (limits,))):
         ...     print(sentence)
-        It contradicts nothing that is stated: scatter alone explains 0.016 mm.
+        It agrees with the stated accuracy: scatter alone explains 0.016 mm.
         >>> doubtful = TurnJudgement("proof_contradicts_repeatability", (limits,))
         >>> for sentence in turn_test_sentences(doubtful):
         ...     print(sentence)
-        Scatter alone explains 0.016 mm, no more: it does not repeat as stated.
-        Possible causes: the nozzle is loose, or what it was measured at has moved.
+        Scatter alone explains only 0.016 mm: it does not repeat as stated.
+        Possible causes: the nozzle is loose, or the station has moved.
         To find out: check the mount, then measure again.
     """
     if judgement is None:

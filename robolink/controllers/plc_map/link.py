@@ -376,9 +376,9 @@ class MappedPlc(DriverLink):
         permit = self.register_map.permit
         if permit is not None and not self.registers.is_on(permit):
             raise NotReadyError(
-                tr("The machine does not allow changes now ({place}).", place=permit.place),
+                tr("The machine does not permit changes now ({place}).", place=permit.place),
                 reason=NotReadyReason.NOT_REMOTE,
-                remedy=tr("Allow them at the machine, then try again; nothing was written."),
+                remedy=tr("Permit them at the machine, then try again; nothing was written."),
             )
 
     def require_known_place(self, tool: int) -> None:

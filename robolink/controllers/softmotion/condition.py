@@ -60,7 +60,7 @@ def require_permit(now: Response) -> None:
     """
     if not now.bits & Bits.PERMITTED:
         raise NotReadyError(
-            tr("The machine does not allow it now."),
+            tr("The machine does not permit it now."),
             reason=NotReadyReason.NOT_REMOTE,
             remedy=tr(
                 "The machine's program gives the permit (xPermit); bring it to its service state."
@@ -168,7 +168,7 @@ def _obstacle(now: Response) -> tuple[NotReadyReason, str, str] | None:
     if now.group_state == GroupState.STOPPING:
         return (
             NotReadyReason.PAUSED,
-            tr("A stop holds the axis group."),
+            tr("The axis group is held by a stop."),
             tr("Run 'robolink robot reset' to release the stop when the cell is clear."),
         )
     if now.group_state == GroupState.DISABLED:

@@ -253,7 +253,7 @@ def test_a_held_stop_is_released_by_the_reset(plc, controller):
 def test_a_held_stop_is_not_released_without_the_machines_permit(plc, controller):
     controller.stop()
     plc.now = replace(plc.now, bits=plc.now.bits & ~Bits.PERMITTED)
-    with pytest.raises(NotReadyError, match="does not allow"):
+    with pytest.raises(NotReadyError, match="does not permit"):
         controller.reset_fault()
     assert [command.operands[0] for command in plc.executed] == [0]
 

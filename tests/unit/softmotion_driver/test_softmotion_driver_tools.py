@@ -179,7 +179,7 @@ def test_nothing_is_written_while_the_group_moves(plc, controller):
 
 def test_nothing_is_written_without_the_machines_permit(cell, plc, controller):
     plc.now = replace(plc.now, bits=plc.now.bits & ~Bits.PERMITTED)
-    with pytest.raises(NotReadyError, match="does not allow") as refusal:
+    with pytest.raises(NotReadyError, match="does not permit") as refusal:
         controller.tools.write(3, NEW, expected=OLD)
     assert refusal.value.reason is NotReadyReason.NOT_REMOTE
     assert plc.executed == []

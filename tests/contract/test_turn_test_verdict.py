@@ -243,7 +243,7 @@ def test_once_more_counts_all_looks_and_each_is_on_record():
 
 
 def test_whoever_looks_until_it_fits_gets_no_pass():
-    person = Person("Measure once", "Look", TAKES_BACK, again=[shown(0.0), shown(0.0)])
+    person = Person("Measure once", "Measure once", TAKES_BACK, again=[shown(0.0), shown(0.0)])
 
     with pytest.raises(VerifyError) as refused:
         concluded(shown(0.1), person)

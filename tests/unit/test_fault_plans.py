@@ -93,8 +93,8 @@ match = "read_response"
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("[[fault]]\naction = 'drop_reply'\nmach = 'x'", "line 5, fault 1, mach: .*is match meant"),
-        ("[[fault]]\naction = 'drop_replay'", "line 4, fault 1, action: .*is drop_reply meant"),
+        ("[[fault]]\naction = 'drop_reply'\nmach = 'x'", "line 5, fault 1, mach: .*did you mean match"),
+        ("[[fault]]\naction = 'drop_replay'", "line 4, fault 1, action: .*did you mean drop_reply"),
         (
             "[[fault]]\naction = 'reset'\n\n[[fault]]\nseconds = 1",
             "line 6, fault 2, action: is mis",
@@ -118,7 +118,7 @@ match = "read_response"
         ("[drawn]\nactions = 'delay'", "line 4, drawn, actions: must be a list"),
         ("[drawn]\nactions = ['echo']", "line 4, drawn, actions: .*echo cannot happen"),
         ("[drawn]\nspeed = 1", "line 4, drawn, speed: is not known"),
-        ("faults = 1", "line 3, faults: is not known; is fault meant"),
+        ("faults = 1", "line 3, faults: is not known; did you mean fault"),
         ("seed = 1.5", "line 3, seed: must be a whole number"),
         ("seed = 1 2", "cannot be read: .*line 3"),
     ],

@@ -99,7 +99,7 @@ def test_the_options_say_what_the_file_does_not(shown):
 def test_options_of_a_file_need_a_file(capsys):
     code = main.run(["calibrate", "two-pose", "--tool", "1", "--pose", "1,2,3", "--length", "m"])
     assert code == 2
-    assert "belong to a file of poses" in capsys.readouterr().err
+    assert "need a file of poses" in capsys.readouterr().err
 
 
 def test_a_calibration_takes_the_same_files(tmp_path, capsys):

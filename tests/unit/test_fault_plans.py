@@ -93,7 +93,10 @@ match = "read_response"
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("[[fault]]\naction = 'drop_reply'\nmach = 'x'", "line 5, fault 1, mach: .*did you mean match"),
+        (
+            "[[fault]]\naction = 'drop_reply'\nmach = 'x'",
+            "line 5, fault 1, mach: .*did you mean match",
+        ),
         ("[[fault]]\naction = 'drop_replay'", "line 4, fault 1, action: .*did you mean drop_reply"),
         (
             "[[fault]]\naction = 'reset'\n\n[[fault]]\nseconds = 1",

@@ -94,7 +94,7 @@ class Inspection:
         verdict = (
             tr("Needs attention: {codes}.", codes=", ".join(one.code for one in self.findings))
             if self.findings
-            else tr("In order.")
+            else tr("No problem found.")
         )
         return NewEntry(
             EntryKind.CHECK,
@@ -217,8 +217,8 @@ def _changed(
 
 def _put_back(tool: int) -> str:
     return tr(
-        "If nobody meant it, write the recorded value back with 'robolink tool set {tool}'; "
-        "otherwise measure the tool again.",
+        "If nobody intended this, write the recorded value back with 'robolink tool set "
+        "{tool}'; otherwise measure the tool again.",
         tool=tool,
     )
 

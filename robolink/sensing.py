@@ -139,7 +139,7 @@ def _seen(sensor: TipSensor, mark: int) -> Sequence[Spot]:
     except Exception as error:
         raise CalibrationError(
             "sensor_failed",
-            tr("The camera {camera} failed: {cause}", camera=sensor.identity, cause=error),
+            tr("Camera {camera} failed: {cause}", camera=sensor.identity, cause=error),
             remedy=tr("Check cable, power and program of the camera, then start again."),
         ) from error
 
@@ -160,7 +160,7 @@ def _require_finite(spot: Spot, sensor: TipSensor) -> None:
     raise CalibrationError(
         "non_finite",
         told,
-        remedy=tr("Restart the camera's program, and look at what it finds in its picture."),
+        remedy=tr("Restart the camera's program, and check what it finds in its picture."),
     )
 
 
@@ -278,7 +278,7 @@ class VisionGuideCamera:
         """
         if self._controller is None:
             raise ConfigError(
-                tr("{camera} is asked through its controller.", camera=VISION_GUIDE),
+                tr("{camera} works through its controller only.", camera=VISION_GUIDE),
                 remedy=tr("Use it in a calibration of that controller."),
             )
         return self._controller.look(mark, program=self._program)

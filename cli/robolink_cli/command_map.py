@@ -31,7 +31,7 @@ _EVERY_DAY: Final = {
     "stop": (f"{CONTROLLER}.operate:stop", declared("Stop the robot now")),
     "recover": (
         f"{RECORD}.recover:recover",
-        declared("After a stop, a crash or a lost link: finish or undo the interrupted job"),
+        declared("Finish or undo an interrupted job: stop, crash, lost link"),
     ),
     "undo": (f"{RECORD}.undo:undo", declared("Undo the last tool change")),
 }

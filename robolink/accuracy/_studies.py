@@ -81,7 +81,7 @@ def artefact_row(
     known_u_mm: float = 0.0,
     station: str = "",
 ) -> MeasuredRow:
-    """Return how a person sees contact, from a gauge tip whose place is known.
+    """Return judging contact by eye, from a gauge tip whose place is known.
 
     Args:
         tips: Its measurements; five or more.

@@ -116,7 +116,7 @@ class ComparisonTolerance:
     def __post_init__(self) -> None:
         if not (0 <= self.length_mm < float("inf") and 0 <= self.angle_deg < float("inf")):
             raise ConfigError(
-                tr("A tolerance must be a number, 0 or more."),
+                tr("A tolerance must be a number of 0 or more."),
                 remedy=tr(
                     "For example {tolerance}.", tolerance=remedy_word(RemedyWord.LENGTH_TOLERANCE)
                 ),

@@ -57,7 +57,9 @@ class JsonReader:
         except ConfigError:
             raise
         except (ValueError, RecursionError) as error:
-            raise self.wrong("", tr("it is not JSON ({cause})", cause=error)) from error
+            raise self.wrong(
+                "", tr("it is not a robolink backup (not JSON: {cause})", cause=error)
+            ) from error
         return found
 
     def members(self, value: object, path: str, names: Sequence[str]) -> dict[str, object]:
@@ -117,7 +119,7 @@ class JsonReader:
         place = path or tr("the file")
         return ConfigError(
             tr("{source}: {place}: {cause}.", source=self.source, place=place, cause=cause),
-            remedy=tr("Nothing was sent. Correct it by hand, or use another backup."),
+            remedy=tr("Nothing was sent. Correct the file by hand, or use another backup."),
         )
 
     def _once(self, pairs: list[tuple[str, object]]) -> dict[str, object]:
@@ -239,7 +241,7 @@ def _check_schema(read: JsonReader, document: object) -> None:
     if version != schema and version.isdecimal() and int(version) > 1:
         raise ConfigError(
             tr(
-                "{source}: schema is {schema!r}, a newer form than {own!r}.",
+                "{source}: schema is {schema!r}, newer than {own!r}.",
                 source=read.source,
                 schema=schema,
                 own=SCHEMA,
@@ -338,7 +340,7 @@ def keep_first_backup(
         ) from error
     tell(
         tr(
-            "Before the first write to this controller its tools were saved in {path}",
+            "Before the first write to this controller, robolink saved its tools in {path}",
             path=path,
         )
     )

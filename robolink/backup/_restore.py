@@ -92,7 +92,7 @@ def require_same_controller(backup: Backup, identity: str, facts: ControllerFact
     for name, a, b in known:
         if a != b:
             raise _another(
-                tr("{name} {saved} in the backup, {found} here", name=name, saved=a, found=b)
+                tr("{name}: {saved} in the backup, {found} here", name=name, saved=a, found=b)
             )
     told_apart = (saved.robot_serials and facts.robot_serials) or (
         saved.controller_serial and facts.controller_serial
@@ -251,8 +251,8 @@ def _another(cause: str) -> ConfigError:
     return ConfigError(
         tr("This backup does not match this controller: {cause}.", cause=cause),
         remedy=tr(
-            "Check that this is the right controller and the right file. If the "
-            "backup is meant for this controller all the same, {other}.",
+            "Check that this is the right controller and the right file. If the backup is "
+            "meant for this controller anyway, {other}.",
             other=remedy_word(RemedyWord.OTHER_CONTROLLER),
         ),
     )

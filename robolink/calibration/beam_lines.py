@@ -272,7 +272,7 @@ def _first_line(points: Floats, middle: Floats) -> Beam:
     if 2 * spread[0] / math.sqrt(len(points)) < LEAST_LENGTH_MM:
         raise CalibrationError(
             "short_beam",
-            tr("The crossings lie too close together along the beam to tell its direction."),
+            tr("The crossings lie too close together along the beam to find its direction."),
             remedy=tr("Spread them over {least:.0f} mm or more.", least=2 * LEAST_LENGTH_MM),
         )
     x, y = middle.tolist()

@@ -163,14 +163,14 @@ def solvable_planes(poses: Sequence[Pose], height: TipHeight | None) -> list[Fla
     planes = [FlangePlane.of(pose) for pose in poses]
     for number, plane in enumerate(planes, start=1):
         if plane.lean_deg > LARGEST_LEAN_DEG:
-            raise _tilted(number, plane, tr("Up to {limit:g} are solved.", limit=LARGEST_LEAN_DEG))
+            raise _tilted(number, plane, tr("The limit is {limit:g}.", limit=LARGEST_LEAN_DEG))
         if plane.lean_deg > UPRIGHT_WITHIN_DEG and height is None:
             raise _tilted(number, plane, tr("The height of the tip is not known."))
     if len({plane.r33 > 0 for plane in planes}) > 1:
         raise CalibrationError(
             "tilted_pose",
             tr("Some poses have the flange upright, others upside down."),
-            remedy=tr("Take all of them with the flange the same way up."),
+            remedy=tr("Record all of them with the flange the same way up."),
         )
     return planes
 
@@ -229,17 +229,22 @@ def require_flange_in_base(poses: Sequence[Pose]) -> None:
             raise CalibrationError(
                 "tool_pose",
                 tr("These are positions of Tool {tool}, not of the flange.", tool=pose.tool),
-                remedy=tr("Give the value of Tool {tool}, or take them in Tool 0.", tool=pose.tool),
+                remedy=tr(
+                    "State the value of Tool {tool}, or record the poses in Tool 0.", tool=pose.tool
+                ),
             )
         if pose.local:
             raise CalibrationError(
                 "local_pose",
                 tr(
-                    "These positions are in Local {local}; they are compared with "
+                    "These positions are in Local {local}, but must be compared with "
                     "positions in the base.",
                     local=pose.local,
                 ),
-                remedy=tr("Say where Local {local} is, or take them in Local 0.", local=pose.local),
+                remedy=tr(
+                    "State where Local {local} is, or record the positions in Local 0.",
+                    local=pose.local,
+                ),
             )
 
 

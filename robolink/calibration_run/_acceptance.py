@@ -1,4 +1,4 @@
-"""What a measurement must be like to be believed, and the verdict in words."""
+"""Acceptance limits of a measurement, and the verdict in words."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -73,10 +73,10 @@ class AcceptanceCriteria:
         if doubt:
             raise CalibrationError(
                 doubt,
-                _out_of_order(result) or tr("The touches agree far less well than was stated."),
+                _out_of_order(result) or tr("The touches agree far less well than stated."),
                 remedy=tr(
-                    "Nobody is asked before this write, so it was refused. Measure "
-                    "again, or have a person look at it."
+                    "Nothing was written: no person confirms this write. Measure again, or "
+                    "let a person check it."
                 ),
             )
         self._require_judged(result)
@@ -113,21 +113,22 @@ class AcceptanceCriteria:
                 result.max_residual_mm,
                 tr("which touch fits worst"),
             ),
-            ("interval_mm", self.interval_mm, result.accurate_to_mm, tr("what it is accurate to")),
+            ("interval_mm", self.interval_mm, result.accurate_to_mm, tr("its accuracy")),
         ):
             asked = name == "interval_mm" or name in self.stated
             if limit_mm is not None and found_mm is None and asked:
                 raise CalibrationError(
                     "not_judged",
                     tr(
-                        "The limit of {limit:g} mm cannot be judged: {method} does not tell "
-                        "{what}.",
+                        "The limit of {limit:g} mm cannot be judged: {method} does not "
+                        "measure {what}.",
                         limit=limit_mm,
                         method=result.method,
                         what=what,
                     ),
                     remedy=tr(
-                        "Nothing was written. Leave the limit out, or use a method that tells it."
+                        "Nothing was written. Leave out the limit, or use a method that "
+                        "measures it."
                     ),
                 )
 
@@ -213,7 +214,7 @@ class AcceptanceCriteria:
             raise CalibrationError(
                 codes[0],
                 _worst_in_words(result),
-                remedy=tr("Nothing was written. Take that pose again, or all of them."),
+                remedy=tr("Nothing was written. Record that pose again, or all of them."),
                 others=codes[1:],
             )
 
@@ -361,15 +362,15 @@ def require_proved(result: VerifyResult, identity: str) -> None:
                 "The heights of the turn test differ from those of the measurement: "
                 "at least one touch was in the air."
             ),
-            remedy=tr("Measure again, each time until the tip is on the pin."),
+            remedy=tr("Measure again. Each time, jog until the tip is on the pin."),
             code=result.codes[0],
             controller=identity,
         )
     drift_mm, limit_mm = result.max_drift_mm, result.tolerance_mm
     if result.verdict is DriftVerdict.UNDECIDED:
         what = tr(
-            "Turn test not decided: {drift:.3f} mm off, too near to the limit of {limit:.3f} "
-            "mm; further touches did not settle it.",
+            "Turn test not decided: {drift:.3f} mm off, too near the limit of {limit:.3f} "
+            "mm, even after more touches.",
             drift=drift_mm,
             limit=limit_mm,
         )

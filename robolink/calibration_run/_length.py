@@ -152,8 +152,8 @@ def _chained(controller: Controller, plan: ToolPlan, proposal: Proposal) -> Prop
     if "z_mm" in proposal.result.changed:
         # A difference is as right as what it was added to.
         kept = tr(
-            "Z is a change: the old Z was kept or typed and never measured. How much longer or "
-            "shorter the new tip is, is known; its length is only as good as the old value."
+            "Only the change of Z is known: the old Z was kept or typed and never "
+            "measured. The new length is only as accurate as the old value."
         )
         notes = (*notes, kept)
     return replace(proposal, kept_record=origin, notes=notes)
@@ -171,7 +171,7 @@ def _told(controller: Controller, plan: ToolPlan, proposal: Proposal) -> _Told:
     if proposal.z_from == "measured":
         return _Told()
     if known is None and plan.pin:
-        return _Told(why=tr("Nothing on record says how high the pin is."))
+        return _Told(why=tr("The height of the pin is not on record."))
     if known is None:
         return _Told(why=tr("No pin was named.") if plan.moving else "")
     heights, inputs = touch_heights_mm(proposal), proposal.result.inputs
@@ -317,7 +317,7 @@ def _with_length(proposal: Proposal, told: LengthChange, decision: str) -> Propo
     result = proposal.result
     doubted = replace(result, warnings=(*result.warnings, "length_changed"))
     if decision != "difference":
-        note = tr("{found} Z is kept nevertheless.", found=in_words(proposal.tool, told))
+        note = tr("{found} Z is kept anyway.", found=in_words(proposal.tool, told))
         return replace(proposal, result=doubted, length=told, notes=(*proposal.notes, note))
     z_mm = told.z_by_difference_mm
     measured = proposal.measured
@@ -359,8 +359,7 @@ def _undecided(tool: int, told: LengthChange) -> CalibrationError:
         "length_changed",
         in_words(tool, told),
         remedy=tr(
-            "Nothing was written. Say beforehand whether Z follows the heights or is kept "
-            "({decide}), or run it where somebody can be asked.",
+            "Nothing was written. For Z: choose with {decide}, or run this at a terminal.",
             decide=remedy_word(RemedyWord.LENGTH),
         ),
     )

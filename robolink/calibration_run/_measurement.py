@@ -195,7 +195,7 @@ class Measuring:
         self, plan: ToolPlan, measure: Callable[[ToolOffset | None], CalibrationResult]
     ) -> Proposal:
         context, tool = self._context, plan.tool
-        self.go_to(plan.approach, tr("Moving to where tool {tool} is measured.", tool=tool))
+        self.go_to(plan.approach, tr("Moving to the station for tool {tool}.", tool=tool))
         self._listener.moment(Moment.BEFORE_MEASURE, context, tool)
         before = context.controller.tools.read(tool)
         with self._watched(plan, before):
@@ -228,7 +228,7 @@ class Measuring:
         )
         context.controller.outcomes.append(entry)
         self._listener.moment(Moment.AFTER_MEASURE, context, tool)
-        self.go_to(plan.retreat, tr("Moving away from where tool {tool} is measured.", tool=tool))
+        self.go_to(plan.retreat, tr("Leaving the station of tool {tool}.", tool=tool))
         return proposal
 
     def _station_record(self, name: str) -> dict[str, object]:
@@ -281,7 +281,7 @@ def told_of_typed(result: CalibrationResult) -> tuple[CalibrationResult, tuple[s
     if not typed:
         return result, ()
     told = tr(
-        "Typed, not touched: touch {numbers}. The turn test has to prove it.",
+        "Typed, not touched: touch {numbers}. Only the turn test can confirm it.",
         numbers=", ".join(map(str, typed)),
     )
     return replace(result, notes=(*result.notes, "touches_not_witnessed")), (told,)
@@ -342,7 +342,7 @@ def _name_another_way(error: CalibrationError) -> None:
     if error.code not in _INSTRUMENT:
         return
     another = tr(
-        "If it has failed: 'robolink calibrate two-pose' measures by touch, or with poses that "
+        "If it failed: 'robolink calibrate two-pose' measures by touch, or with poses that "
         "you type ({poses}).",
         poses=remedy_word(RemedyWord.GIVEN_POSES),
     )

@@ -288,7 +288,7 @@ class NozzleChange:
         if not self._plan.asks:
             outcomes.append(refusal_entry(plan.tool, criteria, refusal))
             raise refusal
-        question = tr("{found} Go on all the same?", found=refusal.what)
+        question = tr("{found} Continue anyway?", found=refusal.what)
         accepted = context.runner().confirm(question)
         entry = decision_entry(
             tr("accepted") if accepted else tr("declined"),

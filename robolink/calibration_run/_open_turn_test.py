@@ -285,7 +285,7 @@ def _open(controller: Controller, operation: str) -> tuple[Marker, Finding]:
             if finding.verdict is Verdict.DONE:
                 return marker, finding
     raise OutcomeUnknownError(
-        tr("There is no written value whose turn test could be made now."),
+        tr("There is no written value that could be tested now."),
         remedy=tr("Nothing moved. Next: 'robolink recover'."),
         controller=controller.identity,
     )
@@ -404,7 +404,7 @@ def _whys(marker: Marker) -> Iterator[str]:
     """Yield a sentence for each tool of a change whose test cannot be made now."""
     untested = marker.details.get(UNTESTED)
     if not isinstance(untested, dict):
-        yield tr("Nothing is on record about how this change was to be tested.")
+        yield tr("The record does not say how to test this change.")
         return
     for tool, entry in untested.items():
         method, why = str(entry.get("method", "")), str(entry.get("why", ""))
@@ -414,27 +414,29 @@ def _whys(marker: Marker) -> Iterator[str]:
 def _why(tool: str, method: str, why: str) -> str:
     sentences = {
         "no_motion": tr(
-            "Tool {tool} was measured from poses that existed already: nothing moves in that, so "
-            "there is no turn test.",
+            "Tool {tool} was measured from existing poses: nothing moves, so there is no "
+            "turn test.",
             tool=tool,
         ),
-        "not_wanted": tr("Tool {tool} was written without a turn test, as was asked.", tool=tool),
+        "not_wanted": tr("Tool {tool} was written without a turn test, as requested.", tool=tool),
         "no_box": tr(
-            "Nothing says how far the robot may go in the turn test of tool {tool}.", tool=tool
+            "The allowed area for the turn test of tool {tool} is not on record.", tool=tool
         ),
         "camera_open": tr(
-            "A program had opened the camera that measured tool {tool}: it cannot be opened from "
-            "here.",
+            "The camera that measured tool {tool} was opened by another program: robolink "
+            "cannot open it.",
             tool=tool,
         ),
         "camera_token": tr(
-            "The address of the camera that measured tool {tool} holds a token, which is kept "
-            "nowhere.",
+            "The address of the camera that measured tool {tool} contains a token, which "
+            "robolink does not store.",
             tool=tool,
         ),
     }
     return sentences.get(why) or tr(
-        "{method}, which measured tool {tool}, keeps no turn test.", method=method, tool=tool
+        "{method}, which measured tool {tool}, has no turn test that can be made later.",
+        method=method,
+        tool=tool,
     )
 
 
@@ -442,6 +444,7 @@ def _anew(method: str, why: str) -> str:
     """Return which command measures and tests, when this is settled."""
     by_motion = "two-pose" if why == "no_motion" else method
     return tr(
-        "When this is settled, 'robolink calibrate {method}' measures and tests it.",
+        "When this job is finished or undone, 'robolink calibrate {method}' measures and "
+        "tests the tool.",
         method=by_motion,
     )

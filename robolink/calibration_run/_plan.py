@@ -73,7 +73,7 @@ class ToolPlan:
     Attributes:
         tool: Number of the tool whose nozzle was changed.
         source: Where its measurement comes from.
-        criteria: What a measurement must be like to be believed.
+        criteria: Acceptance limits of a measurement.
         verify: Whether to turn about the new tip after the write, where the source can.
         attempts: How often it is measured before a refusal ends the change.
         approach: Flange pose from which it is measured, ``None`` for wherever the robot is.
@@ -210,8 +210,8 @@ def _tip_about(flange: Pose, offset: ToolOffset) -> tuple[float, float]:
 def clearance_too_small(clearance_mm: float, limit_mm: float) -> str:
     """Return why a clearance below the largest change that is believed is refused."""
     return tr(
-        "The robot would stop {clearance:g} mm from contact, and a new tip may be {limit:g} mm "
-        "longer.",
+        "The robot would stop {clearance:g} mm from contact, but a new tip may be "
+        "{limit:g} mm longer.",
         clearance=clearance_mm,
         limit=limit_mm,
     )
@@ -233,7 +233,7 @@ def require_clearance(plan: ChangePlan) -> None:
         raise ConfigError(
             clearance_too_small(clearance_mm, one.criteria.max_change_mm),
             remedy=tr(
-                "Nothing was moved. Use a clearance of {limit:g} mm or more, or allow less change.",
+                "Nothing moved. Use a clearance of {limit:g} mm or more, or allow less change.",
                 limit=one.criteria.max_change_mm,
             ),
         )
@@ -289,11 +289,11 @@ def require_contact_input(controller: Controller, touch: TouchPlan) -> None:
     except (ConfigError, RejectedError) as error:
         raise ConfigError(
             tr(
-                "Input {number}, which is to show contact, cannot be read: {cause}",
+                "The contact input {number} cannot be read: {cause}",
                 number=touch.contact.number,
                 cause=error.what,
             ),
-            remedy=tr("Nothing was moved. Give the number of an input that the controller has."),
+            remedy=tr("Nothing moved. Give the number of an input that the controller has."),
         ) from error
 
 

@@ -143,10 +143,9 @@ def require_inside(controller: Controller, steps: Sequence[PlannedStep]) -> None
             raise LimitError(
                 tr("{step} {refusal}", step=step.text, refusal=step.refusal),
                 remedy=tr(
-                    "The allowed area is around where the robot stands at the start: jog the "
-                    "tip closer to where it is measured ('robolink robot jog'), or widen the "
-                    "area. Where the arm cannot reach, put the station elsewhere, or turn the "
-                    "tool another way."
+                    "The allowed area is centred on the robot's start position: jog the "
+                    "tip closer to the station ('robolink robot jog'), or widen the area. "
+                    "If the arm cannot reach, move the station, or turn the tool another way."
                 ),
                 controller=controller.identity,
             )
@@ -173,10 +172,10 @@ def _procedures(
         if source is None:
             continue
         stored = controller.tools.read(tool)
-        there = tr("Moving to where tool {tool} is measured.", tool=tool)
+        there = tr("Moving to the station for tool {tool}.", tool=tool)
         yield one.approach, partial(journey, one.approach, there)
         yield None, partial(_measurement, source, stored)
-        away = tr("Moving away from where tool {tool} is measured.", tool=tool)
+        away = tr("Leaving the station of tool {tool}.", tool=tool)
         yield one.retreat, partial(journey, one.retreat, away)
 
 

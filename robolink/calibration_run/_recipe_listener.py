@@ -168,7 +168,7 @@ class RecipeListener(Listener):
         if outputs is None:
             raise ConfigError(
                 tr("{controller} has no outputs.", controller=self._controller.identity),
-                remedy=tr("Take [[outputs]] out of the recipe."),
+                remedy=tr("Remove [[outputs]] from the recipe."),
             )
         # Ctrl-C waits until it is noted too: how the run ended names what it switched.
         with self._controller.uninterrupted():
@@ -212,7 +212,7 @@ def ask_prompt(context: MeasurementContext, prompt: "Prompt", tool: int | None =
         return runner.ask_text(prompt.text)
     if not runner.confirm(prompt.text):
         raise DeclinedError(
-            tr("{question!r} was answered with no.", question=prompt.text),
+            tr("The answer to {question!r} was no.", question=prompt.text),
             remedy=tr("Nothing was written. Start again when the answer is yes."),
         )
     return "yes"
@@ -233,10 +233,10 @@ def ask_height(context: MeasurementContext, tool: int, name: str) -> float:
             context.operator.tell(str(error))
     raise DeclinedError(
         tr(
-            "No number was typed for Z of tool {tool}, although it was asked several times.",
+            "No number was typed for Z of tool {tool}, after several questions.",
             tool=tool,
         ),
-        remedy=tr("Nothing was written. Start again with the length of the new tip at hand."),
+        remedy=tr("Nothing was written. Have the length of the new tip at hand, then start again."),
     )
 
 
@@ -248,8 +248,8 @@ def height_question(tool: int, name: str) -> str:
 def length_question(tool: int, name: str) -> str:
     """Return the question whether Z may stay as it is."""
     return tr(
-        "Z of tool {tool} {name} is not measured and stays. Is the new tip exactly as long "
-        "as the old one?",
+        "Is the new tip exactly as long as the old one? Z of tool {tool} {name} is not measured "
+        "and stays.",
         tool=tool,
         name=name,
     )

@@ -247,9 +247,8 @@ def _unknown(recipe: "Recipe", why: str) -> ConfigError:
     return ConfigError(
         tr("The recipe does not say where {id} is. {why}", id=recipe.station.id, why=why),
         remedy=tr(
-            "Say it in the recipe or in the cell file, learn it with "
-            "'robolink cell station learn', or "
-            "make a full calibration there. Nothing was moved."
+            "State it in the recipe or in the cell file, learn it with 'robolink cell "
+            "station learn', or run a full calibration there. Nothing moved."
         ),
     )
 
@@ -318,9 +317,9 @@ def find_reference(controller: Controller, tool: int, station: str) -> Reference
             value=describe_offset(newest.value),
         ),
         remedy=tr(
-            "The tool is not what the reference left. Put the value of the reference back, "
-            "or take a new reference with {reference} and the nozzle for which the stored "
-            "value is right.",
+            "The tool changed since the reference. Write the value of the reference back, "
+            "or record a new reference with {reference} and the nozzle that fits the "
+            "stored value.",
             reference=remedy_word(RemedyWord.REFERENCE),
         ),
     )
@@ -461,11 +460,11 @@ def _height(
         raise CalibrationError(
             "reference_outdated",
             tr(
-                "The reference of {at} does not say how high the contact was.",
+                "The reference of {at} has no contact height.",
                 at=local_label(reference.at),
             ),
             remedy=tr(
-                "Take a new reference with {reference}.",
+                "Record a new reference with {reference}.",
                 reference=remedy_word(RemedyWord.REFERENCE),
             ),
         )

@@ -128,8 +128,8 @@ class RecipeRun:
         )
         if take_reference and not loaded.recipe.source.of_method.by_reference:
             raise ConfigError(
-                tr("This recipe takes no reference: the last calibration on the pin is one."),
-                remedy=tr("Make a full calibration there with the previous nozzle."),
+                tr("This recipe needs no reference: it uses the last calibration on the pin."),
+                remedy=tr("Run a full calibration there with the previous nozzle."),
             )
         self.takes_reference = take_reference
         self.changed: tuple[ChangedSince, ...] = ()
@@ -175,7 +175,7 @@ class RecipeRun:
             )
         if self._order is not None and (self.takes_reference or self._measure_only):
             raise ConfigError(
-                tr("This run would write no tool: an order is for a change."),
+                tr("This run writes no tool, but an order must be a change."),
                 remedy=tr("Record the reference first, in a run without an order."),
             )
         require_ready(controller, self.plan)
@@ -290,7 +290,7 @@ class RecipeRun:
             raise NotAllowedError(
                 tr("A change this large needs an engineer."),
                 remedy=tr(
-                    "Nothing was moved. Give {operator}, or leave {accept_jump} out.",
+                    "Nothing moved. Give {operator}, or leave out {accept_jump}.",
                     operator=remedy_word(RemedyWord.OPERATOR),
                     accept_jump=remedy_word(RemedyWord.ACCEPT_JUMP),
                 ),
@@ -315,8 +315,8 @@ def _require_cell(loaded: "LoadedRecipe", cell: Cell | None) -> None:
             cells=cells,
         ),
         remedy=tr(
-            "Choose a recipe of this cell, or name the cell; 'cells' in the recipe says "
-            "which it is for. Nothing was sent."
+            "Choose a recipe of this cell, or name the cell; 'cells' in the recipe lists "
+            "its cells. Nothing was sent."
         ),
     )
 
@@ -411,9 +411,9 @@ def _require_own_numbers(controller: Controller, loaded: "LoadedRecipe") -> None
     if loaded.recipe.numbers is None or says_it_is_simulated(controller):
         return
     raise ConfigError(
-        tr("The numbers of {path} are those of a simulated cell.", path=loaded.path),
+        tr("The numbers in {path} are for a simulated cell.", path=loaded.path),
         remedy=tr(
-            "Put in stations, poses, box and limits of this cell, then delete the line "
+            "Enter stations, poses, box and limits of this cell, then delete the line "
             "'numbers'. Nothing was moved or written."
         ),
         controller=controller.identity,

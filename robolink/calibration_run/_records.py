@@ -288,12 +288,12 @@ def require_pin_in_base(station: str, result: CalibrationResult) -> None:
     raise CalibrationError(
         "local_pose",
         tr(
-            "These are positions in Local {local}; the place of station {station} is kept in the "
-            "base.",
+            "These are positions in Local {local}, but the place of station {station} is "
+            "recorded in the base.",
             local=local,
             station=station,
         ),
-        remedy=tr("Take them in Local 0, or name no station: the tip is then found all the same."),
+        remedy=tr("Record them in Local 0, or name no station: robolink then still finds the tip."),
     )
 
 

@@ -179,8 +179,8 @@ def _sentence(station: str, shift: StationShift) -> str:
             station=station,
         )
     return tr(
-        "Pin {station} seems to have moved by X {dx:+.3f} Y {dy:+.3f} mm since it was found last: "
-        "the nozzle of tool {tool} does not explain it.",
+        "Pin {station} seems to have moved by X {dx:+.3f} Y {dy:+.3f} mm since it was last "
+        "found: the nozzle of tool {tool} does not explain it.",
         station=station,
         dx=dx,
         dy=dy,

@@ -129,11 +129,11 @@ def asked_what_follows(
     if attended.relearning:
         rows[TurnTestStep.LEARN_STATION] = ChoiceRow(
             tr("Learn the station again."),
-            tr("The old value comes back; the command that learns it is named."),
+            tr("robolink writes the old value back and names the command."),
         )
     rows[TurnTestStep.CHECK_MOUNT] = ChoiceRow(
         tr("Check the mount of the nozzle."),
-        tr("The old value comes back. Then start again: the tip is measured anew."),
+        tr("robolink writes the old value back. Then start again and measure the tip anew."),
     )
     kept = _kept(judgement, stated_mm, widest_mm)
     if kept is not None:
@@ -159,15 +159,17 @@ def _sure(step: TurnTestStep, judgement: TurnJudgement, stated_mm: float | None)
 
 
 def _take_back() -> ChoiceRow:
-    return ChoiceRow(tr("Put the old value back."), tr("All that this change wrote is taken back."))
+    return ChoiceRow(
+        tr("Put the old value back."), tr("robolink undoes everything that this change wrote.")
+    )
 
 
 def _again(left: int, *, by_touch: bool) -> ChoiceRow:
     return ChoiceRow(
-        tr("Touch once more.") if by_touch else tr("Look once more."),
+        tr("Make one more touch.") if by_touch else tr("Measure once more with the camera."),
         tr(
-            "The robot turns about the tip again (left: {left}). All looks count together; none "
-            "is picked out.",
+            "The robot turns about the tip again (left: {left}). All results count "
+            "together; none can be left out.",
             left=left,
         ),
     )
@@ -193,7 +195,7 @@ def _kept(
             wider=wider_mm,
             stated=stated_mm or 0.0,
         ),
-        tr("It goes on record, and takes an engineer where the cell names people."),
+        tr("It goes on record, and needs an engineer if the cell names people."),
     )
 
 
@@ -207,15 +209,14 @@ def with_step(error: VerifyError, step: TurnTestStep, relearning: tuple[str, ...
     """
     if step is TurnTestStep.CHECK_MOUNT:
         error.remedy = tr(
-            "Check the mount: is the nozzle tight and straight? Then start again: the tip is "
-            "measured anew."
+            "Check the mount: is the nozzle tight and straight? Then start again and "
+            "measure the tip anew."
         )
     elif step is TurnTestStep.LEARN_STATION:
         named = ", ".join(f"'robolink {command}'" for command in relearning)
         error.next_commands = relearning
         error.remedy = tr(
-            "Learn the station again with a tip that is known, then measure this one anew: "
-            "{commands}.",
+            "Learn the station again with a known tip, then measure this tip anew: {commands}.",
             commands=named,
         )
     return error
@@ -338,7 +339,7 @@ def _record(
     outcomes = controller.outcomes
     keeps = step in KEEPING
     again = step is TurnTestStep.AGAIN
-    verdict = tr("accepted") if keeps else tr("the turn test is made again")
+    verdict = tr("accepted") if keeps else tr("repeat the turn test")
     entry = decision_entry(
         verdict if keeps or again else tr("declined"),
         **({} if again else {"accepted": keeps}),
@@ -392,7 +393,8 @@ def told_of_contradiction(proof: VerifyResult, judgement: TurnJudgement) -> str:
     """
     if judgement.apart_mm is not None:
         found = tr(
-            "Turn test: at one angle its looks lie {apart:.3f} mm apart, more than they scatter.",
+            "Turn test: results at the same angle differ by {apart:.3f} mm, more than "
+            "their scatter.",
             apart=judgement.apart_mm,
         )
         return joined(" ", (found, doubt_sentence(judgement.code)))

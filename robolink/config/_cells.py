@@ -80,7 +80,7 @@ def _sentence(
 def _unknown(key: str, known: Sequence[str]) -> str:
     if _SECRET.search(key):
         return tr(
-            "looks like a password, and a cell file must not hold one; name a "
+            "looks like a password, which a cell file must not contain; name a "
             "password_file that only you can read, or a password_env"
         )
     return is_not_known(key, known)
@@ -159,8 +159,8 @@ def find_cell(name: str) -> Cell:
         remedy = tr("These are known: {names}.", names=", ".join(cells))
     else:
         remedy = tr(
-            "No cell file was found; 'robolink cell files' shows where one may be. A URL such "
-            "as epson+tcp://192.168.0.1:5000 works without."
+            "No cell file was found; 'robolink cell files' shows where robolink looks for "
+            "one. A URL such as epson+tcp://192.168.0.1:5000 needs none."
         )
     raise ConfigError(tr("There is no cell {name!r}.", name=name), remedy=remedy)
 

@@ -82,9 +82,7 @@ def reach_cell(name: str) -> Reach:
             copy = _recall(name, file.path)
             table = asdict(copy) if copy else {}
             if copy:
-                doubts.append(
-                    tr("The address is that of the last connection: {url}.", url=copy.url)
-                )
+                doubts.append(tr("The address is from the last connection: {url}.", url=copy.url))
         else:
             hinted = table.get("password_file")
             if isinstance(hinted, str):

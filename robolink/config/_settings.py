@@ -145,7 +145,7 @@ class CameraSettings(_Station):
         # A value that is wrong itself is missing in the data, and told already.
         pixels = info.data.get("mm_per_px", ...)
         if pixels is not ... and (pixels is None) != (origin_mm is None):
-            raise ValueError(tr("goes with mm_per_px: give both, or neither"))
+            raise ValueError(tr("needs mm_per_px: give both, or neither"))
         return origin_mm
 
 

@@ -144,7 +144,7 @@ class ProcedureLock:
                 if not left_s:
                     raise BusyError(
                         tr(
-                            "{request} has to wait: another operation is under way.",
+                            "{request} must wait: another operation is running.",
                             request=request,
                         ),
                         remedy=tr(
@@ -365,7 +365,7 @@ class MarkerStore:
         if self.moving:
             raise BusyError(
                 tr(
-                    "{request} has to wait: the end of a movement has not been seen.",
+                    "{request} must wait: robolink has not seen the end of a movement.",
                     request=request,
                 ),
                 remedy=tr("Wait until the movement has ended, or stop it."),

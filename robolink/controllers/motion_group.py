@@ -71,7 +71,7 @@ class MotionGroupCore(DriverPart, ABC):
         """Return what a person must know before it moves."""
         return MotionTerms(
             tr("{group} of {identity}", group=self.name, identity=self._driver.identity),
-            tr("Nothing stops it if this computer falls silent."),
+            tr("Nothing stops it if this computer loses the connection."),
         )
 
     def obstacle(self, target: Pose, path: Path, *, start: Pose | None = None) -> str:
@@ -157,7 +157,7 @@ class MotionGroupCore(DriverPart, ABC):
                     found=found,
                 ),
                 reason=NotReadyReason.WRONG_TOOL,
-                remedy=tr("Nothing was moved. Select the right tool first."),
+                remedy=tr("Nothing moved. Select the right tool first."),
             )
 
 
@@ -165,11 +165,11 @@ def not_ended_in_time(request: str, timeout_s: float) -> MotionTimeoutError:
     """Return the error for a movement that took too long and was aborted."""
     return MotionTimeoutError(
         tr(
-            "{statement!r} did not end within {timeout_s:.0f} s and was aborted.",
+            "{statement!r} did not end within {timeout_s:.0f} s; robolink aborted it.",
             statement=request,
             timeout_s=timeout_s,
         ),
-        remedy=tr("Read where the robot is ('robolink robot where') before you go on."),
+        remedy=tr("Check where the robot is ('robolink robot where') before you continue."),
     )
 
 
@@ -258,8 +258,8 @@ class PolledGroup(MotionGroupCore):
             if deadline.expired:
                 raise OutcomeUnknownError(
                     tr(
-                        "{controller} took the stop, but did not come to rest within {seconds:g} "
-                        "s.",
+                        "{controller} accepted the stop, but did not confirm within "
+                        "{seconds:g} s that the robot has stopped.",
                         controller=self._driver.identity,
                         seconds=_REST_S,
                     ),

@@ -152,7 +152,10 @@ def tool_before(marker: Marker) -> int:
 def not_understood(marker: Marker) -> ConfigError:
     """Return the error for the marker of a procedure that something else has written."""
     return ConfigError(
-        tr("What was left unfinished at {when} cannot be read.", when=local_label(marker.begun_at)),
+        tr(
+            "The record of an unfinished job of {when} cannot be read.",
+            when=local_label(marker.begun_at),
+        ),
         remedy=tr(
             "Select the right tool by hand, then {forget}.",
             forget=remedy_word(RemedyWord.FORGET_MARKER),
@@ -169,13 +172,13 @@ def _unrestored(failure: RobolinkError, tool: int) -> str:
     """
     if isinstance(failure, JournalError):
         return tr(
-            "Tool {tool} is selected again, which could not be recorded: {cause} 'robolink "
-            "recover' settles it.",
+            "Tool {tool} is selected again, but this could not be recorded: {cause} Next: "
+            "'robolink recover'.",
             tool=tool,
             cause=failure.what,
         )
     return tr(
-        "The previous tool, tool {tool}, could not be selected again: {cause} 'robolink "
+        "robolink could not select the previous tool {tool} again: {cause} 'robolink "
         "recover' selects it.",
         tool=tool,
         cause=failure.what,
@@ -199,7 +202,7 @@ def _judged(
         return Finding(marker, Verdict.DONE, sentence)
     if now == before:
         sentence = tr(
-            "Tool {tool} is selected, as before; power mode or speed is not as before.", tool=now
+            "Tool {tool} is selected, as before; the power mode or speed has changed.", tool=now
         )
     else:
         sentence = tr(

@@ -193,7 +193,7 @@ def _told_as_its_own(kind: str, opener: ControllerOpener) -> ControllerOpener:
                     kind=kind,
                     cause=f"{type(error).__name__}: {error}",
                 ),
-                remedy=tr("Tell it to whoever made that part."),
+                remedy=tr("Report it to the makers of that part."),
             ) from error
 
     return opened
@@ -430,8 +430,8 @@ def connect_when_reachable(
     """
     if not within_s >= 0:
         raise ConfigError(
-            tr("A wait of {seconds} s is not possible.", seconds=within_s),
-            remedy=tr("Say for how many seconds to keep trying; 0 means one attempt."),
+            tr("{seconds} s is not a possible wait.", seconds=within_s),
+            remedy=tr("State how many seconds to keep trying; 0 means one attempt."),
         )
     clock = clock or SystemClock()
     deadline, pause_s = Deadline.after(clock, within_s), FIRST_PAUSE_S

@@ -144,11 +144,11 @@ class MarkerResolver(DriverPart):
             return examine_write(self._tools, marker)
         raise ConfigError(
             tr(
-                "What was left unfinished at {when} cannot be read.",
+                "The record of an unfinished job of {when} cannot be read.",
                 when=local_label(marker.begun_at),
             ),
             remedy=tr(
-                "Look at the controller, then {forget}.",
+                "Check the controller, then {forget}.",
                 forget=remedy_word(RemedyWord.FORGET_MARKER),
             ),
         )

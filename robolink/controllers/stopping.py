@@ -224,7 +224,7 @@ def _stop_other(link: LinkUrl, means: _Means) -> "ControllerStatus":
 def _stop_map(link: LinkUrl, means: _Means) -> "ControllerStatus":
     del means
     raise RejectedError(
-        tr("A PLC with a register map is neither moved nor stopped by robolink."),
+        tr("robolink neither moves nor stops a PLC with a register map."),
         remedy=tr("Do it at the machine."),
         controller=link.identity,
         request="Stop",

@@ -277,12 +277,12 @@ class ToolTableCore(DriverPart, ABC):
             if found != tool:
                 raise ReadBackError(
                     tr(
-                        "Tool {tool} was to be selected, but the controller has tool {found} "
-                        "selected.",
+                        "robolink selected tool {tool}, but the controller has tool "
+                        "{found} selected.",
                         tool=tool,
                         found=found,
                     ),
-                    remedy=tr("Do not move the robot; look at the controller's Tool setting."),
+                    remedy=tr("Do not move the robot; check the controller's Tool setting."),
                 )
             self._prove_selected(offset, request)
 
@@ -422,8 +422,8 @@ def require_replacement(tool: int, then_select: int | None) -> int:
         raise SelectedToolError(
             tr("Tool {tool} is selected, so it was not cleared.", tool=tool),
             remedy=tr(
-                "Say which tool to select instead: {then_select}, 0 for the flange. "
-                "The machine's programs go on with that tool.",
+                "Name the tool to select instead: {then_select}, 0 for the flange. The "
+                "machine's programs then use that tool.",
                 then_select=remedy_word(RemedyWord.THEN_SELECT),
             ),
         )

@@ -153,7 +153,7 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
     def told_by(self, found: ToolOffset | None) -> str:
         """Return what the value that was read says about an answer that told nothing."""
         if self._same(found, self.requested):
-            return tr("Reading tool {tool} back shows that it did run.", tool=self.tool)
+            return tr("Reading tool {tool} back confirms that it ran.", tool=self.tool)
         if self._same(found, self.before):
             return tr("Reading tool {tool} back shows that it did not run.", tool=self.tool)
         return tr(

@@ -129,7 +129,7 @@ def charts_of(
     """
     if baseline < _LEAST:
         raise ConfigError(
-            tr("Limits cannot rest on {count} values.", count=baseline),
+            tr("{count} values are too few for limits.", count=baseline),
             remedy=tr("Give 2 or more; with fewer than 20 values no limits are drawn."),
         )
     series: dict[_Key, list[ChartPoint]] = {}

@@ -180,8 +180,8 @@ def _sideways(charts: Sequence[Chart]) -> Iterator[DriftFinding]:
                 **_facts(together),
             ),
             tr(
-                "What they have in common has moved: the pin, the adapter at the flange, or the "
-                "zero of U."
+                "Something that they share has moved: the pin, the adapter at the flange, "
+                "or the zero of U."
             ),
         )
     for tool, moved in shifted.items():

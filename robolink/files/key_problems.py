@@ -21,7 +21,7 @@ def is_not_known(key: str, table: Iterable[str]) -> str:
     names = tuple(table)
     close = get_close_matches(key, names, n=1)
     if close:
-        return tr("is not known; is {name} meant?", name=close[0])
+        return tr("is not known; did you mean {name}?", name=close[0])
     return tr("is not known; these are: {names}", names=", ".join(names))
 
 

@@ -124,7 +124,7 @@ def _mode_of_regular(descriptor: int) -> int:
 
 def _taken(path: Path) -> ConfigError:
     return ConfigError(
-        tr("{path} exists already; it was not overwritten.", path=path),
+        tr("{path} exists already and was not overwritten.", path=path),
         remedy=tr(
             "Give another name, or {overwrite} to replace it.",
             overwrite=remedy_word(RemedyWord.OVERWRITE),

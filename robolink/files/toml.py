@@ -112,13 +112,13 @@ class FileKind:
         named = self.named(path)
         return ConfigError(
             tr(
-                "{file} is wrong in {count} places:\n{lines}",
+                "{file} has {count} errors:\n{lines}",
                 file=named,
                 count=len(problems),
                 lines=lines,
             )
             if len(problems) > 1
-            else tr("{file} is wrong:\n{lines}", file=named, lines=lines),
+            else tr("{file} has an error:\n{lines}", file=named, lines=lines),
             remedy=self.wrong_remedy(),
         )
 

@@ -166,8 +166,8 @@ def _told_twice(who: Who, first: Identity) -> Identity:
             names=", ".join(one.name for one in told),
         ),
         remedy=tr(
-            "Nothing was recorded, and nothing was changed. Find what corrupts the answers "
-            "(cable, converter, a second program), then try again."
+            "Nothing was recorded or changed. Find what corrupts the answers (cable, "
+            "converter, a second program), then try again."
         ),
     )
 
@@ -226,8 +226,8 @@ def _remarks(found: Identity, meeting: _Meeting) -> tuple[str, ...]:
     if not (found.own or meeting.before):
         said.append(
             tr(
-                "{address} does not say who it is, so it is known by its address: "
-                "{name}. Another controller at that address would be mistaken for it.",
+                "{address} reports no serial number, so robolink identifies it by its "
+                "address: {name}. Another controller at that address would be taken for it.",
                 address=found.address,
                 name=found.name,
             )

@@ -291,6 +291,6 @@ def _too_new(location: str) -> JournalError:
     return JournalError(
         tr("The journal {name} was made by a newer robolink.", name=location),
         remedy=tr(
-            "Verify it with the newer version: this one does not know all fields of an entry."
+            "Verify it with the newer version; this one does not know all fields of an entry."
         ),
     )

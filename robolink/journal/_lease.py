@@ -99,13 +99,13 @@ class Lease:
             return ""
         who = seen.who()
         if not self._holder.shares_clock_with(who):
-            return seen.at_work(tr("Watch it for a while to see whether it is still working."))
+            return seen.at_work(tr("Watch it for a while to find out whether it is still working."))
         silent_s = max(0, self._clock.now_ns() - seen.beat_ns) / NS_PER_S
         if silent_s >= LEASE_S or self._holder.proves_gone(who):
             return ""
         return seen.at_work(
             tr(
-                "It is still working: its last sign of life was {seconds:.0f} s ago.",
+                "It is still working: it last responded {seconds:.0f} s ago.",
                 seconds=silent_s,
             )
         )
@@ -211,7 +211,7 @@ class Lease:
             raise self._held_error(seen)
         if seen.token == FREE:
             return seen, ""
-        return seen, tr("it gave no sign of life for {seconds:.0f} s", seconds=LEASE_S)
+        return seen, tr("it did not respond for {seconds:.0f} s", seconds=LEASE_S)
 
     def _watched(self, seen: LeaseView) -> LeaseView:
         """Watch a holder whose clock cannot be read here."""
@@ -268,8 +268,8 @@ class Lease:
         return LeaseLostError(
             self._taken.took_over(self.controller),
             remedy=tr(
-                "How this ended is not on record: what was begun stays open, for whoever took "
-                "over. Read the tools again; 'robolink journal list' shows who did what."
+                "The record does not say how this ended: the job stays open for the new "
+                "user. Read the tools again; 'robolink journal list' shows who did what."
             )
             if sent
             else tr(

@@ -195,8 +195,7 @@ class LeaseView:
         """
         return LeaseHeldError(
             tr(
-                "{holder} has been working on {controller} since {since}: {purpose}. "
-                "Last sign of life: {sign}.",
+                "{holder} has locked {controller} since {since}: {purpose}. Last response: {sign}.",
                 holder=describe(self.who()),
                 controller=controller,
                 since=local_label(self.taken_at),
@@ -204,8 +203,8 @@ class LeaseView:
                 sign=last_sign,
             ),
             remedy=tr(
-                "Nothing was sent. Wait until it has finished ({wait}), or end it; after "
-                "{seconds:.0f} s without a sign of life it may be replaced.",
+                "Nothing was sent. Wait until it has finished ({wait}), or end it; if it does not "
+                "respond for {seconds:.0f} s you can take over.",
                 wait=remedy_word(RemedyWord.WAIT),
                 seconds=LEASE_S,
             ),
@@ -262,7 +261,7 @@ class LeaseView:
                 )
                 if insisting is None
                 else tr(
-                    "{insisting} insisted on taking this controller over from {holder}: {because}.",
+                    "{insisting} took over this controller from {holder}: {because}.",
                     insisting=describe(insisting),
                     holder=holder,
                     because=because,

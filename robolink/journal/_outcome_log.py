@@ -190,8 +190,8 @@ class JournalOutcomeLog:
             last = not self._holds and not self._begun - {operation}
             with self._writing(
                 tr(
-                    "How the last command ended could not be recorded, so it counts as "
-                    "unfinished: run 'robolink recover' after that."
+                    "The end of the last command could not be recorded, so it counts as "
+                    "unfinished. Then run 'robolink recover'."
                 )
             ) as tables:
                 if operation in self._begun:
@@ -271,7 +271,7 @@ class JournalOutcomeLog:
         except OSError as error:
             raise JournalError(
                 tr(
-                    "It could not be noted where this controller's record is kept: {cause}",
+                    "The place of this controller's record could not be stored: {cause}",
                     cause=error,
                 ),
                 remedy=tr(
@@ -287,8 +287,8 @@ class JournalOutcomeLog:
         if any(marker.kind is MarkerKind.HISTORY for marker in self.open_markers()):
             raise OutcomeUnknownError(
                 tr(
-                    "The record of what was done to this controller before is missing: it was "
-                    "deleted, emptied, or is kept somewhere else."
+                    "The record of earlier work on this controller is missing: it was "
+                    "deleted, emptied, or is kept elsewhere."
                 ),
                 remedy=tr("Nothing was recorded. Next: 'robolink recover'."),
                 controller=self._named().identity,
@@ -449,7 +449,9 @@ class JournalOutcomeLog:
 
     def _settled_by_another(self) -> OutcomeUnknownError:
         return OutcomeUnknownError(
-            tr("Somebody else has settled what was begun on {name}.", name=self._names.identity),
+            tr(
+                "Somebody else has finished or undone the job on {name}.", name=self._names.identity
+            ),
             remedy=tr("Read the tools again: 'robolink journal list' shows who did what."),
             controller=self._names.identity,
         )

@@ -309,7 +309,7 @@ class BoardSource(RoundSource):
     @property
     def remedy(self) -> str:
         """What to do when a measurement makes the board jump."""
-        return tr("Check that the board is held as drawn, and which marks the camera found.")
+        return tr("Check that the board is held as drawn, and the marks that the camera found.")
 
     def procedure(self, stored: ToolOffset | None, here: Pose) -> "Procedure[CameraRound]":
         """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`."""

@@ -259,8 +259,8 @@ class CameraSource(RoundSource):
     def remedy(self) -> str:
         """What to do when a measurement makes the tip jump."""
         return tr(
-            "Look at the picture: is it the tip that was found, and is it clean? Was the camera "
-            "moved?"
+            "Look at the picture: did the camera find the tip, and is it clean? Was the "
+            "camera moved?"
         )
 
     def places(self, tool: ToolOffset, angles_deg: Sequence[float]) -> list[Place]:

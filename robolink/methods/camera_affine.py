@@ -287,7 +287,7 @@ class CameraAffineSource(LookSource):
     def remedy(self) -> str:
         """What to do when a measurement makes the tip jump."""
         return tr(
-            "Look at the pictures: is it the tip that was found in all of them, and is it clean?"
+            "Look at the pictures: did the camera find the tip in all of them, and is it clean?"
         )
 
     def found_station(self, result: CalibrationResult, tool: int) -> Found | None:

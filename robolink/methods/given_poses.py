@@ -62,7 +62,10 @@ def were_held(context: MeasurementContext, *, stated: bool) -> bool:
     if said is False:
         raise CalibrationError(
             "axes_free",
-            tr("These poses were taught with axes let go, so they are not where the tip touched."),
+            tr(
+                "These poses were taught with released axes (SFREE), so they are not where "
+                "the tip touched."
+            ),
             remedy=tr(
                 "Nothing was written. Switch the motors on (no SFREE), bring the tip onto the pin "
                 "by jogging, and teach them again."
@@ -318,7 +321,7 @@ class _UnknownTool(CalibrationError):
                 apart=self.apart_mm,
             ),
             remedy=tr(
-                "Nothing was written. Say it with {ways}; 0 is the flange.",
+                "Nothing was written. State it with {ways}; 0 is the flange.",
                 ways=joined(tr(" or "), ways),
             ),
         )

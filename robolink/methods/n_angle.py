@@ -394,10 +394,9 @@ METHOD = Method(
     summary=declared("Touch one pin at several angles of U; the touches check each other."),
     description=declared(
         "Touch one pin at several angles of U; the touches check each other.\n\n"
-        "After each touch from the third on it says how well they agree and what X "
-        "and Y are repeatable to. At the end the touch that fits worst is named and may be made "
-        "again.\n\n"
-        "With poses that exist already nothing moves."
+        "From the third touch on, it shows how well they agree and what X and Y are "
+        "repeatable to. At the end it names the touch that fits worst, and you can repeat "
+        "it.\n\nWith existing poses nothing moves."
     ),
     parameters=NAngleParameters,
     measures=("x_mm", "y_mm"),

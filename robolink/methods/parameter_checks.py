@@ -200,7 +200,7 @@ def source_of(
     if found:
         raise ConfigError(
             "\n".join(f"{problem}." for problem in found),
-            remedy=tr("Nothing was sent. docs/methods.md says what can be given."),
+            remedy=tr("Nothing was sent. docs/methods.md lists the parameters."),
         )
     source: TipSource = method.source(parameters, site)
     return source

@@ -148,11 +148,11 @@ def _from_file(
 
 METHOD = Method(
     name="points",
-    summary=declared("Take points that were taught on the pendant: X and Y; nothing moves."),
+    summary=declared("Use points taught on the pendant: X and Y; nothing moves."),
     description=declared(
-        "Take points that were taught on the pendant: X and Y; nothing moves.\n\n"
-        "The points touch one pin. They are read from the controller, and solved as two-pose or "
-        "n-angle would. No tool is selected, and nothing is proved by turning about the new tip."
+        "Use points taught on the pendant: X and Y; nothing moves.\n\n"
+        "The points touch one pin. robolink reads them from the controller and solves them "
+        "like two-pose or n-angle. It selects no tool, and there is no turn test."
     ),
     parameters=PointsParameters,
     measures=("x_mm", "y_mm"),

@@ -177,7 +177,7 @@ def _proof() -> "type[KeptProof]":
 
 METHOD = Method(
     name="runout-table",
-    summary=declared("See how a pick nozzle wobbles: X and Y, and a table by angle."),
+    summary=declared("Measure pick-nozzle runout: X and Y, and a table by angle."),
     description=declared(
         "See the tip with a calibrated, up-looking camera all round: X and Y, and a table of how "
         "far beside them it is at each angle of U; nobody touches anything.\n\n"

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 Retake = Annotated[
     bool,
     Option(flag="--retake/--no-retake", default=True),
-    Help(declared("Whether robolink offers to make the touch that fits worst again.")),
+    Help(declared("Offer to repeat the touch that fits worst.")),
 ]
 """Whether the worst touch is offered again when all are made."""
 
@@ -254,7 +254,7 @@ class LookParameters(MethodParameters):
     retake: Annotated[
         bool,
         Option(flag="--retake/--no-retake", default=True),
-        Help(declared("Whether robolink offers to take the look that fits worst again.")),
+        Help(declared("Offer to repeat the look that fits worst.")),
     ] = False
 
     @property

@@ -212,11 +212,11 @@ METHOD = Method(
     summary=declared("Touch one pin at two angles of U, half a turn apart."),
     description=declared(
         "Touch one pin at two angles of U, half a turn apart.\n\n"
-        "Put the tip some millimetres above a fixed pin first. The robot moves in Power Low only: "
-        "it lifts before it turns and comes down to a clearance; you do the rest by typing "
-        "steps.\n\n"
-        "With two poses that exist already nothing moves, no tool is selected, and nothing is "
-        "proved by turning about the new tip."
+        "First put the tip some millimetres above a fixed pin. The robot moves in Power "
+        "Low only: it lifts before it turns and lowers to a clearance; you do the rest by "
+        "typing steps.\n\n"
+        "With two existing poses nothing moves, no tool is selected, and there is no turn "
+        "test."
     ),
     parameters=TwoPoseParameters,
     measures=("x_mm", "y_mm"),

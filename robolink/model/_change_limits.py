@@ -116,7 +116,8 @@ class ChangeLimits:
         if self.angle_deg is not None and jump.angle_deg > self.angle_deg:
             sentences.append(
                 tr(
-                    "Tool {tool} would turn by {turn:.3f} degrees; this cell allows {limit:.3f}.",
+                    "Tool {tool} would turn by {turn:.3f} degrees; this cell allows "
+                    "{limit:.3f} degrees.",
                     tool=tool,
                     turn=jump.angle_deg,
                     limit=self.angle_deg,

@@ -298,12 +298,12 @@ def describe_outcome(outcome: ControllerOutcome, *, settles: bool = True) -> str
 def _movement(outcome: ControllerOutcome) -> str:
     if outcome.moving:
         return tr(
-            "The robot may still be moving; the end of this was not seen: {requests}.",
+            "The robot may still be moving; robolink did not see the end of: {requests}.",
             requests=", ".join(outcome.moving),
         )
     if outcome.moved:
         return tr("Every movement has ended.")
-    return tr("Nothing was moved.")
+    return tr("Nothing moved.")
 
 
 def _writes(outcome: ControllerOutcome) -> list[str]:
@@ -345,9 +345,9 @@ def _tool(number: int, tool: ToolOutcome) -> str:
 
 def _selection(outcome: ControllerOutcome) -> str:
     if not outcome.selection_known:
-        return tr("It is not proved which tool is selected now.")
+        return tr("Selected tool: not confirmed.")
     if outcome.selected is None:
-        return tr("It was not read which tool is selected.")
+        return tr("Selected tool: not checked.")
     if outcome.selected_another:
         return tr(
             "Tool {now} is selected now; it was tool {tool} before.",

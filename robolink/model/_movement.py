@@ -58,8 +58,8 @@ class InputEdge:
                 ),
                 reason=NotReadyReason.EDGE_PASSED,
                 remedy=tr(
-                    "Nothing was moved. Check the number of the input, clean the sensor, and bring "
-                    "the tip clear of it."
+                    "Nothing moved. Check the number of the input, clean the sensor, and "
+                    "move the tip away from it."
                 ),
                 controller=controller,
                 request=request,

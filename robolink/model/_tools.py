@@ -358,8 +358,8 @@ def read_for_verdict(
             return now
         looks.append(now)
     raise UnclearAnswerError(
-        tr("Tool {tool} reads back otherwise at each look.", tool=tool),
-        remedy=tr("Nothing was written. Check the cable, then look again."),
+        tr("Tool {tool} reads back differently each time.", tool=tool),
+        remedy=tr("Nothing was written. Check the cable, then try again."),
     )
 
 

@@ -188,12 +188,12 @@ def _parts(turn_deg: float, longest_deg: float) -> Iterator[float]:
 def _require_turn(turn_deg: float, lift_mm: float) -> None:
     if not 0 < abs(turn_deg) <= LONGEST_TURN_DEG:
         raise ConfigError(
-            tr("A turn by {turn:g} degrees is not possible.", turn=turn_deg),
+            tr("{turn:g} degrees is not a possible turn.", turn=turn_deg),
             remedy=tr("Give up to {most:g} degrees, with its sign.", most=LONGEST_TURN_DEG),
         )
     if not lift_mm > 0:
         raise ConfigError(
-            tr("Before it turns, it has to be lifted."), remedy=tr("Give a height above 0 mm.")
+            tr("The tool must be lifted before it turns."), remedy=tr("Give a height above 0 mm.")
         )
 
 
@@ -203,15 +203,15 @@ def _outside(name: str, start: Pose, at: Pose, reach_mm: float) -> LimitError:
     )
     return LimitError(
         tr(
-            "On the way round, at U {u:.0f}, the {name} would be {away:.1f} mm from where it is "
-            "now; allowed are {reach:g} mm. Nothing moved.",
+            "During the turn, at U {u:.0f}, the {name} would be {away:.1f} mm from its "
+            "present place; {reach:g} mm is allowed. Nothing moved.",
             u=at.u_deg,
             name=name,
             away=away_mm,
             reach=reach_mm,
         ),
         remedy=tr(
-            "Look at what is around it, then allow more with {box}.",
+            "Check what is around it, then allow more with {box}.",
             box=remedy_word(RemedyWord.BOX),
         ),
     )

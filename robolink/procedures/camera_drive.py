@@ -268,7 +268,7 @@ class CameraDrive:
         middle, there = self._middle(place), self.pose(place)
         expected_mm = (middle[0] + at.x_mm - there.x_mm, middle[1] + at.y_mm - there.y_mm)
         look: SeenAt = yield Look(
-            tr("Looking whether the spot moves with the tip."), expected_mm, place.mark, pictures
+            tr("Checking whether the spot moves with the tip."), expected_mm, place.mark, pictures
         )
         return self.watch.heard(look)
 
@@ -424,7 +424,7 @@ class CameraDrive:
 
 
 def _in_doubt() -> str:
-    return tr("The spot did not move as the robot did. It is looked at once more, more closely.")
+    return tr("The spot did not move with the robot. Checking again, more closely.")
 
 
 def _shifted(pose: Pose, by_mm: float) -> Pose:

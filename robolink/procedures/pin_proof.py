@@ -244,8 +244,8 @@ class DriftProof:
     def told(self, drift: Drift) -> str:
         """Return why it is touched again."""
         return tr(
-            "At U {u:.1f} the tip is {drift:.3f} mm off, too near to the limit of "
-            "{limit:.3f} mm. Touch it once more there; the mean counts.",
+            "At U {u:.1f} the tip is {drift:.3f} mm off, too near the limit of {limit:.3f} "
+            "mm. Touch once more there; the mean counts.",
             u=drift.u_deg,
             drift=drift.distance_mm,
             limit=self.tolerance_mm,

@@ -70,7 +70,7 @@ def finalize_samples(
     for _ in range(MOST_REPEATED if retake and result.dof else 0):
         worst = worst_of(result, times)
         question = tr(
-            "{which} is {distance:.3f} mm off. Take it again?",
+            "{which} is {distance:.3f} mm off. Repeat it?",
             which=method.which(worst + 1, samples.taken[worst]),
             distance=result.residual_distances_mm[worst],
         )

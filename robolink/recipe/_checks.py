@@ -96,7 +96,7 @@ def answers(draft: Draft) -> Iterator[Problem]:
                 ),
             )
         if asked & {(prompt.answer, prompt.tool), (prompt.answer, None)}:
-            yield Problem(f"prompts#{number}.answer", tr("is asked already; ask once"))
+            yield Problem(f"prompts#{number}.answer", tr("is already asked; ask it once"))
         asked.add((prompt.answer, prompt.tool))
 
 

@@ -154,7 +154,7 @@ def _unknown(place: _Place, top: Sequence[str]) -> str:
         top: The keys that are known at the top of the file.
     """
     if place.key in top:
-        return tr("belongs at the top of the file, above the first line with a [table]")
+        return tr("must be at the top of the file, above the first line with a [table]")
     return is_not_known(place.key, place.table)
 
 

@@ -72,7 +72,7 @@ class Recipe(Table):
     box: Box = Field(default_factory=Box)
     """How far the flange may go from where it is when the recipe starts."""
     tolerances: Tolerances = Field(default_factory=Tolerances)
-    """What a measurement must be like to be believed."""
+    """Acceptance limits."""
     accuracy: AccuracyTable = Field(default_factory=AccuracyTable)
     """What is known of errors that no measurement shows by itself."""
     refusal: RefusalTable = Field(default_factory=RefusalTable)

@@ -163,7 +163,7 @@ class Box(Table):
 
 
 class Tolerances(Table):
-    """What a measurement must be like to be believed."""
+    """Acceptance limits."""
 
     rms_mm: Length | None = None
     """Largest rms of the residuals, mm; not for "two-pose", which leaves no residual."""

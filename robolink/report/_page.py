@@ -172,12 +172,12 @@ def render_drift(cells: Sequence[CellDrift], *, made_at: str, robolink_version: 
         >>> change = MeasuredChange(7, at, "c-1", 1, "N-0815", "PIN-07", tip_mm, None, 0.05)
         >>> cell = CellDrift("cell-a", (change,), charts=(), findings=())
         >>> page = render_drift([cell], made_at="2026-11-23T08:00:00Z", robolink_version="0.1.0")
-        >>> "Nothing stands out" in page
+        >>> "Nothing is unusual" in page
         True
     """
     band = simulated_band(any(cell.simulated for cell in cells))
     found = sum(len(cell.findings) for cell in cells)
-    verdict = tr("To look at: {count}", count=found) if found else tr("Nothing stands out")
+    verdict = tr("Unusual: {count}", count=found) if found else tr("Nothing is unusual")
     style = files("robolink.report").joinpath("style.css").read_text(encoding="utf-8")
     return (
         templates()

@@ -158,7 +158,7 @@ def _outcome(entries: Sequence[Recorded]) -> tuple[Outcome, str]:
     if refused and (measured is None or refused_at > measured.number):
         return Outcome.REFUSED, refused.verdict
     if EntryKind.INTENT in kinds:
-        return Outcome.UNFINISHED, tr("How the write ended is not on record.")
+        return Outcome.UNFINISHED, tr("The record does not say how the write ended.")
     declined = any(entry.details.get("accepted") is False for entry in entries)
     return (Outcome.DECLINED if declined else Outcome.PROPOSED), ""
 
@@ -166,7 +166,7 @@ def _outcome(entries: Sequence[Recorded]) -> tuple[Outcome, str]:
 def _end(entries: Sequence[Recorded], end: Recorded) -> tuple[Outcome, str]:
     turned = _last(entries, EntryKind.VERIFY)
     if end.kind is EntryKind.DONE:
-        later = tr("Found done by a later look at the controller.")
+        later = tr("A later reading of the controller confirmed it.")
         ending = later if end.details.get("found_later") else ""
         if not any(entry.kind is EntryKind.WRITE for entry in entries) and not ending:
             return Outcome.SKIPPED, ""

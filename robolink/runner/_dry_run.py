@@ -151,14 +151,12 @@ def first_clear(
         refusal = next(((move, why) for move, why in in_the_way if why), None)
         if refusal is None:
             if refusals:
-                yield Notify(
-                    tr("The robot takes another path than planned: {why}", why=refusals[0][1])
-                )
+                yield Notify(tr("The robot takes a different path: {why}", why=refusals[0][1]))
             return option
         refusals.append(refusal)
     move, why = refusals[0]
     raise LimitError(
-        tr("{step} {refusal} Nothing was moved for it.", step=move.purpose, refusal=why),
+        tr("{step} {refusal} Nothing moved for it.", step=move.purpose, refusal=why),
         remedy=tr(
             "Tilt or turn the tool another way at the first place, or put the "
             "reference point where the arm has room and stays away from its singular "

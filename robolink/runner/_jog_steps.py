@@ -141,13 +141,14 @@ def typed_pose(text: str, here: Pose, settings: RunSettings) -> Pose:
     if away_mm > TYPED_AWAY_MM or away_deg > TYPED_AWAY_DEG:
         raise LimitError(
             tr(
-                "That is {mm:.2f} mm and {deg:.1f} degrees from where the controller says the tool "
-                "is. It was not taken.",
+                "That is {mm:.2f} mm and {deg:.1f} degrees from the controller's position "
+                "of the tool. It was not recorded.",
                 mm=away_mm,
                 deg=away_deg,
             ),
             remedy=tr(
-                "A typed pose may differ by {mm:g} mm and {deg:g} degrees: the robot goes by it.",
+                "A typed pose may differ by {mm:g} mm and {deg:g} degrees, because the "
+                "robot moves by it.",
                 mm=TYPED_AWAY_MM,
                 deg=TYPED_AWAY_DEG,
             ),
@@ -211,7 +212,7 @@ def parse_steps(text: str) -> dict[str, float]:
         axis, sign, number = match.groups()
         if axis in deltas:
             raise ConfigError(
-                tr("{axis} is there twice: it would be one move. Nothing moved.", axis=axis),
+                tr("{axis} appears twice. Nothing moved.", axis=axis),
                 remedy=tr(
                     "Give each axis once, for example x+0.1 z-0.5, and the rest in the next step."
                 ),

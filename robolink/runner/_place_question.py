@@ -220,15 +220,15 @@ class PlaceQuestion:
             raise CalibrationError(
                 "typed_ahead",
                 tr(
-                    "{count} answers came within {least:g} s of the question, before anybody could "
-                    "have read it.",
+                    "{count} answers came within {least:g} s of the question, too early "
+                    "for anybody to have read it.",
                     count=early,
                     least=FASTEST_ANSWER_S,
                 ),
                 remedy=tr("Answer by hand, after you have looked at the tip."),
             )
         self._operator.tell(
-            tr("That came before the question could be read, so it was not taken. Again:")
+            tr("That came before the question could be read and was ignored. Again:")
         )
         self._ask()
 
@@ -261,7 +261,7 @@ class PlaceQuestion:
                 cause=error.what,
             ),
             remedy=" ".join(
-                (error.remedy, tr("The robot stands where the last jog left it; start again."))
+                (error.remedy, tr("The robot is where the last jog left it; start again."))
             ).strip(),
             controller=self._controller.identity,
         )
@@ -279,7 +279,7 @@ class TakenAgainError(CalibrationError):
     def __init__(self, number: int) -> None:
         super().__init__(
             AGAIN,
-            tr("Touch {k} is made again.", k=number),
+            tr("Repeat touch {k}.", k=number),
             remedy=tr("Nothing was written."),
         )
         self.number = number
@@ -312,7 +312,7 @@ def inputs_of(controller: Controller) -> DigitalIo:
     """
     if controller.io is None:
         raise ConfigError(
-            tr("This controller has no inputs, so none can show contact."),
+            tr("This controller has no inputs, so it has no contact input."),
             remedy=tr("Measure without a contact input."),
         )
     return controller.io

@@ -77,7 +77,7 @@ def ended_by(status: ControllerStatus) -> str:
     if status.guard_open:
         return tr("The safety guard was opened.")
     if status.fault:
-        return tr("The controller went into error {code:04d}.", code=status.code)
+        return tr("The controller reported error {code:04d}.", code=status.code)
     return ""
 
 
@@ -295,7 +295,7 @@ class Runner:
         camera = self._camera
         if camera is None:
             raise ConfigError(
-                tr("A camera is needed, and none was named."),
+                tr("This needs a camera, and none was named."),
                 remedy=tr(
                     "Name it with {sensor}, in the recipe, or in the cell file.",
                     sensor=remedy_word(RemedyWord.SENSOR),
@@ -373,8 +373,8 @@ class Runner:
         try:
             return self.confirm(
                 tr(
-                    "This computer was busy for half a second, so the controller halted the robot. "
-                    "It stands still, and nothing was written. Repeat this step from here?"
+                    "This computer was busy for half a second, so the controller stopped "
+                    "the robot. Nothing was written. Repeat this step from here?"
                 )
             )
         except DeclinedError:  # nobody is there

@@ -65,8 +65,8 @@ class CallbackServer:
         self._allowed = frozenset(_ip(address) for address in allow)
         if not self._allowed and not ipaddress.ip_address(_ip(host)).is_loopback:
             raise ConfigError(
-                tr("At {host} any computer on the network could call.", host=host),
-                remedy=tr("Say which may: their addresses, one by one."),
+                tr("At {host} any computer on the network could connect.", host=host),
+                remedy=tr("Name the allowed computers by address, one by one."),
             )
         self._conversation, self._tell = conversation, tell
         self._lock = threading.Lock()
@@ -122,7 +122,8 @@ class CallbackServer:
                 if trouble != before:
                     self._say(
                         tr(
-                            "No program can call just now: {cause}. It is tried again each second.",
+                            "No program can connect now: {cause}. robolink tries again "
+                            "every second.",
                             cause=trouble,
                         )
                     )
@@ -143,7 +144,7 @@ class CallbackServer:
         try:
             thread.start()
         except RuntimeError as error:  # the system gives no further thread just now
-            self._say(tr("{peer} was cut off: {cause}", peer=peer, cause=error))
+            self._say(tr("robolink disconnected {peer}: {cause}", peer=peer, cause=error))
             self._end(link)
             return
         self._threads = [one for one in self._threads if one.is_alive()] + [thread]
@@ -153,13 +154,14 @@ class CallbackServer:
         ip = _ip(peer)
         allowed = ip in self._allowed if self._allowed else ipaddress.ip_address(ip).is_loopback
         if not allowed:
-            return tr("{peer} may not call and was cut off.", peer=peer)
+            return tr("{peer} may not connect; robolink disconnected it.", peer=peer)
         with self._lock:
             full = len(self._links) >= MOST_PROGRAMS
         if not full:
             return ""
         return tr(
-            "{peer} was cut off: {most} programs call already, and no more may.",
+            "robolink disconnected {peer}: {most} programs are connected already, the most "
+            "allowed.",
             peer=peer,
             most=MOST_PROGRAMS,
         )
@@ -175,7 +177,7 @@ class CallbackServer:
                 link.settimeout(BEAT_S)
                 self._answer_all(link, conversation)
         except RobolinkError as error:
-            self._say(tr("{peer} was cut off: {cause}", peer=peer, cause=error))
+            self._say(tr("robolink disconnected {peer}: {cause}", peer=peer, cause=error))
         except OSError:
             pass  # the program puts its own value back; what is open stays so in the journal
         finally:

@@ -139,8 +139,8 @@ class ControllerHolder:
         raise errors.OutcomeUnknownError(
             what
             or tr(
-                "The process that has the controller ({pid}) took the stop and did not say how it "
-                "ended.",
+                "The process that has locked the controller ({pid}) accepted the stop but "
+                "did not report how it ended.",
                 pid=self.pid,
             ),
             remedy=remedy or tr("It may still be moving."),

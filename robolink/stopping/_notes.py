@@ -51,10 +51,10 @@ class StopNote:
     def sentence(self) -> str:
         """What a person is told of it."""
         if not self.when:
-            return tr("This controller was stopped; the note of who did it cannot be read.")
+            return tr("This controller was stopped; the record of who did it cannot be read.")
         if not self.confirmed:
             return tr(
-                "{who} told {url} to stop on {when}, and did not see it come to rest.",
+                "{who} stopped {url} on {when}; it was not confirmed that the robot stopped.",
                 who=self.who,
                 url=self.url,
                 when=local_label(self.when),

@@ -219,7 +219,7 @@ def _put_back(connect: Connect, kept: _Kept, tool: int | None, ledgers: list[Led
                 _once_free(controller, lambda: controller.resolver.settle(finding))
     except RobolinkError as error:
         raise OutcomeUnknownError(
-            joined(" ", (tr("What the checks found was not put back:"), error.what)),
+            joined(" ", (tr("The checks could not restore:"), error.what)),
             remedy=tr("Do not start the cell. Next: 'robolink recover'."),
             controller=error.controller,
         ) from error

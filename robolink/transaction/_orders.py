@@ -83,7 +83,7 @@ class OrderedChange:
         """Return the entry by which the order counts as carried out."""
         tools = {str(receipt.tool): plain_offset(receipt.read_back) for receipt in receipts}
         details = {**self._said(receipts), "tools": tools}
-        return NewEntry(EntryKind.ORDER, verdict=tr("the order was carried out"), details=details)
+        return NewEntry(EntryKind.ORDER, verdict=tr("order carried out"), details=details)
 
     def marked(self, steps: Sequence[Step]) -> dict[str, object]:
         """Return what the marker of the change says about the order.
@@ -209,7 +209,7 @@ def kept_later(marker: Marker, now: Mapping[int, ToolOffset | None]) -> tuple[Ne
 
 def forgotten(marker: Marker) -> tuple[NewEntry, ...]:
     """Return the entry by which an order ends whose change nobody looked at."""
-    return _ended(marker, tr("forgotten without looking"), forgotten=True)
+    return _ended(marker, tr("dropped without a check"), forgotten=True)
 
 
 def _ended(marker: Marker, verdict: str, **more: object) -> tuple[NewEntry, ...]:
@@ -245,10 +245,10 @@ def _done(
         raise _refused(tr("Order {order} was given before, for another job.", order=order))
     if entry.details.get("forgotten"):
         raise _refused(
-            tr("Order {order} was closed without a look at how it ended.", order=order),
+            tr("Order {order} was closed without checking how it ended.", order=order),
         )
     if _taken_back(controller.outcomes, entry):
-        raise _refused(tr("What order {order} did was taken back.", order=order))
+        raise _refused(tr("Order {order} was undone.", order=order))
     tools, result = entry.details.get("tools"), entry.details.get("result")
     if not isinstance(tools, dict) or not isinstance(result, dict):
         raise _refused(
@@ -290,6 +290,6 @@ def _refused(what: str) -> ConfigError:
 
 def _anew() -> str:
     return tr(
-        "It is not carried out again: nothing was moved or written. Give a new order "
-        "if the work has to be done again."
+        "robolink does not repeat it: nothing was moved or written. Give a new order if "
+        "the work must be done again."
     )

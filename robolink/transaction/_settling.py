@@ -150,7 +150,7 @@ class Settler:
             NewEntry(
                 EntryKind.DECISION,
                 operation=marker.operation,
-                verdict=tr("forgotten without looking"),
+                verdict=tr("dropped without a check"),
                 details={"request": marker.request, **marker.details},
             ),
             *forgotten(marker),
@@ -198,9 +198,9 @@ class Settler:
         selected = self._controller.tools.selected()
         now = tr("unknown") if selected is None else str(selected)
         sentence = tr(
-            "Tool {tool} is selected. Only you can tell whether that is right for "
-            "this cell, and whether each tool holds what it should: this PC has no "
-            "record of what was unfinished.",
+            "Tool {tool} is selected. Only you can say whether that is right for this cell "
+            "and whether each tool has the right value: this PC has no record of "
+            "unfinished jobs.",
             tool=now,
         )
         backup = marker.details.get("backup")
@@ -210,7 +210,7 @@ class Settler:
             )
         entry = NewEntry(
             EntryKind.DECISION,
-            verdict=tr("a person looked at the controller and begins a new record"),
+            verdict=tr("a person checked the controller and starts a new record"),
             details={**marker.details, "selected": selected},
         )
         return Finding(marker, Verdict.LOOK, sentence, entries=(entry,))
@@ -281,7 +281,7 @@ def _steps(marker: Marker) -> list[Step]:
     except (KeyError, TypeError, ValueError) as error:
         raise ConfigError(
             tr(
-                "What was left unfinished at {when} cannot be read.",
+                "The record of an unfinished job of {when} cannot be read.",
                 when=local_label(marker.begun_at),
             ),
             remedy=tr(
@@ -462,7 +462,7 @@ class _Recovering:
             self._settler.settle(finding)
         except RobolinkError as error:
             error.remedy = " ".join(
-                (error.remedy, tr("'robolink recover' may be run again."))
+                (error.remedy, tr("You can run 'robolink recover' again."))
             ).strip()
             raise
         self._settled.append(finding)

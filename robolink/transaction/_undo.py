@@ -197,7 +197,7 @@ def _nothing_to_undo(change: str, *, taken_back: bool) -> str:
     if not change:
         return tr("No finished change of this controller is on record.")
     if taken_back:
-        return tr("The change {change} was taken back when it was made.", change=change[:8])
+        return tr("The change {change} was undone when it was made.", change=change[:8])
     return tr("The change {change} completed nothing for that tool.", change=change[:8])
 
 
@@ -372,7 +372,7 @@ def _plan_to(controller: Controller, number: int, tool: int | None) -> UndoPlan:
     if entry is None:
         raise ConfigError(
             tr(
-                "Entry {number} does not say what was read from a tool of this controller.",
+                "Entry {number} has no value read from a tool of this controller.",
                 number=number,
             ),
             remedy=tr(
@@ -423,8 +423,8 @@ def _expected(controller: Controller, tool: int, old: ToolOffset | None) -> Tool
         raise ToolChangedError(
             changed.sentence,
             remedy=tr(
-                "Nothing was written. Find out who changed it; 'robolink tool set' writes what "
-                "you decide on."
+                "Nothing was written. Find out who changed it; 'robolink tool set' writes "
+                "the value that you choose."
             ),
             controller=controller.identity,
         )

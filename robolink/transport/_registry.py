@@ -165,7 +165,7 @@ def _load(link: LinkUrl, media: Mapping[str, tuple[str, str]]) -> Callable[..., 
         known = {f"{link.kind}+{medium}" for medium in media}
         known |= metadata.entry_points(group=TRANSPORTS_GROUP).names
         raise ConfigError(
-            tr("Nothing here knows how to reach {scheme!r}.", scheme=link.scheme),
+            tr("robolink has no connection of the kind {scheme!r}.", scheme=link.scheme),
             remedy=tr("These are known: {known}.", known=", ".join(sorted(known))),
         )
     return cast(Callable[..., Any], found)

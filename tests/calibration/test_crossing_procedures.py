@@ -246,7 +246,7 @@ def test_the_crossing_that_fits_worst_is_offered_and_it_alone_is_driven_again(
     )
     (question, when), *_ = cell.offers
     assert question.startswith(named)
-    assert question.endswith("Take it again?")
+    assert question.endswith("Repeat it?")
     require_safe_ways(cell.steps)
     again = cell.steps[when:]
     seeks = [step for step in again if isinstance(step, Seek)]

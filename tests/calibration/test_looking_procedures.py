@@ -79,7 +79,7 @@ class IdealCell:
     @property
     def placed(self):
         """The looks at places; the others are beside them."""
-        return [look for look in self.looks if not look.purpose.startswith("Looking whether")]
+        return [look for look in self.looks if not look.purpose.startswith("Checking whether")]
 
     def _take(self, step):
         if isinstance(step, Move):

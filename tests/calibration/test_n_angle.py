@@ -312,7 +312,7 @@ def test_the_pose_that_fits_worst_is_named_and_taken_again(slip):
     person = Person(slips=[slip], accepts=1)
     result = course(person, retake=True)
     assert f"Touch {slip} at U" in person.offers[0]
-    assert "Take it again?" in person.offers[0]
+    assert "Repeat it?" in person.offers[0]
     assert person.touches == 9
     assert len(result.inputs) == 8
     assert miss_mm(result) < 0.02

@@ -72,7 +72,7 @@ def test_what_cannot_be_checked_is_said_with_its_reason_and_has_a_default_for_sc
     repeatable, accurate, largest = statement_sentences(two())
     assert repeatable == "Repeatable: not known (two touches cannot check each other)."
     assert accurate == "X, Y: accurate to +-0.088 mm (95 %)."
-    assert "how a person sees contact, +-0.05 mm (default, not measured)" in largest
+    assert "judging contact by eye, +-0.05 mm (default, not measured)" in largest
     scatter = next(row for row in rows_in_words(two().accuracy) if not row.half_width)
     assert scatter.basis == basis_words("default")
     tip = ToolOffset(12, -4, -20)
@@ -89,7 +89,7 @@ def test_what_nobody_held_to_a_cell_has_no_statement_of_accuracy():
 
 def test_the_largest_row_says_what_tells_it():
     stated = list(statement_sentences(two(STATED, sigma_mm=0.002)))[-1]
-    assert "how a person sees contact, +-0.01 mm (stated for this cell: cell file)" in stated
+    assert "judging contact by eye, +-0.01 mm (stated for this cell: cell file)" in stated
     default = list(statement_sentences(two(STATED)))[-1]
     assert default == "Largest row: how well it repeats (default, not measured)."
     own = list(statement_sentences(two(STATED, sigma_mm=0.02)))[-1]
@@ -119,21 +119,21 @@ def judged(code="", *, small=False, covered=False):
     ("judgement", "headline", "said"),
     [
         (None, "Turn test passed: 0.012", None),
-        (judged(), "Turn test passed: 0.012", "It contradicts nothing that is stated"),
+        (judged(), "Turn test passed: 0.012", "It agrees with the stated accuracy"),
         (
             judged("proof_contradicts_repeatability", covered=True),
             "Turn test within its limit, with a doubt: 0.012",
-            "Scatter alone explains 0.016 mm, no more",
+            "Scatter alone explains only 0.016 mm",
         ),
         (
             judged("proof_contradicts_repeatability"),
             "Turn test contradicts the measurement: 0.012",
-            "Scatter alone explains 0.016 mm, no more",
+            "Scatter alone explains only 0.016 mm",
         ),
         (
             judged("proof_contradicts_accuracy"),
             "Turn test contradicts the measurement: 0.012",
-            "All that is stated explains 0.087 mm, no more",
+            "The stated errors explain only 0.087 mm",
         ),
         (judged(small=True), "Tested at a small angle: 0.012", "less than 90"),
     ],
@@ -159,13 +159,13 @@ def test_a_turn_test_is_called_passed_only_where_both_statements_stand(judgement
             {"shows_from_mm": 0.07, "shows_z_from_mm": 0.12},
             "less than 0.070 mm (X, Y), 0.120 mm (Z) may not show.",
         ),
-        ({"shows_from_mm": 0.04, "misses_z": True}, "This test tells no height"),
+        ({"shows_from_mm": 0.04, "misses_z": True}, "This test does not measure height"),
     ],
 )
 def test_what_a_shift_would_have_to_be_is_said_where_it_is_more_than_is_stated(shows, said):
     stated = replace(judged(), accurate_mm=0.05, **shows)
     first, *more = turn_test_sentences(stated)
-    assert first.startswith("It contradicts nothing")
+    assert first.startswith("It agrees with the stated accuracy")
     assert len(more) == bool(said)
     assert all(said in one for one in more), more
     assert TurnJudgement.from_json(stated.as_json()) == stated

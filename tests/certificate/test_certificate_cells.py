@@ -502,7 +502,7 @@ BOTH = pytest.mark.parametrize("at", [pytest.param(PIN, id="pin"), pytest.param(
 
 WIDER = "Keep the value with a wider"
 KEEPS = "Keep the value: it is"
-AGAIN = "Touch once more.", "Look once more."
+AGAIN = "Make one more touch.", "Measure once more with the camera."
 
 
 class Answers:
@@ -567,7 +567,7 @@ def test_whoever_only_presses_enter_gets_the_old_value_back(at):
 
 @EACH
 def test_once_more_shows_a_station_that_was_moved_again_and_twice_at_most(at):
-    more = next(row for row in AGAIN if row.startswith("Touch" if at is PIN else "Look"))
+    more = next(row for row in AGAIN if row.startswith("Make" if at is PIN else "Measure"))
     answers = Answers(more, more, more)
     ended = at_a_terminal(at, answers)
     assert ended.code == "proof_contradicts_accuracy"

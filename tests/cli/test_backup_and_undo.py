@@ -355,14 +355,14 @@ def test_a_fresh_controller_is_backed_up_before_the_first_write(run, simulator, 
         path.unlink()
     code, _, err = run("undo", "--yes")
     assert code == 0
-    assert "its tools were saved in" in err
+    assert "robolink saved its tools in" in err
 
 
 MISTAKES = {
     "no change": ([], "No finished change"),
     "an unknown change": (["abcd"], "No entry and no change"),
     "both": (["abcd", "--to", "1"], "not both"),
-    "no proof": (["--to", "1"], "does not say what was read"),
+    "no proof": (["--to", "1"], "has no value read"),
     "number 0": (["--to", "0"], "--to"),
 }
 

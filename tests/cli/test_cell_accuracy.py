@@ -289,7 +289,7 @@ def run_stated(tmp_path, monkeypatch, capsys):
 @pytest.mark.parametrize(
     ("line", "said"),
     [
-        ("touch_m = 0.04", "cells.line3.accuracy.touch_m: is not known; is touch_mm meant?"),
+        ("touch_m = 0.04", "cells.line3.accuracy.touch_m: is not known; did you mean touch_mm?"),
         ("touch_mm = 0", "cells.line3.accuracy.touch_mm: must be more than 0"),
         ("touch_mm = nan", "cells.line3.accuracy.touch_mm"),
         ('touch_mm = "0.04"', "cells.line3.accuracy.touch_mm"),

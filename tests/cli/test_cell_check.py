@@ -57,7 +57,7 @@ def test_a_cell_in_order_ends_with_0_goes_on_record_and_is_not_touched(cells, si
     assert cell["tools"]["1"]["x_mm"] == 12.0
     assert cell["selected_tool"] == 1
     (entry,) = recorded()
-    assert entry.verdict == "In order."
+    assert entry.verdict == "No problem found."
     assert entry.details["tools"]["1"][0] == 12.0
     requests = [text for _, direction, text in simulator.log if direction == ">"]
     assert requests
@@ -136,7 +136,7 @@ def test_one_cell_that_does_not_answer_leaves_the_others_looked_at(cells, simula
     assert by_name["away"]["tools"] is by_name["away"]["changes"] is None
     assert by_name["away"]["findings"] == []
     assert sorted(entry.verdict.split(":")[0] for entry in recorded()) == [
-        "In order.",
+        "No problem found.",
         "The cell could not be checked",
     ]
     assert main.run(["check", "line3"]) == 0
@@ -144,7 +144,7 @@ def test_one_cell_that_does_not_answer_leaves_the_others_looked_at(cells, simula
     assert cells(more=gone)[0] != 0
     assert main.run(["check"]) != 0
     lines = [line for line in capsys.readouterr().out.splitlines() if not line.startswith(" ")]
-    assert lines[-1].startswith("line3: in order")
+    assert lines[-1].startswith("line3: no problem found")
 
 
 def test_a_name_that_is_no_cell_stops_before_any_is_asked(cells, simulator, capsys):
@@ -192,7 +192,7 @@ def test_a_sensor_measures_after_a_yes_and_nothing_is_written(cells, simulator, 
     code, document = cells("--measure", "beams.toml")
     assert (code, found(document)) == (0, [])
     assert len(asked) == 1
-    assert "nothing is written" in asked[0]
+    assert "without writing" in asked[0]
     assert simulator.machine.arm.moves_started > 0
     tip = simulator.world.tips[1]
     simulator.machine.tools.set(1, replace(tip, x_mm=tip.x_mm + 0.16))
@@ -216,7 +216,7 @@ def test_nothing_moves_without_a_person_s_yes(cells, simulator, watched, tmp_pat
     assert document["cells"][0]["tools"]["1"]["x_mm"] == 12.0
     assert (document["ok"], document["cells"][0]["ok"]) == (False, False), "nobody looked further"
     assert simulator.machine.arm.moves_started == moves
-    assert [entry.verdict for entry in recorded()] == ["In order."]
+    assert [entry.verdict for entry in recorded()] == ["No problem found."]
 
 
 def test_a_recipe_by_which_a_person_touches_measures_nothing(cells, simulator, watched, tmp_path):
@@ -284,7 +284,7 @@ def test_each_robots_places_are_listed_as_its_own(run_with_robots):
 def test_one_station_of_several_robots_is_shown_by_the_name_of_the_robot(run_with_robots):
     code, _, err = run_with_robots("show", "PIN-07")
     assert code == 2
-    assert "Several robots of this controller have a place of station PIN-07" in err
+    assert "Several robots of this controller have a station PIN-07" in err
     for robot, x_mm in zip(ROBOTS, (100.0, 250.0), strict=True):
         shown = json.loads(run_with_robots("show", "PIN-07", "--robot", robot, "--json")[1])
         assert (shown["robot"], shown["x_mm"]) == (robot, x_mm)
@@ -328,7 +328,7 @@ RECIPE = Path(__file__).parents[2] / "examples" / "recipes" / "needle-one-touch.
 def test_each_tool_is_shown_with_its_last_change_and_its_age(run, simulator):
     code, out, _ = run("cell", "tools")
     assert code == 0
-    assert "never from here" in out
+    assert "never by robolink" in out
     assert run("tool", "set", "2", "--x", "5", "--y", "6", "--z", "-70", "--yes")[0] == 0
     code, out, _ = run("cell", "tools")
     assert "today" in out

@@ -345,11 +345,11 @@ def test_whatever_a_driver_raises_is_a_broken_promise_in_every_report(
     [
         ("drv_exits:x", (), "cannot be loaded: SystemExit: 0"),
         ("drv_wrong:x", (), "cannot be loaded: SyntaxError"),
-        ("drv_that_ends:none_for_a_while", (), "gives no controller: KeyError"),
+        ("drv_that_ends:none_for_a_while", (), "returned no controller: KeyError"),
         (
             "drv_that_ends:none_for_a_while",
             ("--write", "--tool", "3", "--yes"),
-            "gives no controller: KeyError",
+            "returned no controller: KeyError",
         ),
     ],
 )

@@ -369,9 +369,9 @@ def test_a_name_that_is_mistyped_gets_one_of_today_suggested(typed, offered, cap
 def test_a_command_of_a_group_is_named_where_its_group_was_left_out(typed, named, capsys):
     assert (main.run([typed]) == 2) or typed == "motors", "that one has an older, shorter name"
     said = capsys.readouterr().err
-    assert said.count("There is 'robolink ") == len(named)
+    assert said.count("Did you mean 'robolink ") == len(named)
     for one in named:
-        assert f"There is 'robolink {one}'." in said
+        assert f"Did you mean 'robolink {one}'?" in said
 
 
 def test_the_first_page_names_the_pages_and_the_recipes(capsys):

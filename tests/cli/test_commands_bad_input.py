@@ -330,7 +330,7 @@ def check_the_outcome_is_called_unknown(cut):
 
 def check_the_link_is_called_broken(cut, *, code):
     assert cut.code == code, cut.err
-    assert "The previous tool, tool 1, could not be selected again" in cut.err
+    assert "robolink could not select the previous tool 1 again" in cut.err
     assert "'robolink recover' selects it" in cut.err
 
 

@@ -31,7 +31,7 @@ def cell(tmp_path, monkeypatch):
 COMMANDS = {
     "status": (["status"], "robolink/status/1", "tool 1 selected"),
     "where": (["where"], "robolink/where/1", "tool 1 in local 0"),
-    "stop": (["stop"], "robolink/stop/1", "stands still; its state is: ready"),
+    "stop": (["stop"], "robolink/stop/1", "has stopped (confirmed). State: ready"),
     "reset": (["reset", "--yes"], "robolink/reset/1", "ready"),
     "motors on": (["motors", "on", "--yes"], "robolink/motors/1", "The motors are on."),
     "motors off": (["motors", "off"], "robolink/motors/1", "The motors are off."),

@@ -50,7 +50,9 @@ def test_path_shows_each_place_and_whether_it_is_there(cells, capsys, monkeypatc
         ("site", True),
     ]
     assert main.run(["config", "path"]) == 0
-    assert f"{cells / 'robolink.toml'}\n    the working folder's: exists" in capsys.readouterr().out
+    assert (
+        f"{cells / 'robolink.toml'}\n    from the working folder: exists" in capsys.readouterr().out
+    )
 
 
 def test_nothing_to_check_is_not_right(capsys):

@@ -121,7 +121,7 @@ def test_keys_that_the_console_does_not_know_are_a_slip_and_no_end(tmp_path, enc
     )
     shown = done.stdout.decode(encoding) + done.stderr.decode(encoding)
     # What lies there before the question is no answer to it, and is shown all the same.
-    assert r"Typed too early and ignored: 'x\\\\xff+1'" in shown
+    assert r"Typed too early and ignored: 'x\\xff+1'" in shown
     assert done.returncode == 9
     assert "Traceback" not in shown
 

@@ -110,7 +110,7 @@ def test_one_change_draws_no_empty_table_and_is_headed_by_the_cell_that_was_name
     assert code == 0
     first, *rest = out.splitlines()
     assert first.startswith(f"line3 ({HERE}): measured changes: 1, ")
-    assert "from the second measured change of a tool on" in rest[0]
+    assert "needs two measured changes of a tool" in rest[0]
     assert "limits" not in out
     assert run("-c", HERE)[1].startswith(f"{HERE}: "), "a URL is no name"
     before = main.run(["-c", "line3", "journal", "drift"])
@@ -275,9 +275,9 @@ def test_an_entry_says_both_statements_its_rows_and_the_seating(shown):
     for said in (
         "Repeatable: not known (two touches cannot check each other).",
         "X, Y: accurate to +-0.088 mm (95 %).",
-        "Largest row: how a person sees contact, +-0.05 mm (default, not measured).",
+        "Largest row: judging contact by eye, +-0.05 mm (default, not measured).",
         "Seating: mounted anew, the tip lies within +-0.130 mm of here (95 %, 12 changes).",
-        "how a person sees contact +-0.05 mm default, not measured",
+        "judging contact by eye +-0.05 mm default, not measured",
     ):
         assert said in text
     assert "not assessed" not in text
@@ -286,7 +286,7 @@ def test_an_entry_says_both_statements_its_rows_and_the_seating(shown):
 
 def test_the_entry_of_a_turn_test_says_what_it_contradicts(shown):
     text = shown("journal", "show", str(recorded(sigma_mm=0.02) + 4))
-    assert "Scatter alone explains 0.0" in text
+    assert "Scatter alone explains only 0.0" in text
     assert "it does not repeat as stated" in text
 
 
@@ -353,7 +353,7 @@ def test_a_report_of_a_good_change_conforms(shown, tmp_path):
     shown("journal", "report", "c0ffee", str(page), "--json")
     text = page.read_text(encoding="utf-8")
     assert "Written, read back and tested" in text
-    assert "It contradicts nothing that is stated" in text
+    assert "It agrees with the stated accuracy" in text
     assert "X, Y: accurate to ± 0.079 mm (95 %)." in text
     assert "accurate to, 95 %" in text
     assert "not on record</td>" not in text

@@ -131,7 +131,7 @@ def test_a_no_sets_clears_and_selects_nothing(run, tools, person, words):
 def test_a_turn_has_a_limit_of_its_own(cell, tools):
     code, _, err = cell("eva", "tool", "set", "1", "--u", "6")
     assert code == 9
-    assert "Tool 1 would turn by 6.000 degrees; this cell allows 5.000." in err
+    assert "Tool 1 would turn by 6.000 degrees; this cell allows 5.000 degrees." in err
     assert cell("eva", "tool", "set", "1", "--u", "6", "--accept-turn", "7")[0] == 0
     assert tools.get(1).u_deg == 6.0
 

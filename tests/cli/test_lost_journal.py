@@ -60,15 +60,15 @@ def test_a_journal_without_history_of_a_known_controller_blocks_until_a_person_l
     assert simulator.machine.tip() == stood
     code, out, err = run("recover")
     assert code == 6
-    assert "Nothing is left unfinished" not in out + err
+    assert "No job is left unfinished" not in out + err
     assert "Tool 0 is selected" in out + err
     assert "robolink tool compare" in out + err
     # It is not said to be settled by having been asked for.
     assert run("recover")[0] == 6
     assert run("resolve", "--yes")[0] == 0
     code, out, err = run("recover")
-    assert "Nothing is left unfinished" in out + err
-    assert "knows nothing" not in run("status")[2]
+    assert "No job is left unfinished" in out + err
+    assert "has no record of it" not in run("status")[2]
 
 
 @pytest.mark.parametrize("gone", ["backups", "controllers"])
@@ -86,13 +86,13 @@ def test_another_place_is_named(run, changed, tmp_path, monkeypatch):
 
 
 def test_a_controller_that_was_never_changed_is_just_new(run, changed):
-    assert "knows nothing" not in run("status")[2]
+    assert "has no record of it" not in run("status")[2]
 
 
 def test_a_write_that_changed_nothing_loses_no_record(run, simulator):
     same = str(simulator.machine.tools.get(1).x_mm)
     assert run("tool", "set", "1", "--x", same, "--yes")[0] == 0
-    assert "knows nothing" not in run("status")[2]
+    assert "has no record of it" not in run("status")[2]
 
 
 def bend(path, old, new):
@@ -281,6 +281,6 @@ def test_each_command_that_writes_or_moves_is_blocked_and_no_other(
         assert tools() == before
         assert run("recover", "--yes")[0] == 0
         assert run("tool", "set", "1", "--x", "14", "--yes")[0] == 0
-        assert "knows nothing" not in run("status")[1]
+        assert "has no record of it" not in run("status")[1]
     finally:
         plant.unregister("lost")

@@ -104,7 +104,7 @@ def test_what_is_wrong_is_refused_and_nothing_is_written(
 
 # ``cell validate`` says what methods will refuse of a cell's limits, in their words.
 
-ABOVE = "The robot would stop {clearance} mm from contact, and a new tip may be {limit} mm longer."
+ABOVE = "The robot would stop {clearance} mm from contact, but a new tip may be {limit} mm longer."
 
 
 @pytest.fixture
@@ -169,7 +169,7 @@ def test_what_only_one_method_refuses_names_that_one(cell, tmp_path, capsys):
     say(tmp_path, "lift_mm = 6")
     code, problems = check(capsys)
     assert (code, list(problems)) == (2, ["cells.a.clearance_mm"])
-    assert "These methods refuse it: one-touch." in problems["cells.a.clearance_mm"]
+    assert "These methods are not possible: one-touch." in problems["cells.a.clearance_mm"]
 
 
 @pytest.mark.simulator_only

@@ -106,7 +106,7 @@ def test_another_command_that_was_refused_is_dropped_and_others_stay():
     for kept in (
         "Next: robolink robot reset, then robolink recover.",
         "Next: 'robolink recover --forget'.",
-        "'robolink recover' may be run again.",
+        "You can run 'robolink recover' again.",
     ):
         assert told(kept, "recover") == kept
     assert told(SAID[0], "status") == SAID[0]

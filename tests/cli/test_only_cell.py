@@ -132,7 +132,7 @@ def test_a_stop_takes_the_only_cell_and_says_it_when_the_robot_stands(cells, sim
     cells("line3")
     assert main.run(["stop"]) == 0
     out, err = capsys.readouterr()
-    assert "only-cell stands" in out
+    assert "only-cell: the robot has stopped" in out
     assert err.splitlines()[0] == "cell: line3"
     assert main.run(["stop", "--dry-run"]) == 0
     assert "cell: line3" in capsys.readouterr().err
@@ -228,4 +228,4 @@ def test_an_address_that_was_never_met_is_told_from_an_empty_record(served, caps
     assert code == 0
     code, out, _ = run(capsys, "journal", "list", "-c", "epson+tcp://10.9.9.9:5000")
     assert code == 0
-    assert "by the addresses at which it was met" in out
+    assert "by the addresses used so far" in out

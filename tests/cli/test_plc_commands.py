@@ -106,7 +106,7 @@ def test_a_slot_with_the_values_of_no_tool_is_shown_refused_and_put_right(shown,
     url, simulator = serve()
     simulator.plc.memory.define(3, (-1.5e-27, 1.6e-314, -10.0, 0.0, 0.0, 0.0), "Tool 3")
     _, out, _ = shown("-c", url, "tool", "list")
-    assert "holding the values of no tool: 3" in out
+    assert "values that are no tool: 3" in out
     code, _, err = shown("-c", url, "tool", "select", "3")
     assert (code, "'robolink tool clear'" in err) == (5, True)
     code, out, _ = shown("-c", url, "verify-controller")
@@ -273,7 +273,7 @@ def test_a_plc_with_a_number_keeps_it_at_each_of_its_addresses(shown_to, machine
         assert shown_to(*compare(host.url))[0] == 0
         assert shown_to(*write(second.url))[0] == 0
         code, err = shown_to("-c", second.url, "plc", "check-map", "--shows", "1.x=9.99")
-        assert (code, "The confirmation by Kim" in err, "taken back" in err) == (2, True, True)
+        assert (code, "The confirmation by Kim" in err, "withdrawn" in err) == (2, True, True)
         assert shown_to(*write(host.url))[0] == 2
 
 

@@ -151,13 +151,13 @@ def test_a_comparison_that_fails_takes_the_confirmation_back(shown, serve):
     write = ["-c", url, "tool", "set", "1", "--x", "2.5", "--dry-run"]
     assert shown(*check, "--shows", "1.x=-5.44", "--operator", "Kim")[0] == 0
     code, _, err = shown(*check, "--shows", "1.x=much")
-    assert (code, "taken back" in err) == (2, False)  # a typing mistake says nothing of the map
+    assert (code, "withdrawn" in err) == (2, False)  # a typing mistake says nothing of the map
     assert shown(*write)[0] == 0
     code, _, err = shown(*check, "--shows", "1.x=9.99")
-    assert (code, "The confirmation by Kim" in err, "taken back" in err) == (2, True, True)
+    assert (code, "The confirmation by Kim" in err, "withdrawn" in err) == (2, True, True)
     assert shown(*write)[0] == 2
     code, _, err = shown(*check, "--shows", "1.x=9.99")
-    assert (code, "taken back" in err) == (2, False)
+    assert (code, "withdrawn" in err) == (2, False)
     assert shown(*check, "--shows", "1.x=-5.44")[0] == 0
     assert shown(*write)[0] == 0
     assert plc.writes == []
@@ -206,7 +206,7 @@ def test_on_a_terminal_the_person_is_asked_and_may_leave(shown, serve, person):
     code, _, err = shown(*check)
     assert code == 9
     assert "type at least 2 after the point" in err
-    assert "stays on record" in err
+    assert "are on record" in err
     asks = person(plc, "3.21", None, "", "-75.07\n", "4.000")
     code, out, _ = shown(*check)
     assert (code, asks.answers) == (0, [])
@@ -252,7 +252,7 @@ def test_a_test_value_that_another_component_shows_takes_everything_back(shown, 
     code, _, err = shown(*check)
     assert (code, asks.answers) == (2, [])
     assert "That is what 1.z reads" in err
-    assert "taken back" in err
+    assert "withdrawn" in err
     assert "put 1.y back to what it was" in err
     code, _, err = shown("-c", url, "tool", "set", "1", "--x", "1", "--dry-run")
     assert (code, "Nobody has compared 1.x" in err) == (2, True)
@@ -276,7 +276,7 @@ def test_what_a_map_cannot_do_is_refused_in_words(shown, serve, command):
     assert (code, out) == (5, "")
     said = err.splitlines()
     if "stop" not in command:  # a stop looks at nothing before it
-        assert "does not say who it is" in said.pop(0)
+        assert "reports no serial number" in said.pop(0)
     assert said[0].startswith("robolink: ")
     assert plc.writes == []
 

@@ -59,7 +59,7 @@ def test_a_person_sees_a_table_and_how_it_was_read(shown):
     assert code == 0
     assert "T 1" in out
     assert "405.800" in out
-    assert "1 poses, read as: table, utf-8." in out
+    assert "1 poses read. Layout: table, utf-8." in out
     assert "Lengths were in mm (no rotation stated)." in out
     assert "R = Rz(W) Ry(P) Rx(R) deg" in out
     assert "Not used: Remark." in out
@@ -99,7 +99,7 @@ def test_the_options_say_what_the_file_does_not(shown):
 def test_options_of_a_file_need_a_file(capsys):
     code = main.run(["calibrate", "two-pose", "--tool", "1", "--pose", "1,2,3", "--length", "m"])
     assert code == 2
-    assert "belong to a file of poses" in capsys.readouterr().err
+    assert "need a file of poses" in capsys.readouterr().err
 
 
 def test_a_calibration_takes_the_same_files(tmp_path, capsys):

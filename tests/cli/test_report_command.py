@@ -88,7 +88,7 @@ ENDS = {
     "refused at once": ((REFUSED,), "Refused, nothing was written"),
     "refused, then measured": ((REFUSED, CALIBRATION), "A proposal, nothing was written"),
     "drifts": ((CALIBRATION, *WRITTEN, FAILED, BACK), "The turn test failed"),
-    "taken back": ((*WRITTEN, BACK), "Taken back, the tool has its old value again"),
+    "taken back": ((*WRITTEN, BACK), "Undone, the tool has its old value again"),
     "not applied": (
         (WRITTEN[0], entry(EntryKind.NOT_APPLIED, **VALUES, value=OLD)),
         "Not applied, the tool keeps its old value",
@@ -97,7 +97,7 @@ ENDS = {
         (*WRITTEN, entry(EntryKind.CONFLICT, **VALUES, value=[9.0] * 6)),
         "Conflict: the tool holds neither",
     ),
-    "killed": ((CALIBRATION, WRITTEN[0]), "How the write ended is not on record."),
+    "killed": ((CALIBRATION, WRITTEN[0]), "The record does not say how the write ended."),
 }
 
 

@@ -298,7 +298,7 @@ def test_ports_and_doctor_know_the_cells_on_a_line(
     assert f"{there}\n    cells: here\n" in capsys.readouterr().out
     main.run(["doctor"])
     shown = capsys.readouterr()
-    assert "/dev/ttyUSB77 of gone is not there." in shown.out + shown.err
+    assert "/dev/ttyUSB77 of gone was not found." in shown.out + shown.err
 
 
 @pytest.mark.parametrize(

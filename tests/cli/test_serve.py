@@ -103,7 +103,7 @@ def test_who_is_not_on_the_list_is_cut_off_unheard():
             assert link.recv(1) == b""
     finally:
         server.close()
-    assert told == ["127.0.0.1 may not call and was cut off."]
+    assert told == ["127.0.0.1 may not connect; robolink disconnected it."]
 
 
 @pytest.fixture
@@ -141,7 +141,9 @@ def test_who_finds_no_room_is_told_so_and_not_that_it_may_not_call(listening):
         )
         assert greeted(last)
         assert ninth.recv(1) == b""
-        assert told == ["127.0.0.1 was cut off: 8 programs call already, and no more may."]
+        assert told == [
+            ("robolink disconnected 127.0.0.1: 8 programs are connected already, the most allowed.")
+        ]
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
@@ -162,7 +164,7 @@ def test_programs_that_cannot_be_answered_take_no_place_away(listening, error):
             assert link.recv(1) == b""
     with socket.create_connection(server.address, timeout=10) as link:
         assert greeted(link)
-    expected = "127.0.0.1 was cut off: no journal"
+    expected = "robolink disconnected 127.0.0.1: no journal"
     assert told == ([expected] * MOST_PROGRAMS if isinstance(error, JournalError) else [])
 
 
@@ -193,8 +195,8 @@ def test_an_error_of_the_system_does_not_end_the_listening(listening, monkeypatc
     assert waits == [1.0, 1.0, 1.0]
     # The same trouble is told once.
     assert told == [
-        "No program can call just now: too many files. It is tried again each second.",
-        "No program can call just now: aborted. It is tried again each second.",
+        "No program can connect now: too many files. robolink tries again every second.",
+        "No program can connect now: aborted. robolink tries again every second.",
     ]
 
 
@@ -215,7 +217,7 @@ def test_a_system_without_a_further_thread_does_not_end_the_listening(listening,
             assert link.recv(1) == b""
     with socket.create_connection(server.address, timeout=10) as link:
         assert greeted(link)
-    assert told == ["127.0.0.1 was cut off: can't start new thread"] * (MOST_PROGRAMS + 1)
+    assert told == ["robolink disconnected 127.0.0.1: can't start new thread"] * (MOST_PROGRAMS + 1)
 
 
 def test_an_address_that_is_taken_is_told_once():
@@ -311,7 +313,7 @@ def test_whoever_watches_reads_why_a_program_was_refused_and_what_to_do(monkeypa
     line = ["expert", "serve", "--spel", "127.0.0.1:5001", *(["--json"] if as_json else [])]
     result = CliRunner().invoke(cli, line)
     assert result.exit_code == 0, result.output
-    sentence = "10.0.0.7 is answered journal: The journal is damaged. Move the file away."
+    sentence = "10.0.0.7 gets the answer journal: The journal is damaged. Move the file away."
     assert sentence in " ".join(result.stderr.split())
     if as_json:
         event, _ = map(json.loads, result.stdout.splitlines())
@@ -411,7 +413,7 @@ def test_f79_an_order_delivered_again_reports_the_first_result_and_writes_nothin
     code, out, _ = run(*SET, "--json")
     assert (code, json.loads(out)) == (0, {**first, "already_done": True})
     assert first["read_back"]["x_mm"] == 12.5
-    assert "nothing was moved or written now" in run(*SET)[1]
+    assert "Nothing was moved or written now" in run(*SET)[1]
     assert (simulator.machine.flash_writes, open_journal().count()) == (written, entries)
 
 
@@ -419,7 +421,7 @@ def test_f79_an_order_delivered_again_reports_the_first_result_and_writes_nothin
 @pytest.mark.parametrize(
     ("between", "code", "said"),
     [
-        (("undo", "--yes"), 2, "What order A-17 did was taken back"),
+        (("undo", "--yes"), 2, "Order A-17 was undone"),
         (("tool", "set", "1", "--x", "13", "--yes"), 5, "it holds X 13.000"),
     ],
 )

@@ -79,7 +79,7 @@ def test_a_page_that_is_there_in_chinese_is_shown_so(run):
 def test_a_page_that_is_nearly_called_so_is_proposed(run):
     code, _, err = run("docs", "recipies")
     assert code == 2
-    assert "Is one of these meant: recipes" in err
+    assert "Did you mean recipes, recipe-keys?" in err
 
 
 def test_recipes_are_listed_with_what_they_are_for(run):

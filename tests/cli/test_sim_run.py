@@ -161,7 +161,7 @@ tcp = "127.0.0.1:6012"
         ('[cells.a]\nkind = "epson"\nserial = "com"', "line 4, cells.a.serial: 'com' is not 'pty'"),
         (
             '[cells.a]\nkind = "epson"\ntcp = "127.0.0.1:0"\nserial = "pty"',
-            "line 2, cells.a: --serial stands in place of --tcp",
+            "line 2, cells.a: --serial and --tcp cannot be combined",
         ),
         ('[cells.a]\nkind = "epson"\nallow_remote = 1', "line 4, cells.a.allow_remote: must be"),
         ('[cells.a]\nkind = "epson"\noption = ["a=1"]', "line 4, cells.a.option: must be a table"),
@@ -181,16 +181,16 @@ tcp = "127.0.0.1:6012"
         ('[cells."a b"]\nkind = "epson"', "line 2, cells.a b: a name has"),
         (
             '[cells.a]\nkind = "epson"\n[cells.b]\nkind = "epson"\ntcp = "127.0.0.1:5000"',
-            "line 6, cells.b.tcp: a has it already",
+            "line 6, cells.b.tcp: a uses it already",
         ),
         (
             '[cells.a]\nkind = "epson"\ncount = 2\ntcp = "127.0.0.1:0"\nstate = "s.json"',
-            "line 6, cells.a.state: a-1 has it already",
+            "line 6, cells.a.state: a-1 uses it already",
         ),
         (
             '[cells.a]\nkind = "epson"\nstate = "s.json"\n'
             '[cells.b]\nkind = "epson"\ntcp = "127.0.0.1:0"\nstate = "b/../s.json"',
-            "line 8, cells.b.state: a has it already",
+            "line 8, cells.b.state: a uses it already",
         ),
         (
             '[cells.a]\nkind = "epson"\ncount = 3\ntcp = "127.0.0.1:65534"',
@@ -201,7 +201,7 @@ tcp = "127.0.0.1:6012"
             "line 4, cells.a.count: a bus has at most 127 nodes",
         ),
         ("", "cells: must be a table"),
-        ('[cell.a]\nkind = "epson"', "line 2, cell: is not known; is cells meant?"),
+        ('[cell.a]\nkind = "epson"', "line 2, cell: is not known; did you mean cells?"),
     ],
 )
 def test_what_is_wrong_is_told_with_line_and_key(file, tables, told):
@@ -223,7 +223,7 @@ def test_all_that_is_wrong_is_told_at_once_and_nothing_is_served(file, capsys):
     assert main.run(["sim", "run", str(path)]) == 2
     told = capsys.readouterr()
     assert told.out == ""
-    assert "is wrong in 3 places" in told.err
+    assert "has 3 errors" in told.err
     assert all(word in told.err for word in ("schema", "line 3, cells.a.seed", "cells.a.speed"))
 
 
@@ -365,7 +365,7 @@ def test_a_careful_person_is_believed_and_a_believed_one_is_no_refusal():
     change = on_plc(2, DemoOperator.CAREFUL)
     assert isinstance(change, AcceptedChange)
     assert change.error_mm < 0.05
-    with pytest.raises(RuntimeError, match="was believed, on Kin_Scara3_Z"):
+    with pytest.raises(RuntimeError, match="accepted the careless touches, on Kin_Scara3_Z"):
         require_refused([change])
 
 

@@ -141,7 +141,7 @@ def test_run_takes_a_vision_project(ended, program):
 def test_a_vision_project_goes_with_a_program(ended, program):
     end = ended("sim", "epson", "--tcp", "127.0.0.1:0", "--vision", program(VISION, "v.toml"))
     assert end.code == 2
-    assert "--vision goes with --program" in end.err
+    assert "--vision needs --program" in end.err
 
 
 def test_run_reaches_the_serial_line_that_it_is_told(ended, program):
@@ -181,7 +181,7 @@ def test_what_goes_with_a_program_is_refused_without_one(ended, option, tmp_path
     value = {"--com": "1=/dev/pts/3", "--files": str(tmp_path)}[option]
     end = ended("sim", "epson", "--tcp", "127.0.0.1:0", option, value)
     assert end.code == 2
-    assert f"{option} goes with --program" in end.err
+    assert f"{option} needs --program" in end.err
 
 
 def test_a_served_program_has_the_line_and_the_folder_that_were_named(tmp_path, program):

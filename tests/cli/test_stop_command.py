@@ -70,8 +70,8 @@ def stop(moving, capsys):
 def test_it_stops_and_says_that_it_stands(moving, stop):
     code, out, err = stop()
     assert code == 0
-    assert out == f"{moving.url} stands still; its state is: ready.\n"
-    assert "Nothing moves with --yes until" in err
+    assert out == f"{moving.url}: the robot has stopped (confirmed). State: ready.\n"
+    assert "Commands with --yes are blocked until" in err
     assert "without a clear answer" in err  # the movement of the client that died
 
 
@@ -94,7 +94,7 @@ def test_a_journal_of_garbage_is_told_afterwards_and_truly(moving, stop, state_f
     (state_folder / "journal.db").write_bytes(b"no database" * 100)
     code, out, err = stop()
     assert code == 0
-    assert "stands" in out
+    assert "has stopped" in out
     assert "journal" in err
     assert "The stop went out anyway." in err
     assert "not touched" not in out + err
@@ -121,7 +121,7 @@ def test_a_cell_file_that_is_broken_leaves_the_address_of_the_last_connection(mo
     assert code == 0
     assert moving.url in out
     assert "robolink.toml cannot be read" in err
-    assert f"The address is that of the last connection: {moving.url}." in err
+    assert f"The address is from the last connection: {moving.url}." in err
 
 
 @pytest.mark.parametrize("command", [["status"], ["where"], ["motors", "off"], ["reset", "--yes"]])
@@ -152,8 +152,8 @@ def test_a_state_folder_that_is_none_is_no_matter(moving, stop, tmp_path, monkey
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "file"))
     code, out, err = stop()
-    assert (code, "stands" in out) == (0, True)
-    assert "The note of this stop could not be kept" in err
+    assert (code, "has stopped" in out) == (0, True)
+    assert "This stop could not be recorded" in err
 
 
 def test_a_password_file_that_others_may_read_does_not_keep_it_back(moving, stop, tmp_path):
@@ -458,7 +458,7 @@ def test_a_look_that_does_not_check_the_cell_file_heeds_what_it_says(moving, sto
         assert main.run(["-c", "a", "status"]) == 0
         told = capsys.readouterr().err
         assert "The cell a has a robot LS10-B" in told
-        assert "the cell a works with tool 2" in told
+        assert "the cell a uses tool 2" in told
         assert main.run(["-c", "a", "--operator", "Anna", "status"]) == 0
         assert main.run(["-c", "a", "--operator", "nobody", "status"]) == 2
         assert "not among the people of this cell" in capsys.readouterr().err

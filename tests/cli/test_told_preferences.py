@@ -75,5 +75,5 @@ def test_a_write_beside_a_dry_run_ends_with_5_and_says_what_to_do(cell):
     simulator, run = cell(dry_run=True)
     code, _, err = run("tool", "set", "1", "--x", "12.5")
     assert code == 5
-    assert "only seem to move" in err
+    assert "not really move" in err
     assert simulator.machine.flash_writes == 0

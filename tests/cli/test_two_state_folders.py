@@ -73,12 +73,12 @@ def test_a_jog_from_the_other_folder_asks_before_it_moves_the_flange(epson, fold
     stood = simulator.machine.tip()
     code, said = run("-c", "a", "jog", "x+1", "--yes")
     assert code == 9
-    assert "the cell a works with tool 1" in said
+    assert "the cell a uses tool 1" in said
     assert "robolink tool select" in said
     assert simulator.machine.tip() == stood
     assert run("-c", "a", "tool", "select", "1", "--yes")[0] == 0
     assert run("-c", "a", "jog", "x+1", "--yes")[0] == 0
-    assert "works with tool" not in run("-c", "a", "status")[1]
+    assert "uses tool" not in run("-c", "a", "status")[1]
 
 
 def test_without_a_cell_file_the_record_of_the_last_procedure_tells(epson, folder, run):
@@ -91,7 +91,7 @@ def test_without_a_cell_file_the_record_of_the_last_procedure_tells(epson, folde
     folder(here.name)
     code, said = run("-c", url, "jog", "x+1", "--yes")
     assert code == 9
-    assert "the last procedure on record began with tool 1" in said
+    assert "the last procedure on record started with tool 1" in said
     assert simulator.machine.tools.selected == 0
 
 
@@ -103,7 +103,7 @@ def test_the_owner_of_a_mailbox_is_said_and_kept(folder, run):
             folder("second")
             code, said = run("-c", host.url, "status")
             assert code == 0
-            assert "Another client owns the mailbox" in said
+            assert "Another client has the mailbox locked" in said
             with robolink.connect(host.url) as second, pytest.raises(LeaseHeldError):
                 second.tools.select(1)
         first.close()

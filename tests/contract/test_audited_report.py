@@ -56,7 +56,7 @@ def test_machine_gauge_people_times_budget_touches_and_rule_stand_on_the_page(ce
         "Each interval of the table holds for its axis alone",
         "X, Y: repeatable to ± 0.0",
         "X, Y: accurate to ± 0.0",
-        "Largest row: how a person sees contact, ± 0.05 mm (default, not measured)",
+        "Largest row: judging contact by eye, ± 0.05 mm (default, not measured)",
         "Seating: not known",
         "degrees of freedom",
         "combined",

@@ -79,7 +79,7 @@ def test_a_step_is_repeated_to_the_same_place_when_a_person_says_so(cell, contro
     assert len(begun) == 2
     (question,) = person.asked
     assert "busy" in question
-    assert "stands still" in question
+    assert "stopped the robot" in question
     assert cell.open_requests == []
 
 

@@ -154,7 +154,7 @@ def test_points_are_a_method_of_their_own(command, simulator, points, more, firs
     ("words", "code", "said"),
     [
         ((), 2, "Missing option '--points'"),
-        (("--points", "901,902", "--speed", "5"), 2, "--speed says how to move"),
+        (("--points", "901,902", "--speed", "5"), 2, "--speed is for movements"),
         (("--points", "901,902,951"), 2, "--points: must hold two points; more are for"),
         (("--points", "901,902", "--method", "n-angle"), 2, "--points: must hold three points"),
         (("--points", "901,902", "--pose", "1,2,3"), 2, "No such option"),
@@ -186,8 +186,8 @@ def test_on_a_terminal_a_no_writes_nothing(command, simulator, monkeypatch):
     monkeypatch.setattr(given_poses, "agree", decline)
     assert command(*calibrate("--points", "901,902", "--axes-held"))[0] == 9
     (question,) = asked
-    assert "Write it to tool 1 all the same?" in question
-    assert "Nobody saw these touches" in question
+    assert "Write it to tool 1 anyway?" in question
+    assert "did not see these touches" in question
     assert stored(simulator) == STORED
 
 
@@ -260,7 +260,7 @@ def test_with_yes_alone_it_is_a_note_that_names_the_option(command, simulator):
 def test_axes_held_belongs_to_poses_that_exist(command):
     code, _, err = command(*calibrate("--axes-held"))
     assert code == 2
-    assert "--axes-held belong to poses that exist already" in err
+    assert "--axes-held need existing poses" in err
 
 
 def test_a_dry_run_shows_the_request_and_writes_nothing(command, simulator):
@@ -490,7 +490,7 @@ def test_a_pin_that_was_touched_in_a_local_is_not_kept_as_one_of_the_base(comman
 def test_that_nobody_saw_the_touches_is_said_though_yes_was_said_beforehand(command, simulator):
     code, out, err = command(*calibrate("--points", "901,902", "--yes"))
     assert code == 0
-    assert "Nobody saw these touches being made" in out
+    assert "not seen by robolink" in out
     assert "Not tested yet" in out + err
     assert "verified" not in out + err
     assert stored(simulator) != STORED

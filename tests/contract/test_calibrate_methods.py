@@ -155,10 +155,10 @@ def test_a_sensor_stops_inside_the_tolerance_and_its_worst_is_offered_for_retaki
         assert "That is enough" in done.err
         assert max(done.document["fit"]["half_width95"].values()) <= 0.05
         said = [entry.details.get("question", "") for entry in cell.recorded(EntryKind.DECISION)]
-        *_, first = offered = [str(one) for one in said if "Take it again" in str(one)]
+        *_, first = offered = [str(one) for one in said if "Repeat it" in str(one)]
         assert len(offered) == 3
         assert first.startswith(which)
-        assert first.endswith("Take it again?")
+        assert first.endswith("Repeat it?")
         assert within(done.document, cell.truth, axes="xy" if which == "Crossing" else "z")
 
 

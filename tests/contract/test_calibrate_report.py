@@ -86,7 +86,7 @@ def test_a_write_from_poses_is_reported(command, tmp_path):
     for value in [*document["before"].values(), *written.values()]:
         assert f'<data value="{float(value)!r}">' in page
     assert "Written and read back, not tested" in page
-    assert "It was not proved by turning about the new tip." in page
+    assert "There was no turn test of the new tip." in page
     assert "typed poses; taught with tool 0" in page
     # As in the page of the journal.
     for said in ("Entries of the journal", "done by", "What was judged", "report number"):

@@ -79,7 +79,7 @@ def test_place_and_orientation_are_found_written_and_proved(plc, tmp_path):
     assert max(list(half)[3:]) < 0.1
     assert document["off_square_deg"] == pytest.approx(0.0, abs=0.1)
     assert document["verification"]["passed"]
-    assert "Ways along the tool's axes shown by you: 2" in said
+    assert "You show moves along the tool's axes: 2" in said
     assert "The moves are 0.0" in said
     with_tool = replace(ToolOffset(), **document["proposed"])
     a_deg, b_deg, c_deg = plc.plc.memory.slot(1).tool[3:]

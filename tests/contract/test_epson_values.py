@@ -271,7 +271,7 @@ def test_alarms_are_listed_and_reset(simulator, connected):
 def test_an_alarm_that_comes_back_is_an_error(simulator, connected):
     simulator.panel.raise_alarm(501)
     simulator._desk._served["resetalm"] = lambda number: ()
-    with pytest.raises(ControllerFaultError, match="501 is still there"):
+    with pytest.raises(ControllerFaultError, match="501 is still on"):
         connected.alarms.reset(501)
 
 

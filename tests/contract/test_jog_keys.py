@@ -202,7 +202,7 @@ def test_on_a_dumb_terminal_keys_are_lines_and_what_is_typed_during_a_step_is_dr
         terminal.press(b"help\n")
         terminal.wait_for("stop ends")
         terminal.press(b"x+0.5\nx+1\n")
-        terminal.wait_for(r"Typed too early and ignored: 'x\\+1'")
+        terminal.wait_for(r"Typed too early and ignored: 'x\+1'")
         terminal.wait_for(r"Since start 0\.[45]\d\d mm")
         terminal.press(b"\n")
         terminal.wait_for(r"Since start 0\.[45]\d\d mm")

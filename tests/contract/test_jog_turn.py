@@ -102,7 +102,7 @@ def test_the_way_between_is_checked_of_tip_and_flange(cell, went, tool, named):
     refused = cell.run("robot", "jog", "--turn", "360", "--yes")
     assert refused.code == 2, refused.err
     assert f"the {named} would be " in refused.err
-    assert "allowed are 50 mm. Nothing moved." in refused.err
+    assert "50 mm is allowed. Nothing moved." in refused.err
     assert went == []
     assert stands(cell, before)
     # Half of it stays inside a box that is wide enough, and outside one that is not.

@@ -94,7 +94,7 @@ def test_a_run_of_this_computer_that_has_ended_is_named_and_waited_out(plc):
     assert 8 < waited_s < 13
     waits, free = plc.told
     assert waits.startswith("Bea (ann, process 4194305 on ")
-    assert "has ended without giving it back. Waiting until it is free, 12 s at most." in waits
+    assert "ended without releasing it. Waiting until it is free, 12 s at most." in waits
     assert free == "The mailbox is free."
     assert plc.cell.simulator.plc.memory.slot(1).tool[2] == OLD.z_mm
     assert plc.cell.owner == 0

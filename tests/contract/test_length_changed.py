@@ -112,11 +112,11 @@ def test_the_height_of_a_pin_is_never_learnt_from_a_z_that_was_kept(arm):
     with arm.cell.connected() as controller:
         controller.tools.write(2, ToolOffset(12.0, -3.5, -19.0), expected=None)
     arm.world.tips[2] = ToolOffset(12.2, -3.4, -20.3)
-    # Tool 2 has no touch of its own there, and nothing trustworthy says how high the pin is.
+    # Tool 2 has no touch of its own there, and nothing trustworthy says height of the pin is not.
     second = arm.calibrate(*TWO, NO_PROOF, tool=2)
     assert second.code == 0, second.err
     assert second.document["length"] is None
-    assert any("how high the pin is" in note for note in second.document["notes"])
+    assert any("height of the pin is not" in note for note in second.document["notes"])
 
 
 def test_a_pin_of_known_height_shows_that_another_tool_s_z_is_wrong(arm):

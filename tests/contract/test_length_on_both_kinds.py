@@ -165,9 +165,9 @@ def test_the_height_that_only_the_cell_file_states_tells_it_at_once(cell, tmp_pa
         (("z_mm = {z:.3f}",), "length_changed"),
         (("x_mm = {x:.1f}", "y_mm = {y:.1f}", "z_mm = {z:.3f}"), "length_changed"),
         (("x_mm = {aside:.1f}", "y_mm = {y:.1f}", "z_mm = {z:.3f}"), "not where it was"),
-        (("x_mm = {x:.1f}", "y_mm = {y:.1f}"), "how high the pin is"),
+        (("x_mm = {x:.1f}", "y_mm = {y:.1f}"), "height of the pin is not"),
     ],
-    ids=["unsure", "height only", "about there", "another pin", "how high the contact was"],
+    ids=["unsure", "height only", "about there", "another pin", "has no contact height"],
 )
 def test_how_sure_a_stated_height_is_decides(tmp_path, monkeypatch, lines, said):
     with method_cell("epson", tmp_path, monkeypatch) as arm:

@@ -223,7 +223,7 @@ def test_a_table_that_never_stands_still_is_an_error(serve, options):
     simulator = in_production(options)
     with serve(simulator) as cell, cell.connect() as controller:
         publishing(simulator, 100)
-        with pytest.raises(ToolError, match="being changed"):
+        with pytest.raises(ToolError, match="changed during"):
             controller.published_tools()
         simulator.on_request = None
         assert controller.published_tools() is not None
@@ -234,7 +234,7 @@ def test_a_publication_that_was_broken_off_is_never_taken_for_a_whole_one(serve,
     with serve(simulator) as cell, cell.connect() as controller:
         controller.published_tools()
         simulator.variables.set("robolink_begin", "2")
-        with pytest.raises(ToolError, match="being changed") as caught:
+        with pytest.raises(ToolError, match="changed during") as caught:
             controller.published_tools()
     assert "RobolinkPublish" in caught.value.remedy
 

@@ -116,7 +116,7 @@ def test_e_stop_and_guard_show_within_one_poll(simulator, controller, danger, wo
 
 def test_an_e_stop_at_the_prompt_of_a_procedure_names_the_tool_that_is_left(simulator, controller):
     operator = SlowOperator(clock_of(NAME), 60.0, meanwhile=simulator.panel.press_estop)
-    with pytest.raises(ControllerFaultError, match="tool 1, could not be selected again"):
+    with pytest.raises(ControllerFaultError, match="could not select the previous tool 1 again"):
         with controller.preserved("calibrate tool 1"):
             controller.tools.select(0)
             ask(controller, operator)

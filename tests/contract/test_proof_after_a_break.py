@@ -294,22 +294,27 @@ def taught(tool):
         (
             lambda _cell, _eye: (taught(0), taught(0)),
             True,
-            "Tool 2 was measured from poses that existed already: nothing moves in that, so there "
-            "is no turn test. When this is settled, 'robolink calibrate two-pose' measures and "
-            "tests it.",
+            (
+                "Tool 2 was measured from existing poses: nothing moves, so there is no turn "
+                "test. When this job is finished or undone, 'robolink calibrate two-pose' "
+                "measures and tests the tool."
+            ),
         ),
         pytest.param(
             lambda _cell, _eye: (TwoPoseSource(), TwoPoseSource()),
             False,
-            "Tool 2 was written without a turn test, as was asked. When this is settled, "
-            "'robolink calibrate two-pose' measures and tests it.",
+            "Tool 2 was written without a turn test, as requested. When this job is "
+            "finished or undone, 'robolink calibrate two-pose' measures and tests the tool.",
             marks=pytest.mark.soak,
         ),
         (
             lambda cell, eye: (CameraSource(eye, camera_station(cell)),),
             True,
-            "A program had opened the camera that measured tool 1: it cannot be opened from here. "
-            "When this is settled, 'robolink calibrate camera' measures and tests it.",
+            (
+                "The camera that measured tool 1 was opened by another program: robolink "
+                "cannot open it. When this job is finished or undone, 'robolink calibrate "
+                "camera' measures and tests the tool."
+            ),
         ),
     ],
     ids=["taught points", "no test", "an open camera"],

@@ -24,7 +24,7 @@ from tests.packaging.test_documented_examples import problem
 
 pytestmark = [pytest.mark.simulator_only, pytest.mark.timeout(60)]
 
-WIDER, AGAIN = "Keep the value with a wider", "Look once more."
+WIDER, AGAIN = "Keep the value with a wider", "Measure once more with the camera."
 POWER_GOES = "(the power goes)"
 
 

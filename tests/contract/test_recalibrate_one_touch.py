@@ -151,7 +151,7 @@ def test_a_recipe_names_beams_and_a_surface_by_their_stations_and_may_end_early(
         assert "That is enough" in done.err
     # With --yes nobody is asked about the worst, and what nobody was asked nobody declined.
     said = [entry.details for entry in arm.recorded(EntryKind.DECISION)]
-    assert not any("Take it again" in str(one["question"]) for one in said)
+    assert not any("Repeat it" in str(one["question"]) for one in said)
     assert {one["answered_by"] for one in said} == {"--yes"}
 
 
@@ -198,9 +198,9 @@ def test_a_recipe_offers_the_worst_pose_again_and_the_answer_is_on_record(
     kinds = [event.get("kind") for event in events if event["event"] == "step"]
     assert kinds.count("offer") == 3
     assert "remark" in kinds
-    assert sum("Take it again?" in question for question in asked) == 3
+    assert sum("Repeat it?" in question for question in asked) == 3
     said = [entry.details.get("question", "") for entry in arm.recorded(EntryKind.DECISION)]
-    assert sum("Take it again?" in str(question) for question in said) == 3
+    assert sum("Repeat it?" in str(question) for question in said) == 3
 
 
 def test_a_z_that_nobody_measured_is_changed_and_never_stated(arm, tmp_path):
@@ -257,7 +257,7 @@ def test_a_z_that_was_measured_has_its_interval_after_one_touch(arm, tmp_path):
         half = tool["fit"]["half_width95"]["z_mm"]
         assert abs(arm.stored.z_mm - arm.truth.z_mm) <= half
         assert half > tool["change_z_half95_mm"]
-        assert f"the stored Z was measured: entry {measured.number}" in done.err
+        assert f"the stored Z was measured: journal entry {measured.number}" in done.err
     # Typed, it is a number that nobody measured.
     assert arm.run("tool", "set", "1", "--z", str(arm.stored.z_mm + 0.01), "--yes").code == 0
     assert arm.calibrate(*full).code == 0

@@ -97,9 +97,9 @@ def test_a_quiet_change_is_not_taken_back_by_a_second_pc(plc):
         plc.time.sleep(QUIET_S)
         with plc.connect(BOB) as second, pytest.raises(LeaseHeldError) as told:
             recover(second, confirm=lambda _: True)
-        assert "ann (process 11 on pc-1) has been working on" in told.value.what
+        assert "ann (process 11 on pc-1) has locked" in told.value.what
         assert "change of tool 1" in told.value.what
-        assert "Last sign of life: while it was watched just now" in told.value.what
+        assert "Last response: while it was watched just now" in told.value.what
         assert plc.held == NEW.z_mm
         change.keep("parts were good")
     assert plc.held == NEW.z_mm
@@ -123,7 +123,7 @@ def test_the_lease_of_an_epson_controller_is_renewed_while_its_login_is_held(bac
                 sent = first.exchanges
                 time.sleep(QUIET_S)
                 assert first.exchanges == sent, "the controller was sent something"
-                with pytest.raises(LeaseHeldError, match="Last sign of life: 0 s ago"):
+                with pytest.raises(LeaseHeldError, match="Last response: 0 s ago"):
                     journal.log(
                         log.identity, holder=replace(ANN, pid=12, process_start=""), clock=time
                     ).look()
@@ -200,7 +200,7 @@ def test_a_person_insists_and_the_old_holder_is_refused_from_then_on(plc):
             broken = isinstance(told.value, TransportClosedError | RemoteProtocolError)
             assert (broken and "can" in plc.cell.url) or dispossessed(told.value)
     taken, insisted = plc.shared.entries(kinds=(EntryKind.LEASE,))
-    assert insisted.verdict.startswith("bob (process 22 on pc-2) insisted on taking")
+    assert insisted.verdict.startswith("bob (process 22 on pc-2) took over")
     assert "ann (process 11 on pc-1)" in insisted.verdict
     assert "ann went home" in insisted.verdict
     assert taken.details == {"taken_from": owner, "reason": "ann went home"}
@@ -229,7 +229,7 @@ def test_after_that_the_mailbox_of_the_other_is_not_given_back(in_process):
         with plc.connect(BOB, plc.others) as second:
             second.take_over("ann went home")
             owner = plc.cell.owner
-            with pytest.raises(LeaseLostError, match="another client took the mailbox"):
+            with pytest.raises(LeaseLostError, match="another client has taken over the mailbox"):
                 first._mailbox.commands.ownership.release()
             assert plc.cell.owner == owner
 

@@ -161,7 +161,7 @@ def test_touches_at_angles_turn_half_as_far_where_the_arm_ends(at):
     stand(at, FAR_OUT, LEANING)
     done = at.calibrate("n-angle", "--station", "PIN-07", "--count", "4")
     assert done.code == 0, done.err[-900:]
-    assert "The robot takes another path than planned" in done.err
+    assert "The robot takes a different path" in done.err
     for axis in ("x", "y"):
         wrong = done.document["proposed"][f"{axis}_mm"] - getattr(at.truth, f"{axis}_mm")
         assert abs(wrong) <= interval_mm(done.document["fit"], axis)

@@ -150,7 +150,7 @@ def test_a_halted_movement_ends_where_it_is_and_the_group_moves_again(cell, grou
 
 def test_a_move_that_takes_too_long_is_halted_and_its_end_is_seen(cell, group):
     motion = group.move_to(above(group.pose(), 20.0), SLOW, box=ANYWHERE)
-    with pytest.raises(MotionTimeoutError, match="was halted"):
+    with pytest.raises(MotionTimeoutError, match="robolink stopped it"):
         motion.wait(timeout_s=0.05)
     assert cell.movements_started == 1
     assert cell.open_requests == []

@@ -159,7 +159,7 @@ def test_nobody_there():
 
 
 def test_a_map_has_no_stop():
-    with pytest.raises(RejectedError, match="neither moved nor stopped"):
+    with pytest.raises(RejectedError, match="neither moves nor stops"):
         stop_now("plc+modbus-tcp://127.0.0.1:1?map=x.toml")
 
 

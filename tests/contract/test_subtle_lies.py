@@ -111,7 +111,7 @@ def test_a_machine_that_does_not_rest_was_not_stopped():
     """It takes the stop; five seconds later nobody knows what it does."""
     machine, clock = NeverRests(), ManualClock()
     with SimpleController(machine, identity="memory+object://restless", clock=clock) as controller:
-        with pytest.raises(OutcomeUnknownError, match="did not come to rest") as unconfirmed:
+        with pytest.raises(OutcomeUnknownError, match="did not confirm within") as unconfirmed:
             controller.stop()
         assert "press the emergency stop" in unconfirmed.value.remedy
         assert controller.latch.closed

@@ -138,7 +138,7 @@ def test_a_program_that_does_not_fit_is_refused(program, softmotion_factory, req
         (program / "RL_Kept.st").unlink()
         softmotion_factory(program=program)
     for kind in ("epson", "plc"):
-        with pytest.raises(ConfigError, match="pays heed to 'program'"):
+        with pytest.raises(ConfigError, match="uses 'program'"):
             request.getfixturevalue(f"{kind}_factory")(program=program)
 
 
@@ -184,7 +184,7 @@ def test_what_cannot_be_asked_for_is_refused(given, words, epson_factory):
     ],
 )
 def test_what_a_kind_pays_no_heed_to_is_refused(kind, name, value, request):
-    with pytest.raises(ConfigError, match=f"kind \\({kind}\\) pays heed to '{name}'"):
+    with pytest.raises(ConfigError, match=f"kind \\({kind}\\) uses '{name}'"):
         request.getfixturevalue(f"{kind}_factory")(**{name: value})
 
 
@@ -456,7 +456,7 @@ def test_a_test_that_fails_shows_wire_seed_and_state(tmp_path, shared):
     assert shown.count("robolink wire: epson") == 5
     assert "has no parameter 'colour'" in shown
     assert "(nothing moved)" in shown
-    assert "kind (epson) pays heed to 'kinematics'" in shown
+    assert "kind (epson) uses 'kinematics'" in shown
     assert "No request came that contains 'TLSet', at which press_estop was to be done." in shown
     assert "No cell of this test keeps the time of virtual_clock" in shown
     assert "restore could not be done: There is no snapshot 'nothing'." in shown

@@ -217,7 +217,7 @@ SCARA_PIN = str(EXAMPLES / "recipes" / "scara-pin.toml")
 def test_what_a_recipe_would_measure_in_vain_is_said_before_anything_moves(run, words):
     code, told = run(*words, "--assist", "softmotion+sim://fits")
     assert code == 5
-    assert "Kin_Scara2_Z cannot be given what would be measured: X, Y." in told
+    assert "Kin_Scara2_Z cannot store the measured values: X, Y." in told
 
 
 @pytest.mark.parametrize(

@@ -107,7 +107,7 @@ def test_a_touch_that_slipped_is_made_again_alone_and_the_measurement_goes_on(ce
     source = NAngleSource((180.0, 90.0, -90.0), sampling=SamplingPolicy(retake=False))
     person, result = change(cell, source, touches={2: SLIP, 3: ["again"]})
     assert person.asked == 1 + 1 + 1 + 1 + 1 + 1
-    assert "Touch 2 is made again." in person.told
+    assert "Repeat touch 2." in person.told
     assert len(result.inputs) == 4
     assert [round(pose.u_deg - result.inputs[0].u_deg) % 360 for pose in result.inputs] == [
         0, 180, 90, 270,

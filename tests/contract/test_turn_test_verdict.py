@@ -40,7 +40,7 @@ def newest(controller: SimpleController):
 
 
 TAKES_BACK = "Put the old value back."
-AGAIN = "Touch once more."
+AGAIN = "Make one more touch."
 LEARNS = "Learn the station again."
 MOUNT = "Check the mount of the nozzle."
 KEEPS = "Keep the value"
@@ -159,7 +159,7 @@ def test_a_sensor_looks_once_more_and_nothing_is_offered_that_cannot_be_done():
     looking = Person(TAKES_BACK, again=[shown(0.1)], relearning=())
     with pytest.raises(VerifyError):
         concluded(shown(0.1), looking)
-    assert looking.asked[0][1][1] == "Look once more."
+    assert looking.asked[0][1][1] == "Measure once more with the camera."
     assert LEARNS not in looking.asked[0][1]
 
     once = Person(TAKES_BACK)
@@ -205,7 +205,7 @@ def test_a_doubt_that_the_accuracy_covers_may_be_kept_as_stated():
     ("answer", "chosen", "remedy", "commands"),
     [
         (TAKES_BACK, "take_back", "Check the mount of the nozzle and", ()),
-        (MOUNT, "check_mount", "measured anew", ()),
+        (MOUNT, "check_mount", "measure the tip anew", ()),
         (LEARNS, "learn_station", "'robolink cell station learn BEAMS-02 --tool 15'", RELEARN),
     ],
 )
@@ -226,7 +226,7 @@ def test_a_step_that_would_tell_ends_with_the_old_value_and_says_what_to_do(
 
 
 def test_once_more_counts_all_looks_and_each_is_on_record():
-    controller, person = controller_of_its_own(), Person("Look", again=[shown(0.004)])
+    controller, person = controller_of_its_own(), Person("Measure once", again=[shown(0.004)])
 
     proof = concluded(shown(0.018), person, controller)
 
@@ -243,14 +243,14 @@ def test_once_more_counts_all_looks_and_each_is_on_record():
 
 
 def test_whoever_looks_until_it_fits_gets_no_pass():
-    person = Person("Look", "Look", TAKES_BACK, again=[shown(0.0), shown(0.0)])
+    person = Person("Measure once", "Measure once", TAKES_BACK, again=[shown(0.0), shown(0.0)])
 
     with pytest.raises(VerifyError) as refused:
         concluded(shown(0.1), person)
 
     assert refused.value.code == "proof_contradicts_repeatability"
-    assert "0.100 mm apart" in person.asked[-1][0]
-    assert "Look once more." not in person.asked[-1][1], "twice at most"
+    assert "differ by 0.100 mm" in person.asked[-1][0]
+    assert "Measure once more with the camera." not in person.asked[-1][1], "twice at most"
     widened = person.asked[-1][1][-1]
     assert "+-0.107 mm" in widened, "the worst look counts"
 
@@ -258,7 +258,7 @@ def test_whoever_looks_until_it_fits_gets_no_pass():
 def test_once_more_beyond_the_limit_of_the_process_is_that_and_ends_it():
     controller = controller_of_its_own()
     with pytest.raises(VerifyError) as refused:
-        concluded(shown(0.1), Person("Look", again=[shown(0.25)]), controller)
+        concluded(shown(0.1), Person("Measure once", again=[shown(0.25)]), controller)
     assert refused.value.code == "large_drift"
     assert newest(controller).details["passed"] is False
 
@@ -267,12 +267,12 @@ def test_what_was_seen_before_a_break_counts_with_what_is_seen_after_it():
     person = Person(TAKES_BACK)
     with pytest.raises(VerifyError):
         concluded(shown(0.0), person, earlier=[shown(0.1)])
-    assert "apart" in person.asked[0][0]
+    assert "differ by" in person.asked[0][0]
 
     controller = controller_of_its_own()
     controller.outcomes.change = "c1"
     with pytest.raises(VerifyError):
-        concluded(shown(0.1), Person("Look", TAKES_BACK, again=[shown(0.0)]), controller)
+        concluded(shown(0.1), Person("Measure once", TAKES_BACK, again=[shown(0.0)]), controller)
     kept = _records.tests_on_record(controller.outcomes, 1, shown(0.001))
     assert [one.drifts[0].dx_mm for one in kept] == [0.1, 0.0]
     controller.outcomes.change = "c2"

@@ -62,7 +62,7 @@ def test_what_was_typed_before_a_question_or_during_a_jog_answers_nothing(start,
     terminal.wait_for(JOG)
     before = arm.flange()
     terminal.press(b"x + 0.5\nx+1\n\n")
-    terminal.wait_for(r"Typed too early and ignored: 'x\\+1'")
+    terminal.wait_for(r"Typed too early and ignored: 'x\+1'")
     terminal.wait_for(r"done: moved 0\.[45]\d\d mm")
     assert arm.flange().x_mm - before.x_mm == pytest.approx(0.5, abs=0.2)
     terminal.press(b"x0.1\n")

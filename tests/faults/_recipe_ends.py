@@ -45,7 +45,7 @@ def check_interrupted(cell: RecipeCell, ended: Ended, disturbance: Disturbance) 
     check_writes(cell)
     if whole:
         numbers = ", ".join(map(str, cell.recipe_tools))
-        said = f"Tool {numbers} keeps the new value|Tool 1 is written and read back"
+        said = f"Tool {numbers} keeps the new value|The controller has stored tool 1"
         assert re.search(said, ended.err + ended.out), ended.err
     else:
         assert cell.changed() == set(), ended.err

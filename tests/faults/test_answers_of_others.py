@@ -208,7 +208,7 @@ def test_f10_bytes_that_a_controller_pushes_by_itself_are_named():
         with robolink.connect(host.url, timeout_s=PATIENCE_S) as controller:
             before = controller.tools.read(1)
             simulator.push(b'#Execute,"7"\r\n')
-            with pytest.raises(RemoteProtocolError, match="nobody asked"):
+            with pytest.raises(RemoteProtocolError, match="did not ask for"):
                 while True:
                     assert controller.tools.selected() == 1
         with robolink.connect(host.url) as controller:

@@ -66,7 +66,7 @@ def check(cell, failing, number):
         return
     assert "cannot be used: the disk is full" in shown.err
     said = shown.err.splitlines()[-1]
-    assert ("Tool 1 is selected." in said) or ("not proved" in said), said
+    assert ("Tool 1 is selected." in said) or ("not confirmed" in said), said
     kept = cell.tool_1 != OLD_TIP
     if kept:
         # It was measured, verified and put on record before.

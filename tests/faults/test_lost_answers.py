@@ -261,7 +261,7 @@ def test_a_write_whose_acknowledgement_was_garbled_is_told_as_that(serve, unclea
             change_tools(controller, [Wanted(1, NEW, old)], tell=told.append)
         assert simulator.machine.tools.get(1) == old
         assert controller.outcomes.open_markers() == ()
-    assert "did run. The old value of tool 1 is back." in str(caught.value)
+    assert "it ran. The old value of tool 1 is back." in str(caught.value)
     assert told == ["The old value of tool 1 is back."]
     assert len([text for _, _, text in simulator.log if WRITE in text]) == 2
 
@@ -314,7 +314,7 @@ def test_a_garbled_acknowledgement_keeps_nothing_from_being_put_back(serve, uncl
 def test_a_movement_whose_end_was_garbled_is_not_called_refused(serve, unclear):
     simulator = unclear(MOVE, 9, "#Execute,")
     with serve(simulator) as url, robolink.connect(url, timeout_s=0.5) as controller:
-        with pytest.raises(UnclearAnswerError, match="Read what it should have changed"):
+        with pytest.raises(UnclearAnswerError, match="Check what it should have changed"):
             lift(controller).wait(timeout_s=60)
         assert simulator.machine.arm.moves_started == 1
 

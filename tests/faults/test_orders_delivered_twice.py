@@ -124,7 +124,7 @@ def test_f79_an_order_that_was_closed_without_looking_is_not_run_again():
         (marker,) = controller.outcomes.open_markers()
         Settler(controller).forget(marker)
         with (
-            pytest.raises(ConfigError, match="closed without a look"),
+            pytest.raises(ConfigError, match="closed without checking"),
             carrying_out(controller, ORDER, JOB),
         ):
             pytest.fail("it was run again")

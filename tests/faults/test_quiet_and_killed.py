@@ -51,7 +51,7 @@ def test_who_is_quiet_keeps_all_and_who_was_killed_is_named_and_waited_out(
             assert main.run(["-c", host.url, "recover", "--yes"]) == 0
             told = capfd.readouterr().err
             assert f"process {child.pid} on" in told
-            assert "has ended without giving it back. Waiting until it is free" in told
+            assert "ended without releasing it. Waiting until it is free" in told
         finally:
             child.kill()
             child.communicate()

@@ -164,7 +164,7 @@ def test_what_nobody_can_read_takes_a_word_too(cell):
     log.close()
     left = cell.run("recover")
     assert left.code == 6, left.err
-    assert f"What was left unfinished at {local_label(WHEN)} cannot be read." in left.err
+    assert f"The record of an unfinished job of {local_label(WHEN)} cannot be read." in left.err
     assert {marker.request for marker in cell.open_markers()} >= {"something newer"}
     assert cell.run("recover", "--yes").code == 0
     assert cell.open_markers() == ()

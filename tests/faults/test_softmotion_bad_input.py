@@ -249,7 +249,7 @@ def test_a_second_client_is_told_who_owns_the_mailbox_and_may_insist(cell):
             first.tools.write(SCRATCH, NEW, expected=None)
         assert refusal.value.code == ErrorClass.NOT_OWNER
         assert "Connect again when the other client has ended" in refusal.value.remedy
-        with pytest.raises(LeaseLostError, match="another client took the mailbox"):
+        with pytest.raises(LeaseLostError, match="another client has taken over the mailbox"):
             first.tools.write(SCRATCH, NEW, expected=None)
         second.tools.write(SCRATCH, NEW, expected=None)
     assert cell.slot_changes(SCRATCH) == 1

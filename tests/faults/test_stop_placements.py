@@ -74,7 +74,7 @@ def check_nothing_went_on(cell: RecipeCell, ended: Ended, rest: AtRest) -> None:
     if not cell.changed():
         return
     if kept(cell):
-        said = "keeps the new value|is written and read back"
+        said = "keeps the new value|controller has stored tool"
         assert re.search(said, ended.err + ended.out), ended.err
     else:
         assert MarkerKind.CHANGE in unproved, "a value stays that nobody knows of"

@@ -149,7 +149,7 @@ def test_every_error_is_told_at_once_with_its_path_and_file(places):
         "cells.line3.clearance_mm: must be at least 0.5",
         "cells.line3.password_env: must be the name of a variable that begins with ROBOLINK_",
         "cells.line3.password_file: must not be empty",
-        "cells.line3.max_chagne_mm: is not known; is max_change_mm meant?",
+        "cells.line3.max_chagne_mm: is not known; did you mean max_change_mm?",
         "cells.b: must be a table",
     ):
         assert f"    {line}" in told
@@ -163,7 +163,7 @@ def test_every_error_is_told_at_once_with_its_path_and_file(places):
 def test_a_key_that_looks_like_a_password_is_refused_and_not_repeated(tmp_path, table, key):
     found = problems(tmp_path, f'{table}{key} = "hunter2"\n')
     (what,) = found.values()
-    assert "looks like a password, and a cell file must not hold one" in what
+    assert "looks like a password, which a cell file must not contain" in what
     assert "hunter2" not in str(found)
 
 

@@ -93,8 +93,11 @@ match = "read_response"
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("[[fault]]\naction = 'drop_reply'\nmach = 'x'", "line 5, fault 1, mach: .*is match meant"),
-        ("[[fault]]\naction = 'drop_replay'", "line 4, fault 1, action: .*is drop_reply meant"),
+        (
+            "[[fault]]\naction = 'drop_reply'\nmach = 'x'",
+            "line 5, fault 1, mach: .*did you mean match",
+        ),
+        ("[[fault]]\naction = 'drop_replay'", "line 4, fault 1, action: .*did you mean drop_reply"),
         (
             "[[fault]]\naction = 'reset'\n\n[[fault]]\nseconds = 1",
             "line 6, fault 2, action: is mis",
@@ -118,7 +121,7 @@ match = "read_response"
         ("[drawn]\nactions = 'delay'", "line 4, drawn, actions: must be a list"),
         ("[drawn]\nactions = ['echo']", "line 4, drawn, actions: .*echo cannot happen"),
         ("[drawn]\nspeed = 1", "line 4, drawn, speed: is not known"),
-        ("faults = 1", "line 3, faults: is not known; is fault meant"),
+        ("faults = 1", "line 3, faults: is not known; did you mean fault"),
         ("seed = 1.5", "line 3, seed: must be a whole number"),
         ("seed = 1 2", "cannot be read: .*line 3"),
     ],
@@ -130,7 +133,7 @@ def test_what_is_wrong_is_told_with_its_line_and_key(written, text, told):
 
 def test_all_that_is_wrong_is_told_at_once(written):
     text = "[[fault]]\naction = 'dely'\nsecond = 1\n[[fault]]\naction = 'reset'\nbit = 9"
-    with pytest.raises(ConfigError, match=r"(?s)3 places.*line 4.*line 5.*line 8"):
+    with pytest.raises(ConfigError, match=r"(?s)3 errors.*line 4.*line 5.*line 8"):
         read_fault_file(written(HEAD + text))
 
 

@@ -114,7 +114,7 @@ def test_a_frozen_holder_is_replaced_and_told_so_when_it_comes_back(leases):
     (entry,) = leases.entries()
     assert entry.details["holder"]["operator"] == "Anna"
     assert entry.details["epoch"] == 2
-    assert "no sign of life" in entry.verdict
+    assert "did not respond" in entry.verdict
     for _ in range(2):
         with pytest.raises(LeaseLostError):
             anna.begin(marker("c"))
@@ -147,7 +147,7 @@ def test_an_end_after_the_lease_was_lost_is_not_recorded_and_frees_nothing(lease
     with pytest.raises(LeaseLostError) as refused:
         anna.clear("a", NewEntry(EntryKind.DONE, tool=3))
     assert f"Bert (bert, process {HERE.pid} on {HERE.host}) took over" in refused.value.what
-    assert "not on record" in refused.value.remedy
+    assert "does not say how this ended" in refused.value.remedy
     assert list(leases.journal.entries(kinds=(EntryKind.DONE,))) == []
     assert [known.operation for known in bert.open_markers()] == ["a", "b"]
     with pytest.raises(LeaseHeldError, match="Bert"):

@@ -188,33 +188,40 @@ def output(ledger):
     [
         (
             lambda ledger: None,
-            "Nothing was moved. Nothing was written. It was not read which tool is selected.",
+            "Nothing moved. Nothing was written. Selected tool: not checked.",
         ),
         (
             in_doubt,
-            "Nothing was moved. Tool 1 may hold the new value X 12.500 Y -3.500 Z -20.000 U 0.000; "
-            "before, it held X 12.000 Y -3.500 Z -20.000 U 0.000. Tool 1 is selected. "
-            "Next: robolink recover.",
+            (
+                "Nothing moved. Tool 1 may hold the new value X 12.500 Y -3.500 Z -20.000 U "
+                "0.000; before, it held X 12.000 Y -3.500 Z -20.000 U 0.000. Tool 1 is "
+                "selected. Next: robolink recover."
+            ),
         ),
         (
             changed,
-            "Nothing was moved. Tool 1 now holds X 12.500 Y -3.500 Z -20.000 U 0.000; before, "
-            "it held X 12.000 Y -3.500 Z -20.000 U 0.000. It was not read which tool is selected.",
+            (
+                "Nothing moved. Tool 1 now holds X 12.500 Y -3.500 Z -20.000 U 0.000; before, "
+                "it held X 12.000 Y -3.500 Z -20.000 U 0.000. Selected tool: not checked."
+            ),
         ),
         (
             tool_zero,
-            "Nothing was moved. Nothing was written. Tool 0 is selected now; it was tool 1 before. "
-            "Next: robolink recover.",
+            (
+                "Nothing moved. Nothing was written. Tool 0 is selected now; it was tool 1 "
+                "before. Next: robolink recover."
+            ),
         ),
         (
             on_the_way,
-            "The robot may still be moving; the end of this was not seen: Go P1. Nothing was "
-            "written. It was not read which tool is selected. Next: robolink recover.",
+            (
+                "The robot may still be moving; robolink did not see the end of: Go P1. "
+                "Nothing was written. Selected tool: not checked. Next: robolink recover."
+            ),
         ),
         (
             output,
-            "Nothing was moved. This was carried out: SetIO,8,1. "
-            "It was not read which tool is selected.",
+            "Nothing moved. This was carried out: SetIO,8,1. Selected tool: not checked.",
         ),
     ],
 )
@@ -296,13 +303,13 @@ def said(controller):
 def test_a_question_of_any_procedure_is_on_record_without_a_measurement():
     def asks():
         first = yield Confirm("Show both moves again?")
-        second = yield Confirm("Take it again?", also=("more",))
+        second = yield Confirm("Repeat it?", also=("more",))
         return first, second
 
     with SimpleController(identity="a procedure") as controller:
         assert runner_of(controller, "y", "more", tool=3).run(asks()) == (True, "more")
         assert said(controller) == [
-            ("Take it again?", "more", 3),
+            ("Repeat it?", "more", 3),
             ("Show both moves again?", "yes", 3),
         ]
 

@@ -95,7 +95,7 @@ BAD = {
     "a key that is mistyped": (
         GOOD.replace("x = {", "xx = {").replace("adress", "address"),
         "tools#1.xx",
-        "is x meant",
+        "did you mean x",
     ),
     "no type": (GOOD.replace('type = "REAL"\n', ""), "tools#1.x.type", "missing, here and in"),
     "no word order": (

@@ -190,7 +190,7 @@ def test_registers_alone_do_not_prove_a_takeover_and_recovery_asks_once_more(com
         (marker,) = controller.outcomes.open_markers()
         finding = controller.resolver.examine(marker)
         assert finding.verdict is Verdict.NOT_FINISHED
-        assert "take" in finding.action
+        assert "accept" in finding.action
         recovery = recover(controller)
         assert not recovery.left
         assert not controller.outcomes.open_markers()
@@ -265,7 +265,7 @@ def test_a_look_that_is_refused_after_the_request_leaves_the_outcome_unknown(com
             return read(address, count)
 
         commit_bit.client.read_discrete = read_discrete
-        with pytest.raises(OutcomeUnknownError, match=r"took the value\. server busy"):
+        with pytest.raises(OutcomeUnknownError, match=r"accepted the value\. server busy"):
             controller.tools.write(1, NEW, expected=ANY)
         assert len(controller.outcomes.open_markers()) == 1
         assert controller.tools.read(1) == NEW
@@ -289,7 +289,7 @@ def test_a_preview_names_everything_that_would_be_written(commit_bit, level):
 def test_registers_that_cannot_be_put_back_leave_the_outcome_unknown(commit_bit):
     with commit_bit.connect() as controller:
         commit_bit.client.refuse = {1, 2}
-        with pytest.raises(OutcomeUnknownError, match="could not be put back"):
+        with pytest.raises(OutcomeUnknownError, match="could not restore the registers"):
             controller.tools.write(1, NEW, expected=ANY)
         assert len(controller.outcomes.open_markers()) == 1
 
@@ -481,7 +481,7 @@ def test_registers_that_change_between_two_looks_are_looked_at_again(commit_bit)
         assert controller.tools.read(1) == wanted
         turns = count()
         commit_bit.client.read_holding = lambda address, n: (next(turns) % 7,) * n
-        with pytest.raises(RemoteProtocolError, match="are different at every reading"):
+        with pytest.raises(RemoteProtocolError, match="change at every reading"):
             controller.tools.read(1)
 
 

@@ -277,10 +277,14 @@ def test_a_missing_basis_says_what_both_mean(problems):
             'must be "stop" or "measure_again"',
         ),
         ("[tolerances]\njump_mm = 0", "tolerances.jump_mm", "must be at least 0.001"),
-        ("[tolerances]\ndrfit_mm = 1", "tolerances.drfit_mm", "is not known; is drift_mm meant?"),
+        (
+            "[tolerances]\ndrfit_mm = 1",
+            "tolerances.drfit_mm",
+            "is not known; did you mean drift_mm?",
+        ),
         ("[box]\nq = 1", "box.q", "is not known; these are: sideways_mm, down_mm, up_mm"),
-        ("nots = ''", "nots", "is not known; is notes meant?"),
-        ("[box]\nverify = false", "box.verify", "belongs at the top of the file, above the first"),
+        ("nots = ''", "nots", "is not known; did you mean notes?"),
+        ("[box]\nverify = false", "box.verify", "must be at the top of the file, above the first"),
     ],
 )
 def test_a_key_that_is_wrong_is_told_by_its_path(problems, lines, where, what):
@@ -298,7 +302,7 @@ def test_all_problems_are_told_at_once_those_between_tables_too(tmp_path):
     )
     with pytest.raises(ConfigError) as caught:
         load_recipe(path)
-    assert f"{path} is wrong in 5 places:\n" in caught.value.what
+    assert f"{path} has 5 errors:\n" in caught.value.what
     for where in ("basis", "verify", "tolerances.rms_mm", "refusal.attempts", "prompts#1.tool"):
         assert f"\n    {where}: " in caught.value.what
     assert "Nothing was sent" in caught.value.remedy
@@ -309,7 +313,7 @@ def test_a_single_problem_is_not_counted(tmp_path):
     path.write_text(without("name"))
     with pytest.raises(ConfigError) as caught:
         load_recipe(path)
-    assert caught.value.what == f"The recipe {path} is wrong:\n    name: is missing"
+    assert caught.value.what == f"The recipe {path} has an error:\n    name: is missing"
 
 
 @pytest.mark.parametrize(

@@ -95,7 +95,7 @@ def run_of(controller, loaded):
 
 def test_a_copy_with_simulated_numbers_is_refused_by_a_real_controller():
     with SimpleController() as controller:
-        with pytest.raises(ConfigError, match=r"numbers of a\.toml are those of a simulated cell"):
+        with pytest.raises(ConfigError, match=r"numbers in a\.toml are for a simulated cell"):
             run_of(controller, copied()).preflight()
         # Whoever has put in their own deletes the line; what is refused then is something else.
         with pytest.raises(LimitError):

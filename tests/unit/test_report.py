@@ -253,7 +253,7 @@ OUTCOMES = {
     Outcome.REFUSED: "Refused, nothing was written",
     Outcome.VERIFY_FAILED: "The turn test failed",
     Outcome.NOT_APPLIED: "Not applied, the tool keeps its old value",
-    Outcome.ROLLED_BACK: "Taken back, the tool has its old value again",
+    Outcome.ROLLED_BACK: "Undone, the tool has its old value again",
     Outcome.CONFLICT: "Conflict: the tool holds neither the old nor the new value",
     Outcome.UNFINISHED: "Not finished",
 }

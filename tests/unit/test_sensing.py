@@ -212,7 +212,7 @@ def test_a_camera_that_dies_on_the_way_ends_it_with_the_tool_lifted_and_put_back
     with cell_of("epson") as cell:
         before = cell.stored
         plug_in("dying", lambda _: Dying(cell))
-        with pytest.raises(CalibrationError, match="The camera bench failed") as refusal:
+        with pytest.raises(CalibrationError, match="Camera bench failed") as refusal:
             run_source(cell, CameraSource("dying", camera_station(cell)))
         assert refusal.value.code == "sensor_failed"
         assert refusal.value.__cause__ is error

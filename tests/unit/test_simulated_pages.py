@@ -140,7 +140,7 @@ def test_a_typed_value_on_a_simulated_controller_has_a_band_too(changed_by_hand)
     ],
 )
 def test_the_sign_of_a_simulator_is_refused_where_a_machine_could_be(address):
-    with pytest.raises(ConfigError, match="Only the address of a simulator on this computer"):
+    with pytest.raises(ConfigError, match="only for a simulator on this computer"):
         open_plc_map(parse_url(address.format(map=MAP)), outcomes=lambda name: pytest.fail(name))
 
 

@@ -206,7 +206,7 @@ def test_a_nearer_file_adds_stations_and_takes_none_away(tmp_path, monkeypatch):
     [
         ('kind = "laser"', "cells.a.stations.S", "needs a kind: pin, beams, touch"),
         ("x_mm = 1.0", "cells.a.stations.S", "needs a kind"),
-        ('kind = "pin"\nguage = "G"', "cells.a.stations.S.guage", "is gauge meant?"),
+        ('kind = "pin"\nguage = "G"', "cells.a.stations.S.guage", "did you mean gauge?"),
         ('kind = "pin"\nx_mm = "1"', "cells.a.stations.S.x_mm", "must be a number"),
         ('kind = "pin"\ncheck_every_days = 0', "cells.a.stations.S.check_every_days", "more than"),
         (
@@ -311,8 +311,8 @@ def test_a_station_that_only_the_journal_knows_has_the_sensor_of_then():
 @pytest.mark.parametrize(
     ("more", "where", "what"),
     [
-        ("mm_per_px = [[0.02, 0.0], [0.0, 0.02]]", "origin_mm", "goes with mm_per_px"),
-        ("origin_mm = [1, 2]", "origin_mm", "goes with mm_per_px"),
+        ("mm_per_px = [[0.02, 0.0], [0.0, 0.02]]", "origin_mm", "needs mm_per_px"),
+        ("origin_mm = [1, 2]", "origin_mm", "needs mm_per_px"),
         ("mm_per_px = [[0.02, 0.0]]\norigin_mm = [1, 2]", "mm_per_px", "must hold at least 2"),
         ("sensors = 'x'", "sensors", "is not known"),
     ],

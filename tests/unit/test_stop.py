@@ -263,7 +263,7 @@ def test_rest_is_believed_only_where_the_note_says_so(confirmed):
     found = find_note(HERE)
     assert found is not None
     assert not found.confirmed
-    assert "did not see it come to rest" in found.sentence
+    assert "it was not confirmed that the robot stopped" in found.sentence
 
 
 @pytest.mark.usefixtures("robolink_state")
@@ -353,7 +353,7 @@ def test_a_stop_that_was_accepted_is_no_rest_while_the_flag_is_on():
 @pytest.mark.fault("F76")
 def test_no_rest_in_time_is_unknown(shown):
     robot = Robot(aborts=1000, shown=shown)
-    with pytest.raises(OutcomeUnknownError, match="did not come to rest within 5 s"):
+    with pytest.raises(OutcomeUnknownError, match="did not confirm within 5 s"):
         robot.stop()
     assert (REST_S - 0.5) * NS_PER_S < robot.clock.now_ns() < (REST_S + 0.5) * NS_PER_S
     assert robot.asked.count("Abort") >= 5
@@ -415,7 +415,7 @@ def test_who_only_ever_answers_something_else_is_no_controller():
     conversation = over(wire)
     for name in ("Abort", "Stop"):  # each request has its own count
         assert conversation.exchange(name).fields == ("0",)
-    with pytest.raises(RemoteProtocolError, match="a question nobody asked"):
+    with pytest.raises(RemoteProtocolError, match="robolink did not ask for"):
         conversation.exchange("GetStatus")
 
 
@@ -453,5 +453,5 @@ def test_a_refusal_without_a_name_is_the_answer_to_a_stop():
 
 def test_half_an_answer_to_a_stop_is_told_from_none():
     wire = Wire(b"#Abo")
-    with pytest.raises(TransportTimeoutError, match="answered 4 bytes, then nothing: Abort"):
+    with pytest.raises(TransportTimeoutError, match="sent only 4 bytes of its answer: Abort"):
         over(wire).exchange("Abort")

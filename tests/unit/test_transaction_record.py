@@ -161,7 +161,7 @@ def test_looks_that_never_agree_settle_nothing(cell, controller):
     marker = leave_open(cell)
     for look, text in enumerate(("21.000", "12.000", "500")):
         cell.simulator.faults.add(swapped(look, text))
-    with pytest.raises(UnclearAnswerError, match="reads back otherwise at each look") as refused:
+    with pytest.raises(UnclearAnswerError, match="reads back differently each time") as refused:
         Settler(controller).examine(marker)
     assert "Check the cable" in refused.value.remedy
     assert cell.journal.open_markers() == ((controller.outcomes.identity, marker),)
@@ -198,7 +198,7 @@ def test_a_person_may_forget_a_marker_and_that_is_on_record(cell, controller):
     marker = leave_open(cell)
     Settler(controller).forget(marker)
     (decision,) = cell.entries(EntryKind.DECISION)
-    assert decision.verdict == "forgotten without looking"
+    assert decision.verdict == "dropped without a check"
     assert decision.details["request"] == marker.request
     assert cell.journal.open_markers() == ()
 
@@ -217,7 +217,7 @@ def test_a_value_that_cannot_be_put_back_stays_open_and_recover_may_run_again(ce
     cell.simulator.faults.add(Fault(FaultAction.IGNORE_WRITE, match="TLSet 1"))
     with pytest.raises(RobolinkError, match="could not be written back") as failed:
         recover(controller)
-    assert failed.value.remedy.endswith("'robolink recover' may be run again.")
+    assert failed.value.remedy.endswith("You can run 'robolink recover' again.")
     assert {marker.kind for _, marker in cell.journal.open_markers()} == {MarkerKind.CHANGE}
     assert recover(controller).left == ()
     assert cell.tools == OLD

@@ -46,7 +46,7 @@ def test_a_window_that_is_closed_ends_the_work_in_order_in_the_time_that_windows
     assert simulator.machine.tools.selected == 1
     assert simulator.machine.flash_writes == 0
     told = at_cell(windows, state, tmp_path, "recover")
-    assert "Nothing is left unfinished" in told.stdout + told.stderr
+    assert "No job is left unfinished" in told.stdout + told.stderr
 
 
 SLOWLY = pytest.mark.parametrize("pace", [1.0])
@@ -92,12 +92,12 @@ def test_a_window_closed_on_a_silent_controller_and_a_killed_process_leave_a_mar
     assert "Next: robolink" in blocked.stderr
     told = at_cell(windows, state, tmp_path, "recover", "--yes")
     assert told.returncode == 0, told.stderr
-    assert "Everything is settled" in told.stdout + told.stderr
+    assert "All jobs are finished or undone" in told.stdout + told.stderr
     assert simulator.machine.arm.moves_started == moved
     assert simulator.machine.tools.selected == 1
     again = at_cell(windows, state, tmp_path, "recover")
     assert again.returncode == 0
-    assert "Nothing is left unfinished" in again.stdout + again.stderr
+    assert "No job is left unfinished" in again.stdout + again.stderr
     jogged = at_cell(windows, state, tmp_path, "robot", "jog", "x+0.1", "--yes")
     assert jogged.returncode == 0, jogged.stderr
 
@@ -125,7 +125,7 @@ def once_it_is_silent(windows, state, folder, *words):
     end_s = time.monotonic() + 60
     told = at_cell(windows, state, folder, *words)
     while time.monotonic() < end_s:
-        if "sign of life" not in told.stderr and "does not answer the login" not in told.stderr:
+        if "Last response" not in told.stderr and "does not answer the login" not in told.stderr:
             break
         assert told.returncode != 0
         told = at_cell(windows, state, folder, *words)

@@ -20,7 +20,7 @@ def test_the_full_screen_is_drawn_takes_keys_and_is_left(opened):
     console.see(r"Start moving \(1 open\)")
     assert console.text.count("\n OK ") == 6
     console.type("0")
-    console.see("Nothing was moved. Nothing was written. Tool 1 is selected.")
+    console.see("Nothing moved. Nothing was written. Tool 1 is selected.")
     assert console.exit_code() == 9
 
 

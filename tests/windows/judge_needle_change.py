@@ -93,7 +93,7 @@ def test_a_code_that_is_scanned_while_somebody_jogs_moves_nothing(opened, simula
     for how in ("scan 4468136931", "burst 4+6+9+enter", "scan 6842679", "burst 4+6+8+2") * 3:
         began = arm.moves_started
         if console.scanned(how):
-            console.see("Too fast for a hand")
+            console.see("Looked like a scanner")
             console.rest(1.0)
             assert arm.moves_started == began, how
             judged += 1

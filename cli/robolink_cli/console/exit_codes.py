@@ -114,15 +114,17 @@ MEANINGS: Final[dict[int, str]] = {
     DONE: "done",
     DIFFERENT: (
         "`tool compare` found a difference; `journal verify` or `journal report` "
-        "found a damaged record; `journal drift` found something that stands out; "
-        "`check-contract` found a broken promise; `cell doctor`, `cell ports` or `cell check` "
+        "found a damaged record; `journal drift` found something unusual; "
+        "`check-contract` found a failed check; `cell doctor`, `cell ports` or `cell check` "
         "found something that needs attention"
     ),
     USAGE: "the command, a file, a setting, the journal or an installed package is wrong",
     3: "the controller was not reached, or the link broke",
-    4: "the two sides do not understand each other",
+    4: "protocol error",
     5: "the controller, or a check of its state, said no",
-    UNKNOWN: "the end of a write or a movement is not proved; `robolink recover` comes next",
+    UNKNOWN: (
+        "robolink could not confirm how a write or movement ended; `robolink recover` comes next"
+    ),
     7: "the measurements do not support a result",
     8: "the turn test failed, or its touches were not made; the old value was put back",
     9: "a person said no, or was not there to say yes",
@@ -130,7 +132,7 @@ MEANINGS: Final[dict[int, str]] = {
     BUG: "a defect in robolink",
     HUNG_UP: "the window was closed, or the connection to it was lost (SIGHUP)",
     INTERRUPTED: "interrupted (Ctrl-C)",
-    READER_LEFT: "the program that read the output has ended",
+    READER_LEFT: "a closed pipe: the program that read the output has ended",
     TERMINATED: "terminated (SIGTERM)",
 }
 """What each exit code says; docs/commands.md has the same table."""

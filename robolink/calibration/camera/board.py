@@ -172,7 +172,7 @@ def check_spacing(spacing_mm: float, nominal_mm: float | None) -> None:
                 spacing=spacing_mm,
                 nominal=nominal_mm,
             ),
-            remedy=tr("Check which marks the camera found, and its scale."),
+            remedy=tr("Check the marks that the camera found, and its scale."),
         )
 
 

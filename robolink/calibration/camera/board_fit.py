@@ -172,7 +172,7 @@ def _require_as_drawn(seen: Complexes, drawing: Complexes) -> None:
         raise CalibrationError(
             "spacing_mismatch",
             tr("The fiducials are {scale:.4f} times as far apart as in the drawing.", scale=scale),
-            remedy=tr("Check which marks the camera found, their order, and its scale."),
+            remedy=tr("Check the marks that the camera found, their order, and its scale."),
         )
 
 

@@ -234,7 +234,7 @@ def _require_spread(pixels: Floats) -> None:
             limit=LEAST_SPREAD_PX,
         ),
         remedy=tr(
-            "Look at the pictures: does the spot that is found move with the tip? Let the tip go "
+            "Look at the pictures: does the spot move with the tip? Let the tip go "
             "further, to places that are not in line."
         ),
     )
@@ -245,7 +245,7 @@ def _require_observable(fit: LinearFit) -> None:
         return
     matrix_part, offset_part = np.abs(fit.weakest[:4]).max(), np.abs(fit.weakest[6:]).max()
     if offset_part > matrix_part:
-        what = tr("The tool turned too little to tell its offset from the place of the camera.")
+        what = tr("The tool turned too little to separate its offset from the place of the camera.")
         remedy = tr("Add pictures at other angles of U, best over a full turn.")
     else:
         what = tr("The tip moved too little over the image: its scale and turn are unknown.")

@@ -202,8 +202,8 @@ class CameraLimits:
 
 def _seen_wrongly() -> str:
     return tr(
-        "Look at the pictures: is it the tip that was found in all of them? Clean window and tip, "
-        "look after focus and mount, then measure again."
+        "Look at the pictures: did the camera find the tip in all of them? Clean window "
+        "and tip, check focus and mount, then measure again."
     )
 
 

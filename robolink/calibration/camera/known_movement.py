@@ -204,28 +204,27 @@ def tip_did_not_move(movement: SeenMovement | None, *, in_mm: bool) -> Calibrati
     """
     if movement is None:
         what = tr(
-            "The camera finds it at one place only, and nowhere beside: nothing shows that what "
-            "it found is the tip."
+            "The camera found the tip at one place only: this does not show that it really "
+            "is the tip."
         )
     elif in_mm and movement.seen_length < LEAST_SHARE * movement.known_length_mm:
         what = tr(
-            "What the camera found does not move with the tip: the robot went {known:.2f} mm, "
-            "and it was seen to go {seen:.2f} mm.",
+            "The camera's spot does not move with the tip: the robot moved {known:.2f} mm, "
+            "the spot {seen:.2f} mm.",
             known=movement.known_length_mm,
             seen=movement.seen_length,
         )
     elif in_mm:
         what = tr(
-            "What the camera found does not move with the tip: the robot went {known:.2f} mm, "
-            "and it was seen to go {seen:.2f} mm in another direction, or once so and once "
-            "otherwise.",
+            "The camera's spot does not move with the tip: the robot moved {known:.2f} mm, "
+            "the spot {seen:.2f} mm in another direction, or differently each time.",
             known=movement.known_length_mm,
             seen=movement.seen_length,
         )
     else:
         what = tr(
-            "What the camera found does not move with the tip: the robot went {known:.2f} mm, "
-            "and it was seen to go {seen:.1f} pixels.",
+            "The camera's spot does not move with the tip: the robot moved {known:.2f} mm, "
+            "the spot {seen:.1f} pixels.",
             known=movement.known_length_mm,
             seen=movement.seen_length,
         )
@@ -233,8 +232,8 @@ def tip_did_not_move(movement: SeenMovement | None, *, in_mm: bool) -> Calibrati
         "tip_did_not_move",
         what,
         remedy=tr(
-            "Look at the picture: a fleck on the window, a reflection or a wrong circle stands "
-            "still. Clean window and tip, look after light and focus, then start again."
+            "Look at the picture: a spot on the window, a reflection or a wrong circle "
+            "does not move. Clean window and tip, check light and focus, then start again."
         ),
     )
 
@@ -244,8 +243,9 @@ def camera_changed(movement: SeenMovement) -> CalibrationError:
     return CalibrationError(
         "camera_changed",
         tr(
-            "The robot moved the tip by {known:.3f} mm, and the camera saw {seen:.3f} mm, turned "
-            "by {turn:+.1f} degrees: scale, turn or mirror are not those of its calibration.",
+            "The robot moved the tip by {known:.3f} mm; the camera saw {seen:.3f} mm, "
+            "turned by {turn:+.1f} degrees. Its scale, turn or mirror differ from its "
+            "calibration.",
             known=movement.known_length_mm,
             seen=movement.seen_length,
             turn=movement.turn_deg,
@@ -262,12 +262,12 @@ def spot_changed(radius_px: float, usual_px: float) -> CalibrationError:
     return CalibrationError(
         "spot_changed",
         tr(
-            "What the camera found has a radius of {radius:.2f} px, in the other looks "
-            "{usual:.2f} px: they are not of the same thing.",
+            "The spot has a radius of {radius:.2f} px, but {usual:.2f} px in the other "
+            "looks: they show different things.",
             radius=radius_px,
             usual=usual_px,
         ),
         remedy=tr(
-            "Look at the pictures: is it the tip that was found in all of them, in focus and clean?"
+            "Look at the pictures: did the camera find the tip in all of them, in focus and clean?"
         ),
     )

@@ -383,7 +383,8 @@ def solve_runout_table(
                 "Between two looks the tool turned by {gap:.1f} degrees.", gap=table.largest_gap_deg
             ),
             remedy=tr(
-                "Look all round, at least every {limit:g} degrees of U.", limit=LARGEST_GAP_DEG
+                "Look over a full turn, at least every {limit:g} degrees of U.",
+                limit=LARGEST_GAP_DEG,
             ),
         )
     plain = _result(sightings, report, stored, sigma_mm, camera)

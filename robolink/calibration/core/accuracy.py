@@ -215,7 +215,7 @@ class AccuracyRow:
 ACCURACY_ROWS: Final[Mapping[str, AccuracyRow]] = {
     row.key: row
     for row in (
-        AccuracyRow("touch_mm", "mm", 0.05, declared("how a person sees contact")),
+        AccuracyRow("touch_mm", "mm", 0.05, declared("judging contact by eye")),
         AccuracyRow("place_mm", "mm", 0.02, declared("place of the station"), month=0.01, most=0.1),
         AccuracyRow("camera_turn_deg", "deg", 0.5, declared("turn of the camera")),
         AccuracyRow("camera_scale_percent", "percent", 0.5, declared("scale of the camera")),

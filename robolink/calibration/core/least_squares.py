@@ -253,11 +253,11 @@ def _too_many(rejected: int, count: int) -> CalibrationError:
     return CalibrationError(
         "too_many_outliers",
         tr(
-            "{rejected} of {count} touches do not fit the others; a third may be left out.",
+            "{rejected} of {count} touches do not fit the others; at most a third can be left out.",
             rejected=rejected,
             count=count,
         ),
-        remedy=tr("Look for what moved between the poses, and measure again."),
+        remedy=tr("Find out what moved between the poses, then measure again."),
     )
 
 

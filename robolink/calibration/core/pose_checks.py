@@ -72,7 +72,7 @@ def check_frames(
         raise CalibrationError(
             "mixed_local",
             tr("The poses are given in different local coordinate systems."),
-            remedy=tr("Give all of them in local 0, the base, or say what the locals are."),
+            remedy=tr("Give all of them in local 0, the base, or state the locals."),
             others=("local_pose",),
         )
     mixed = len({hand for hand in hands if hand is not None}) > 1
@@ -81,7 +81,7 @@ def check_frames(
             "mixed_hand",
             tr("The poses were taken with different arm configurations."),
             remedy=tr(
-                "Take all of them with the same hand, so that errors of the arm lengths cancel."
+                "Record all of them with the same hand, so that errors of the arm lengths cancel."
             ),
         )
     return ("mixed_hand",) if mixed else ()
@@ -92,7 +92,7 @@ def _refuse_tools(tools: Collection[int]) -> None:
         raise CalibrationError(
             "mixed_tool",
             tr("The poses were taken with different tools selected."),
-            remedy=tr("Take all of them in Tool 0."),
+            remedy=tr("Record all of them in Tool 0."),
             others=("tool_pose",),
         )
     for tool in tools:
@@ -100,7 +100,9 @@ def _refuse_tools(tools: Collection[int]) -> None:
             raise CalibrationError(
                 "tool_pose",
                 tr("These are positions of Tool {tool}, not of the flange.", tool=tool),
-                remedy=tr("Say what Tool {tool} is, or take them in Tool 0.", tool=tool),
+                remedy=tr(
+                    "State the value of Tool {tool}, or record the poses in Tool 0.", tool=tool
+                ),
             )
 
 
@@ -116,11 +118,13 @@ def keep_unmeasured(stored: ToolOffset | None, **measured: float) -> ToolOffset:
         raise CalibrationError(
             "implausible_offset",
             tr(
-                "The offset would be {longest:.1f} mm long; no tool is longer than {limit:.0f} mm.",
+                "The offset would be {longest:.1f} mm long; the limit is {limit:.0f} mm.",
                 longest=longest,
                 limit=MAX_OFFSET_MM,
             ),
-            remedy=tr("Check that all poses touch the same point, are flange poses and in mm."),
+            remedy=tr(
+                "Check that all poses touch the same point, are flange poses, and are in mm."
+            ),
             others=("suspect_units",),
         )
     return offset
@@ -336,7 +340,7 @@ def require_poses(count: int, minimum: int) -> None:
                 count=count,
                 minimum=minimum,
             ),
-            remedy=tr("Take more, at angles that differ as much as the robot allows."),
+            remedy=tr("Record more, at angles as different as the robot allows."),
         )
 
 
@@ -355,7 +359,7 @@ def refuse_radians(poses: Sequence[Pose], spread_deg: float) -> None:
     if travel_mm / (2 * math.sin(math.radians(spread_deg / 2))) > _LIKE_A_NEEDLE_MM:
         raise CalibrationError(
             "suspect_units",
-            tr("The poses move {travel:.1f} mm while they hardly turn.", travel=travel_mm),
+            tr("The poses are {travel:.1f} mm apart but hardly turn.", travel=travel_mm),
             remedy=tr("The angles look like radians; give them in degrees."),
         )
 
@@ -364,7 +368,7 @@ def _require_rotation(poses: Sequence[Pose], spread_deg: float, minimum_deg: flo
     if spread_deg < _SAME_ANGLE_DEG:
         raise CalibrationError(
             "degenerate_angles",
-            tr("All poses have the same U; the offset cannot be found from them."),
+            tr("All poses have the same U; they do not determine the offset."),
             remedy=tr("Turn the tool between the poses, best over half a turn or more."),
         )
     if spread_deg < minimum_deg:

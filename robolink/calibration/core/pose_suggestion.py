@@ -91,13 +91,13 @@ def suggest_poses(
     """
     if count < 1:
         raise ConfigError(
-            tr("{count} poses cannot be planned.", count=count), remedy=tr("Plan one or more.")
+            tr("{count} poses cannot be planned.", count=count), remedy=tr("Plan 1 or more.")
         )
     candidates = _candidates(guess, point_mm, limits)
     if len(candidates) < 2:
         raise CalibrationError(
             "insufficient_rotation",
-            tr("The limits leave {count} orientations only.", count=len(candidates)),
+            tr("The limits leave only {count} orientations.", count=len(candidates)),
             remedy=tr("Widen the range of U or the box, or choose another reference point."),
         )
     size = 3 if limits.tilt_deg > 0 else 2

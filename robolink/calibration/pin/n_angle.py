@@ -277,7 +277,7 @@ def _result(
 def _all_copies() -> CalibrationError:
     return CalibrationError(
         "degenerate_angles",
-        tr("All poses are copies of one; the offset cannot be found from them."),
+        tr("All poses are copies of one; they do not determine the offset."),
         remedy=tr("Turn the tool between the poses, best over half a turn or more."),
         others=("too_few_poses",),
     )

@@ -239,5 +239,5 @@ def _require_plausible(shift_mm: float, limit_mm: float) -> None:
                 shift=shift_mm,
                 limit=limit_mm,
             ),
-            remedy=tr("Look at how it is seated, or make a full calibration."),
+            remedy=tr("Check how it is seated, or run a full calibration."),
         )

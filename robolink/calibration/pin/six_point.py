@@ -77,8 +77,8 @@ def require_unturned(start: Pose, end: Pose) -> None:
     if off > math.sqrt(2) * math.radians(_TURNED_DEG):
         raise CalibrationError(
             "turned_on_the_way",
-            tr("The tool turned during the move that should show its axis."),
-            remedy=tr("Keep the orientation in which the move began."),
+            tr("The tool turned during the move that shows its axis."),
+            remedy=tr("Keep the orientation from the start of the move."),
         )
 
 

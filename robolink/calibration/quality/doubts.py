@@ -126,7 +126,7 @@ def order_in_words(order: RunOrder) -> str:
 # Called late, because the language is chosen when a command runs.
 _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
     "small_rotation": lambda: tr("The poses differ little in U; half a turn would be best."),
-    "few_poses": lambda: tr("Too few poses to tell which one is off; four or more would show it."),
+    "few_poses": lambda: tr("Too few poses to find the wrong one; four or more would show it."),
     "large_rms": lambda: tr("The measurements agree badly with each other for this method."),
     "large_residual": lambda: tr("One touch is far off. Touch it again."),
     "camera_moved": lambda: tr(
@@ -138,8 +138,8 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
         "The looks differ from each other by more than half a pixel."
     ),
     "turned_from_stored": lambda: tr(
-        "An axis is more than 45 degrees from the stored one: make sure that +X and "
-        "+Z were not mistaken for other axes. The test by tilting cannot show that."
+        "An axis is more than 45 degrees from the stored one: make sure that +X and +Z "
+        "were not confused with other axes. The tilt test cannot show that."
     ),
     "ways_askew": lambda: tr(
         "The two moves are further from a right angle than the touches explain: the "
@@ -150,14 +150,14 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
         "one have added up."
     ),
     "duplicate_poses": lambda: tr(
-        "Some poses are copies of others; a copy tells nothing new and counts once."
+        "Some poses are copies of others; a copy adds nothing and counts once."
     ),
     "sigma_contradicted": lambda: tr(
-        "The poses agree less well than was stated; the +- is taken from how well they agree."
+        "The poses agree less well than stated; the +- comes from how well they agree."
     ),
     "residuals_too_small": lambda: tr(
-        "The poses agree far better than was stated: they may be copied or smoothed, or what "
-        "was stated is too large."
+        "The poses agree far better than stated: they may be copied or smoothed, or the "
+        "stated value is too large."
     ),
     "high_leverage": lambda: tr(
         "The result depends on a single pose; take one more near it, so that an error would show."
@@ -175,18 +175,19 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
     ),
     "wobble": lambda: tr("The tip wobbles when it turns: it is bent, or the camera leans."),
     "wobble_not_identifiable": lambda: tr(
-        "These angles cannot tell an offset from a wobble; four or more that spread would."
+        "These angles cannot separate an offset from a wobble; four or more over a full turn could."
     ),
-    "overshoot": lambda: tr("The tip runs on after the trigger; the result is corrected for it."),
+    "overshoot": lambda: tr(
+        "The tip overshoots after the trigger; the result is corrected for it."
+    ),
     "station_undecided": lambda: tr(
-        "Whether the station moved cannot be told from these tools; a shift that matters could "
-        "stay unseen."
+        "These tools cannot show whether the station moved; a relevant shift could stay unseen."
     ),
     "drift_undecided": lambda: tr(
-        "The turn test is too near to its limit to call it passed or failed; take more touches."
+        "The turn test is too near its limit to pass or fail; make more touches."
     ),
     "not_judged": lambda: tr(
-        "A limit is set, but nothing tells how large the errors are, so it cannot be judged."
+        "A limit is set, but it cannot be judged: the size of the errors is not known."
     ),
     "gauge_marginal": lambda: tr(
         "The measurement repeats only just well enough for the tolerance."
@@ -195,8 +196,8 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
     "chart_point_out": lambda: tr("A value is outside the limits of the chart."),
     "chart_drift": lambda: tr("The chart shows a slow drift."),
     "resolution_floor": lambda: tr(
-        "The poses agree better than the robot can show positions; the +- is taken "
-        "from the smallest step it shows."
+        "The poses agree better than the robot's position display; the +- comes from the "
+        "smallest step it shows."
     ),
     "needle_leans": lambda: tr(
         "The needle leans. X and Y are those of its end, corrected by how its shaft leans."
@@ -206,21 +207,21 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
         "was not given, so the +- leaves it out."
     ),
     "order_not_testable": lambda: tr(
-        "Too few touches to see whether something moved meanwhile; six or more would show it."
+        "Drift during the measurement cannot be checked with fewer than six touches."
     ),
     "touches_not_witnessed": lambda: tr(
-        "Nobody saw these touches being made: the poses were taught, typed or read from a file."
+        "These touches were not seen by robolink: the poses were taught, typed or read from a file."
     ),
     "proof_contradicts_repeatability": lambda: tr(
-        "The turn test differs from the measurement by more than it repeats: was the station "
-        "moved, is the nozzle loose, was a touch off?"
+        "The turn test differs from the measurement by more than its repeatability: was "
+        "the station moved, is the nozzle loose, was a touch off?"
     ),
     "proof_contradicts_accuracy": lambda: tr(
         "The turn test contradicts what the measurement is accurate to: was the station moved, is "
         "the nozzle loose, was the camera turned?"
     ),
     "turn_test_repeated": lambda: tr(
-        "The turn test was made again after it had contradicted the measurement; all its looks "
+        "The turn test was repeated after it contradicted the measurement; all its results "
         "count together."
     ),
     "tested_at_small_angle": lambda: tr(
@@ -234,7 +235,7 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
     ),
     "length_changed": lambda: tr("The length of the tool has changed."),
     "length_not_observable": lambda: tr(
-        "Whether the length of the tool has changed cannot be told from these touches."
+        "These touches cannot show whether the length of the tool has changed."
     ),
 }
 """Doubts that a caller says in other words are left out."""

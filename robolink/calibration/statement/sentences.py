@@ -127,7 +127,7 @@ def largest_row_sentence(accuracy: Accuracy) -> str:
         >>> touches = Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)
         >>> found = assessed(solve_two_pose(*touches, sigma_mm=0.02), AccuracyFacts())
         >>> largest_row_sentence(found.accuracy)
-        'Largest row: how a person sees contact, +-0.05 mm (default, not measured).'
+        'Largest row: judging contact by eye, +-0.05 mm (default, not measured).'
     """
     row = accuracy.largest
     facts = {"row": row_title(row), "basis": basis_in_words(row)}
@@ -153,7 +153,7 @@ def statement_sentences(result: "CalibrationResult") -> Iterator[str]:
         ...     print(sentence)
         Repeatable: not known (two touches cannot check each other).
         X, Y: accurate to +-0.088 mm (95 %).
-        Largest row: how a person sees contact, +-0.05 mm (default, not measured).
+        Largest row: judging contact by eye, +-0.05 mm (default, not measured).
     """
     for sentence in (repeatable_sentence(result), accurate_sentence(result)):
         if sentence:
@@ -318,25 +318,25 @@ def turn_test_sentences(
         >>> limits = DriftLimits(repeatable_mm=0.016, accurate_mm=0.09, turn_deg=180.0)
         >>> for sentence in turn_test_sentences(TurnJudgement("", (limits,))):
         ...     print(sentence)
-        It contradicts nothing that is stated: scatter alone explains 0.016 mm.
+        It agrees with the stated accuracy: scatter alone explains 0.016 mm.
         >>> doubtful = TurnJudgement("proof_contradicts_repeatability", (limits,))
         >>> for sentence in turn_test_sentences(doubtful):
         ...     print(sentence)
-        Scatter alone explains 0.016 mm, no more: it does not repeat as stated.
-        Possible causes: the nozzle is loose, or what it was measured at has moved.
+        Scatter alone explains only 0.016 mm: it does not repeat as stated.
+        Possible causes: the nozzle is loose, or the station has moved.
         To find out: check the mount, then measure again.
     """
     if judgement is None:
         return
     if judgement.tests > 1:
         yield tr(
-            "The turn test was made {count} times, because the first contradicted the measurement; "
-            "all its looks count together.",
+            "The turn test was made {count} times, because the first contradicted the "
+            "measurement; all results count together.",
             count=judgement.tests,
         )
     if judgement.apart_mm is not None:
         yield tr(
-            "At one angle its looks lie {mm} mm apart: it does not repeat as stated.",
+            "Results at the same angle differ by {mm} mm: more than the stated repeatability.",
             mm=stated_mm(judgement.apart_mm),
         )
     yield from _explained(judgement)
@@ -344,7 +344,7 @@ def turn_test_sentences(
         yield from _causes(None if measured is None else measured.accuracy)
     if judgement.small_angle:
         yield tr(
-            "The tool was turned by {turn:.0f} degrees; less than 90 is not called tested.",
+            "The tool turned by {turn:.0f} degrees; less than 90 does not count as tested.",
             turn=max(one.turn_deg for one in judgement.limits),
         )
     yield from _not_shown(judgement)
@@ -375,7 +375,7 @@ def _not_shown(judgement: TurnJudgement) -> Iterator[str]:
             shifts=", ".join(shifts),
         )
     if judgement.misses_z:
-        yield tr("This test tells no height: a shift in Z would not show.")
+        yield tr("This test does not measure height: a shift in Z would not show.")
 
 
 def _explained(judgement: TurnJudgement) -> Iterator[str]:
@@ -383,17 +383,17 @@ def _explained(judgement: TurnJudgement) -> Iterator[str]:
     limit = judgement.limits[judgement.worst]
     if judgement.contradicts_accuracy:
         yield tr(
-            "All that is stated explains {mm} mm, no more: the tip is not where it was measured.",
+            "The stated errors explain only {mm} mm: the tip is not where it was measured.",
             mm=stated_mm(limit.accurate_mm),
         )
     elif judgement.contradicts_repeatability and judgement.apart_mm is None:
         yield tr(
-            "Scatter alone explains {mm} mm, no more: it does not repeat as stated.",
+            "Scatter alone explains only {mm} mm: it does not repeat as stated.",
             mm=stated_mm(limit.repeatable_mm),
         )
     elif not judgement.code and not judgement.small_angle:
         yield tr(
-            "It contradicts nothing that is stated: scatter alone explains {mm} mm.",
+            "It agrees with the stated accuracy: scatter alone explains {mm} mm.",
             mm=stated_mm(limit.repeatable_mm),
         )
 
@@ -453,5 +453,5 @@ def _causes(accuracy: Accuracy | None) -> Iterator[str]:
         )
         yield tr("To find out: check the mount, then learn the station again.")
     else:
-        yield tr("Possible causes: the nozzle is loose, or what it was measured at has moved.")
+        yield tr("Possible causes: the nozzle is loose, or the station has moved.")
         yield tr("To find out: check the mount, then measure again.")

@@ -137,8 +137,8 @@ def length_not_observable(why: str) -> CalibrationError:
     """Return the refusal to tell a length from heights, for a reason in a whole sentence."""
     return CalibrationError(
         "length_not_observable",
-        tr("{why} The heights of the touches cannot tell the length of the tip.", why=why),
-        remedy=tr("Measure Z by a touch of a surface, or decide to keep it."),
+        tr("{why} The heights of the touches do not show the length of the tip.", why=why),
+        remedy=tr("Measure Z by touching a surface, or keep it."),
     )
 
 

@@ -218,5 +218,7 @@ def _require_radius(places: Floats, radius_mm: float | None) -> None:
                 found=found_mm,
                 stated=radius_mm,
             ),
-            remedy=tr("Give the radius, not the diameter, or leave it out, so that it is found."),
+            remedy=tr(
+                "Give the radius, not the diameter, or leave it out: robolink then finds it."
+            ),
         )

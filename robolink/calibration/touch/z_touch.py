@@ -155,8 +155,7 @@ def require_plausible(
     if not low - slack * found.latency_gain <= found.latency_s <= high + slack * found.latency_gain:
         raise _implausible(
             tr(
-                "The trigger would be read {latency:.4f} s after the touch; possible "
-                "are {low:g} to {high:g} s.",
+                "The trigger delay would be {latency:.4f} s; possible are {low:g} to {high:g} s.",
                 latency=found.latency_s,
                 low=low,
                 high=high,
@@ -189,8 +188,8 @@ def _implausible(what: str) -> CalibrationError:
         "implausible_latency",
         what,
         remedy=tr(
-            "Does the robot reach these speeds before the touch? Are surface and tip clean, "
-            "and is it the right input? Then touch again."
+            "Check that the robot reaches these speeds before the touch, that surface and "
+            "tip are clean, and the input number. Then touch again."
         ),
     )
 

@@ -41,10 +41,10 @@ def _remedy(code: int) -> str:
         return tr("Wait for the running statement, or stop it.")
     if code == 11:
         return tr(
-            "Connect again to log in. If it is refused again, this firmware does not know "
-            "the command."
+            "Connect again to log in. If the controller refuses again, its firmware does "
+            "not know the command."
         )
-    return tr("Nothing was repeated. Read the status before you go on.")
+    return tr("Nothing was repeated. Check the status before you continue.")
 
 
 def status_from_flags(flags: StatusFlags, code: int) -> ControllerStatus:
@@ -160,7 +160,7 @@ def _occupied(status: ControllerStatus) -> tuple[NotReadyReason, str, str] | Non
         return (
             NotReadyReason.RUNNING,
             tr("A program is running on the controller."),
-            tr("Wait for its end, or stop the cell; robolink does not stop it for you."),
+            tr("Wait until it ends, or stop the cell yourself; robolink does not stop programs."),
         )
     if status.paused:
         return (

@@ -47,7 +47,7 @@ class EpsonAlarms(DriverPart):
         if spel.parse_integer(count) != len(numbers):
             raise RemoteProtocolError(
                 tr(
-                    "{count} alarms were announced, but {found} arrived.",
+                    "The controller announced {count} alarms, but {found} arrived.",
                     count=count,
                     found=numbers,
                 ),
@@ -76,7 +76,7 @@ class EpsonAlarms(DriverPart):
             self._session.exchange("ResetAlm", str(number))
             if number in self.list():
                 raise ControllerFaultError(
-                    tr("Alarm {number} is still there after its reset.", number=number),
+                    tr("Alarm {number} is still on after its reset.", number=number),
                     code=number,
                     remedy=tr("Remove the cause; the alarm list in RC+ names it."),
                 )

@@ -235,7 +235,7 @@ class EpsonController(ControllerCore):
             if group.motors_on() is not on:
                 raise ReadBackError(
                     tr("The motors are not on.") if on else tr("The motors are not off."),
-                    remedy=tr("Look at the controller; nothing was repeated."),
+                    remedy=tr("Check the controller; nothing was repeated."),
                 )
 
     def robot_number(self) -> int:
@@ -409,7 +409,7 @@ def _typed_statement(text: str) -> Statement:
     stripped = text.strip()
     if not stripped or not (stripped.isascii() and stripped.isprintable()):
         raise ConfigError(
-            tr("{text!r} cannot be sent as a statement.", text=text),
+            tr("robolink cannot send {text!r} as a statement.", text=text),
             remedy=tr("Write one line of printable ASCII."),
         )
     return Statement(stripped)

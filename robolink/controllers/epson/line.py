@@ -273,7 +273,7 @@ class EpsonConversation:
         if held := self._codec.bytes_held:
             raise TransportTimeoutError(
                 tr(
-                    "{identity} answered {count} bytes, then nothing: {request}.",
+                    "{identity} sent only {count} bytes of its answer: {request}.",
                     identity=self.identity,
                     count=len(held),
                     request=as_shown(request),
@@ -303,8 +303,11 @@ class EpsonConversation:
         self._passed_over += 1
         if self._passed_over >= _STRAYS:
             raise RemoteProtocolError(
-                tr("{identity} sent an answer to a question nobody asked.", identity=self.identity),
-                remedy=tr("Look for a second program on this controller."),
+                tr(
+                    "{identity} sent an answer that robolink did not ask for.",
+                    identity=self.identity,
+                ),
+                remedy=tr("Check for a second program on this controller."),
             )
 
     def _rejected(self, refusal: Refusal, name: str) -> RejectedError:

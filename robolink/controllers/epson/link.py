@@ -128,7 +128,7 @@ class Preferences:
         """
         if Preference.DRY_RUN in (self.read() or ()):
             raise NotReadyError(
-                tr("The controller is set to dry run: the robot would only seem to move."),
+                tr("The controller is set to dry run: the robot does not really move."),
                 reason=NotReadyReason.DRY_RUN,
                 remedy=tr(
                     "Nothing was sent. Switch the preference 'Dry run' off in RC+ (the controller "
@@ -146,7 +146,7 @@ class Preferences:
         """
         if Preference.VIRTUAL_IO in (self.read() or ()):
             raise NotReadyError(
-                tr("The controller is set to virtual I/O: none of its inputs is a real one."),
+                tr("The controller is set to virtual I/O: none of its inputs is real."),
                 reason=NotReadyReason.VIRTUAL_IO,
                 remedy=tr(
                     "Nothing was sent. Switch the preference 'Virtual I/O' off in RC+ (the "

@@ -125,7 +125,7 @@ class EpsonMotion:
             if deadline.expired:
                 session.close()
                 raise TransportTimeoutError(
-                    tr("The controller did not announce the end of the statement."),
+                    tr("The controller did not report the end of the statement."),
                     controller=session.identity,
                     request=self.statement,
                 )
@@ -250,7 +250,7 @@ class Settings:
             raise NotReadyError(
                 tr("The controller does not confirm low power and the speed that was set."),
                 reason=NotReadyReason.HIGH_POWER,
-                remedy=tr("Nothing was moved. Check the power mode on the controller."),
+                remedy=tr("Nothing moved. Check the power mode on the controller."),
                 controller=self._link.identity,
                 request=spel.power_low(),
             )
@@ -273,7 +273,7 @@ class Settings:
                 self._window.command(statement)
         if self.read() != before:
             raise NotReadyError(
-                tr("The previous power mode and speed could not be put back."),
+                tr("robolink could not restore the previous power mode and speed."),
                 reason=NotReadyReason.HIGH_POWER,
                 remedy=tr("Check Power, Speed and SpeedS before you start the cell."),
                 controller=self._link.identity,

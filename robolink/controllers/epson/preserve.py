@@ -99,8 +99,8 @@ class EpsonPreserver(Preserver):
                     second=second.shown(),
                 ),
                 remedy=tr(
-                    "Nothing was changed. Check the cable and everything between this "
-                    "PC and the controller, and that no other program sets them."
+                    "Nothing was changed. Check the cable and all devices between this PC "
+                    "and the controller, and that no other program changes these settings."
                 ),
                 controller=self._epson.identity,
                 request=reason,
@@ -121,7 +121,7 @@ class EpsonPreserver(Preserver):
     def _action(self, marker: Marker, now: int | None) -> str:
         tool = InForce.from_marker(marker).tool
         if now == tool:
-            return tr("Set power mode and speed as they were")
+            return tr("Restore power mode and speed")
         return tr("Select tool {tool} again, with the earlier power mode and speed", tool=tool)
 
 
@@ -149,11 +149,11 @@ class PendingValues:
             case _:
                 raise ConfigError(
                     tr(
-                        "What was left unfinished at {when} cannot be read.",
+                        "The record of an unfinished job of {when} cannot be read.",
                         when=local_label(marker.begun_at),
                     ),
                     remedy=tr(
-                        "Look at the controller, then {forget}.",
+                        "Check the controller, then {forget}.",
                         forget=remedy_word(RemedyWord.FORGET_MARKER),
                     ),
                 )
@@ -163,15 +163,19 @@ class PendingValues:
 def _finding(marker: Marker, now: Value, kind: str) -> Finding:
     before, requested = marker.details.get("before"), marker.details.get("requested")
     if equal_values(now, requested, kind):
-        sentence = tr("{request}: the new value {now} is there.", request=marker.request, now=now)
+        sentence = tr(
+            "{request}: the controller has the new value {now}.", request=marker.request, now=now
+        )
         return Finding(marker, Verdict.DONE, sentence)
     if equal_values(now, before, kind):
         sentence = tr(
-            "{request}: the old value {now} is still there.", request=marker.request, now=now
+            "{request}: the controller still has the old value {now}.",
+            request=marker.request,
+            now=now,
         )
         return Finding(marker, Verdict.NOT_APPLIED, sentence)
     sentence = tr(
-        "{request}: {now} is there, neither the old value {before} nor the new one.",
+        "{request}: the controller has {now}, neither the old value {before} nor the new one.",
         request=marker.request,
         now=now,
         before=before,

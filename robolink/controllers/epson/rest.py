@@ -58,7 +58,8 @@ def bring_to_rest(ask: Ask, clock: Clock, *, controller: str) -> tuple[StatusFla
             clock.sleep(min(_POLL_S, again.remaining_s()))
     raise OutcomeUnknownError(
         tr(
-            "{controller} took the stop, but did not come to rest within {seconds:g} s.",
+            "{controller} accepted the stop, but did not confirm within {seconds:g} s that "
+            "the robot has stopped.",
             controller=controller,
             seconds=REST_S,
         ),

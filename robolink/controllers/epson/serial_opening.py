@@ -81,8 +81,8 @@ def _silence(transport: Transport) -> int:
             raise RemoteProtocolError(
                 tr("The line {identity} is never quiet.", identity=transport.identity),
                 remedy=tr(
-                    "Check baud rate and parity, that no other program uses the line, and that "
-                    "the control device is Remote RS232."
+                    "Check the baud rate and parity, that no other program uses the line, "
+                    "and that the control device is Remote RS232."
                 ),
                 controller=transport.identity,
             )

@@ -247,7 +247,7 @@ class EpsonSession(EpsonConversation):
             if command is None or not command.during_execute:
                 raise BusyError(
                     tr(
-                        "{name} has to wait: a statement is still running on the controller.",
+                        "{name} must wait: a statement is still running on the controller.",
                         name=request.name,
                     ),
                     remedy=tr("Wait until the movement has ended, or stop it."),
@@ -290,12 +290,13 @@ class EpsonSession(EpsonConversation):
             return
         raise RemoteProtocolError(
             tr(
-                "The controller sent an answer to a question nobody asked: {event}.",
+                "The controller sent an answer that robolink did not ask for: {event}.",
                 event="***" if hidden else repr(event)[:_SHOWN],
             ),
             remedy=tr(
-                "The connection is closed, because later answers could be mistaken. Connect "
-                "again; if it happens twice, look for a second program on this controller."
+                "robolink closed the connection, because later answers could be mixed up. "
+                "Connect again; if it happens twice, check for a second program on this "
+                "controller."
             ),
         )
 

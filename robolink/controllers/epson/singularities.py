@@ -175,8 +175,8 @@ class SingularPlaces:
             bend_deg = self._joint_at(place, _WRIST)
             if abs(bend_deg) < KEPT_CLEAR_DEG + further_deg:
                 return tr(
-                    "Joint 5 would be at {angle:.1f} degrees there, too near to its "
-                    "singular place at 0 for a straight movement.",
+                    "Joint 5 would be at {angle:.1f} degrees there, too near its "
+                    "singularity at 0 for a straight movement.",
                     angle=bend_deg,
                 )
         return ""
@@ -198,8 +198,8 @@ class SingularPlaces:
         if swing_deg <= usual_deg * (1.0 if self.six_axes else _FOLLOWING):
             return ""
         return tr(
-            "Joint 1 would turn by {angle:.0f} degrees in a straight movement of {way:.1f} mm: "
-            "the wrist is too near to its axis.",
+            "Joint 1 would turn by {angle:.0f} degrees in a straight movement of {way:.1f} "
+            "mm: the wrist is too near its axis.",
             angle=swing_deg,
             way=way_mm,
         )

@@ -239,10 +239,10 @@ def read_published(variables: EpsonVariables) -> PublishedTools | None:
             return None
         raise
     raise ToolError(
-        tr("The published tool table was being changed at each of {n} readings.", n=_ATTEMPTS),
+        tr("The published tool table changed during each of {n} readings.", n=_ATTEMPTS),
         remedy=tr(
-            "Try again. If it stays so, the program was stopped in the middle of "
-            "RobolinkPublish; its next call puts that right."
+            "Try again. If this persists, the program was stopped in the middle of "
+            "RobolinkPublish; its next call corrects that."
         ),
     )
 
@@ -256,7 +256,8 @@ def _understood(
     if layout != LAYOUT:
         raise ToolError(
             tr(
-                "The project publishes its tools in layout {found}; this robolink reads {own}.",
+                "The project publishes its tools in layout {found}, but this robolink "
+                "reads layout {own}.",
                 found=layout,
                 own=LAYOUT,
             ),

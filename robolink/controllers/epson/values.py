@@ -81,12 +81,13 @@ class ValueChange(MarkedCommand[ValueT]):
         if not self._same(found, requested):
             raise ReadBackError(
                 tr(
-                    "{request} was accepted, but reads back as {found!r} instead of {requested!r}.",
+                    "The controller accepted {request}, but it reads back as {found!r} "
+                    "instead of {requested!r}.",
                     request=request,
                     found=found,
                     requested=requested,
                 ),
-                remedy=tr("A program or the PLC may set it too. Nothing was repeated."),
+                remedy=tr("A program or the PLC may also set it. Nothing was repeated."),
                 request=request,
             )
         return ValueReceipt(request, before, requested, found, skipped=False)
@@ -309,7 +310,7 @@ class EpsonVariables(DriverPart):
         if len(fields) != count:
             raise RemoteProtocolError(
                 tr(
-                    "{count} elements of {name} were requested, but {found} arrived.",
+                    "robolink requested {count} elements of {name}, but {found} arrived.",
                     count=count,
                     name=name,
                     found=len(fields),

@@ -135,7 +135,7 @@ class _Look(MarkedCommand[tuple[int, tuple[Spot, ...]]]):
 
     def _failed(self, code: int) -> OutcomeUnknownError:
         cause = ControllerFaultError(
-            tr("The vision program did not end as it should, or published nothing."),
+            tr("The vision program did not end normally, or published nothing."),
             code=code,
             controller=self._link.identity,
         )

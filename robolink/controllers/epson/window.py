@@ -69,7 +69,7 @@ class CommandWindow:
         if self._session.carries("Abort"):
             return
         raise NotReadyError(
-            tr("What is started over this serial line could not be stopped over it."),
+            tr("A movement started over this serial line could not be stopped over it."),
             reason=NotReadyReason.NO_ABORT,
             remedy=tr(
                 "Nothing was sent. Move over Remote Ethernet; or see with 'robolink "
@@ -127,7 +127,7 @@ class CommandWindow:
             if may_be_nothing:
                 return ""
             raise RemoteProtocolError(
-                tr("{query} printed nothing.", query=query),
+                tr("The controller printed nothing for {query}.", query=query),
                 remedy=tr("This controller's SPEL+ differs from the documented one; report it."),
                 controller=self._session.identity,
                 request=query,
@@ -175,7 +175,9 @@ class CommandWindow:
                 statement=statement,
                 answer=_shown(answer),
             ),
-            remedy=tr("Nothing was repeated. Read what it should have changed before you go on."),
+            remedy=tr(
+                "Nothing was repeated. Check what it should have changed before you continue."
+            ),
             controller=controller,
             request=statement,
         )
@@ -195,7 +197,7 @@ class CommandWindow:
             )
         return ControllerFaultError(
             tr(
-                "{statement!r} was ended by the controller: {cause}.",
+                "The controller ended {statement!r}: {cause}.",
                 statement=statement,
                 cause=cause,
             ),

@@ -408,6 +408,6 @@ def _require_simulator(url: LinkUrl, said: str) -> None:
     """
     if said != "yes" or not url.stays_here:
         raise ConfigError(
-            tr("Only the address of a simulator on this computer has the option simulated=yes."),
-            remedy=tr("Leave it out of the address of a machine. Nothing was sent."),
+            tr("The option simulated=yes is only for a simulator on this computer."),
+            remedy=tr("Remove it from the address of a machine. Nothing was sent."),
         )

@@ -141,7 +141,10 @@ class Handshake:
                 with suppress(RobolinkError):  # what is said below holds in any case
                     self._registers.switch(asked, on=False, kind=CommandClass.CALM)
                 raise self._unknown(
-                    tr("It did not answer the request within {timeout:g} s.", timeout=timeout_s)
+                    tr(
+                        "The PLC did not answer the request within {timeout:g} s.",
+                        timeout=timeout_s,
+                    )
                 )
             self._registers.clock.sleep(_POLL_S)
 
@@ -186,6 +189,6 @@ class Handshake:
 
     def _unknown(self, why: str) -> OutcomeUnknownError:
         return OutcomeUnknownError(
-            tr("It is not known whether the PLC took the value. {why}", why=why),
+            tr("robolink could not confirm that the PLC accepted the value. {why}", why=why),
             remedy=tr("The request was not repeated. Look at the HMI, then 'robolink recover'."),
         )

@@ -143,7 +143,7 @@ class Registers:
                 return found
         raise RemoteProtocolError(
             tr(
-                "The registers from {place} on are different at every reading.",
+                "The registers from {place} on change at every reading.",
                 place=describe_place(table, addresses.start),
             ),
             remedy=tr(
@@ -301,7 +301,7 @@ class MappedPlc(DriverLink):
     def no_motion(self) -> RejectedError:
         """Return the error for anything that would move, stop or switch the machine."""
         return RejectedError(
-            tr("A PLC with a register map is neither moved nor stopped by robolink."),
+            tr("robolink neither moves nor stops a PLC with a register map."),
             remedy=tr("Do it at the machine; in danger press the emergency stop."),
         )
 
@@ -376,7 +376,7 @@ class MappedPlc(DriverLink):
             raise NotReadyError(
                 tr("The machine does not permit changes now ({place}).", place=permit.place),
                 reason=NotReadyReason.NOT_REMOTE,
-                remedy=tr("Permit it at the machine, then try again; nothing was written."),
+                remedy=tr("Permit them at the machine, then try again; nothing was written."),
             )
 
     def require_known_place(self, tool: int) -> None:

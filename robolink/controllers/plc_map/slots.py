@@ -122,7 +122,7 @@ class OffsetValues:
         except RemoteProtocolError as error:
             raise LimitError(
                 tr(
-                    "{cause} It would read like that after the write, so nothing was sent.",
+                    "{cause} After the write it would read like that, so nothing was sent.",
                     cause=error.what,
                 ),
                 remedy=tr("Write 0 in place of so small a number."),
@@ -189,7 +189,7 @@ class OffsetValues:
             )
         raise RemoteProtocolError(
             tr(
-                "{axis} at {place} reads {value:g}, which cannot be true.",
+                "{axis} at {place} reads {value:g}, which is impossible.",
                 axis=name.upper(),
                 place=number.place,
                 value=value,
@@ -296,7 +296,7 @@ class Slots:
             return SlotContent(dict.fromkeys(addresses, 0))
         raise ToolError(
             tr("Tool {tool} of this PLC cannot be made undefined.", tool=slot.tool),
-            remedy=tr("Write another offset; or zeros, if this machine takes zeros as no tool."),
+            remedy=tr("Write another offset; or zeros, if zeros mean no tool on this machine."),
         )
 
     def changed(self, slot: MapSlot, content: SlotContent) -> tuple[str, ...]:
@@ -357,7 +357,7 @@ class Slots:
             if not restored:
                 raise OutcomeUnknownError(
                     tr(
-                        "{refusal} The registers of tool {tool} could not be put back.",
+                        "{refusal} robolink could not restore the registers of tool {tool}.",
                         refusal=error.what,
                         tool=slot.tool,
                     ),

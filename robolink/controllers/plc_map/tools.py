@@ -82,7 +82,7 @@ class RegisterToolTable(ToolTableCore):
             self._plc.require_known_place(tool)
         if not self._map.slots[tool].table.writable:
             raise ToolError(
-                tr("Tool {tool} is in input registers, which nobody can write.", tool=tool),
+                tr("Tool {tool} is in input registers, which are read-only.", tool=tool),
                 remedy=tr("Change it at the HMI, or map holding registers."),
             )
 
@@ -300,6 +300,8 @@ class RegisterResolver(MarkerResolver):
         finding = examine_write(self._registers, marker)
         if finding.verdict is not Verdict.DONE or not self._registers.handshake.answers:
             return finding
-        sentence = tr("{holds} It is not known whether the PLC took it.", holds=finding.sentence)
-        action = tr("ask the PLC once more to take what is in the registers")
+        sentence = tr(
+            "{holds} robolink could not confirm that the PLC accepted it.", holds=finding.sentence
+        )
+        action = tr("ask the PLC again to accept the values in the registers")
         return replace(finding, verdict=Verdict.NOT_FINISHED, sentence=sentence, action=action)

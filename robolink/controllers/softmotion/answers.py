@@ -80,8 +80,8 @@ def refused(command: Command, now: Response, error_class: int) -> RejectedError:
 def command_ended_early(command: Command) -> ControllerFaultError:
     """Return the error for a command, not a movement, that a stop or a fault ended."""
     return ControllerFaultError(
-        tr("{request!r} was ended before it finished.", request=describe(command)),
-        remedy=tr("Someone stopped the group, or it went into error. Read the status."),
+        tr("{request!r} ended before it finished.", request=describe(command)),
+        remedy=tr("Somebody stopped the group, or it went into error. Check the status."),
     )
 
 
@@ -162,4 +162,4 @@ def _remedy(error_class: int, raw_error: int = 0) -> str:
             "then start again."
         ),
     }
-    return remedies.get(error_class) or tr("Read the status before you go on.")
+    return remedies.get(error_class) or tr("Check the status before you continue.")

@@ -388,8 +388,8 @@ class CommandSender:
     def _restless(self) -> OutcomeUnknownError:
         return OutcomeUnknownError(
             tr(
-                "{controller} was told to stop, but did not show within {seconds:g} s "
-                "that it is at rest.",
+                "robolink sent {controller} the stop, but could not confirm within {seconds:g} s "
+                "that the robot has stopped.",
                 controller=self._wire.identity,
                 seconds=REST_S,
             ),
@@ -407,8 +407,11 @@ class CommandSender:
         # Only what a stop ends is kept among the last ends; what had ended before it, well or
         # not, is not shown any more (docs/mailbox.md, "When a command counts").
         return UnclearAnswerError(
-            tr("A stop came before the end of {request!r} was read.", request=describe(command)),
-            remedy=tr("Read again what it should have changed."),
+            tr(
+                "A stop came before robolink read the end of {request!r}.",
+                request=describe(command),
+            ),
+            remedy=tr("Check what it should have changed."),
         )
 
     def _overtaken(self, command: Command, now: Response) -> RemoteProtocolError:
@@ -420,7 +423,7 @@ class CommandSender:
                 owner=now.ack_owner,
                 request=describe(command),
             ),
-            remedy=tr("Find the other client; one at a time may command this mailbox."),
+            remedy=tr("Find the other client; only one at a time may command this mailbox."),
         )
 
 

@@ -81,7 +81,7 @@ def require_beats(whole_look_s: float) -> None:
         raise ConfigError(
             tr(
                 "This line is too slow for movements: one reading of the PLC takes "
-                "{look:.2f} s, and a movement is halted after 0.5 s without a sign "
+                "{look:.2f} s, and the PLC stops a movement after 0.5 s without a signal "
                 "from this computer.",
                 look=whole_look_s,
             ),
@@ -109,7 +109,7 @@ def require_still(now: Response) -> None:
         raise NotReadyError(
             tr("An interrupted movement is waiting to continue."),
             reason=NotReadyReason.PAUSED,
-            remedy=tr("Let it continue to its end, or halt it."),
+            remedy=tr("Let it finish, or stop it."),
         )
 
 

@@ -215,7 +215,7 @@ class SoftMotionController(ControllerCore):
                     now = self._left(state, mailbox.commands.carry_out(draft))
             if any(now.group_state == state for state, _draft in _RESETS):
                 raise ControllerFaultError(
-                    tr("The reset did not bring the axis group out of its state."),
+                    tr("The axis group is still in the same state after the reset."),
                     code=now.error_class,
                     remedy=tr("Remove the cause at the drives or the machine, then reset again."),
                 )

@@ -74,7 +74,7 @@ class SoftMotionGroup(MotionGroupCore):
         """Read what a person must know before the group moves."""
         return MotionTerms(
             tr("The axis group of {identity}", identity=self._mailbox.identity),
-            tr("The PLC halts it if this computer falls silent for half a second."),
+            tr("The PLC stops it if this computer sends nothing for half a second."),
             tr("The machine permits movements by this computer"),
         )
 

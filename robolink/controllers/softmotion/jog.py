@@ -236,10 +236,10 @@ class JogWatch:
         if refusal is not None:
             raise ControllerFaultError(
                 tr(
-                    "The end of {jog} was not acknowledged. The group was halted and stands still.",
+                    "The PLC did not acknowledge the end of {jog}. The group was stopped.",
                     jog=self.request,
                 ),
-                remedy=tr("Look at the link to the PLC before the next jog."),
+                remedy=tr("Check the link to the PLC before the next jog."),
             ) from refusal
         return now
 
@@ -273,7 +273,7 @@ class JogWatch:
 
     def _unproved(self, cause: RobolinkError | None) -> OutcomeUnknownError:
         error = OutcomeUnknownError(
-            tr("The group did not come to rest after {jog}.", jog=self.request),
+            tr("The group did not stop after {jog}.", jog=self.request),
             remedy=tr(
                 "Press the emergency stop if the robot still moves. Next: 'robolink "
                 "recover'. The robot stays blocked until then."

@@ -178,7 +178,7 @@ def require_fit(images: OrientationImages, now: Response, offset: ToolOffset) ->
         return
     raise _incompatible(
         tr(
-            "{kinematics} cannot carry this tool: {parts} of its shift is impossible. {why}",
+            "{kinematics} cannot use this tool: {parts} of its shift is impossible. {why}",
             kinematics=_name(now),
             parts=_parts(space, shift),
             why=_why(space),
@@ -209,7 +209,7 @@ def require_measurable(images: OrientationImages, now: Response, components: Seq
     if impossible:
         raise _incompatible(
             tr(
-                "{kinematics} cannot be given what would be measured: {parts}. {why}",
+                "{kinematics} cannot store the measured values: {parts}. {why}",
                 kinematics=_name(now),
                 parts=", ".join(name[0].upper() for name in impossible),
                 why=_why(space),

@@ -116,11 +116,11 @@ class SoftMotionMotion:
             self.abort()
             raise MotionTimeoutError(
                 tr(
-                    "{request!r} did not end within {timeout_s:.0f} s and was halted.",
+                    "{request!r} did not end within {timeout_s:.0f} s; robolink stopped it.",
                     request=self._request,
                     timeout_s=timeout_s,
                 ),
-                remedy=tr("Read where the robot is ('robolink robot where') before you go on."),
+                remedy=tr("Check where the robot is ('robolink robot where') before you continue."),
             )
         end = self._take_end()
         self._await_rest()

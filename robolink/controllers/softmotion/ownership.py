@@ -113,14 +113,14 @@ class Ownership:
         """Ask again and again until the PLC gives away what a run left that has ended."""
         self._tell(
             tr(
-                "{who} took the mailbox of the PLC on {since} and has ended without giving it "
-                "back. Waiting until it is free, {seconds:.0f} s at most.",
+                "{who} locked the mailbox of the PLC on {since} and ended without "
+                "releasing it. Waiting until it is free, {seconds:.0f} s at most.",
                 who=run.who,
                 since=local_label(run.since),
                 seconds=_LONGEST_SILENCE_S,
             )
         )
-        latch, request = self._wire.latch, tr("taking the mailbox")
+        latch, request = self._wire.latch, tr("locking the mailbox")
         stopped = latch.closed
         deadline = Deadline.after(self._wire.clock, _LONGEST_SILENCE_S)
         while not deadline.expired:
@@ -221,7 +221,10 @@ class Ownership:
 
     def _lost_error(self, request: str) -> LeaseLostError:
         return LeaseLostError(
-            tr("{request!r} was not sent: another client took the mailbox.", request=request),
+            tr(
+                "{request!r} was not sent: another client has taken over the mailbox.",
+                request=request,
+            ),
             remedy=tr("Connect again when it has ended."),
         )
 
@@ -237,7 +240,8 @@ class Ownership:
                 identity=self._wire.identity,
             )
             error.remedy = tr(
-                "Close the other program; {seconds:.0f} s after its last sign the mailbox is free.",
+                "Close the other program; {seconds:.0f} s after its last signal the "
+                "mailbox is free.",
                 seconds=SILENCE_S,
             )
         else:
@@ -262,8 +266,8 @@ class Ownership:
     def _wait_for_silence(self, held: LeaseHeldError) -> None:
         self._tell(
             tr(
-                "Client {holder} holds the mailbox of the PLC. If it has ended, the mailbox is "
-                "free within {seconds:.0f} s. Waiting until then.",
+                "Client {holder} has the mailbox of the PLC locked. If it has ended, the "
+                "mailbox is free within {seconds:.0f} s. Waiting until then.",
                 holder=held.holder,
                 seconds=_LONGEST_SILENCE_S,
             )

@@ -292,7 +292,7 @@ class Snapshots:
     def _useless(self, name: str, cause: str, *, keep: bool) -> RobolinkError:
         useless = RemoteProtocolError(
             tr("{name} cannot be used: {cause}.", name=name, cause=cause),
-            remedy=tr("Connect again; if it stays so, compare the PLC's register map."),
+            remedy=tr("Connect again; if this persists, compare the PLC's register map."),
         )
         return useless if keep else self._wire.ended(useless)
 
@@ -320,8 +320,8 @@ class Snapshots:
         if now.boot_id != met.boot_id:
             what = tr("The PLC {identity} has restarted.", identity=self._wire.identity)
             remedy = tr(
-                "Nothing comes back by itself: no tool slot is selected now and the "
-                "group is disabled. Connect again and select the tool."
+                "No tool slot is selected now, and the group is disabled. Connect again "
+                "and select the tool."
             )
         else:
             what = tr("The unit of length of {identity} changed.", identity=self._wire.identity)

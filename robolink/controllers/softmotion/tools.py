@@ -317,7 +317,8 @@ class SoftMotionResolver(MarkerResolver):
 
 def _examine_output(marker: Marker) -> Finding:
     sentence = tr(
-        "A PLC's output cannot be read through the mailbox: look at what {request!r} did.",
+        "A PLC's output cannot be read through the mailbox: check the effect of "
+        "{request!r} at the machine.",
         request=marker.request,
     )
     return Finding(marker, Verdict.LOOK, sentence)

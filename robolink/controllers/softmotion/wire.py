@@ -73,7 +73,7 @@ class MotionTracker:
         """
         if len(self._ends) >= MOST:
             raise BusyError(
-                tr("{request} has to wait: four movements are unfinished.", request=request),
+                tr("{request} must wait: four movements are unfinished.", request=request),
                 remedy=tr("Wait for the first of them, then send the next."),
             )
 

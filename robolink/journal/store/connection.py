@@ -285,8 +285,7 @@ def _require_file(place: JournalPlace) -> None:
         raise JournalError(
             tr("There is no journal {name}.", name=place.name),
             remedy=tr(
-                "The first change that robolink makes starts one; or name another one "
-                "in ROBOLINK_JOURNAL."
+                "robolink creates one at the first change; or name another one in ROBOLINK_JOURNAL."
             ),
         )
 

@@ -112,8 +112,8 @@ def _sentences(reason: str, text: str) -> tuple[str, str]:
 
 def _move_it_away() -> str:
     return tr(
-        "Save what can be read with {export} and move the file away; a new one is made then. It "
-        "also held what was left unfinished: check the robot's selected tool and its tool "
-        "offsets by hand.",
+        "Save the readable part with {export} and move the file away; robolink then "
+        "creates a new one. The file also held the unfinished jobs: check the robot's "
+        "selected tool and its tool offsets by hand.",
         export=remedy_word(RemedyWord.EXPORT_JOURNAL),
     )

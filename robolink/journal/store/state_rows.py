@@ -168,9 +168,9 @@ def _marker(row: _Stored) -> Marker:
         raise JournalError(
             tr("A safety record of {controller} cannot be read.", controller=row.controller),
             remedy=tr(
-                "It says what was left unfinished, {request!r} of {when}, and may "
-                "have been written by a newer robolink. Check the robot's selected "
-                "tool and its tool offsets by hand, then move the journal away.",
+                "It is about an unfinished job, {request!r} of {when}, and may come from a "
+                "newer robolink. Check the robot's selected tool and its tool offsets by "
+                "hand, then move the journal away.",
                 request=row.request,
                 when=local_label(row.begun_at),
             ),

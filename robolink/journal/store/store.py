@@ -227,8 +227,8 @@ class Store:
             raise JournalError(
                 tr("The journal {name} was moved or deleted while in use.", name=self._place.name),
                 remedy=tr(
-                    "Put it back. Otherwise the next command starts a new one, which knows nothing "
-                    "of what is unfinished."
+                    "Put it back. Otherwise the next command creates a new one without a "
+                    "record of unfinished jobs."
                 ),
             )
         return self._tables

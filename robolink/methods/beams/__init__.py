@@ -89,8 +89,7 @@ class BeamsParameters(SampledParameters):
         Option(metavar="DEG"),
         Help(
             declared(
-                "By how much U differs at a second measurement, so that moved beams do no harm; "
-                "0 for no second one."
+                "Turn of U for a second measurement, so that moved beams do no harm; 0 for none."
             )
         ),
     ] = 0.0
@@ -98,7 +97,7 @@ class BeamsParameters(SampledParameters):
         int,
         Ge(1),
         Le(10),
-        Help(declared("How often each beam is crossed both ways; once cannot be checked.")),
+        Help(declared("How often to cross each beam both ways; once cannot be checked.")),
     ] = 2
     search_mm: Annotated[
         float,
@@ -123,10 +122,7 @@ class BeamsParameters(SampledParameters):
         Le(20),
         MM,
         Help(
-            declared(
-                "How much deeper the shaft is measured as well, to find a bent needle; 0 to "
-                "leave it out."
-            )
+            declared("How much deeper to measure the shaft too, to find a bent needle; 0 for none.")
         ),
     ] = 3.0
     max_lean_deg: Annotated[
@@ -164,7 +160,7 @@ class BeamsParameters(SampledParameters):
     retake: Annotated[
         bool,
         Option(flag="--retake/--no-retake", default=True),
-        Help(declared("Whether robolink offers to make the crossing that fits worst again.")),
+        Help(declared("Offer to repeat the crossing that fits worst.")),
     ] = False
 
     def may_end_early(self, *, sigma_stated: bool) -> bool:
@@ -293,7 +289,7 @@ class BeamsSource(InputSource[BeamsParameters]):
     @property
     def remedy(self) -> str:
         """What to do when a measurement makes the tip jump."""
-        return tr("Were the beams moved since the reference was taken, or does the needle lean?")
+        return tr("Were the beams moved since the reference was recorded, or does the needle lean?")
 
     def told_by(self, context: MeasurementContext) -> Self:
         """Return the source with the run-up and the step of a crossing."""
@@ -416,14 +412,14 @@ def _proof() -> "type[KeptProof]":
 
 METHOD = Method(
     name="beams",
-    summary=declared("Drive the tip through two crossed light beams: X and Y."),
+    summary=declared("Find X and Y by driving the tip through two crossed light beams."),
     description=declared(
         "Drive the tip through two crossed light beams: X and Y; nobody touches anything.\n\n"
-        "As soon as the crossings check each other it says after each how well they agree and what "
-        "X and Y are repeatable to. At the end the one that fits worst is named and may be made "
-        "again.\n\n"
-        "The station is declared in the cell file, or was learnt with 'station learn'. Afterwards "
-        "the tip turns half a turn about itself and crosses the beams again."
+        "Once the crossings check each other, it shows after each how well they agree and "
+        "what X and Y are repeatable to. At the end it names the one that fits worst, and "
+        "you can repeat it.\n\n"
+        "Declare the station in the cell file, or learn it with 'station learn'. "
+        "Afterwards the tip turns half a turn about itself and crosses the beams again."
     ),
     parameters=BeamsParameters,
     measures=("x_mm", "y_mm"),

@@ -155,10 +155,10 @@ def require_known_length(stored: ToolOffset | None) -> ToolOffset:
     """
     if stored is None:
         raise ConfigError(
-            tr("The tool is not defined: how far above the pin it has to stop is not known."),
+            tr("The tool is not defined: the robot cannot know how far above the pin to stop."),
             remedy=tr(
-                "Write about where the tip is with 'tool set', to a millimetre or two, and "
-                "measure then."
+                "First write the place of the tip with 'tool set', to a millimetre or two, "
+                "then measure."
             ),
         )
     return stored
@@ -189,7 +189,7 @@ class OneTouchSource(ProvesAgain):
     @property
     def remedy(self) -> str:
         """What to do when a measurement makes the tip jump."""
-        return tr("Was the pin bumped, or is the nozzle loose? A full calibration tells.")
+        return tr("Was the pin bumped, or is the nozzle loose? A full calibration will show it.")
 
     def measure(
         self,

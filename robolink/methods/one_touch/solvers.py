@@ -122,8 +122,8 @@ def find_last_touch(controller: Controller, tool: int, station: str) -> LastTouc
                 value=describe_offset(newest.value),
             ),
             remedy=tr(
-                "The tool is not what its last calibration left. Put that value back, or "
-                "make a full calibration."
+                "The tool changed since its last calibration. Write that value back, or "
+                "run a full calibration."
             ),
         )
     return newest
@@ -332,8 +332,8 @@ def difference_from_last(
     if sigma is None:
         raise ConfigError(
             tr(
-                "It is not known how well a touch repeats: the last calibration left "
-                "nothing that checks it."
+                "The repeatability of a touch is not known: the last calibration could not "
+                "check it."
             ),
             remedy=tr(
                 "Give {sigma} (in a recipe sigma_mm), or calibrate with n-angle once.",

@@ -217,8 +217,8 @@ def require_known_tip(stored: ToolOffset | None) -> ToolOffset:
         raise ConfigError(
             tr("The tool is not defined: where its tip would swing when it tilts is not known."),
             remedy=tr(
-                "Write about where the tip is with 'tool set', to a millimetre or two, and "
-                "measure then."
+                "First write the place of the tip with 'tool set', to a millimetre or two, "
+                "then measure."
             ),
         )
     return stored

@@ -224,8 +224,8 @@ def verify_on_surface(
             break
         yield Notify(
             tr(
-                "The tip is {drift:.3f} mm off, too near to the limit of {limit:.3f} mm. The "
-                "surface is touched once more at every place; the mean counts.",
+                "The tip is {drift:.3f} mm off, too near the limit of {limit:.3f} mm. "
+                "Touch the surface once more at every place; the mean counts.",
                 drift=proof.drift().distance_mm,
                 limit=tolerance_mm,
             )

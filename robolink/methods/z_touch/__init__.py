@@ -119,7 +119,7 @@ class ZTouchParameters(SampledParameters):
     retake: Annotated[
         bool,
         Option(flag="--retake/--no-retake", default=True),
-        Help(declared("Whether robolink offers to make the touch that fits worst again.")),
+        Help(declared("Offer to repeat the touch that fits worst.")),
     ] = False
 
     def may_end_early(self, *, sigma_stated: bool) -> bool:

@@ -182,7 +182,7 @@ def _said(result: CalibrationResult, evidence: Mapping[str, Any]) -> str:
     if "drift_in_run_order" in result.warnings:
         said.append(tr("A drift shows from the first to the last."))
     if "order_not_testable" in result.notes:
-        said.append(tr("With so few poses it cannot be seen whether something moved meanwhile."))
+        said.append(tr("With so few poses, drift during the measurement cannot be checked."))
     if evidence.get("step_f") is not None:
         said.append(
             tr(

@@ -188,6 +188,6 @@ def conformity(report: Report) -> Iterator[str]:
             limit=result.tolerance_mm,
         )
     elif report.outcome in (Outcome.WRITTEN, Outcome.SKIPPED):
-        yield tr("Conformity is not stated: the tip was not proved by turning about it.")
+        yield tr("Conformity is not stated: there was no turn test of the new tip.")
     elif report.outcome is not Outcome.PROPOSED:
         yield tr("Conformity is not stated: this change was not kept.")

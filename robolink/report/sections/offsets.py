@@ -104,7 +104,7 @@ def absence(report: Report) -> str:
     """Return why nothing is shown, for a report without taught points."""
     if report.before is None:
         return tr("The tool was undefined: no program can have driven to a point with it.")
-    return tr("No taught points were named, so where they lead afterwards is not shown.")
+    return tr("No taught points were named, so this page shows none.")
 
 
 def moves_nothing(impact: Impact) -> bool:

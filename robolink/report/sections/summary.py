@@ -170,7 +170,7 @@ def _verdict(outcome: Outcome) -> str:
         Outcome.REFUSED: tr("Refused, nothing was written"),
         Outcome.VERIFY_FAILED: tr("The turn test failed"),
         Outcome.NOT_APPLIED: tr("Not applied, the tool keeps its old value"),
-        Outcome.ROLLED_BACK: tr("Taken back, the tool has its old value again"),
+        Outcome.ROLLED_BACK: tr("Undone, the tool has its old value again"),
         Outcome.CONFLICT: tr("Conflict: the tool holds neither the old nor the new value"),
         Outcome.UNFINISHED: tr("Not finished"),
     }[outcome]

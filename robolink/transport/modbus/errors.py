@@ -44,7 +44,7 @@ def unanswered(
     """Return the error for an answer that did not come, or not whole."""
     if held:
         what = tr(
-            "{identity} answered {count} bytes, then nothing: {request}.",
+            "{identity} sent only {count} bytes of its answer: {request}.",
             identity=identity,
             count=len(held),
             request=describe(request),

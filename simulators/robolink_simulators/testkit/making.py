@@ -116,7 +116,7 @@ def require_heeded(names: Iterable[str], kinds: Iterable[str]) -> None:
         if name not in heeded:
             raise ConfigError(
                 tr(
-                    "No simulated cell of this kind ({kinds}) pays heed to {name!r}.",
+                    "No simulated cell of this kind ({kinds}) uses {name!r}.",
                     kinds=", ".join(kinds),
                     name=name,
                 ),

@@ -37,7 +37,7 @@ from tests.cli.wizard._people import (
     write_subject,
 )
 
-CHOICES = ("The old one.", "The new one.", "I cannot tell.")
+CHOICES = ("The old one.", "The new one.", "I am not sure.")
 
 
 def at_touch(**more):
@@ -49,7 +49,7 @@ def test_a_first_touch_that_the_robot_went_to_by_itself_is_jogged_too():
     assert brought.sent == ["done"], (
         "a tip that was on the pin before anything moved is taken as it is"
     )
-    going = MoveSubject(ARRIVAL, Way.JOINT, 20.0, "Moving to where tool 1 is measured.")
+    going = MoveSubject(ARRIVAL, Way.JOINT, 20.0, "Moving to the station for tool 1.")
     carried = Sitting().happens(WasRegarded(going)).asked(touch_subject(number=1, arrival=None))
     carried.keys("5")
     assert "still stands where the robot put it" in carried.state.message
@@ -373,7 +373,7 @@ def test_a_typed_pose_is_gone_after_a_step_and_where_none_is_taken():
     assert at_touch().keys(".").state.message == "You cannot type a pose here."
     assert at_touch().line("pose 1 2 3 4").state.pose_typed == ""
     three = at_touch(types=True).line("pose 1 2 3")
-    assert "Nothing was taken." in three.state.message
+    assert "Nothing was recorded." in three.state.message
     assert three.keys("5").sent == []
     assert at_touch(types=True).keys(".").key("stop").sent == ["q"]
 
@@ -384,7 +384,7 @@ def test_nothing_of_one_touch_counts_for_the_next():
     hand.asked(touch_subject(types=True)).keys("5")
     assert hand.sent == []
     assert "still stands where the robot put it" in hand.state.message
-    going = MoveSubject(ARRIVAL, Way.JOINT, 20.0, "Moving to where tool 2 is measured.")
+    going = MoveSubject(ARRIVAL, Way.JOINT, 20.0, "Moving to the station for tool 2.")
     hand = at_touch().jogs("z-0.1").happens(WasRegarded(going))
     hand.asked(touch_subject(number=1, arrival=None)).keys("5")
     assert hand.sent == []

@@ -45,7 +45,7 @@ SAID = {
     ),
     "the safe way out": r"STOP|Stop: .*|Leave.*|Do not write|Put the old value back\.",
     "more, less": r"One more touch|Next tool|",
-    "a touch again": r"Touch \\d+ again|Start again at touch 1",
+    "a touch again": r"Touch \d+ again|Start again at touch 1",
     "open what is not shown": r"The rest|Show the report|Type the pose, .*|shows the rest\.",
     "write": r"Write|or Space\.",
     "turn the arrows": r"Turn keys",

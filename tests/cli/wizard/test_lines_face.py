@@ -226,7 +226,7 @@ def test_neither_a_question_nor_the_end_of_a_movement_finds_an_answer_there(
     if kind is Question.PLACE:
         # It waits for the next step at the same question: the robot has moved meanwhile.
         assert told(face, hand, WaitsForAnswer(number, hand.now), line) == []
-    assert "Typed too early, so it was not taken" in capsys.readouterr().err
+    assert "Typed too early and ignored" in capsys.readouterr().err
     face._lines = Typed(line)
     assert not face._listen(Desk(), hand.state).waits, "one that is typed now is the answer"
 
@@ -250,7 +250,7 @@ def spent_s():
         ((), 2, "Usage: robolink"),
         (("change",), 9, "There is nobody to ask here."),
         (("calibrate", "two-pose", "--tool", "1"), 9, "nobody"),
-        (("recover",), 0, "Nothing is left unfinished"),
+        (("recover",), 0, "No job is left unfinished"),
     ],
 )
 def test_every_entry_ends_by_itself(words, code, said):

@@ -100,13 +100,13 @@ def chosen_and_tested(hand):
     hand.start()
     contacts = 0
     while True:
-        found = hand.see(r"Jog the tip onto the pin|Everything is settled|DONE|STOPPED")[0]
+        found = hand.see(r"Jog the tip onto the pin|All jobs are finished|DONE|STOPPED")[0]
         contacts += found.startswith("Jog")
         if not found.startswith("Jog"):
             return contacts
         hand.jog()
         hand.press(["5"])
-        hand.see("moving|Please wait|Everything is settled|DONE|STOPPED")
+        hand.see("moving|Please wait|All jobs are finished|DONE|STOPPED")
 
 
 @pytest.mark.simulator_only

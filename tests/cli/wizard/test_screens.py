@@ -538,9 +538,9 @@ def test_how_long_a_movement_takes_is_said_where_it_is_known():
     def shown(hand, later_s=0.0):
         return "\n".join(screen_of(hand.state, hand.now + later_s).rows())
 
-    assert "Still: 23.0 mm, about 3 s" in shown(coming_down())
+    assert "To go: 23.0 mm, about 3 s" in shown(coming_down())
     # A controller that tells no position meanwhile: the whole way, from where it began.
-    assert "Way:   60.0 mm in all, about 8 s" in shown(coming_down(reads=False))
+    assert "Path:  60.0 mm in all, about 8 s" in shown(coming_down(reads=False))
     assert "Still" not in shown(coming_down(), later_s=1.5), "where it is now, nobody knows"
     # A tool that turns on its way has a speed of its own.
     for turns in ({"u_deg": 80.0}, {"v_deg": 1.0}, {"w_deg": 1.0}):
@@ -627,7 +627,7 @@ def test_lines_show_each_row_of_a_contradicted_turn_test_and_what_enter_does():
     hand = turn_test_asks()
     told = told_before(hand.state)
     assert told[0] == "  1 Put the old value back."
-    assert told[2] == "  2 Touch once more."
+    assert told[2] == "  2 Make one more touch."
     assert told_question(hand.state).endswith(
         "What should happen now? [Type the number of a row. Enter alone: 1.]"
     )

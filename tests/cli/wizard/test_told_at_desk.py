@@ -123,8 +123,8 @@ def test_nothing_of_a_proposal_is_left_out_before_it_is_written(count):
         assert f" Tool {tool} " in seen
         assert f"Stations found with tool {tool}: 1" in seen
     assert any("Stations found with tool 1" in row for row in told_before(hand.state))
-    assert count > 1 or "Where a program goes with tool 1" in seen
-    assert count > 1 or "error this write removes" in seen
+    assert count > 1 or "Programs using tool 1 will now run" in seen
+    assert count > 1 or "corrects the" in seen
 
 
 def test_the_state_row_says_nothing_that_was_not_read():
@@ -238,7 +238,7 @@ def test_a_list_says_which_backup_there_is_on_this_computer(tmp_path, monkeypatc
             path.unlink()
             assert "has no backup of this controller" in listed(controller)
         with robolink.connect("epson+sim://no-backup") as controller:
-            assert "what is simulated ends with this command" in listed(controller)
+            assert "the simulation ends with this command" in listed(controller)
 
 
 def test_a_backup_that_is_missing_keeps_nobody_from_starting():
@@ -253,13 +253,13 @@ def test_a_list_says_how_a_tool_was_left_and_nothing_of_one_that_somebody_change
     with serve_tcp(simulator, clock=ScaledClock(10.0)) as host:
         log = memory_journal(host.url).log(host.url, signature=Signature(nozzle="N-0417"))
         with robolink.connect(host.url, outcomes=log) as controller:
-            assert "as the last change left it" not in listed(controller, 1)
+            assert "unchanged since the last change" not in listed(controller, 1)
             change_tools(controller, [Wanted(1, new, controller.tools.read(1))])
             said = listed(controller, 1)
-            assert f"Tool 1 is as the last change left it: {describe_offset(new)}." in said
+            assert f"Tool 1 is unchanged since the last change: {describe_offset(new)}." in said
             assert "needle N-0417" in said
             simulator.machine.tools.set(1, ToolOffset(12.6, -3.0, -20.0))
-            assert "as the last change left it" not in listed(controller, 1)
+            assert "unchanged since the last change" not in listed(controller, 1)
 
 
 def test_lines_say_of_each_job_what_it_does():
@@ -340,7 +340,7 @@ def test_a_job_is_chosen_by_what_it_does_and_when_it_did_so_last(tmp_path, monke
     log = open_log("x", durable=True, signature=Signature(recipe=name, nozzle="N-7"))
     log.append(NewEntry(EntryKind.DONE, tool=1, details={"took_s": 600.0}))
     log.close()
-    assert offered()[2].startswith("Used so far on another robot only, x, last ")
+    assert offered()[2].startswith("Used so far only on another robot, x, last ")
     assert "needle N-7" not in offered()[2], "that was on another robot"
     other = (
         (tmp_path / "a.toml").read_text(encoding="utf-8").replace(f'name = "{name}"', 'name = "B"')
@@ -413,7 +413,7 @@ def test_where_there_is_no_recipe_one_that_fits_is_copied_and_not_run(tmp_path, 
     monkeypatch.chdir(cells)
     cell = find_cell("line3")
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(ConfigError, match="It is not run yet") as told:
+    with pytest.raises(ConfigError, match="Do not run it yet") as told:
         choose_recipe(desk := Chooser(1), cell, cell.url)
     (path,) = cells.glob("gantry*.toml")
     assert desk.marked == [("gantry-touch-probe", "Choose")]
@@ -501,7 +501,7 @@ def test_what_the_robot_of_the_cell_cannot_tilt_for_is_not_offered_and_else_that
     ("drawn", "tools", "said"),
     [
         (True, 1, []),
-        (True, 2, ["Tool 2 is measured now."]),
+        (True, 2, ["Measuring tool 2."]),
         (False, 1, ["-- tool 2: measure", "-- propose and write"]),
     ],
 )

@@ -51,7 +51,7 @@ def test_a_jog_whose_end_is_refused_is_halted(cell, plc, controller):
 
 def test_a_jog_whose_end_is_not_acknowledged_is_halted(cell, plc, controller):
     plc.overhears = ends_a_jog
-    with pytest.raises(ControllerFaultError, match=r"not acknowledged.*stands still"):
+    with pytest.raises(ControllerFaultError, match=r"did not acknowledge.*was stopped"):
         jog(controller)
     assert plc.opcodes() == [Opcode.JOG, Opcode.HALT]
     assert moves_nothing(plc)
@@ -62,7 +62,7 @@ def test_a_jog_whose_end_is_not_acknowledged_is_halted(cell, plc, controller):
 
 def test_a_jog_whose_end_and_halt_are_not_acknowledged_is_stopped(plc, controller):
     plc.overhears = lambda command: ends_a_jog(command) or command.opcode == Opcode.HALT
-    with pytest.raises(ControllerFaultError, match=r"not acknowledged.*stands still"):
+    with pytest.raises(ControllerFaultError, match=r"did not acknowledge.*was stopped"):
         jog(controller)
     assert plc.opcodes() == [Opcode.JOG, Opcode.STOP]
     assert moves_nothing(plc)
@@ -172,7 +172,7 @@ def test_a_jog_that_another_program_takes_over_is_said_to_be_and_what_he_moves_i
     assert failure.value.code == ErrorClass.NOT_OWNER
     assert plc.opcodes() == [Opcode.JOG]
     assert cell.open_requests() == []
-    with pytest.raises(LeaseLostError, match="another client took the mailbox"):
+    with pytest.raises(LeaseLostError, match="another client has taken over the mailbox"):
         jog(controller)
     assert plc.opcodes() == [Opcode.JOG]
 

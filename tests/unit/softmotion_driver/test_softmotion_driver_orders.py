@@ -280,7 +280,7 @@ def test_a_group_whose_axes_go_on_after_its_stop_was_not_stopped(cell, plc, cont
         return read()
 
     cell.link.read_response = turning
-    with pytest.raises(OutcomeUnknownError, match="at rest") as unconfirmed:
+    with pytest.raises(OutcomeUnknownError, match="could not confirm") as unconfirmed:
         controller.stop()
     assert "press the emergency stop" in unconfirmed.value.remedy
 
@@ -301,7 +301,7 @@ def test_an_error_that_stays_after_the_reset_is_told(cell, plc, controller):
     for _ in range(100):
         cell.link.before("read_head", error_again)
         cell.link.before("read_response", error_again)
-    with pytest.raises(ControllerFaultError, match="out of its state"):
+    with pytest.raises(ControllerFaultError, match="still in the same state"):
         controller.reset_fault()
 
 

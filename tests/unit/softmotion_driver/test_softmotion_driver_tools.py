@@ -255,7 +255,7 @@ def test_the_selected_tool_is_put_back_after_an_error(cell, plc, controller):
 
 def test_a_selection_that_could_not_be_put_back_is_offered(cell, plc, controller):
     controller.tools.select(3)
-    with pytest.raises(ConfigError, match="could not be selected again"):
+    with pytest.raises(ConfigError, match="could not select the previous tool"):
         with controller.preserved("calibration"):
             controller.tools.select(0)
             plc.now = replace(plc.now, group_state=GroupState.ERRORSTOP)

@@ -177,7 +177,7 @@ def test_an_image_calibration_turns_pixels_into_places(printed, failure):
         ("exact = true", "exact = 1", "calibration.1.exact: must be true or false"),
         ("exact = true", "", "calibration.1: needs one of exact, points and poses"),
         ("[0, 100, 10, 22]", "[0, 100]", "calibration.3: needs four numbers"),
-        ('name = "tip"', 'nam = "tip"', "is name meant?"),
+        ('name = "tip"', 'nam = "tip"', "did you mean name?"),
         ("camera_noise_px", "camera_noise", "no parameter 'camera_noise'"),
         ("NumberToFind", "NumberToSeek", "no property or result numbertoseek"),
         ("robolink/vision/1", "robolink/vision/2", "schema: must be"),

@@ -202,7 +202,7 @@ def people(
     *,
     cell: Annotated[str | None, CliArgument()] = None,
 ) -> None:
-    """List who works at one CELL or at all, and in which role. Engineers may do everything."""
+    """List who works at one CELL, or at all cells, and in which role."""
     from robolink.config import find_cell, load_cells
     from robolink_cli.views.cells import people_payload, show_people
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @click.group()
 def poses() -> None:
-    """Show how robolink reads files of poses."""
+    """Show how robolink reads a file of poses."""
 
 
 @poses.command("show", short_help="Show the poses in a file, and how robolink read them.")

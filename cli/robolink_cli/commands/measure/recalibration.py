@@ -364,7 +364,7 @@ class Recalibration:
         nobody = not self.options.answers.yes and self.options.alone
         if nobody and not run.takes_reference:
             raise DeclinedError(
-                tr("This writes tools, but there is nobody to confirm it."),
+                tr("This writes tools, but there is nobody to ask."),
                 remedy=tr("Nothing was written. Add --yes, or run it on a terminal."),
             )
 

@@ -250,7 +250,7 @@ def _agree_to_write(tool: int, *, yes: bool) -> None:
     )
     if not yes and not on_terminal():
         raise DeclinedError(
-            tr("This writes tool {tool}, but there is nobody to confirm it.", tool=tool),
+            tr("This writes tool {tool}, but there is nobody to ask.", tool=tool),
             remedy=tr("Nothing was written. Add --yes, or run it on a terminal."),
         )
     agree(question, yes=yes)

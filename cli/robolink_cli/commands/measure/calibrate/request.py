@@ -45,7 +45,7 @@ class CalibrationRequest:
     Attributes:
         context: What the command was told about controller, person and nozzle.
         tool: Number of the tool.
-        criteria: What a measurement must be like to be believed.
+        criteria: Acceptance limits of a measurement.
         limits: Where and how fast the robot may go.
         verify: Whether to prove the new tip after the write.
         assist: A simulator's stand-in for the person.

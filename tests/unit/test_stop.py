@@ -372,7 +372,8 @@ def test_a_stop_that_is_not_allowed_is_an_error_at_once():
 class Wire:
     """Says one thing whatever is sent, and then nothing."""
 
-    identity = place = "robot"
+    url = identity = place = "robot"
+    durable = False
 
     def __init__(self, *pieces):
         self.clock = ManualClock()
@@ -386,6 +387,9 @@ class Wire:
         if not self._pieces:
             raise TransportTimeoutError("Nothing came.", remedy="Look at it.")
         return self._pieces.pop(0)
+
+    def receive_waiting(self):
+        return None
 
 
 def over(wire: Any) -> EpsonConversation:

@@ -12,8 +12,8 @@ what repeats six characters of it later is not told either.
 
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
-from contextvars import ContextVar
 from functools import wraps
+from threading import local
 from typing import Final, Literal, ParamSpec, TypeVar
 
 from robolink.messages import tr
@@ -51,7 +51,13 @@ class Listeners:
         self.links = 0
 
 
-_listeners: ContextVar[Listeners | None] = ContextVar("robolink_listeners", default=None)
+class _ThisThread(local):
+    """Who is told of what this thread opens."""
+
+    listeners: Listeners | None = None
+
+
+_here: Final = _ThisThread()
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -77,13 +83,13 @@ def told_to(*sinks: TraceSink | None) -> Iterator[Listeners]:
         [('sent', b'$GetStatus')]
         >>> line.close()
     """
-    outer, given = _listeners.get(), tuple(sink for sink in sinks if sink is not None)
+    outer, given = _here.listeners, tuple(sink for sink in sinks if sink is not None)
     listeners = Listeners(given if outer is None else (*outer.sinks, *given))
-    token = _listeners.set(listeners)
+    _here.listeners = listeners
     try:
         yield listeners
     finally:
-        _listeners.reset(token)
+        _here.listeners = outer
         if outer is not None:
             outer.links += listeners.links
 
@@ -94,15 +100,15 @@ def told_alike(opened: Callable[_P, _R]) -> Callable[_P, _R]:
     Args:
         opened: Opens it.
     """
-    listeners = _listeners.get()
+    listeners = _here.listeners
 
     @wraps(opened)
     def opened_later(*args: _P.args, **kwargs: _P.kwargs) -> _R:
-        token = _listeners.set(listeners)
+        before, _here.listeners = _here.listeners, listeners
         try:
             return opened(*args, **kwargs)
         finally:
-            _listeners.reset(token)
+            _here.listeners = before
 
     return opened_later
 
@@ -140,7 +146,7 @@ class Traffic:
         sinks: tuple[TraceSink, ...] = (),
         log: PackageLog | None = PACKAGE_LOG,
     ) -> None:
-        listeners = _listeners.get()
+        listeners = _here.listeners
         if listeners is not None and log is not None:
             listeners.links += 1
             sinks = (*listeners.sinks, *sinks)

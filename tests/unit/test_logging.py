@@ -160,6 +160,15 @@ def test_a_kind_with_a_link_of_its_own_tells_its_requests(heard, monkeypatch):
     assert any(one.direction == "sent" and one.controller == "acme+usb://17" for one in heard)
 
 
+def test_a_mailbox_in_this_process_tells_its_words():
+    told = []
+    trace = lambda _ns, direction, data: told.append((direction, data))  # noqa: E731
+    with robolink.connect("softmotion+sim://log-words", trace=trace) as controller:
+        controller.tools.write(5, ToolOffset(1, 2, -3), expected=None)
+    assert {len(data) for direction, data in told if direction == "sent"} <= {2, 128}
+    assert {len(data) for direction, data in told if direction == "received"} >= {72, 224}
+
+
 # What no log and no trace holds.
 
 

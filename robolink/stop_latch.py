@@ -76,6 +76,11 @@ class StopLatch:
         self._under_way = 0
         self._permits = threading.local()
         self._put_back: set[int] = set()
+        self._tell: Callable[[str], None] | None = None
+
+    def tell(self, told: Callable[[str], None]) -> None:
+        """Tell ``told`` of each request that is admitted, where the link itself tells nothing."""
+        self._tell = told
 
     @property
     def closed(self) -> bool:
@@ -126,7 +131,13 @@ class StopLatch:
         Raises:
             StoppedError: It was not sent.
         """
-        if not self._closed or kind in (CommandClass.LOOK, CommandClass.CALM):
+        if self._closed:
+            self._require_admitted(kind, request)
+        if self._tell is not None:
+            self._tell(request)
+
+    def _require_admitted(self, kind: CommandClass, request: str) -> None:
+        if kind in (CommandClass.LOOK, CommandClass.CALM):
             return
         if kind is CommandClass.RESET and self._permits.__dict__.get("calms") == self._closings:
             return

@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from gettext import gettext
-from typing import TYPE_CHECKING, Final, NoReturn
+from typing import TYPE_CHECKING, Any, Final, NoReturn
 
 import click
 
@@ -128,6 +128,20 @@ def _root() -> click.Command:
 def _answer(arguments: Sequence[str]) -> int:
     if "_ROBOLINK_COMPLETE" in os.environ:
         _root().main(list(arguments), prog_name="robolink")  # answers the shell and exits
+    before = _logs().logs_open() if _logs() else 0
+    code = _ended(arguments)
+    if logs := _logs():
+        logs.close_logs(beyond=before, code=code)
+    return code
+
+
+def _logs() -> "Any":  # noqa: ANN401 - a module
+    """Return what opens logs; ``None`` where nobody has asked for one."""
+    return sys.modules.get("robolink_cli.options.log_file")
+
+
+def _ended(arguments: Sequence[str]) -> int:
+    """Carry a command line out; return its exit code."""
     try:
         return _invoke(arguments)
     except click.exceptions.Exit as end:

@@ -214,6 +214,7 @@ class ControllerCore(DriverPart, ABC):
         except RobolinkError as error:
             advise_emergency_stop(error)
             raise
+        self._driver.decided("stop acknowledged: it rests", str(Act.STOP))
 
     def release_stop(self) -> None:
         """Let this process act again after :meth:`stop`, because a person says so."""

@@ -41,10 +41,14 @@ from robolink.errors import (
     RobolinkError,
     UnclearAnswerError,
 )
-from robolink.messages import joined, tr
+from robolink.messages import in_english, joined, tr
 from robolink.model import ChangeGuard, EntryKind, Marker, MarkerKind, NewEntry, OutcomeLog
+from robolink.package_log import PackageLog
 from robolink.stop_latch import StopLatch
 from robolink.timing import Clock
+from robolink.transport.traffic import Traffic
+
+_LOG: Final = PackageLog(__package__)
 
 EVERY_S: Final = 1.0
 """Between two signs: a tenth of the silence after which somebody counts as gone."""
@@ -251,6 +255,15 @@ class DriverLink:
             controller=self.identity,
         )
 
+    def decided(self, text: str, request: str) -> None:
+        """Log what was decided about this controller; see :mod:`robolink.package_log`.
+
+        Args:
+            text: A sentence.
+            request: What it was decided about.
+        """
+        _LOG.decided(text, controller=self.identity, request=request)
+
     def asked(self, request: str) -> AbstractContextManager[None]:
         """Let each error that leaves the block name this controller and ``request``."""
         return Concerning(self.identity, request)
@@ -277,6 +290,7 @@ class DriverLink:
                             command.send()
                         command.acknowledged = True
                         ledger.answered(marker)
+                        self.decided(f"accepted: {in_english(command.request)}", command.request)
                     except (RejectedError, ControllerFaultError) as error:
                         ledger.answered(marker)
                         if isinstance(error, RejectedError) and self.was_not_executed(error):
@@ -295,6 +309,24 @@ class DriverLink:
             unclear.remedy = command.told_by(found) or unclear.remedy
             raise unclear
         return found
+
+
+def tell_requests(latch: StopLatch, identity: str, clock: Clock) -> None:
+    """Have each request that a latch admits told to the trace and the log, where no bytes are.
+
+    Args:
+        latch: It; a request is told as text.
+        identity: Which controller.
+        clock: Its.
+    """
+    traffic = Traffic(identity, clock, log=_LOG)
+
+    def tell(request: str) -> None:
+        if traffic.listened():
+            said = in_english(request)
+            traffic.sent(said.encode("utf-8", "replace"), request=said)
+
+    latch.tell(tell)
 
 
 class DriverPart:

@@ -24,11 +24,14 @@ from robolink.errors import (
     StoppedError,
     TransportError,
 )
-from robolink.messages import tr
+from robolink.messages import in_english, tr
 from robolink.model import Ledger, Marker, MarkerKind, NewEntry, OutcomeLog, new_operation
+from robolink.package_log import PackageLog
 from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.stop_latch import LOOK_S, Patience, StopLatch
 from robolink.timing import local_label, wall_label
+
+_LOG: Final = PackageLog(__package__)
 
 _PROCEDURES: Final = frozenset({MarkerKind.SELECTION, MarkerKind.CHANGE})
 _OF_A_TOOL: Final = frozenset({"tool", "select"})
@@ -280,6 +283,7 @@ class MarkerStore:
         if not self._recorded(lambda: self.outcomes.begin(marker)):
             self._unstored.add(name)
         self.ledger.begin(marker)
+        self._decided(f"begun: {kind} {name}, {in_english(request)}", request)
         self._under_way[name] = kind
         if kind in _PROCEDURES:
             self._procedures[kind] = marker
@@ -295,6 +299,8 @@ class MarkerStore:
         """
         self.ledger.ended(marker)
         self._under_way.pop(marker.operation, None)
+        ends = ", ".join(str(entry.kind) for entry in entries) or "ended"
+        self._decided(f"settled: {marker.kind} {marker.operation}, {ends}", marker.request)
         cleared = True
         if marker.kind in _PROCEDURES:
             self.outcomes.clear(marker.operation, *entries)
@@ -455,4 +461,9 @@ class MarkerStore:
             raw=error.raw,
         )
         note_outcome(doubt, self.ledger.outcome())
+        self._decided("no clear answer came; it was not sent again", request, doubtful=True)
         return doubt
+
+    def _decided(self, text: str, request: str, *, doubtful: bool = False) -> None:
+        tell = _LOG.doubted if doubtful else _LOG.decided
+        tell(text, controller=self._identity, request=request)

@@ -35,11 +35,14 @@ from robolink.errors import (
 from robolink.journal import open_log, signature_here
 from robolink.messages import tr
 from robolink.model import Capabilities, ChangeLimits, Controller, OutcomeLog, Secret, Signature
+from robolink.package_log import PackageLog
 from robolink.plug_ins import PlugInError, find_plug_in
 from robolink.stop_latch import require_wait, waiting_for
 from robolink.timing import Clock, Deadline, SystemClock
-from robolink.transport import LinkUrl, TraceSink, parse_url
+from robolink.transport import LinkUrl, TraceSink, parse_url, told_to
 from robolink.version import VERSION
+
+_LOG: Final = PackageLog(__package__)
 
 CONTROLLERS_GROUP: Final = "robolink.controllers"
 
@@ -79,7 +82,8 @@ class ConnectionTerms:
         timeout_s: Longest wait for one answer.
         remote_timeout_s: The remote time-out set on an EPSON controller.
         clock: Replaces the machine's clock.
-        trace: Told of all traffic, where that can be told.
+        trace: Told of all traffic. The links of robolink tell it by themselves; a kind that has
+            one of its own makes a :class:`robolink.transport.Traffic` and tells that.
         outcomes: The record to keep; ``None`` for the journal of this user.
         glance: Whether this is for a look only.
         tell: Told, in sentences, what is waited for.
@@ -274,8 +278,10 @@ def connect(
             program or thread that is at work, in seconds; ``None`` or 0 refuses at once. The
             controller has it as ``patience.wait_s``.
         clock: Replaces the machine's clock; a simulator brings its own.
-        trace: Called with (time in ns, "sent" or "received", bytes) for all traffic but the
-            login frame; of an EPSON controller only.
+        trace: Called with (time in ns, "sent" or "received", bytes) for all traffic; a password is
+            ``b"<secret>"``. Bytes are those on the line: a CAN frame is its identifier in two
+            bytes and its data, a word of a mailbox in this process two bytes. A kind of another
+            package that has a link of its own tells its requests as text.
         outcomes: Where outcomes are recorded; by default the journal of this user, or memory
             for a simulator that dies with this process. A journal that cannot be used keeps
             nobody from looking and stopping: ``outcomes.trouble`` says what is wrong with it,
@@ -331,8 +337,7 @@ def connect(
         glance=glance,
         tell=tell,
     )
-    opener = find_opener(link)
-    controller = _waited_for(lambda: opener(link, terms), wait_s, tell)
+    controller = _waited_for(lambda: opened(link, terms), wait_s, tell)
     try:
         _require_kind(type(controller), kind, url)
         if wait_s:
@@ -387,6 +392,29 @@ def _waited_for(
                 tell(waiting_for(taken, left_s))
                 told = True
         runtime.sleep(min(left_s, _drawn(2 * _AGAIN_S)))
+
+
+def opened(url: LinkUrl, terms: ConnectionTerms) -> Controller:
+    """Connect to the controller at a URL, and have its traffic told.
+
+    A kind whose link tells nothing, such as the library of a maker, tells the requests that its
+    stop latch admits.
+
+    Args:
+        url: It.
+        terms: On which terms.
+
+    Raises:
+        RobolinkError: As the opener of its kind.
+    """
+    with told_to(terms.trace) as listeners:
+        controller = find_opener(url)(url, terms)
+        if not listeners.links:
+            from robolink.controllers.driver_link import tell_requests
+
+            tell_requests(controller.latch, controller.identity, controller.clock)
+    _LOG.decided("connected", controller=controller.identity, request="connect")
+    return controller
 
 
 FIRST_PAUSE_S: Final = 1.0

@@ -11,7 +11,7 @@ from typing import Final
 
 from robolink import runtime
 from robolink.controllers.controller_core import ControllerCore
-from robolink.controllers.driver_link import DriverLink
+from robolink.controllers.driver_link import DriverLink, tell_requests
 from robolink.controllers.motion_group import PolledGroup
 from robolink.controllers.tool_table import ToolTableCore
 from robolink.controllers.tool_writing import ToolWrite
@@ -135,6 +135,7 @@ class SimpleLink(DriverLink):
         gate = self._own_gate = InterruptGate()
         gate.open()
         super().__init__(identity, clock, StopLatch(identity), outcomes, gate=gate)
+        tell_requests(self.latch, identity, clock)
         self._machine = machine
         self._wire = runtime.lock()
         self._closed = False

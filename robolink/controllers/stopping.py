@@ -19,7 +19,8 @@ from robolink.errors import (
     TransportError,
 )
 from robolink.messages import tr
-from robolink.transport import LinkUrl, parse_url
+from robolink.package_log import PackageLog
+from robolink.transport import LinkUrl, parse_url, told_to
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -29,6 +30,8 @@ if TYPE_CHECKING:
     from robolink.model import Controller, ControllerStatus, Secret
     from robolink.timing import Clock
     from robolink.transport import TraceSink
+
+_LOG: Final = PackageLog(__package__)
 
 _TRIES: Final = 3
 """A stop may be repeated: an answer that was lost, or another client's words over ours in a
@@ -54,8 +57,8 @@ def stop_now(
         password: An EPSON controller's remote password, if one is set.
         timeout_s: Longest wait for the connection, and for one answer.
         clock: Replaces the machine's clock; a simulator brings its own.
-        trace: Called with (time in ns, "sent" or "received", bytes) for all traffic with an
-            EPSON controller but the login frame.
+        trace: Called with (time in ns, "sent" or "received", bytes) for all traffic but a
+            password; see :func:`robolink.connect`.
         met: Called with the name under which the controller is on record, once it stands and
             where it says of itself who it is.
 
@@ -79,10 +82,13 @@ def stop_now(
     kinds = {"epson": _stop_epson, "softmotion": _stop_group, "plc": _stop_map}
     stop = kinds.get(link.kind, _stop_other)
     given = password if isinstance(password, str) else password.reveal() if password else ""
-    means = _Means(given, timeout_s, clock, trace, met, runtime.random_number(32))
+    means = _Means(given, timeout_s, clock, met, runtime.random_number(32))
     for tries_left in reversed(range(_TRIES)):
         try:
-            return stop(link, means)
+            with told_to(trace):
+                status = stop(link, means)
+            _LOG.decided("stop acknowledged: it rests", controller=link.identity, request="stop")
+            return status
         except (TransportError, RemoteProtocolError) as error:
             if isinstance(error, ConnectError) or not tries_left:
                 raise
@@ -115,7 +121,6 @@ class _Means(NamedTuple):
     password: str
     timeout_s: float
     clock: "Clock | None"
-    trace: "TraceSink | None"
     met: "Callable[[str], None] | None"
     owner: int
     """The token of all tries in a mailbox. With one of its own, a try would be overtaken by the one
@@ -126,8 +131,7 @@ def _stop_epson(link: LinkUrl, means: _Means) -> "ControllerStatus":
     from robolink.controllers.epson.line import EpsonConversation, open_line
     from robolink.controllers.epson.rest import bring_to_rest
 
-    traces = () if means.trace is None else (means.trace,)
-    opened = open_line(link, timeout_s=means.timeout_s, clock=means.clock, traces=traces)
+    opened = open_line(link, timeout_s=means.timeout_s, clock=means.clock)
     talk = EpsonConversation(opened, timeout_s=means.timeout_s)
     try:
         with Concerning(talk.identity):
@@ -201,7 +205,7 @@ def _tell_what_is_said_twice(asked: "Callable[[], str]", met: "Callable[[str], N
 
 def _stop_other(link: LinkUrl, means: _Means) -> "ControllerStatus":
     """Stop a controller of a kind that another package brings, by what it offers for that."""
-    from robolink.controllers.registry import ConnectionTerms, find_opener
+    from robolink.controllers.registry import ConnectionTerms, opened
     from robolink.journal import open_log, signature_here
     from robolink.model import Secret
     from robolink.version import VERSION
@@ -212,11 +216,10 @@ def _stop_other(link: LinkUrl, means: _Means) -> "ControllerStatus":
         password=Secret(means.password) if means.password else None,
         timeout_s=means.timeout_s,
         clock=means.clock,
-        trace=means.trace,
         # It opens no journal before something has to be recorded.
         outcomes=open_log(link.address, durable=True, signature=signature, glance=True),
     )
-    with find_opener(link)(link, terms) as controller:
+    with opened(link, terms) as controller:
         controller.stop()
         return controller.status()
 

@@ -285,6 +285,7 @@ class ToolTableCore(DriverPart, ABC):
                     remedy=tr("Do not move the robot; check the controller's Tool setting."),
                 )
             self._prove_selected(offset, request)
+            self._driver.decided(f"selected: tool {tool}, after tool {before}", request)
 
     def _refuse_operator(self, tool: int) -> None:
         """Refuse a clear to an operator before another tool is selected for it."""

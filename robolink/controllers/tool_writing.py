@@ -107,6 +107,7 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
             self.before = self.read_before(expected)
             markers.ledger.saw_tool(self.tool, self.before)
             if self._same(self.before, self.requested):
+                self._link.decided("not written: it holds that value already", self.request)
                 return self._receipt(self.before, skipped=True)
             if expected is not ANY and not self._same(self.before, expected):
                 raise tool_changed(self.tool, self.before, expected)
@@ -115,6 +116,7 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
             found = self._link.carry_out(self)
             if not self._same(found, self.requested):
                 raise self._differs(found)
+            self._link.decided(f"verified: tool {self.tool} reads back as written", self.request)
             return self._receipt(found)
 
     def _require_clearer(self) -> None:

@@ -63,8 +63,12 @@ def holds(path: Path, data: bytes) -> bool:
         return False
 
 
-def append_to_named(path: Path) -> TextIO:
-    """Open a regular file for ASCII text at its end; it is made if it is not there.
+def append_to_named(path: Path, *, encoding: str = "ascii") -> TextIO:
+    """Open a regular file for text at its end; it is made if it is not there.
+
+    Args:
+        path: The file; a link is followed.
+        encoding: Of the text; what it lacks is written as an escape.
 
     Raises:
         OSError: As of :func:`read_named`.
@@ -72,7 +76,9 @@ def append_to_named(path: Path) -> TextIO:
     descriptor = os.open(path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | _AT_ONCE, _ANYONE)
     try:
         _mode_of_regular(descriptor)
-        return os.fdopen(descriptor, "a", encoding="ascii", newline="\n")
+        return os.fdopen(
+            descriptor, "a", encoding=encoding, errors="backslashreplace", newline="\n"
+        )
     except BaseException:
         os.close(descriptor)
         raise

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 from robolink.errors import JournalError, RemoteProtocolError
 from robolink.messages import tr
 from robolink.model import EntryKind, Identity, NewEntry, Signature, Who
+from robolink.package_log import PackageLog
 from robolink.timing import wall_label
 
 if TYPE_CHECKING:
@@ -69,6 +70,9 @@ class _Meeting:
     shared: bool = False
 
 
+_LOG: Final = PackageLog(__package__)
+
+
 class Naming:
     """Finds out who the controller of one log is, and keeps that on record.
 
@@ -116,6 +120,8 @@ class Naming:
                 meeting = self._looked_up(found)
             if found is None or (found.certain and self._recorded(found, meeting, signature)):
                 self._settled = meeting.names
+                if found is not None:
+                    _LOG.decided(f"identified, reached at {found.address}", controller=found.name)
             return meeting.names
         return self._settled
 

@@ -15,13 +15,16 @@ from typing import TYPE_CHECKING, Final
 from robolink.errors import LeaseHeldError, LeaseLostError
 from robolink.journal._lease_view import FREE, LEASE_S, LeaseHolder, LeaseView
 from robolink.journal.store.chain import canonical, storable
-from robolink.messages import tr
+from robolink.messages import in_english, tr
 from robolink.model import NewEntry, new_operation
+from robolink.package_log import PackageLog
 from robolink.timing import NS_PER_S, Clock, Deadline, wall_label
 
 if TYPE_CHECKING:
     from robolink.journal.store.state_rows import LeaseRows
     from robolink.journal.store.store import Store
+
+_LOG: Final = PackageLog(__package__)
 
 BEAT_S: Final = 1.0
 """A holder gives a sign of life at most this often."""
@@ -140,6 +143,9 @@ class Lease:
 
     def settle(self, grip: Grip) -> None:
         """Note, after the commit, that the lease is held."""
+        if self._epoch != grip.epoch:
+            over = "".join(f", over from another: {in_english(e.verdict)}" for e in grip.entries)
+            self._decided(f"lease taken, epoch {grip.epoch}{over}")
         self._epoch = grip.epoch
 
     def beat(self) -> None:
@@ -194,6 +200,7 @@ class Lease:
         seen = rows.sight(self.controller)
         if seen.token == self._token:
             return None
+        self._decided(f"lease taken away from its holder: {in_english(reason)}")
         rows.end(self.controller, self._claim(reason, operator, self._clock.now_ns()))
         insisting = replace(self._holder, operator=operator or self._holder.operator)
         return seen.taken_entry(reason, insisting)
@@ -239,6 +246,9 @@ class Lease:
             "purpose": storable(purpose),
         }
 
+    def _decided(self, text: str) -> None:
+        _LOG.decided(text, controller=self.controller, request="lease")
+
     def _renewed(self, rows: "LeaseRows") -> bool:
         if self.held:
             now_ns = self._clock.now_ns()
@@ -248,10 +258,12 @@ class Lease:
     def _lose(self, rows: "LeaseRows") -> None:
         if not self._lost:
             self._taken = rows.sight(self.controller)
+            self._decided("lease lost: somebody else took it")
         self._epoch, self._lost = 0, True
 
     def _held_error(self, seen: LeaseView) -> LeaseHeldError:
         who = seen.who()
+        self._decided(f"lease refused: {who.operator or 'somebody else'} has it")
         if self._holder.shares_clock_with(who):
             silent_s = max(0, self._clock.now_ns() - seen.beat_ns) / NS_PER_S
             sign = tr("{seconds:.0f} s ago", seconds=silent_s)

@@ -2,9 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 from robolink.errors import ReadBackError, RobolinkError, SelectedToolError
-from robolink.messages import tr
+from robolink.messages import in_english, tr
 from robolink.model import (
     Controller,
     EntryKind,
@@ -15,6 +16,9 @@ from robolink.model import (
     plain_offset,
     read_for_verdict,
 )
+from robolink.package_log import PackageLog
+
+_LOG: Final = PackageLog(__package__)
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,10 +79,14 @@ def put_back(
             A tool that becomes undefined again gives way to it, should it be in force now, and to
             the flange where it is not known.
     """
-    return [
+    done = [
         _put_one_back(controller, step, spoiled=step.tool == spoiled, selected=selected or 0)
         for step in reversed(steps)
     ]
+    for one in done:
+        tell = _LOG.decided if one.restored else _LOG.doubted
+        tell(f"rolled back: {in_english(one.sentence)}", controller=controller.identity)
+    return done
 
 
 def _put_one_back(controller: Controller, step: Step, *, spoiled: bool, selected: int) -> PutBack:

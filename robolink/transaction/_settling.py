@@ -7,6 +7,7 @@ and so one write per tool is the most that ever takes effect.
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
+from typing import Final
 
 from robolink.errors import (
     ConfigError,
@@ -16,7 +17,7 @@ from robolink.errors import (
     OutcomeUnknownError,
     RobolinkError,
 )
-from robolink.messages import joined, tr
+from robolink.messages import in_english, joined, tr
 from robolink.model import (
     Controller,
     EntryKind,
@@ -32,10 +33,13 @@ from robolink.model import (
     read_for_verdict,
     read_offset,
 )
+from robolink.package_log import PackageLog
 from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.timing import local_label
 from robolink.transaction._orders import forgotten, kept_later, order_of
 from robolink.transaction._put_back import Step, put_back
+
+_LOG: Final = PackageLog(__package__)
 
 
 class Settler:
@@ -124,6 +128,11 @@ class Settler:
             RobolinkError: It could not be done; the marker stays.
         """
         outcomes = self._controller.outcomes
+        _LOG.decided(
+            f"recovered: {finding.verdict}, {in_english(finding.sentence)}",
+            controller=self._controller.identity,
+            request=finding.marker.request,
+        )
         outcomes.change = str(finding.marker.details.get("change", ""))
         outcomes.order = order_of(finding.marker)
         try:

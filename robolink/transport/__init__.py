@@ -16,9 +16,6 @@ if TYPE_CHECKING:
     from robolink.transport._url import UrlOptions as UrlOptions
     from robolink.transport._url import far_end_of as far_end_of
     from robolink.transport._url import parse_url as parse_url
-    from robolink.transport.byte_stream import SECRET_PLACEHOLDER as SECRET_PLACEHOLDER
-    from robolink.transport.byte_stream import Direction as Direction
-    from robolink.transport.byte_stream import TraceSink as TraceSink
     from robolink.transport.byte_stream import TracingTransport as TracingTransport
     from robolink.transport.byte_stream import Transport as Transport
     from robolink.transport.dialogue import Dialogue as Dialogue
@@ -28,6 +25,11 @@ if TYPE_CHECKING:
     from robolink.transport.dialogue import opening_line as opening_line
     from robolink.transport.dialogue import parse_dialogues as parse_dialogues
     from robolink.transport.dialogue import passage_line as passage_line
+    from robolink.transport.traffic import SECRET_PLACEHOLDER as SECRET_PLACEHOLDER
+    from robolink.transport.traffic import Direction as Direction
+    from robolink.transport.traffic import TraceSink as TraceSink
+    from robolink.transport.traffic import Traffic as Traffic
+    from robolink.transport.traffic import told_to as told_to
 else:
     __getattr__, __dir__, __all__ = lazy_exports(
         __name__,
@@ -37,11 +39,12 @@ else:
                 "TRANSPORTS_GROUP TransportOpener open_mailbox_link open_modbus open_transport"
             ),
             "_url": "LinkUrl UrlOptions far_end_of parse_url",
-            "byte_stream": "Direction SECRET_PLACEHOLDER TraceSink TracingTransport Transport",
+            "byte_stream": "TracingTransport Transport",
             "dialogue": (
                 "Dialogue DialogueLog Passage format_dialogue opening_line "
                 "parse_dialogues passage_line"
             ),
+            "traffic": "Direction SECRET_PLACEHOLDER TraceSink Traffic told_to",
         },
         old_names(__name__),
     )

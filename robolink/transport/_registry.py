@@ -15,7 +15,7 @@ from robolink.plug_ins import PlugInError, find_plug_in
 from robolink.timing import Clock
 from robolink.transport._mailbox_link import MailboxLink
 from robolink.transport._url import LinkUrl, parse_url
-from robolink.transport.byte_stream import Transport
+from robolink.transport.byte_stream import Transport, logged
 
 if TYPE_CHECKING:
     from robolink.transport.modbus.client import ModbusClient
@@ -74,7 +74,7 @@ def open_transport(
     """
     link = parse_url(url) if isinstance(url, str) else url
     opener = cast(TransportOpener, _find(link, _MEDIA))
-    return opener(link, timeout_s=timeout_s, clock=clock)
+    return logged(opener(link, timeout_s=timeout_s, clock=clock))
 
 
 def open_mailbox_link(
@@ -102,7 +102,11 @@ def open_mailbox_link(
     """
     link = parse_url(url) if isinstance(url, str) else url
     opened: MailboxLink = _find(link, _MAILBOX_MEDIA)(link, timeout_s=timeout_s, clock=clock)
-    return opened
+    if link.medium in _MAILBOX_MEDIA:
+        return opened  # its bytes tell
+    from robolink.transport.word_traffic import WordTraffic
+
+    return WordTraffic(opened)
 
 
 def open_modbus(

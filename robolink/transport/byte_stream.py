@@ -1,14 +1,13 @@
-"""The contract of a byte transport.
+"""The contract of a byte transport, and the transport that tells what passes."""
 
-Records what goes over a transport.
-"""
-
-from collections.abc import Callable
-from typing import Final, Literal, Protocol
+from collections.abc import Collection
+from typing import Protocol
 
 from robolink.errors import TransportClosedError
 from robolink.messages import tr
+from robolink.package_log import PackageLog
 from robolink.timing import Clock, Deadline
+from robolink.transport.traffic import PACKAGE_LOG, TraceSink, Traffic
 
 
 class Transport(Protocol):
@@ -99,49 +98,63 @@ def link_closed(identity: str) -> TransportClosedError:
     )
 
 
-Direction = Literal["sent", "received"]
-
-TraceSink = Callable[[int, Direction, bytes], None]
-"""Takes the time in ns of the transport's clock, the direction and the bytes."""
-
-SECRET_PLACEHOLDER: Final = b"<secret>"
-"""Stands in a trace for every secret send, whatever its content and length."""
-
-
 class TracingTransport:
     """Passes everything on to ``inner`` and tells ``sink`` what went by.
 
-    Bytes are recorded before they are sent, because after a failure an unknown part of
-    them may be out. An end of stream is recorded as received ``b""``.
+    Bytes are told before they are sent, because after a failure an unknown part of them may be
+    out. An end of stream is told as received ``b""``. A secret is told as
+    :data:`SECRET_PLACEHOLDER` (:mod:`robolink.transport.traffic`).
+
+    Attributes:
+        traffic: Where it is told.
     """
 
-    def __init__(self, inner: Transport, sink: TraceSink) -> None:
+    def __init__(self, inner: Transport, sink: TraceSink | Traffic) -> None:
         self.url, self.identity, self.durable = inner.url, inner.identity, inner.durable
         self.clock = inner.clock
         self._inner = inner
-        self._sink = sink
+        self._send, self._receive = inner.send, inner.receive
+        self._receive_waiting = inner.receive_waiting
+        if not isinstance(sink, Traffic):
+            sink = Traffic(inner.identity, inner.clock, sinks=(sink,), log=None)
+        self.traffic = sink
+        self._listened = sink.listened
 
     @property
     def place(self) -> str:
         """The inner transport's."""
         return self._inner.place
 
+    @property
+    def logs(self) -> bool:
+        """Whether it, or one within, tells the log of its package."""
+        inner = self._inner
+        return self.traffic.logs or (isinstance(inner, TracingTransport) and inner.logs)
+
+    def show_answers(self, answers: Collection[bytes]) -> None:
+        """See :meth:`robolink.transport.traffic.Traffic.show_answers`."""
+        self.traffic.show_answers(answers)
+        if isinstance(self._inner, TracingTransport):
+            self._inner.show_answers(answers)
+
     def send(self, data: bytes, *, deadline: Deadline, secret: bool = False) -> None:
         """See :meth:`robolink.transport.Transport.send`; a secret never reaches the sink."""
-        self._sink(self.clock.now_ns(), "sent", SECRET_PLACEHOLDER if secret else data)
-        self._inner.send(data, deadline=deadline, secret=secret)
+        if secret or self._listened():  # looked at here: each call costs in every exchange
+            self.traffic.sent(data, secret=secret)
+        self._send(data, deadline=deadline, secret=secret)
 
     def receive(self, *, deadline: Deadline) -> bytes:
         """See :meth:`robolink.transport.Transport.receive`."""
-        data = self._inner.receive(deadline=deadline)
-        self._sink(self.clock.now_ns(), "received", data)
+        data = self._receive(deadline=deadline)
+        if self._listened():
+            self.traffic.received(data)
         return data
 
     def receive_waiting(self) -> bytes | None:
         """See :meth:`robolink.transport.Transport.receive_waiting`."""
-        data = self._inner.receive_waiting()
-        if data is not None:
-            self._sink(self.clock.now_ns(), "received", data)
+        data = self._receive_waiting()
+        if data is not None and self._listened():
+            self.traffic.received(data)
         return data
 
     def wait_readable(self, *, deadline: Deadline) -> bool:
@@ -151,3 +164,17 @@ class TracingTransport:
     def close(self) -> None:
         """See :meth:`robolink.transport.Transport.close`."""
         self._inner.close()
+
+
+def logged(transport: Transport, *, log: PackageLog | None = None) -> TracingTransport:
+    """Return a transport that tells the log what passes; one that does so already, as it is.
+
+    Args:
+        transport: Moves the bytes.
+        log: Of the package that does so; by default this one.
+    """
+    if isinstance(transport, TracingTransport) and transport.logs:
+        return transport
+    return TracingTransport(
+        transport, Traffic(transport.identity, transport.clock, log=log or PACKAGE_LOG)
+    )

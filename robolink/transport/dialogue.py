@@ -9,7 +9,8 @@ after it is one piece of the stream. Bytes are written as the characters of the 
     {"t_s": 0.004, "received": "#Login,0\r\n"}
     {"t_s": 0.005, "sent": "$GetStatus\r\n"}
 
-The login is not in the file at all: only that one was sent.
+The login is not in the file at all: only that one was sent. Nor is an answer that may repeat it:
+only that one came, ``{"t_s": 0.004, "secret": "received"}``.
 """
 
 import json
@@ -22,7 +23,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.timing import NS_PER_S
-from robolink.transport.byte_stream import SECRET_PLACEHOLDER, Direction
+from robolink.transport.traffic import SECRET_PLACEHOLDER, Direction
 
 SCHEMA: Final = "robolink/dialogue/1"
 
@@ -35,7 +36,7 @@ class Passage:
         at_s: Seconds since the first piece.
         direction: ``sent`` by the client or ``received`` by it.
         data: The bytes; a received ``b""`` is the end of the stream.
-        secret: A login went here; ``data`` is empty.
+        secret: A login went here, or an answer that may repeat one; ``data`` is empty.
     """
 
     at_s: float
@@ -106,7 +107,7 @@ class DialogueLog:
         """
         if self._began_ns is None:
             self._began_ns = at_ns
-        secret = direction == "sent" and data == SECRET_PLACEHOLDER
+        secret = data == SECRET_PLACEHOLDER
         at_s = (at_ns - self._began_ns) / NS_PER_S
         passage = Passage(at_s, direction, b"" if secret else data, secret)
         self._passages.append(passage)
@@ -135,7 +136,7 @@ def passage_line(passage: Passage) -> str:
     """Return the line of one piece."""
     line: dict[str, object] = {"t_s": round(passage.at_s, 6)}
     if passage.secret:
-        line["secret"] = True
+        line["secret"] = True if passage.direction == "sent" else passage.direction
     else:
         line[passage.direction] = passage.data.decode("latin-1")
     return json.dumps(line)
@@ -183,9 +184,9 @@ def _connections(lines: Iterable[str], source: str) -> Iterator[tuple[str, str, 
 
 def _passage(line: dict[str, object]) -> Passage:
     at_s = float(str(line["t_s"]))
-    if line.get("secret") is True:
-        return Passage(at_s, "sent", b"", secret=True)
     direction: Direction = "sent" if "sent" in line else "received"
+    if secret := line.get("secret"):
+        return Passage(at_s, "sent" if secret is True else "received", b"", secret=True)
     data = line[direction]
     if not isinstance(data, str):
         raise TypeError(data)

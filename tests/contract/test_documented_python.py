@@ -4,6 +4,7 @@ Only addresses are replaced, by those of simulators; what a block takes as given
 operator, a file) is brought by a maker of this file. A block without a maker fails.
 """
 
+import logging
 import re
 import shutil
 import textwrap
@@ -303,6 +304,17 @@ def an_acme_arm(stack: ExitStack) -> dict[str, Any]:
     return given
 
 
+def logged_as_shown(stack: ExitStack) -> dict[str, Any]:
+    shown = {name: logging.getLogger(name) for name in ("robolink", "robolink.transport")}
+    for logger in shown.values():
+        stack.callback(logger.setLevel, logger.level)
+    return {
+        "then": lambda: (
+            [one.getEffectiveLevel() for one in shown.values()] == [logging.INFO, logging.DEBUG]
+        )
+    }
+
+
 def nothing(stack: ExitStack) -> dict[str, Any]:
     return {}
 
@@ -338,6 +350,7 @@ MAKERS = {
     "extending.md 5": a_panel,
     "extending.md 6": nothing,
     "extending.md 7": an_acme_arm,
+    "extending.md 8": logged_as_shown,
     "fault-plans.md 1": a_fault_plan,
     "monitor-only.md 1": with_variables,
     "journal.md 1": a_journal,

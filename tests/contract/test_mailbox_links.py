@@ -9,7 +9,7 @@ from robolink.errors import (
     RejectedError,
     TransportClosedError,
 )
-from robolink.transport import MailboxHead, open_mailbox_link, open_modbus
+from robolink.transport import MailboxHead, open_mailbox_link, open_modbus, told_to
 from tests.contract._mailbox_far_ends import (
     NODE,
     CanopenFarEnd,
@@ -59,6 +59,27 @@ def test_a_response_is_read_whole(far_end, link):
     assert link.read_response() == RESPONSE
     far_end.put_response(RESPONSE[::-1])
     assert link.read_response() == RESPONSE[::-1]
+
+
+def test_all_that_passes_is_told_to_a_trace(far_end):
+    told = []
+    with told_to(lambda _ns, direction, data: told.append((direction, data))):
+        link = open_mailbox_link(far_end.url, timeout_s=2.0)
+    with closing(link):
+        link.write_command(COMMAND)
+        far_end.put_response(RESPONSE)
+        link.read_response()
+        sent = b"".join(data for direction, data in told if direction == "sent")
+        received = b"".join(data for direction, data in told if direction == "received")
+        # A word of CANopen goes low byte first, and seven bytes are in a frame.
+        low_first = isinstance(far_end, CanopenFarEnd)
+        assert (b"\xe8\x03\xe9" if low_first else b"\x03\xe8\x03") in sent
+        assert (b"\x64\x00\x65" if low_first else b"\x00\x64\x00") in received
+        link.close()
+        count = len(told)
+        with closing(link.reopened(timeout_s=2.0)) as again:
+            again.read_response()
+        assert len(told) > count, "one that is opened again tells it too"
 
 
 def test_a_head_is_the_beginning_of_the_response(far_end, link):

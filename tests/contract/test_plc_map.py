@@ -167,8 +167,9 @@ def test_a_wrong_unit_a_missing_map_and_a_closed_port_are_clear_errors():
             robolink.connect(f"{bare}?map=missing.toml")
         with pytest.raises(ConfigError, match="no option 'units'"):
             robolink.connect(f"{served.url}&units=1")
-        with pytest.raises(ConfigError, match="cannot be recorded"):
-            robolink.connect(served.url, trace=lambda *_: None)
+        told = []
+        robolink.connect(served.url, trace=lambda *passage: told.append(passage[1])).close()
+        assert {"sent", "received"} == set(told)
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]

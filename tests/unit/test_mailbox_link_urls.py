@@ -6,6 +6,7 @@ import sys
 import tty
 from importlib import metadata
 from importlib.metadata import EntryPoint, EntryPoints
+from types import SimpleNamespace
 
 import pytest
 
@@ -82,12 +83,14 @@ def test_a_client_for_bare_registers_knows_no_mailbox():
 def test_a_simulated_mailbox_is_found_by_the_name_of_its_scheme(monkeypatch):
     class DeskEntryPoint(EntryPoint):
         def load(self):
-            return lambda url, *, timeout_s, clock: (url.host, timeout_s, clock)
+            return lambda url, *, timeout_s, clock: SimpleNamespace(
+                identity=url.host, place=f"{timeout_s} {clock}", clock=SystemClock()
+            )
 
     group = EntryPoints([DeskEntryPoint("softmotion+desk", "desk:opener", TRANSPORTS_GROUP)])
     monkeypatch.setattr(metadata, "entry_points", lambda **by: group.select(**by))
-    opened: object = open_mailbox_link("softmotion+desk://cell-b", timeout_s=1.5)
-    assert opened == ("cell-b", 1.5, None)
+    opened = open_mailbox_link("softmotion+desk://cell-b", timeout_s=1.5)
+    assert (opened.identity, opened.place) == ("cell-b", "1.5 None")
 
 
 def places(query):

@@ -42,9 +42,11 @@ def test_a_login_is_kept_as_a_mark_and_not_as_bytes():
     log = DialogueLog("here", "now")
     log(5_000_000_000, "sent", SECRET_PLACEHOLDER)
     log(5_250_000_000, "received", b"#Login,0\r\n")
+    log(5_500_000_000, "received", SECRET_PLACEHOLDER)
     assert log.dialogue.passages == (
         Passage(0.0, "sent", b"", secret=True),
         Passage(0.25, "received", b"#Login,0\r\n"),
+        Passage(0.5, "received", b"", secret=True),
     )
     assert SECRET_PLACEHOLDER.decode() not in format_dialogue(log.dialogue)
     assert parse_dialogues(format_dialogue(log.dialogue), source="") == (log.dialogue,)
@@ -192,6 +194,13 @@ def test_a_file_that_is_no_recording_is_a_mistake_of_the_person(tmp_path, conten
     if content is not None:
         path.write_bytes(content)
     with pytest.raises(ConfigError, match="recording"):
+        read_recording(path)
+
+
+def test_a_recording_of_a_plc_is_served_by_no_epson(tmp_path):
+    path = tmp_path / "recording.jsonl"
+    path.write_text(format_dialogue(Dialogue("softmotion+modbus-tcp://192.0.2.1", "now", ())))
+    with pytest.raises(ConfigError, match="only one of an EPSON controller"):
         read_recording(path)
 
 

@@ -374,7 +374,8 @@ def test_a_stop_that_is_not_allowed_is_an_error_at_once():
 class Wire:
     """Says one thing whatever is sent, and then nothing."""
 
-    identity = place = "robot"
+    url = identity = place = "robot"
+    durable = False
 
     def __init__(self, *pieces):
         self.clock = ManualClock()
@@ -392,6 +393,9 @@ class Wire:
 
     def close(self):
         self.closed = True
+
+    def receive_waiting(self):
+        return None
 
 
 def over(wire: Any) -> EpsonConversation:

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from robolink.controllers.registry import find_opener
 from robolink.errors import ConfigError
 from robolink.methods import find_method
+from robolink.timing import SystemClock
 from robolink.transport import TRANSPORTS_GROUP, open_transport, parse_url
 
 # URLs that name a controller.
@@ -96,8 +97,23 @@ def test_any_text_is_a_url_or_a_config_error(text):
 # Finding the transport that a URL names.
 
 
+class DeskLine:
+    """A transport that says how it was opened."""
+
+    durable = False
+
+    def __init__(self, url, timeout_s, clock):
+        self.url = self.identity = self.place = url.identity
+        self.opened = (url, timeout_s, clock)
+        self.clock = SystemClock()
+
+
 def opener(url, *, timeout_s, clock):
-    return ("opened", url, timeout_s, clock)
+    opened.append(DeskLine(url, timeout_s, clock))
+    return opened[-1]
+
+
+opened: list[DeskLine] = []
 
 
 class DeskEntryPoint(EntryPoint):
@@ -121,14 +137,15 @@ def entry_points(monkeypatch):
 
 def test_another_package_is_found_by_the_name_of_its_full_scheme(entry_points):
     link = parse_url("epson+desk://cell-a?seed=1")
-    opened: object = open_transport(link, timeout_s=1.5)
-    assert opened == ("opened", link, 1.5, None)
+    line = open_transport(link, timeout_s=1.5)
+    assert opened.pop().opened == (link, 1.5, None)
+    assert (line.url, line.place) == ("epson+desk://cell-a", "epson+desk://cell-a")
 
 
 def test_a_url_may_be_given_as_text(entry_points):
     link = parse_url("epson+desk://cell-a")
-    opened: object = open_transport("epson+desk://cell-a")
-    assert opened == ("opened", link, 3.0, None)
+    open_transport("epson+desk://cell-a")
+    assert opened.pop().opened == (link, 3.0, None)
 
 
 def test_an_unknown_scheme_is_refused_with_a_list_of_what_there_is(entry_points):

@@ -1,7 +1,7 @@
 """--record FILE: the dialogue with the controller, kept as it happens."""
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,16 +37,29 @@ def recording(path: str | None, controller: str) -> "Iterator[TraceSink | None]"
     try:
         file = append_to_named(Path(path))
     except OSError as error:
-        raise ConfigError(
-            tr("The recording {path} cannot be written: {cause}.", path=path, cause=error.strerror),
-            remedy=tr("Nothing was sent. Choose another file."),
-        ) from error
-    with file:
+        raise _unwritable(path, error) from error
 
-        def keep(at_ns: int, direction: Direction, data: bytes) -> None:
-            # Flushed at once: what matters most is what came before a crash.
-            file.write(passage_line(log.keep(at_ns, direction, data)) + "\n")
+    def write(line: str) -> None:
+        # Flushed at once: what matters most is what came before a crash.
+        try:
+            file.write(f"{line}\n")
             file.flush()
+        except OSError as error:
+            raise _unwritable(path, error) from error
 
-        file.write(opening_line(log.dialogue) + "\n")
+    def keep(at_ns: int, direction: Direction, data: bytes) -> None:
+        write(passage_line(log.keep(at_ns, direction, data)))
+
+    try:
+        write(opening_line(log.dialogue))
         yield keep
+    finally:
+        with suppress(OSError):  # a disk that was full is told by now, and ends no change
+            file.close()
+
+
+def _unwritable(path: str, error: OSError) -> ConfigError:
+    return ConfigError(
+        tr("The recording {path} cannot be written: {cause}.", path=path, cause=error.strerror),
+        remedy=tr("Nothing was sent. Choose another file."),
+    )

@@ -7,7 +7,7 @@ document instead.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 import click
 
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 _JSON = "robolink.json"
 _DOCUMENT = "robolink.document"
+_LOG = "robolink.log"
 
 
 def json_is_on() -> bool:
@@ -31,6 +32,20 @@ def json_is_on() -> bool:
 def switch_json_on(context: click.Context) -> None:
     """Make this invocation speak JSON."""
     context.meta[_JSON] = True
+
+
+LOG_LEVELS: Final = ("debug", "info", "warning", "error")
+
+
+def want_log(context: click.Context, option: str, value: str) -> None:
+    """Keep what an option says of the log of this invocation."""
+    context.meta.setdefault(_LOG, {})[option] = value
+
+
+def log_wanted() -> tuple[str, str]:
+    """Return the file and the level of the log that was asked for; empty where none was."""
+    wanted: dict[str, str] = click.get_current_context().meta.get(_LOG, {})
+    return wanted.get("log_file", ""), wanted.get("log_level", "")
 
 
 def say(text: str = "") -> None:

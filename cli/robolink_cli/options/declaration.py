@@ -18,6 +18,7 @@ from typing import Any, Final, Literal, NamedTuple, TypeVar, cast, get_args, get
 import click
 
 from robolink_cli.console.numbers import DECIMAL
+from robolink_cli.console.render import log_wanted
 
 CommandT = TypeVar("CommandT", bound=Callable[..., Any])
 Decorator = Callable[[Any], Any]
@@ -121,13 +122,35 @@ def add_declared(
         framed: What is called in its place, the function itself when nothing is.
     """
     declared = tuple(_declared_by(function))
-    command: Any = framed or packed(function)
+    command: Any = opening_log(framed or packed(function))
     for one in reversed([one for one in declared if one.marker.late]):
         command = one.decorator()(command)
     command = shared(command)
     for one in reversed([one for one in declared if not one.marker.late]):
         command = one.decorator()(command)
     return command
+
+
+def opening_log(command: CommandT) -> CommandT:
+    """Return a command that opens its log, if one is wanted, before it does anything.
+
+    A stop does that afterwards.
+
+    Raises, when it is called:
+        ConfigError: The file cannot be written, or what was given means nothing.
+    """
+
+    @wraps(command)
+    def logged(*args: object, **given: object) -> Any:  # noqa: ANN401 - what the command returns
+        context = click.get_current_context()
+        wanted = log_wanted()
+        if any(wanted) and context.command.name != "stop":
+            from robolink_cli.options.log_file import began
+
+            began(context.command_path, *wanted)
+        return command(*args, **given)
+
+    return cast("CommandT", logged)
 
 
 def declared_options(function: Callable[..., Any]) -> Decorator:

@@ -13,7 +13,7 @@ from robolink_cli.access.cell import complete_cell
 from robolink_cli.console.language import OPTION, VARIABLE
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.output import visible
-from robolink_cli.console.render import switch_json_on
+from robolink_cli.console.render import LOG_LEVELS, switch_json_on, want_log
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -117,6 +117,7 @@ def json_option(command: CommandT) -> CommandT:
 
 
 def _json_and_language(command: CommandT) -> CommandT:
+    shared = _log_options(lang_option(command))
     return click.option(
         "--json",
         "json_",
@@ -124,7 +125,43 @@ def _json_and_language(command: CommandT) -> CommandT:
         expose_value=False,
         callback=_note_json,
         help=declared("Print one JSON document on stdout; text goes to stderr."),
-    )(lang_option(command))
+    )(shared)
+
+
+def _log_options(command: CommandT) -> CommandT:
+    """Add ``--log-file`` and ``--log-level``."""
+    file = click.option(
+        "--log-file",
+        type=click.Path(),
+        metavar="FILE",
+        expose_value=False,
+        callback=_keep_log,
+        help=declared("Append to FILE what is decided, and with --log-level debug what is sent."),
+    )
+    level = click.option(
+        "--log-level",
+        metavar="|".join(LOG_LEVELS),
+        shell_complete=_complete_level,
+        expose_value=False,
+        callback=_keep_log,
+        help=declared("How much --log-file holds (info)."),
+    )
+    return file(level(command))
+
+
+def _keep_log(context: click.Context, parameter: click.Parameter, value: str | None) -> None:
+    if value is not None:
+        want_log(context, str(parameter.name), value)
+
+
+def _complete_level(
+    ctx: click.Context,  # noqa: ARG001 - click's form
+    param: click.Parameter,  # noqa: ARG001 - click's form
+    incomplete: str,
+) -> "list[CompletionItem]":
+    from click.shell_completion import CompletionItem
+
+    return [CompletionItem(one) for one in LOG_LEVELS if one.startswith(incomplete)]
 
 
 def lang_option(command: CommandT) -> CommandT:

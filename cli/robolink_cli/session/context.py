@@ -20,7 +20,7 @@ from robolink_cli.access.cell import (
     which_cell,
 )
 from robolink_cli.console.output import may_be_guided
-from robolink_cli.console.render import json_is_on, note
+from robolink_cli.console.render import json_is_on, log_wanted, note
 from robolink_cli.options.declaration import add_declared, packed
 from robolink_cli.options.shared import GIVEN, TYPED, all_shared
 from robolink_cli.stopping.request import StopRequest
@@ -93,6 +93,7 @@ Command = Callable[..., int | None]
 def stop_request() -> StopRequest:
     """Return what a command that must not depend on any file was told."""
     given = click.get_current_context().meta.get(GIVEN, {})
+    log_file, log_level = log_wanted()
     return StopRequest(
         named=given.get("url") or "",
         json=json_is_on(),
@@ -100,6 +101,8 @@ def stop_request() -> StopRequest:
         timeout_s=given.get("timeout_s", 3.0),
         operator=given.get("operator") or "",
         record=given.get("record") or "",
+        log_file=log_file,
+        log_level=log_level,
     )
 
 

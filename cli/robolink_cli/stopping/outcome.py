@@ -3,7 +3,7 @@
 from contextlib import suppress
 
 from robolink.errors import JournalError, LeaseHeldError, RobolinkError
-from robolink.messages import joined, tr
+from robolink.messages import in_english, joined, tr
 from robolink.stopping import leave_note
 from robolink.transport import parse_url
 from robolink_cli.access.cell import which_cell
@@ -61,6 +61,7 @@ class Telling:
         if outcome.may_stand and outcome.keys:
             told += self._noted()
         told += self._recorded()
+        told += self._logged()
         told += self._journal()
         if told and outcome.error is None:
             told.append(tr("The stop went out anyway."))
@@ -136,6 +137,18 @@ class Telling:
         except RobolinkError as error:
             return [error.what]
         return []
+
+    def _logged(self) -> list[str]:
+        request, outcome = self._request, self._outcome
+        if not (request.log_file or request.log_level):
+            return []
+        from robolink_cli.options.log_file import log_afterwards
+
+        ended = in_english(str(outcome.error) if outcome.error else self.sentence())
+        missed = log_afterwards(
+            request.log_file, request.log_level, outcome.heard, ended, _shown(outcome.url)
+        )
+        return [missed] if missed else []
 
     def _journal(self) -> list[str]:
         """Return what the journal has to say: that it is damaged, or what was left unfinished."""

@@ -13,6 +13,8 @@ VALUES: Final = {
     "--wait": "",
     "--operator": "operator",
     "--record": "record",
+    "--log-file": "log_file",
+    "--log-level": "log_level",
     "--lang": "",
 }
 """Options with a value that may stand beside ``stop``, and where it is kept; a stop needs no
@@ -32,6 +34,8 @@ class StopRequest(NamedTuple):
         timeout_s: Longest wait for one answer.
         operator: Badge or name of the person.
         record: File to which the dialogue is appended afterwards.
+        log_file: File to which it is logged afterwards.
+        log_level: How much; empty for the usual.
     """
 
     named: str = ""
@@ -40,6 +44,8 @@ class StopRequest(NamedTuple):
     timeout_s: float = 3.0
     operator: str = ""
     record: str = ""
+    log_file: str = ""
+    log_level: str = ""
 
 
 def read_stop(arguments: Sequence[str]) -> StopRequest | None:
@@ -72,6 +78,8 @@ def read_stop(arguments: Sequence[str]) -> StopRequest | None:
         timeout_s=timeout_s,
         operator=found.get("operator") or os.environ.get("ROBOLINK_OPERATOR", ""),
         record=found.get("record", ""),
+        log_file=found.get("log_file", ""),
+        log_level=found.get("log_level", ""),
     )
 
 

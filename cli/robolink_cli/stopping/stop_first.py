@@ -193,6 +193,7 @@ def _directly(request: StopRequest, outcome: StopOutcome, file: str, variable: s
     def met(name: str) -> None:
         outcome.controller = name
 
+    kept = request.record or request.log_file
     refused: LoginRefusedError | None = None
     for password in _passwords(outcome, file, variable):
         try:
@@ -200,7 +201,7 @@ def _directly(request: StopRequest, outcome: StopOutcome, file: str, variable: s
                 outcome.url,
                 password=password,
                 timeout_s=request.timeout_s,
-                trace=(lambda *passage: outcome.heard.append(passage)) if request.record else None,
+                trace=(lambda *passage: outcome.heard.append(passage)) if kept else None,
                 met=met,
             )
         except LoginRefusedError as error:

@@ -350,8 +350,7 @@ def open_epson_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
         LeaseHeldError: Nobody answers the login, and somebody else has the controller.
         RobolinkError: As :func:`open_epson`, and as the transport.
     """
-    traces = () if terms.trace is None else (terms.trace,)
-    line = open_line(url, timeout_s=terms.timeout_s, clock=terms.clock, traces=traces)
+    line = open_line(url, timeout_s=terms.timeout_s, clock=terms.clock)
     outcomes = terms.record_of(line.transport)
     try:
         return open_epson(

@@ -42,8 +42,9 @@ from robolink.protocols.epson_text import (
 )
 from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.timing import Clock, Deadline
-from robolink.transport import LinkUrl, TraceSink, TracingTransport, Transport, open_transport
-from robolink.transport.byte_stream import link_closed
+from robolink.transport import LinkUrl, TraceSink, Transport, open_transport, told_to
+from robolink.transport.byte_stream import link_closed, logged
+from robolink.transport.traffic import repeats
 
 if TYPE_CHECKING:
     from robolink.protocols.epson_binary import Dialect
@@ -51,6 +52,14 @@ if TYPE_CHECKING:
 
 SERIAL: Final = "serial"
 """The medium of Remote RS232."""
+
+
+_LOGIN_ANSWERS: Final = frozenset(
+    text.encode("ascii") + end
+    for text in ("#Login,0", *(f"!Login,{int(code)}" for code in ErrorCode))
+    for end in (b"\r\n", b"\r", b"\n")
+)
+"""Answers to a login in which no password can stand (docs/reference/epson.md 1.6)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +99,9 @@ class EpsonLine:
 
 def text_line(transport: Transport) -> EpsonLine:
     """Return a line of Remote Ethernet over any transport."""
-    return EpsonLine(transport, EpsonTextCodec(Role.HOST))
+    told = logged(transport)
+    told.show_answers(_LOGIN_ANSWERS)
+    return EpsonLine(told, EpsonTextCodec(Role.HOST))
 
 
 def open_line(
@@ -122,9 +133,8 @@ def open_line(
         from robolink.controllers.epson.serial_opening import take_dialect
 
         dialect, link = take_dialect(link)
-    transport: Transport = open_transport(link, timeout_s=timeout_s, clock=clock)
-    for trace in traces:
-        transport = TracingTransport(transport, trace)
+    with told_to(*traces):
+        transport = open_transport(link, timeout_s=timeout_s, clock=clock)
     if dialect is None:
         return text_line(transport)
     return _turned_on(transport, dialect)
@@ -139,8 +149,14 @@ def _turned_on(transport: Transport, dialect: "Dialect") -> EpsonLine:
     except BaseException:
         transport.close()
         raise
-    codec = EpsonBinaryCodec(Role.HOST, dialect)
-    return EpsonLine(transport, codec, outlives_sessions=True)
+    told, far = logged(transport), EpsonBinaryCodec(Role.DEVICE, dialect)
+    told.show_answers(
+        [
+            far.send(Reply("Login", ("0",))),
+            *(far.send(Refusal("Login", int(code))) for code in ErrorCode),
+        ]
+    )
+    return EpsonLine(told, EpsonBinaryCodec(Role.HOST, dialect), outlives_sessions=True)
 
 
 _PASSWORD_REFUSALS: Final = (13, 98)
@@ -225,7 +241,7 @@ class EpsonConversation:
             data = self._codec.send(request)
             deadline = Deadline.after(self.clock, self.timeout_s)
             self._transport.send(data, deadline=deadline, secret=secret)
-            return self._receive(request, deadline)
+            return self._receive(request, deadline, secret=secret)
         except RobolinkError as error:
             self._end(error)
             raise
@@ -252,15 +268,25 @@ class EpsonConversation:
                 self._ended_by = error
             self._transport.close()
 
-    def _receive(self, request: Request, deadline: Deadline) -> Reply | Refusal:
-        """Read until the answer to a request that was sent has come."""
-        wanted = request.name.lower()
+    def _receive(
+        self, request: Request, deadline: Deadline, *, secret: bool = False
+    ) -> Reply | Refusal:
+        """Read until the answer to a request that was sent has come.
+
+        Raises:
+            RemoteProtocolError: It repeats the password of a login, which then is in no error.
+        """
+        wanted, came = request.name.lower(), b""
         while True:
             try:
                 data = self._transport.receive(deadline=deadline)
             except TransportTimeoutError as error:
                 self._require_none_held(request, error)
                 raise
+            if secret:
+                came += data
+                if any(repeats(parameter, came) for parameter in request.parameters):
+                    raise self._echoed()
             self._codec.receive_data(data)
             while (event := self._codec.next_event()) is not NEED_DATA:
                 if isinstance(event, (Reply, Refusal)) and self._answers(event, wanted):
@@ -314,6 +340,17 @@ class EpsonConversation:
         from robolink.controllers.epson.answers import rejected
 
         return rejected(refusal, controller=self.identity, request=name)
+
+    def _echoed(self) -> RemoteProtocolError:
+        return RemoteProtocolError(
+            tr("{identity} answered the login with the password.", identity=self.identity),
+            remedy=tr(
+                "Check that this port is the controller's Remote Ethernet port; if it is, check "
+                "the cable."
+            ),
+            controller=self.identity,
+            request="Login",
+        )
 
     def _closed_by_far_end(self) -> TransportBrokenError:
         return TransportBrokenError(

@@ -157,7 +157,7 @@ class EpsonSession(EpsonConversation):
                     deadline = Deadline.after(self.clock, self.timeout_s)
                     self._transport.send(data, deadline=deadline, secret=secret)
                     self.exchanges += 1
-                    return self._receive(request, deadline)
+                    return self._receive(request, deadline, secret=secret)
                 except RobolinkError as error:
                     self._end(error)
                     raise

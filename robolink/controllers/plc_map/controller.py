@@ -309,17 +309,8 @@ def open_plc_map_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
     """Connect to the PLC at a URL; see :class:`~robolink.controllers.ControllerOpener`.
 
     Raises:
-        ConfigError: The dialogue was to be recorded; and as :func:`open_plc_map`.
         RobolinkError: As :func:`open_plc_map`.
     """
-    if terms.trace is not None:
-        raise ConfigError(
-            tr("The dialogue with a PLC's registers cannot be recorded."),
-            remedy=tr(
-                "Leave {record} out; a network capture shows the registers.",
-                record=remedy_word(RemedyWord.RECORD),
-            ),
-        )
     record = partial(terms.record_at, durable=url.medium != _IN_PROCESS)
     return open_plc_map(url, outcomes=record, timeout_s=terms.timeout_s, clock=terms.clock)
 

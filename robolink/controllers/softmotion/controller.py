@@ -40,7 +40,6 @@ from robolink.protocols.mailbox import (
     Opcode,
     Response,
 )
-from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.timing import Deadline
 from robolink.transport import LinkUrl, MailboxLink, open_mailbox_link
 
@@ -277,17 +276,8 @@ def open_softmotion_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
     """Connect to the PLC at a URL; see :class:`~robolink.controllers.ControllerOpener`.
 
     Raises:
-        ConfigError: The dialogue was to be recorded; and as the link.
         RobolinkError: As :func:`open_softmotion`, and as the link.
     """
-    if terms.trace is not None:
-        raise ConfigError(
-            tr("The dialogue with a PLC mailbox cannot be recorded."),
-            remedy=tr(
-                "Leave {record} out; a network capture shows the registers.",
-                record=remedy_word(RemedyWord.RECORD),
-            ),
-        )
     url, kinematics = _own_kinematics(url)
     link = open_mailbox_link(url, timeout_s=terms.timeout_s, clock=terms.clock)
     return open_softmotion(

@@ -28,6 +28,7 @@ from robolink.errors import (
 )
 from robolink.interrupts import InterruptGate
 from robolink.messages import tr
+from robolink.package_log import PackageLog
 from robolink.protocols.mailbox import CommandState, Finished, Response
 from robolink.stop_latch import StopLatch
 from robolink.timing import Deadline
@@ -118,6 +119,8 @@ def has_ended(state: int) -> bool:
     """Whether a state is one of the three ends; numbers of a newer PLC are not."""
     return state in (CommandState.DONE, CommandState.ABORTED, CommandState.ERROR)
 
+
+_LOG: Final = PackageLog(__package__)
 
 _READS: Final = 3
 _LOOK_BACK_S: Final = 0.7
@@ -358,6 +361,7 @@ class MailboxWire:
         if self.whole_look_s and isinstance(error, TransportTimeoutError):
             return error  # a start cuts no serial line: who is silent there has nothing to tell
         self._link.close()
+        _LOG.decided("the link ended; looked at once more over a new one", controller=self.identity)
         try:
             link = self._link.reopened(timeout_s=_LOOK_BACK_S)
         except RobolinkError:

@@ -25,13 +25,17 @@ from robolink.errors import (
     TransportError,
 )
 from robolink.messages import tr
-from robolink.timing import NS_PER_S, Clock, Deadline
+from robolink.package_log import PackageLog
+from robolink.timing import NS_PER_S, Clock, Deadline, SystemClock
 from robolink.transport._mailbox_link import MailboxHead
 from robolink.transport._url import LinkUrl, UrlOptions
 from robolink.transport.byte_stream import link_closed
+from robolink.transport.traffic import Traffic
 
 # It writes to standard error when nobody listens; every failure is an exception here.
 logging.getLogger("can").addHandler(logging.NullHandler())
+
+_LOG: Final = PackageLog(__package__)
 
 SLICE_S: Final = 0.05
 _MULTICAST_PORT: Final = 43113
@@ -40,7 +44,9 @@ _BUS_OFF: Final = 0x40
 """In the identifier of an error frame, as Linux reports it (linux/can/error.h)."""
 
 
-def open_can_bus(url: LinkUrl, options: UrlOptions, identifiers: tuple[int, ...]) -> "CanLine":
+def open_can_bus(
+    url: LinkUrl, options: UrlOptions, identifiers: tuple[int, ...], clock: Clock | None = None
+) -> "CanLine":
     """Open the bus that a ``KIND+can://CHANNEL`` URL names.
 
     Args:
@@ -48,6 +54,7 @@ def open_can_bus(url: LinkUrl, options: UrlOptions, identifiers: tuple[int, ...]
         options: ``interface`` (socketcan, slcan, socketcand, udp_multicast, virtual or any
             other of python-can), ``channel`` where the URL cannot spell it, ``bitrate``.
         identifiers: The only 11-bit identifiers that are wanted.
+        clock: Gives the times of a trace.
 
     Raises:
         ConfigError: The interface is not known, or lacks something.
@@ -78,7 +85,7 @@ def open_can_bus(url: LinkUrl, options: UrlOptions, identifiers: tuple[int, ...]
             remedy=tr("Check that the adapter is plugged in and that its interface is up."),
             controller=url.identity,
         ) from error
-    return CanLine(bus, url.identity)
+    return CanLine(bus, url.identity, clock)
 
 
 def _settings(url: LinkUrl, options: UrlOptions, interface: str) -> dict[str, Any]:
@@ -100,11 +107,15 @@ def _settings(url: LinkUrl, options: UrlOptions, interface: str) -> dict[str, An
 
 
 class CanLine:
-    """A bus that whoever waits reads. Owns it; :meth:`close` may come from any thread."""
+    """A bus that whoever waits reads. Owns it; :meth:`close` may come from any thread.
 
-    def __init__(self, bus: can.BusABC, identity: str) -> None:
+    A frame is told to a trace as its identifier, two bytes, the high one first, and its data.
+    """
+
+    def __init__(self, bus: can.BusABC, identity: str, clock: Clock | None = None) -> None:
         self._bus = bus
         self._identity = identity
+        self._traffic = Traffic(identity, clock or SystemClock(), log=_LOG)
         self._closed = threading.Event()
 
     def receive(self, deadline: Deadline) -> can.Message | None:
@@ -122,11 +133,15 @@ class CanLine:
             raise self._ended(error) from error
         if message and message.is_error_frame and message.arbitration_id & _BUS_OFF:
             raise self._bus_off()
+        if message and self._traffic.listened():
+            self._traffic.received(_frame(message.arbitration_id, bytes(message.data)))
         return message
 
     def send(self, identifier: int, data: bytes) -> None:
         """Send one frame with an 11-bit identifier, once. Raises as :meth:`receive`."""
         message = can.Message(arbitration_id=identifier, data=data, is_extended_id=False)
+        if self._traffic.listened():
+            self._traffic.sent(_frame(identifier, data))
         try:
             self._bus.send(message)
         except (can.CanError, OSError, ValueError) as error:
@@ -156,6 +171,10 @@ class CanLine:
             ),
             controller=self._identity,
         )
+
+
+def _frame(identifier: int, data: bytes) -> bytes:
+    return (identifier & 0x7FF).to_bytes(2) + data
 
 
 TPDO1: Final = 0x180

@@ -28,6 +28,7 @@ from robolink.transport._mailbox_link import (
 from robolink.transport._url import LinkUrl, UrlOptions
 from robolink.transport.can.bus import CanLine, NodeWatch, identifiers, open_can_bus
 from robolink.transport.can.sdo import SdoTransfer
+from robolink.transport.traffic import told_alike
 
 COMMAND_OBJECT: Final = 0x2100
 RESPONSE_OBJECT: Final = 0x2101
@@ -61,9 +62,11 @@ def open_canopen_link(
     node = options.take_int("node", None, 1, 127)
     start = options.take_choice("start", "yes", {"yes": True, "no": False})
     in_process = url.options.get("interface") == "virtual"
-    line = open_can_bus(url, options, identifiers(node))
+    clock = clock or SystemClock()
+    line = open_can_bus(url, options, identifiers(node), clock)
     looking = replace(url, options={**url.options, "start": "no"})
 
+    @told_alike
     def again(timeout_s: float) -> CanopenMailboxLink:
         return open_canopen_link(looking, timeout_s=timeout_s, clock=clock)
 
@@ -74,7 +77,7 @@ def open_canopen_link(
         identity=f"{url.identity}?node={node}",
         durable=not in_process,
         timeout_s=timeout_s,
-        clock=clock or SystemClock(),
+        clock=clock,
     )
     try:
         link.meet(start=start)

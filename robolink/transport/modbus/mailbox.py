@@ -24,6 +24,7 @@ from robolink.transport._url import LinkUrl, UrlOptions
 from robolink.transport.modbus.client import ModbusClient
 from robolink.transport.modbus.frames import Area
 from robolink.transport.modbus.opening import Probe, open_client
+from robolink.transport.traffic import told_alike
 
 _HEAD_WORDS: Final = max(HEAD_PLACES) + 1
 _REGISTERS: Final = 0x10000
@@ -88,6 +89,7 @@ def open_modbus_link(
             controller=client.identity,
         )
 
+    @told_alike
     def again(timeout_s: float) -> ModbusMailboxLink:
         return open_modbus_link(url, timeout_s=timeout_s, clock=clock)
 

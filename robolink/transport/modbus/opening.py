@@ -5,8 +5,10 @@ from typing import TYPE_CHECKING, Final
 
 from robolink.errors import Concerning, ConfigError, ConnectError, TransportTimeoutError
 from robolink.messages import tr
+from robolink.package_log import PackageLog
 from robolink.timing import Clock, Deadline, SystemClock
 from robolink.transport._url import LinkUrl, UrlOptions
+from robolink.transport.byte_stream import logged
 from robolink.transport.modbus.client import ModbusClient
 from robolink.transport.modbus.frames import MOST_REGISTERS_READ, Area, RtuFraming, TcpFraming
 from robolink.transport.modbus.tcp import TcpExchange
@@ -29,6 +31,8 @@ _FASTEST_TIMED_BAUD: Final = 19_200
 _QUIET_CHARACTERS: Final = 10
 _QUIET_S: Final = 0.02
 """USB adapters hand over what they receive every 16 ms; a shorter pause is not silence."""
+
+_LOG: Final = PackageLog(__package__)
 
 _NO_YES: Final = {"no": False, "yes": True}
 
@@ -94,7 +98,8 @@ def _open_tcp(url: LinkUrl, options: UrlOptions, *, timeout_s: float, clock: Clo
         )
     server = replace(url, port=url.port or _PORT, options={})
     deadline = Deadline.after(clock, timeout_s)
-    transport = TcpTransport(dial(server, timeout_s=timeout_s, deadline=deadline), server, clock)
+    connection = dial(server, timeout_s=timeout_s, deadline=deadline)
+    transport = logged(TcpTransport(connection, server, clock), log=_LOG)
     identity = _identity(server, unit)
     exchange = TcpExchange(transport, identity, TcpFraming())
     return ModbusClient(
@@ -133,7 +138,8 @@ def _open_rtu(
         probe_area=probe.area,
         probe_address=probe.address,
     )
-    transport = open_serial(url, settings, timeout_s=timeout_s, clock=clock)
+    line_itself = open_serial(url, settings, timeout_s=timeout_s, clock=clock)
+    transport = logged(line_itself, log=_LOG)
     identity = _identity(url, unit)
     exchange = RtuExchange(transport, identity, line, RtuFraming())
     try:

@@ -194,7 +194,20 @@ def read_recording(path: Path) -> tuple[Dialogue, ...]:
             tr("The recording {path} cannot be read: {cause}.", path=path, cause=_cause(error)),
             remedy=tr("Give a file that --record or --transcript has written."),
         ) from error
-    return parse_dialogues(text, source=str(path))
+    dialogues = parse_dialogues(text, source=str(path))
+    for dialogue in dialogues:
+        kind, link, _ = dialogue.controller.partition("://")
+        if link and not kind.startswith("epson+"):
+            raise ConfigError(
+                tr(
+                    "{path} is a recording of {controller}; only one of an EPSON controller can "
+                    "be replayed.",
+                    path=path,
+                    controller=dialogue.controller,
+                ),
+                remedy=tr("Give another recording."),
+            )
+    return dialogues
 
 
 def _cause(error: OSError | UnicodeDecodeError) -> str:

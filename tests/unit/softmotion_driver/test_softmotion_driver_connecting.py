@@ -8,7 +8,6 @@ import pytest
 from robolink.controllers import SoftMotionController, connect
 from robolink.controllers.softmotion import controller as softmotion
 from robolink.errors import (
-    ConfigError,
     ConnectError,
     LeaseHeldError,
     OutcomeUnknownError,
@@ -404,8 +403,3 @@ def test_a_mailbox_that_does_not_run_is_not_reached(cell, monkeypatch):
     with pytest.raises(ConnectError):
         connect("softmotion+modbus-tcp://192.0.2.1")
     assert cell.link.closed
-
-
-def test_a_dialogue_with_a_plc_is_not_recorded_by_half():
-    with pytest.raises(ConfigError, match="cannot be recorded"):
-        connect("softmotion+modbus-tcp://192.0.2.1", trace=lambda *_passage: None)

@@ -4,6 +4,7 @@ import gc
 import os
 import signal
 import sys
+from contextlib import suppress
 from typing import Any
 
 import pytest
@@ -17,6 +18,15 @@ from tests._processes import pytest_addoption, pytest_runtestloop  # noqa: F401 
 # the more so the more cores a machine has.
 for _library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
+
+
+# What tests write stands in memory where there is room: a new journal with one entry takes 1.8 ms
+# of CPU there, 4.7 ms on a disk; and that it outlives a killed process shows there too.
+if sys.platform == "linux":
+    with suppress(AttributeError, OSError):  # no statvfs where POSIX is taken away
+        _memory = os.statvfs("/dev/shm")
+        if os.access("/dev/shm", os.W_OK) and _memory.f_bavail * _memory.f_frsize > 4 << 30:
+            os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", "/dev/shm")
 
 
 collect_ignore = ["integrator"]

@@ -188,7 +188,7 @@ def test_nothing_is_written_without_the_machines_permit(cell, plc, controller):
 
 def test_a_refused_tool_leaves_no_doubt(cell, plc, controller):
     plc.refusals[Opcode.WRITE_TOOL] = ErrorClass.TOOL_INCOMPATIBLE
-    with pytest.raises(RejectedError, match="cannot use this tool") as refusal:
+    with pytest.raises(RejectedError, match="cannot carry this tool") as refusal:
         controller.tools.write(3, NEW, expected=OLD)
     assert refusal.value.code == 301
     assert "11000" in refusal.value.what

@@ -127,8 +127,7 @@ class AcceptanceCriteria:
                         what=what,
                     ),
                     remedy=tr(
-                        "Nothing was written. Leave out the limit, or use a method that "
-                        "reports it."
+                        "Nothing was written. Leave out the limit, or use a method that reports it."
                     ),
                 )
 

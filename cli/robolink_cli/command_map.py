@@ -57,7 +57,7 @@ _SET_UP: Final = {
     "sim": (f"{SIMULATE}.sim:sim", declared("Simulated controllers to practise on")),
     "demo": (
         f"{SIMULATE}.demo:demo",
-        declared("Watch a whole needle change on a simulated robot; needs no machine"),
+        declared("A whole needle change on a simulated robot; needs no machine"),
     ),
 }
 

@@ -121,14 +121,13 @@ class AcceptanceCriteria:
                     "not_judged",
                     tr(
                         "The limit of {limit:g} mm cannot be judged: {method} does not "
-                        "measure {what}.",
+                        "report {what}.",
                         limit=limit_mm,
                         method=result.method,
                         what=what,
                     ),
                     remedy=tr(
-                        "Nothing was written. Leave out the limit, or use a method that "
-                        "measures it."
+                        "Nothing was written. Leave out the limit, or use a method that reports it."
                     ),
                 )
 

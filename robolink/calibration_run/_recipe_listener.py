@@ -248,8 +248,8 @@ def height_question(tool: int, name: str) -> str:
 def length_question(tool: int, name: str) -> str:
     """Return the question whether Z may stay as it is."""
     return tr(
-        "Is the new tip exactly as long as the old one? Z of tool {tool} {name} is not measured "
-        "and stays.",
+        "Z of tool {tool} {name} is not measured and stays. Is the new tip exactly as long "
+        "as the old one?",
         tool=tool,
         name=name,
     )

@@ -115,6 +115,6 @@ def test_a_limit_of_which_it_tells_nothing_is_refused(cell):
         refused = cell.calibrate("silent-touch", *limited)
         assert refused.code == 7, refused.err
         assert refused.document["error"]["code"] == "not_judged"
-        assert "silent-touch does not tell" in refused.document["error"]["what"]
+        assert "silent-touch does not report" in refused.document["error"]["what"]
         assert not cell.recorded(EntryKind.DONE)
         assert cell.calibrate("silent-touch", "--station", "PLATE").code == 0

@@ -126,7 +126,7 @@ def test_a_dry_run_shows_each_tilt_and_sends_nothing(plc):
     [
         (("--tool", "1", "--box", "1", "--yes"), 2, "would leave the allowed area"),
         (("--tool", "2", "--yes"), 2, "The tool is not defined"),
-        (("--tool", "1", "--until", "1", "--pose", "1,2,3,4,5,6"), 2, "says how to move"),
+        (("--tool", "1", "--until", "1", "--pose", "1,2,3,4,5,6"), 2, "is for movements"),
         (("--tool", "1"), 9, ""),
     ],
 )

@@ -141,7 +141,7 @@ def test_over_a_bus_touches_and_ways_go_the_same():
     [
         (("--box", "40", "--yes"), 2, "would leave the allowed area"),
         (("--way", "5", "--yes"), 2, "--way"),
-        (("--way", "60", "--pose", "1,2,3,4,5,6"), 2, "says how to move"),
+        (("--way", "60", "--pose", "1,2,3,4,5,6"), 2, "is for movements"),
         ((), 9, ""),
     ],
 )

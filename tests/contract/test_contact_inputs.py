@@ -74,7 +74,7 @@ def test_an_input_that_is_not_there_ends_it_with_the_robot_where_it_was(cell, tm
             recipe(cell, tmp_path) if way == "recipe" else learn(cell, "--contact-input", NOWHERE)
         )
     assert (done.code, done.document["error"]["kind"]) == (2, "ConfigError"), done.err
-    assert f"Input {NOWHERE}" in done.document["error"]["what"]
+    assert f"input {NOWHERE}" in done.document["error"]["what"]
     assert cell.world.robot.placement() == here
     assert cell.world.operator.touches == asked
     assert "Jog the tip" not in done.err

@@ -85,7 +85,7 @@ def test_a_target_for_another_tool_is_refused(cell, group):
     with pytest.raises(NotReadyError, match="tool 9, but tool 1") as refusal:
         group.move_to(replace(group.pose(), tool=9), QUICK, box=ANYWHERE)
     assert refusal.value.reason is NotReadyReason.WRONG_TOOL
-    assert "Nothing was moved" in refusal.value.remedy
+    assert "Nothing moved" in refusal.value.remedy
     assert cell.movements_started == 0
 
 

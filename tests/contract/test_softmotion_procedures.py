@@ -68,7 +68,7 @@ def test_a_start_of_the_plc_is_told_as_one_on_every_link(cell, controller):
     cell.restart()
     with pytest.raises(TransportBrokenError, match="restarted") as ended:
         controller.status()
-    assert "no tool slot is selected" in ended.value.remedy
+    assert "No tool slot is selected" in ended.value.remedy
     with cell.connect() as again:
         assert again.status().state is ControllerState.DISABLED
 

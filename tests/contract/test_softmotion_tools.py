@@ -181,7 +181,7 @@ def test_a_tool_that_the_kinematics_cannot_carry_is_refused_and_changes_nothing(
         with cell.connect() as controller:
             before = controller.tools.read(1)
             changes = cell.slot_changes(1)
-            with pytest.raises(RejectedError, match="cannot carry this tool") as refusal:
+            with pytest.raises(RejectedError, match="cannot use this tool") as refusal:
                 controller.tools.write(1, OTHER, expected=before)
             assert refusal.value.code == ErrorClass.TOOL_INCOMPATIBLE
             assert "X 9.000 mm, Y 9.000 mm" in str(refusal.value)

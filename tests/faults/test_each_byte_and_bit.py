@@ -49,7 +49,7 @@ def test_f04_an_answer_that_ends_at_any_byte_is_a_time_out_that_names_the_bytes(
     for at in range(1, length_of(simulator, url, READ) - 2):
         simulator.faults.add(Fault(FaultAction.TRUNCATE_REPLY, match=READ, position=at))
         with robolink.connect(url, timeout_s=0.3) as controller:
-            with pytest.raises(TransportTimeoutError, match=f"answered {at} bytes") as caught:
+            with pytest.raises(TransportTimeoutError, match=f"sent only {at} bytes") as caught:
                 controller.tools.read(1)
             assert len(caught.value.raw) == at
             with pytest.raises(TransportClosedError):

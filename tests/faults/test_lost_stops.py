@@ -52,7 +52,7 @@ def test_f76_a_stop_that_is_never_answered_is_repeated_and_then_says_what_to_pre
         said = capsys.readouterr()
         assert code not in (0, 70)
         assert "emergency stop" in said.err
-        assert "stands" not in said.out
+        assert "has stopped" not in said.out
         since = list(simulator.log)[before:]
         asked = [text for _, way, text in since if way == ">" and request_ in text]
         assert len(asked) == TRIES

@@ -59,7 +59,7 @@ def test_a_second_terminal_stops_through_the_one_that_is_logged_in(epson, beside
     assert not simulator.machine.arm.moving
     assert simulator.machine.arm.flange().x_mm > began_mm - 3
     shown = capsys.readouterr().out
-    assert "stands" in shown
+    assert "has stopped" in shown
     assert "jog" in shown  # who had it, and for what
     assert process.exit_code() == 10
     assert "Stopped from another terminal by" in process.err
@@ -73,7 +73,7 @@ def test_a_second_terminal_stops_a_plc_itself(plc, beside, capsys):
     process = beside("-c", url, "jog", "x-5", "--speed", "1", "--yes")
     await_that(lambda: group.movements_started > 0, process)
     assert entry.run(["-c", url.replace("127.0.0.1", "localhost"), "stop"]) == 0
-    assert "stands" in capsys.readouterr().out
+    assert "has stopped" in capsys.readouterr().out
     assert process.exit_code() == 10
     assert group.movements_started == 1
     jog = ["-c", url, "jog", "x+1", "--yes"]
@@ -94,6 +94,6 @@ def test_a_movement_left_by_a_killed_jog_is_stopped(epson, beside, capsys):
     assert simulator.machine.arm.moving
     assert entry.run(["-c", url, "stop"]) == 0
     assert not simulator.machine.arm.moving
-    assert "stands" in capsys.readouterr().out
+    assert "has stopped" in capsys.readouterr().out
     # What the killed one left to be found is taken away.
     assert list(holders_of(far_end_of(url))) == []

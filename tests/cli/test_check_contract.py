@@ -234,7 +234,13 @@ def test_a_stop_from_another_terminal_ends_the_checks(medium, request, robolink_
         controller.tools.write(2, ToolOffset(1, 2, 3), expected=robolink.ANY)
     process = checking(cell)
     assert main.run(["-c", cell.url, "stop"]) == 0
-    assert process.wait(timeout=60) == 10
+    if (ended := process.wait(timeout=60)) == 6:
+        # The stop's own block took the place of a write, so nothing proved how that ended.
+        assert medium == "softmotion"
+        assert main.run(["-c", cell.url, "robot", "reset", "--yes"]) == 0
+        assert main.run(["-c", cell.url, "recover", "--yes"]) == 0
+    else:
+        assert ended == 10
     truth = cell.truth()
     assert (truth["stored"]["2"]["x_mm"], truth["selected_tool"]) == (pytest.approx(1.0), 1)
     with robolink.connect(cell.url) as controller:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from robolink.controllers.epson.values import EpsonVariables as EpsonVariables
     from robolink.controllers.epson.values import typed_value as typed_value
     from robolink.controllers.epson.values import variable_type as variable_type
+    from robolink.controllers.model_axes import axes_of_model as axes_of_model
     from robolink.controllers.motion_group import MotionGroupCore as MotionGroupCore
     from robolink.controllers.motion_group import PolledGroup as PolledGroup
     from robolink.controllers.plc_map.controller import FlangeReader as FlangeReader
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
     from robolink.controllers.registry import CONTROLLERS_GROUP as CONTROLLERS_GROUP
     from robolink.controllers.registry import ConnectionTerms as ConnectionTerms
     from robolink.controllers.registry import ControllerOpener as ControllerOpener
-    from robolink.controllers.registry import axes_of_model as axes_of_model
     from robolink.controllers.registry import capabilities_of_kind as capabilities_of_kind
     from robolink.controllers.registry import connect as connect
     from robolink.controllers.registry import connect_when_reachable as connect_when_reachable
@@ -57,8 +57,9 @@ else:
             "motion_group": "MotionGroupCore PolledGroup",
             "plc_map.controller": "FlangeReader PlcMapController open_plc_map",
             "preserving": "Preserver",
+            "model_axes": "axes_of_model",
             "registry": (
-                "CONTROLLERS_GROUP ConnectionTerms ControllerOpener axes_of_model "
+                "CONTROLLERS_GROUP ConnectionTerms ControllerOpener "
                 "capabilities_of_kind connect connect_when_reachable"
             ),
             "resolving": "MarkerResolver",

@@ -488,13 +488,9 @@ def _beginning(marker: Marker, *, first: bool) -> tuple[NewEntry, ...]:
 
 def _act(kind: EntryKind, marker: Marker) -> NewEntry:
     """Return what is put on record about what ``marker`` stands for."""
-    tool = marker.details.get("tool")
-    return NewEntry(
-        kind,
-        operation=marker.operation,
-        tool=tool if isinstance(tool, int) else None,
-        details={**marker.details, "request": marker.request},
-    )
+    tool, details = marker.details.get("tool"), {**marker.details, "request": marker.request}
+    known = tool if isinstance(tool, int) else None
+    return NewEntry(kind, operation=marker.operation, tool=known, details=details)
 
 
 def _untouched() -> str:

@@ -98,7 +98,7 @@ def test_a_stop_is_logged_once_it_is_over(cell, joined, monkeypatch):
     assert entry.run([*where, "stop", "--log-file", "day.log", "--log-level", "debug"]) == 0
     text = Path("day.log").read_text(encoding="utf-8")
     assert all(LINE.match(line) for line in text.splitlines()), text
-    assert text.index("sent $Abort") < text.index("sent $Stop") < text.index("stands still")
+    assert text.index("sent $Abort") < text.index("sent $Stop") < text.index("has stopped")
     assert PASSWORD not in text
 
 

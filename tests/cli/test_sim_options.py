@@ -26,7 +26,7 @@ from tests.cli.test_command_names import run_on_terminal
 # One set of option names for every simulator, grouped on its help page; old names still work.
 
 SERVED = ("epson", "softmotion", "plc")
-OF_EVERY_COMMAND = {"--json", "--lang"}
+OF_EVERY_COMMAND = {"--json", "--lang", "--log-file", "--log-level"}
 COMMON = {
     *("--tcp", "--serial", "--allow-remote", "--seed", "--speed", "--faults"),
     *("--control", "--with-parent", "--idle-exit"),
@@ -317,19 +317,22 @@ def test_a_recording_holds_the_dialogue_and_not_the_password(cell, tmp_path):
     assert "$GetIO,3" in text
 
 
-def test_a_recording_is_replayed_as_a_test(cell, tmp_path, epson_replay, capsys, monkeypatch):
-    recording = tmp_path / "day.jsonl"
+def test_a_recording_is_replayed_as_a_test(
+    epson_factory, tmp_path, epson_replay, capsys, monkeypatch
+):
+    cell, recording = epson_factory(medium="tcp"), tmp_path / "day.jsonl"
     commands = [["status", "--json"], ["tool", "list", "--json"], ["var", "get", "VERSION$"]]
-    live = []
-    for arguments in commands:
-        assert main.run(["--record", str(recording), *arguments]) == 0
-        live.append(capsys.readouterr().out)
-    url = epson_replay(recording)
-    for arguments, shown in zip(commands, live, strict=True):
-        # A controller on a network is asked who it is by those who never met it.
-        monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / arguments[0]))
+
+    def shown_of(url, arguments, place):
+        # Who never met a controller asks it who it is: so does each of these commands.
+        monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / place / arguments[0]))
         assert main.run(["-c", url, *arguments]) == 0
-        assert capsys.readouterr().out == shown.replace("epson+sim://cli-evidence", url)
+        return capsys.readouterr().out.replace(url, "URL")
+
+    record = ["--record", str(recording)]
+    live = [shown_of(cell.url, [*arguments, *record], "live") for arguments in commands]
+    url = epson_replay(recording)
+    assert [shown_of(url, arguments, "replay") for arguments in commands] == live
 
 
 def test_sim_serves_a_recording_and_names_what_differs(cell, tmp_path, capsys):

@@ -71,7 +71,17 @@ def file(tmp_path):
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_option_of_a_command_is_a_key_of_its_table(kind):
     command = sim.commands[kind]
-    alone = {"control", "with-parent", "idle-exit", "json", "lang", "help", "replay"}
+    alone = {
+        "control",
+        "with-parent",
+        "idle-exit",
+        "json",
+        "lang",
+        "log-file",
+        "log-level",
+        "help",
+        "replay",
+    }
     alone |= {"modbus-tcp", "modbus-rtu"}  # what --tcp and --serial were called
     options = {max(it.opts, key=len).lstrip("-") for it in command.params} - alone
     keys = DeclaredKeys(command, Path()).options

@@ -70,7 +70,7 @@ def test_those_that_wait_get_their_turn_in_the_order_in_which_they_came(controll
         for number in range(5):
             ends.append(threads.submit(write, number))
             come_to_wait(controller, number + 1)
-        with pytest.raises(BusyError, match="has to wait"):  # whoever does not wait is told
+        with pytest.raises(BusyError, match="must wait"):  # whoever does not wait is told
             threads.submit(controller.tools.write, 2, value(9), expected=ANY).result(PATIENCE_S)
         assert came == []
     for end in ends:
@@ -183,7 +183,7 @@ def test_the_wait_ends_with_its_time(threads):
     with runtime.replaced(time), SimpleController(identity=URL) as controller:
         with controller.procedure("a calibration"):
             late = threads.submit(controller.tools.write, 1, value(1), expected=None, wait_s=7.0)
-            with pytest.raises(BusyError, match="another operation is under way"):
+            with pytest.raises(BusyError, match="another operation is running"):
                 late.result(PATIENCE_S)
         assert time.slept_s == pytest.approx(7.0)
         assert controller._driver.lock._waiting == []

@@ -23,6 +23,7 @@ from robolink.errors import (
     VerifyError,
 )
 from robolink.model import ANY, EntryKind, MarkerKind, PersonRole, ToolOffset, read_offset
+from robolink.protocols import spel
 from robolink.transaction import ToolChange, Wanted, change_tools, recover
 from tests.unit._transaction_cell import NEW, OLD, OTHER, UNDEFINED, tool_cell, wanted
 
@@ -402,10 +403,11 @@ def test_a_list_that_does_not_confirm_what_was_expected_is_not_believed(
     cell, controller_as_asked, monkeypatch, listing
 ):
     controller_as_asked.tools.write(2, NEW[2], expected=OLD[2])
-    monkeypatch.setattr("robolink.controllers.epson.tools._listing", lambda _window: listing)
+    parsed = spel.parse_tool_listing
+    monkeypatch.setattr(spel, "parse_tool_listing", lambda _printed: parsed(listing))
     cell.simulator.log.clear()
     controller_as_asked.tools.write(1, NEW[1], expected=OLD[1])
-    assert asked(cell) == [*ONE_BY_ONE, *WRITTEN]
+    assert asked(cell) == ["TLSet", *ONE_BY_ONE, *WRITTEN]
 
 
 def test_what_is_stored_already_is_asked_for_by_itself_before_the_write_is_left_out(

@@ -14,6 +14,7 @@ BIN := $(VENV)/bin
 PEER := $(VENV)/bench-peer
 JUDGES := $(VENV)/judges
 API_JUDGE := $(VENV)/schemathesis
+TYPE_JUDGE := $(VENV)/pyright
 WHEELHOUSE := wheelhouse
 POT := robolink/locale/robolink.pot
 
@@ -61,7 +62,7 @@ faults: $(VENV)/.installed-dev ## Run the fault catalogue, F01 to F80, and print
 
 # Their files are called judge_*.py: a plain pytest, which takes test_*.py, leaves them out.
 .PHONY: peers
-peers: $(VENV)/.installed-dev $(JUDGES) $(API_JUDGE) ## Let foreign programs judge buses, PLC program and control API.
+peers: $(VENV)/.installed-dev $(JUDGES) $(API_JUDGE) $(TYPE_JUDGE) ## Let foreign programs judge buses, PLC program, control API and examples.
 	@{ command -v mbpoll && command -v tshark && command -v node && command -v cc && pkg-config --exists libmodbus; } \
 		>/dev/null || { \
 		echo "Not all judges are here. On Debian and Ubuntu:" \
@@ -77,6 +78,11 @@ $(JUDGES): $(VENV)/.installed-dev
 $(API_JUDGE): $(VENV)/.installed-dev
 	$(BIN)/python -m venv $@
 	$@/bin/python -m pip install --quiet schemathesis==4.32.5 || true
+
+# The npm package holds the checker itself; without npm or a network its judge says so.
+$(TYPE_JUDGE): $(VENV)/.installed-dev
+	mkdir -p $@
+	npm install --silent --no-fund --no-audit --prefix $@ pyright@1.1.414 || true
 
 # NIGHT= hours; PARTS="docs peers" runs some. The parts and their shares: tools/nightly.py.
 NIGHT ?= 8

@@ -11,6 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
+__all__ = ["ControllerOutcome", "Effect", "ToolOutcome", "UNTOUCHED", "outcome_after"]
+
 Components = tuple[float, ...] | None
 """x, y, z in mm and u, v, w in degrees; ``None`` for an undefined tool."""
 

@@ -124,7 +124,7 @@ OLD_NAMES: Final[Mapping[str, Mapping[str, str]]] = {
         "PlcopenSchema": "robolink.protocols.mailbox.exports.PlcopenSchema",
         "electronic_data_sheet": "robolink.protocols.mailbox.exports.electronic_data_sheet",
         "error_table_csv": "robolink.protocols.mailbox.exports.error_table_csv",
-        "plcopen_xml": "robolink.protocols.mailbox.exports.plc_program",
+        "plcopen_xml": "robolink.protocols.mailbox.exports.plcopen_xml",
         "program_texts": "robolink.protocols.mailbox.exports.program_texts",
         "register_map_csv": "robolink.protocols.mailbox.exports.register_map_csv",
         "register_map_markdown": "robolink.protocols.mailbox.exports.register_map_markdown",

@@ -21,15 +21,9 @@ TOPS: Final = {
     "robolink": ROOT / "robolink",
     "robolink_simulators": ROOT / "simulators" / "robolink_simulators",
 }
-_HEAD: Final = """\
-# What is public
+_LISTS: Final = "## robolink\n"
+"""The heading at which the lists begin; what stands before it is written by hand."""
 
-Each name has one place to import it from: `from robolink.controllers import EpsonController`. What
-is not listed here is internal and may change in any version. A name that was given up works for
-one more version and warns (`DeprecationWarning`). `help(NAME)` shows parameters, units, errors and
-examples, and so do the pages that `make docs` builds. This page is written by
-`python -m tools.api`.
-"""
 _KINDS: Final = ("Classes", "Errors", "Functions", "Constants and types")
 _ROLE: Final = re.compile(r":(?:py:)?\w+:`~?([^`<]*?)(?: ?<[^`]*>)?`")
 
@@ -54,15 +48,16 @@ def page() -> str:
     """Return the page."""
     found = public()
     front = found.pop("robolink")
+    written, _, _ = PAGE.read_text(encoding="utf-8").partition(_LISTS)
     rows = (f"| `{name}` | {_sentence(thing)} |" for name, thing in front.items())
-    parts = [_HEAD, "## robolink\n", "| name | what it is |\n|---|---|", *rows]
+    parts = [written + _LISTS, "| name | what it is |\n|---|---|", *rows]
     for package, names in found.items():
         parts.append(f"\n## {package}\n\n{_sentence(import_module(package))}")
         for kind in _KINDS:
             here = [
                 f"`{name}`"
                 for name, thing in sorted(names.items())
-                if _kind(thing) == kind and front.get(name, _HEAD) is not thing
+                if _kind(thing) == kind and front.get(name, _LISTS) is not thing
             ]
             if here:
                 parts.append("\n" + fill(f"{kind}: {', '.join(here)}.", 120))

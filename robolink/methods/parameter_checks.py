@@ -6,6 +6,7 @@ Commands, recipes and docs read the same fields; what is wrong is told in the sa
 import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
+from inspect import get_annotations
 from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Annotated, Any, Union, get_args, get_origin, get_type_hints
 
@@ -32,7 +33,6 @@ if TYPE_CHECKING:
     from robolink.procedures import TipSource
 
 
-_NOTES = "__annotations__"
 _UNITS = ("_mm_s", "_mm_per_px", "_mm", "_deg")
 
 
@@ -86,7 +86,7 @@ def fields_of(parameters: type[Any]) -> tuple[ParameterField, ...]:
     """
     if parameters not in _read:
         hints = get_type_hints(parameters, include_extras=True)
-        order = [name for owner in parameters.__mro__ for name in vars(owner).get(_NOTES, ())]
+        order = [name for owner in parameters.__mro__ for name in get_annotations(owner)]
         found = sorted(dataclasses.fields(parameters), key=lambda one: order.index(one.name))
         _read[parameters] = tuple(_field(one, hints[one.name]) for one in found)
     return _read[parameters]

@@ -4,8 +4,6 @@ import importlib.util
 import json
 import os
 import re
-import shlex
-import shutil
 import signal
 import subprocess
 import sys
@@ -110,26 +108,6 @@ def test_what_the_container_runs_works_in_a_plain_shell(environment):
         assert served.wait(timeout=60) == 0
     finally:
         served.kill()
-
-
-@pytest.mark.soak
-@pytest.mark.timeout(600)
-@pytest.mark.skipif(os.name == "nt", reason="needs a POSIX shell")
-def test_the_pipeline_is_through_in_a_plain_shell(environment, tmp_path):
-    for name in ("cells.toml", "pipeline.sh"):
-        shutil.copy(EXAMPLES / name, tmp_path / name)
-    done = subprocess.run(
-        shlex.split("sh pipeline.sh"),
-        cwd=tmp_path,
-        env=environment,
-        capture_output=True,
-        text=True,
-        timeout=500,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.endswith("The pipeline is through.\n")
-    assert "TLSet 3, XY" in (tmp_path / "wire.txt").read_text(encoding="utf-8")
 
 
 # ``make nightly``: every part is run, bounded, and told as it ended.

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator
 from functools import cache
 from importlib import import_module
+from inspect import get_annotations
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -268,7 +269,7 @@ def followed(thing: Any, names: list[str]) -> bool:
 def _said(one: type) -> set[str]:
     # What __init__ alone gives to an object is an attribute as well where the docstring names it.
     text = one.__doc__ or ""
-    return {*vars(one).get("__annotations__", {}), *re.findall(r"^ {4,8}([\w, ]+):", text, re.M)}
+    return {*get_annotations(one), *re.findall(r"^ {4,8}([\w, ]+):", text, re.M)}
 
 
 def absolute(names: list[str]) -> bool:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from robolink.deprecation import OLD_NAMES
 from tests.packaging._way_to_the_wire import (
     follow_a_tool_write,
     follow_into_the_simulator,
@@ -24,6 +25,7 @@ MOST_MODULES = 16
 two, not when it is long."""
 MOST_LINES = 500
 """Of a module that stays one idea; most are far shorter."""
+IMPORT = re.compile(r"^from (robolink[\w.]*) import (\([^)]*\)|[\w, ]+)", re.MULTILINE)
 CLASS = re.compile(r"^class ([A-Za-z]\w*)", re.MULTILINE)
 
 
@@ -205,6 +207,23 @@ def test_no_other_package_hands_out_what_it_does_not_list():
 
 def test_the_page_names_what_is_public():
     assert api.PAGE.read_text(encoding="utf-8") == api.page(), ".venv/bin/python -m tools.api"
+
+
+def test_what_an_old_name_leads_to_is_public(public):
+    homes = [new for row in OLD_NAMES.values() for new in row.values()]
+    listed = {f"{home}.{name}" for home, names in public.items() for name in names}
+    assert [new for new in homes if new not in listed] == []
+
+
+def test_what_pages_and_examples_import_is_public(public):
+    pages = [ROOT / "README.md", ROOT / "simulators/README.md", *ROOT.glob("docs/*.md")]
+    strange = []
+    for path in [*pages, *ROOT.glob("examples/*/*.py")]:
+        for home, names in IMPORT.findall(path.read_text(encoding="utf-8")):
+            for name in re.findall(r"\w+", names):
+                if name not in public.get(home, ()) and f"{home}.{name}" not in public:
+                    strange.append(f"{path.name}: {home}.{name}")
+    assert strange == []
 
 
 # The ways of a tool write to the wire, and of poses to the solver, grow no longer unnoticed.

@@ -14,7 +14,7 @@ TRIED: Final = Path(__file__).with_name("tried.json")
 NEVER: Final = ("dev", "docs")
 """Extras for people who work on robolink; nothing of them is needed to use it."""
 
-PYTHONS: Final = ("3.11", "3.12", "3.13")
+PYTHONS: Final = ("3.11", "3.12", "3.13", "3.14")
 """The versions of Python that ``make versions`` looks for, the lowest first."""
 
 _CLASSIFIER: Final = "Programming Language :: Python :: 3."

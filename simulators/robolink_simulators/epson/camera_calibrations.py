@@ -22,6 +22,8 @@ from robolink_simulators.cell.places import Pixel
 from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 from robolink_simulators.epson.memory.points import Point
 
+__all__ = ["CameraMounting", "VisionCalibration"]
+
 _FEWEST_POINTS = 3
 
 

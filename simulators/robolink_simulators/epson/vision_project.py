@@ -20,6 +20,8 @@ from robolink_simulators.cell.places import Pixel
 from robolink_simulators.epson.camera_calibrations import VisionCalibration
 from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 
+__all__ = ["PropertySet", "VisionObject", "VisionProject", "VisionSequence"]
+
 VisionValue = bool | int | float | str
 """What properties and results are."""
 

@@ -25,6 +25,8 @@ from robolink_simulators.epson.vision_project import (
     bitmap,
 )
 
+__all__ = ["VisionSystem"]
+
 _FIDUCIAL: Final = TIP + 1
 _EXPOSED_MS: Final = 33
 _US_PER_MS: Final = 1000

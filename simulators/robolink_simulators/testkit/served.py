@@ -17,6 +17,8 @@ from robolink_simulators.control.cell import AnySimulator, ControlledCell
 from robolink_simulators.device.wire_record import StartedMotion, WireLine, WireRecord
 from robolink_simulators.testkit.operator import ScriptedOperator
 
+__all__ = ["EndedCommand", "MotionLook", "SimulatedCell", "WireLook"]
+
 _SHOWN: Final = 40
 
 

@@ -18,6 +18,8 @@ from robolink_simulators.hosting.in_process.transport import InProcessTransport
 from robolink_simulators.option_values import require_known
 from robolink_simulators.state_files import drawn_serial
 
+__all__ = ["register", "unregister"]
+
 _OWN_OPTIONS: Final = ("robot", "seed", "state", "split", "faults")
 
 _named: Final = NamedSimulators[EpsonSimulator]("epson+sim")

@@ -22,6 +22,8 @@ from robolink_simulators.softmotion.mailbox.simulator import (
     SoftMotionSimulator,
 )
 
+__all__ = ["register", "unregister"]
+
 _OWN_OPTIONS: Final = ("kinematics", "seed", "state", "faults")
 
 _named: Final = NamedSimulators[SoftMotionSimulator]("softmotion+sim")

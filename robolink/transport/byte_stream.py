@@ -119,6 +119,7 @@ class TracingTransport:
             sink = Traffic(inner.identity, inner.clock, sinks=(sink,), log=None)
         self.traffic = sink
         self._listened = sink.listened
+        self._told = True
 
     @property
     def place(self) -> str:
@@ -139,21 +140,23 @@ class TracingTransport:
 
     def send(self, data: bytes, *, deadline: Deadline, secret: bool = False) -> None:
         """See :meth:`robolink.transport.Transport.send`; a secret never reaches the sink."""
-        if secret or self._listened():  # looked at here: each call costs in every exchange
+        # Looked at here, and once an exchange: what it costs where nobody listens, all pay.
+        self._told = self._listened()
+        if secret or self._told:
             self.traffic.sent(data, secret=secret)
         self._send(data, deadline=deadline, secret=secret)
 
     def receive(self, *, deadline: Deadline) -> bytes:
         """See :meth:`robolink.transport.Transport.receive`."""
         data = self._receive(deadline=deadline)
-        if self._listened():
+        if self._told:
             self.traffic.received(data)
         return data
 
     def receive_waiting(self) -> bytes | None:
         """See :meth:`robolink.transport.Transport.receive_waiting`."""
         data = self._receive_waiting()
-        if data is not None and self._listened():
+        if data is not None and self._told:
             self.traffic.received(data)
         return data
 

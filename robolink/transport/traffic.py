@@ -166,7 +166,7 @@ class Traffic:
 
     def listened(self) -> bool:
         """Whether anybody is told; who moves bytes looks at it before it tells of any."""
-        return self._debugs() or bool(self._sinks)
+        return True if self._sinks else self._debugs()
 
     def show_answers(self, answers: Collection[bytes]) -> None:
         """Say which answers to a secret hold none of it, so that they are told as they are.

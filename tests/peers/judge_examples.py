@@ -9,10 +9,12 @@ import shutil
 import signal
 import subprocess
 import sys
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+import platformdirs
 import pytest
 
 from tests._mail_server import mail_server
@@ -137,17 +139,49 @@ def test_pyright_finds_nothing_in_its_strict_mode(installed, typed, tmp_path):
     node = shutil.which("node")
     if node is None or not PYRIGHT.exists():
         pytest.skip("pyright is not here: make peers fetches it with npm")
-    (tmp_path / "pyrightconfig.json").write_text(
-        json.dumps({"include": typed, "typeCheckingMode": "strict", "extraPaths": [str(PROGRAMS)]})
-    )
+    # It takes no paths but relative ones.
+    include = [os.path.relpath(path, tmp_path) for path in typed]
+    settings = {"include": include, "typeCheckingMode": "strict", "extraPaths": [str(PROGRAMS)]}
+    (tmp_path / "pyrightconfig.json").write_text(json.dumps(settings))
     done = subprocess.run(
-        [node, str(PYRIGHT), "-p", str(tmp_path), "--pythonpath", str(installed)],
+        [node, str(PYRIGHT), "-p", str(tmp_path), "--pythonpath", str(installed), "--outputjson"],
         capture_output=True,
         text=True,
         check=False,
     )
-    (fault,) = [line for line in done.stdout.splitlines() if " - error: " in line]
-    assert "wrong.py:3:" in fault, done.stdout
+    told = json.loads(done.stdout)
+    assert told["summary"]["filesAnalyzed"] == len(typed)
+    (fault,) = told["generalDiagnostics"]
+    assert Path(fault["file"]).name == "wrong.py"
+
+
+# What a driver needs of other packages
+
+
+def test_tools_are_written_with_nothing_but_platformdirs(installed, cells, tmp_path, run):
+    """As docs/install.md says of ``pip install --no-deps robolink platformdirs``."""
+    packages = tmp_path / "packages"
+    packages.mkdir()
+    (wheel,) = installed.parents[2].glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(packages)
+    (packages / "platformdirs").symlink_to(Path(platformdirs.__file__).parent)
+    program = (
+        "import sys\n"
+        "sys.path.append(sys.argv[1])\n"
+        "from robolink import ToolOffset, connect\n"
+        "from robolink.transaction import ToolChange, Wanted, recover\n"
+        "with connect(sys.argv[2]) as controller:\n"
+        "    wanted = Wanted(4, ToolOffset(1, 2, -3), controller.tools.read(4))\n"
+        "    with ToolChange(controller, [wanted], verify=True) as change:\n"
+        "        change.write()\n"
+        "        change.keep()\n"
+        "    print(controller.tools.read(4), controller.status().state)\n"
+        "    controller.stop()\n"
+    )
+    alone = [sys.executable, "-I", "-S", "-c", program]  # no site-packages
+    ended = run(*alone, packages, cells["line-07"]["url"])
+    assert (ended.code, "x_mm=1.0" in ended.out) == (0, True), ended
 
 
 # change_and_try.py

@@ -128,10 +128,12 @@ def _root() -> click.Command:
 def _answer(arguments: Sequence[str]) -> int:
     if "_ROBOLINK_COMPLETE" in os.environ:
         _root().main(list(arguments), prog_name="robolink")  # answers the shell and exits
-    before = _logs().logs_open() if _logs() else 0
-    code = _ended(arguments)
-    if logs := _logs():
-        logs.close_logs(beyond=before, code=code)
+    before, code = _logs().logs_open() if _logs() else 0, None
+    try:
+        code = _ended(arguments)
+    finally:
+        if logs := _logs():
+            logs.close_logs(beyond=before, code=code)
     return code
 
 

@@ -24,7 +24,7 @@ from tests.faults._nozzle_cell import MOVE, OLD_TIP, served_cell
 from tests.faults._recipe_instants import Instant, Instants
 from tests.faults._worlds import Worlds
 
-pytestmark = pytest.mark.timeout(3600)
+pytestmark = [pytest.mark.timeout(3600), pytest.mark.usefixtures("signals_of_a_terminal")]
 
 POSE = '$Execute,"Print RealPos"'
 

@@ -13,6 +13,7 @@ from robolink_cli import main
 from robolink_cli.commands.controller.contract_report import TrialConnections
 from robolink_cli.console.exit_codes import UNKNOWN
 from robolink_cli.console.shell_words import SHELL_WAYS
+from robolink_cli.options.log_file import close_logs, logs_open
 from robolink_simulators.hosting.in_process import epson, softmotion
 
 from robolink.errors import OutcomeUnknownError
@@ -69,6 +70,7 @@ def run_line(
         stack.enter_context(mock.patch.object(TrialConnections, "_listen", _heard_by(process)))
         stack.enter_context(speaking(SHELL_WAYS))
         stack.callback(close_files)
+        stack.callback(close_logs, beyond=logs_open())
         stack.callback(lambda: tell(" / ".join(shown.getvalue().splitlines()[-2:])))
         code = main._invoke(  # what run() does, but for the signals of this process
             ("-c", plant.address, *words)

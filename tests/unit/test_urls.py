@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from robolink.controllers.registry import find_opener
 from robolink.errors import ConfigError
 from robolink.methods import find_method
-from robolink.timing import SystemClock
 from robolink.transport import TRANSPORTS_GROUP, open_transport, parse_url
+from tests.unit.test_transport_trace import ScriptedTransport
 
 # URLs that name a controller.
 
@@ -97,15 +97,12 @@ def test_any_text_is_a_url_or_a_config_error(text):
 # Finding the transport that a URL names.
 
 
-class DeskLine:
+class DeskLine(ScriptedTransport):
     """A transport that says how it was opened."""
 
-    durable = False
-
     def __init__(self, url, timeout_s, clock):
-        self.url = self.identity = self.place = url.identity
+        super().__init__()
         self.opened = (url, timeout_s, clock)
-        self.clock = SystemClock()
 
     def send(self, data, *, deadline, secret=False):
         """Send nothing."""
@@ -148,7 +145,7 @@ def test_another_package_is_found_by_the_name_of_its_full_scheme(entry_points):
     link = parse_url("epson+desk://cell-a?seed=1")
     line = open_transport(link, timeout_s=1.5)
     assert opened.pop().opened == (link, 1.5, None)
-    assert (line.url, line.place) == ("epson+desk://cell-a", "epson+desk://cell-a")
+    assert (line.url, line.place) == (DeskLine.url, DeskLine.place)
 
 
 def test_a_url_may_be_given_as_text(entry_points):

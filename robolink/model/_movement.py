@@ -97,11 +97,24 @@ class MotionProfile:
     """How fast to move. Power is always low; these are set and read back before a move.
 
     ``speed_percent`` rules joint moves, ``speed_mm_s`` straight ones.
+
+    Raises:
+        ConfigError: There is no such path.
     """
 
     path: Path = Path.JOINT
     speed_percent: int = 5
     speed_mm_s: float = 20.0
+
+    def __post_init__(self) -> None:
+        if type(self.path) is not Path:  # a mere word would pass for the other path
+            try:
+                object.__setattr__(self, "path", Path(self.path))
+            except ValueError:
+                raise ConfigError(
+                    tr("There is no path {given!r}.", given=self.path),
+                    remedy=tr("Give Path.JOINT or Path.STRAIGHT. Nothing moved."),
+                ) from None
 
 
 @dataclass(frozen=True, slots=True)

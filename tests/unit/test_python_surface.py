@@ -24,7 +24,7 @@ from robolink.errors import ConfigError, ToolIndexError
 from robolink.journal import open_journal
 from robolink.methods import OneTouchSource, TwoPoseSource, measure_two_pose
 from robolink.model import EntryKind, NewEntry, WorkBox
-from robolink.model._movement import MotionProfile
+from robolink.model._movement import MotionProfile, Path
 from robolink.procedures import (
     InputSource,
     LazySource,
@@ -319,6 +319,25 @@ def controller(tmp_path, monkeypatch):
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path))
     with robolink.connect("epson+sim://arguments") as controller:
         yield controller
+
+
+def test_a_path_in_a_word_is_that_path_and_no_other(controller, monkeypatch):
+    word: Any = "straight"
+    assert MotionProfile(path=word).path is Path.STRAIGHT
+    with pytest.raises(ConfigError, match="no path 'curved'"):
+        MotionProfile(path=cast("Any", "curved"))
+    admit, seen = controller.latch.admit, list[str]()
+
+    def admitted(kind, request):
+        seen.append(request)
+        admit(kind, request)
+
+    monkeypatch.setattr(controller.latch, "admit", admitted)
+    here = controller.groups[0].pose()
+    box = WorkBox.around(here, xy_mm=5, below_mm=5, above_mm=5)
+    above = replace(here, z_mm=here.z_mm + 1)
+    controller.groups[0].move_to(above, MotionProfile(path=word), box=box).wait(timeout_s=60)
+    assert any("Move XY" in one for one in seen)
 
 
 def test_numbers_of_numpy_are_numbers(controller):

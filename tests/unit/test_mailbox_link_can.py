@@ -178,6 +178,33 @@ def toggled(service, data):
     return bytes([service | data[0] & 0x10]) + bytes(7)
 
 
+LATE = (
+    b"\x60\x00\x21\0\0\0\0\0",  # a download begun
+    b"\x20\0\0\0\0\0\0\0",  # a segment taken
+    b"\x43\x18\x10\x04\1\2\3\4",  # another object
+    b"\x80\x01\x21\x00\0\0\2\6",  # an abort
+)
+
+
+@pytest.mark.parametrize("late", LATE)
+@pytest.mark.fault("F57", "F58")
+def test_an_answer_to_a_client_that_was_killed_is_passed_over_by_the_next_one(link_to, late):
+    bus, link = link_to(
+        lambda identifier, data: [(SDO_ANSWER, late), *node_with(200)(identifier, data)]
+    )
+    assert bus.sent == [(SDO_ASK, b"\x40\x17\x10\x00\0\0\0\0"), (0, bytes([1, NODE]))]
+    bus.clock.sleep(0.7)
+    with pytest.raises(TransportBrokenError, match=r"0\.2 s"):  # the period is the node's own
+        link.beat(1)
+
+
+def test_a_second_client_on_the_bus_is_noticed_while_connecting(link_to):
+    twice = [(SDO_ANSWER, LATE[0]), (SDO_ANSWER, LATE[1])]
+    with pytest.raises(RemoteProtocolError, match="1017h:0") as caught:
+        link_to(lambda identifier, data: [*twice, *node_with(0)(identifier, data)])
+    assert "second SDO client" in caught.value.remedy
+
+
 @pytest.mark.fault("F10")
 @pytest.mark.parametrize(
     "foreign",

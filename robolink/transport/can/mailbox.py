@@ -119,6 +119,8 @@ class CanopenMailboxLink:
     def meet(self, *, start: bool) -> None:
         """Ask for the node's heartbeat period, then start the node if wanted.
 
+        One answer that is due to a killed client may come first; it is passed over.
+
         Raises:
             ConnectError: It does not answer.
         """
@@ -205,7 +207,7 @@ class CanopenMailboxLink:
 
     def _read_heartbeat_s(self, deadline: Deadline) -> float:
         try:
-            data = self._upload(HEARTBEAT_TIME_OBJECT, 0, deadline)
+            data = self._upload(HEARTBEAT_TIME_OBJECT, 0, deadline, strays=1)
         except RejectedError:  # the object is optional
             return 0.0
         return int.from_bytes(data, "little") / _MS_PER_S
@@ -228,8 +230,9 @@ class CanopenMailboxLink:
             )
         return struct.unpack(f"<{count}H", data)
 
-    def _upload(self, index: int, subindex: int, deadline: Deadline) -> bytes:
-        return SdoTransfer(self._watch, self.identity, (index, subindex), deadline).upload()
+    def _upload(self, index: int, subindex: int, deadline: Deadline, *, strays: int = 0) -> bytes:
+        place = (index, subindex)
+        return SdoTransfer(self._watch, self.identity, place, deadline, strays=strays).upload()
 
     def _download(self, index: int, subindex: int, data: bytes, deadline: Deadline) -> None:
         SdoTransfer(self._watch, self.identity, (index, subindex), deadline).download(data)

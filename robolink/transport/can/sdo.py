@@ -69,16 +69,25 @@ class SdoTransfer:
         identity: Names the far end in errors.
         place: Index and subindex.
         deadline: For the whole of the transfer.
+        strays: Answers to somebody else that are passed over. A client has one request under way
+            at most, so one can still be due when a process was killed and the next one connects.
     """
 
     def __init__(
-        self, line: SdoLine, identity: str, place: tuple[int, int], deadline: Deadline
+        self,
+        line: SdoLine,
+        identity: str,
+        place: tuple[int, int],
+        deadline: Deadline,
+        *,
+        strays: int = 0,
     ) -> None:
         self._line = line
         self._identity = identity
         self._index, self._subindex = place
         self._object = self._index.to_bytes(2, "little") + bytes([self._subindex])
         self._deadline = deadline
+        self._strays = strays
         line.answers.clear()
 
     def upload(self) -> bytes:
@@ -117,17 +126,23 @@ class SdoTransfer:
 
     def _exchange(self, request: bytes) -> bytes:
         self._line.ask(request)
+        while True:
+            answer = self._next_answer()
+            if self._fits(request, answer):
+                return answer
+            if answer[:4] == bytes([_ABORTED]) + self._object and len(answer) == _FRAME_BYTES:
+                raise self._refused(int.from_bytes(answer[4:], "little"))
+            if not self._strays:
+                raise self._mismatched(answer)
+            self._strays -= 1
+
+    def _next_answer(self) -> bytes:
         while not self._line.answers:
             if self._deadline.expired:
                 self._abort(_ABORT_TIMED_OUT)
                 raise self._unanswered()
             self._line.pump(self._deadline)
-        answer = self._line.answers.popleft()
-        if len(answer) == _FRAME_BYTES and answer[0] == _ABORTED and answer[1:4] == self._object:
-            raise self._refused(int.from_bytes(answer[4:], "little"))
-        if not self._fits(request, answer):
-            raise self._mismatched(answer)
-        return answer
+        return self._line.answers.popleft()
 
     def _fits(self, request: bytes, answer: bytes) -> bool:
         service = request[0] & _SERVICE

@@ -168,8 +168,9 @@ def _commit() -> str:
         )
         return done.stdout.strip()
 
-    # The list of seeds that were run is a record: a night itself adds to it.
-    seen = ("--untracked-files=no", "--", ".", ":!tests/soak/seeds_run.txt")
+    # Seeds that were run and versions that were tried are records: a night itself adds to them.
+    records = (":!tests/soak/seeds_run.txt", ":!tests/versions/tried.json")
+    seen = ("--untracked-files=no", "--", ".", *records)
     changed = " with changes" if asked("status", "--porcelain", *seen) else ""
     return f"commit {asked('rev-parse', '--short=12', 'HEAD') or 'unknown'}{changed}"
 

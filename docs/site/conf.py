@@ -26,6 +26,7 @@ include_patterns = [
     "docs/**.md",
     "simulators/README.md",
     "companions/**.md",
+    "examples/**.md",
     "tests/**.md",
 ]
 exclude_patterns = ["docs/site"]

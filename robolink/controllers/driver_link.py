@@ -256,7 +256,7 @@ class DriverLink:
         )
 
     def decided(self, text: str, request: str) -> None:
-        """Log what was decided about this controller; see :mod:`robolink.package_log`.
+        """Log what was decided about this controller; see ``robolink.package_log``.
 
         Args:
             text: A sentence.

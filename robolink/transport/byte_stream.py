@@ -103,7 +103,7 @@ class TracingTransport:
 
     Bytes are told before they are sent, because after a failure an unknown part of them may be
     out. An end of stream is told as received ``b""``. A secret is told as
-    :data:`SECRET_PLACEHOLDER` (:mod:`robolink.transport.traffic`).
+    :data:`SECRET_PLACEHOLDER` (``robolink.transport.traffic``).
 
     Attributes:
         traffic: Where it is told.
@@ -133,7 +133,7 @@ class TracingTransport:
         return self.traffic.logs or (isinstance(inner, TracingTransport) and inner.logs)
 
     def show_answers(self, answers: Collection[bytes]) -> None:
-        """See :meth:`robolink.transport.traffic.Traffic.show_answers`."""
+        """Name the answers to a secret that hold none of it, and may be logged as they are."""
         self.traffic.show_answers(answers)
         if isinstance(self._inner, TracingTransport):
             self._inner.show_answers(answers)

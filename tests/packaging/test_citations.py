@@ -9,6 +9,7 @@ from functools import cache
 from importlib import import_module
 from inspect import get_annotations
 from pathlib import Path
+from types import FunctionType
 from typing import Any, NamedTuple
 
 import pytest
@@ -323,19 +324,42 @@ def test_what_a_docstring_names_is_there(package):
 
 def without_a_page(text: str, pages: dict[str, dict[str, object]]) -> list[str]:
     """Return what the roles of a text name by its whole path and no page of the API describes."""
-    described = {*pages, *(f"{package}.{name}" for package in pages for name in pages[package])}
+    names = {f"{package}.{name}" for package in pages for name in pages[package]}
     whole = [target for target in targets(text) if target.startswith("robolink")]
-    return [one for one in whole if not {one, one.rpartition(".")[0]} & described]
+    return [one for one in whole if one not in pages and not {one, one.rpartition(".")[0]} & names]
+
+
+def members(thing: object) -> Iterator[object]:
+    """Yield what the page of a class describes with it."""
+    if isinstance(thing, type):
+        shown = (one for name, one in vars(thing).items() if not name.startswith("_"))
+        yield from (one for one in shown if isinstance(one, FunctionType | property))
 
 
 def test_what_a_page_of_the_api_names_has_a_page():
     pages = public()
     texts = [import_module(package).__doc__ or "" for package in pages]
-    texts += [
-        getattr(thing, "__doc__", "") or "" for named in pages.values() for thing in named.values()
-    ]
+    things = [thing for named in pages.values() for thing in named.values()]
+    for one in (*things, *(member for thing in things for member in members(thing))):
+        texts.append(getattr(one, "__doc__", "") or "")
     assert [one for text in texts for one in without_a_page(text, pages)] == []
     assert without_a_page("Says :mod:`robolink.locale.languages`.", pages)
+
+
+def test_what_a_page_links_to_is_built_with_it():
+    conf = (DOCS / "site" / "conf.py").read_text(encoding="utf-8")
+    written = re.search(r"^include_patterns = (\[.*?\])", conf, re.M | re.S)
+    assert written
+    there = [
+        re.escape(one).replace(r"\*\*", ".*").replace(r"\*", "[^/]*")
+        for one in ast.literal_eval(written[1])
+    ]
+    linked = {
+        (page.parent / link).resolve().relative_to(ROOT).as_posix()
+        for page in DOCS.rglob("*.md")
+        for link in re.findall(r"\]\(([\w./-]+\.md)[)#]", page.read_text(encoding="utf-8"))
+    }
+    assert [one for one in linked if not re.fullmatch("|".join(there), one)] == []
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 import ast
 import importlib
 import re
+import subprocess
 from collections import defaultdict
 from pathlib import Path
 
@@ -42,6 +43,18 @@ def test_a_folder_holds_no_more_modules_than_a_newcomer_can_tell_apart():
         if path.name != "__init__.py" and not kept_for_one_version:
             held[str(path.parent.relative_to(ROOT))].append(path.stem)
     assert {folder: names for folder, names in held.items() if len(names) > MOST_MODULES} == {}
+
+
+def test_nothing_lies_on_the_doorstep():
+    known = {".gitignore", "CHANGELOG.md", "LICENSE", "Makefile", "NOTICE", "README.md"}
+    known |= {"README.zh.md", "SECURITY.md", "pyproject.toml", "requirements.lock"}
+    known |= {"requirements-dev.lock"}
+    tracked = subprocess.run(
+        ("git", "ls-files", "--", ":(glob)*"), cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    if tracked.returncode:
+        pytest.skip("no git checkout: what is tracked cannot be told from what was made")
+    assert set(tracked.stdout.split()) == known
 
 
 def test_a_module_can_be_read_in_one_go():

@@ -99,7 +99,8 @@ class WindowsPython:
 
     def environment(self, more: Mapping[str, str]) -> dict[str, str]:
         """Return the environment: a wine of its own, UTF-8, no word of wine itself."""
-        left = re.compile("ROBOLINK|PYTHONDONTWRITEBYTECODE")
+        # In the folder of this pytest, that of Windows would tidy up what others are using.
+        left = re.compile("ROBOLINK|PYTHONDONTWRITEBYTECODE|PYTEST")
         kept = {name: value for name, value in os.environ.items() if not left.search(name)}
         own = {
             "WINEPREFIX": str(self.folder / "prefix"),

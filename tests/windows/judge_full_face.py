@@ -16,9 +16,11 @@ def test_the_full_screen_is_drawn_takes_keys_and_is_left(opened):
     console.type("\r")
     console.see(r"Start moving \(2 open\)")
     assert console.text.count("\n OK ") == 5
+    console.rest(0.6)
     console.type("1")
     console.see(r"Start moving \(1 open\)")
     assert console.text.count("\n OK ") == 6
+    console.rest(0.6)
     console.type("0")
     console.see("Nothing moved. Nothing was written. Tool 1 is selected.")
     assert console.exit_code() == 9

@@ -27,7 +27,7 @@ def test_the_named_files_pass(windows, suite, group):
         timeout=3500,
         check=False,
     )
-    assert done.returncode == 0, done.stdout[-6000:]
+    assert done.returncode == 0, f"{done.stdout[-6000:]}\n{done.stderr[-2000:]}"
     counted = re.search(r"(\d+) passed", done.stdout)
     assert counted, done.stdout[-2000:]
     assert int(counted[1]) >= group["at_least"]

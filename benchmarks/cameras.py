@@ -3,7 +3,7 @@
     python -m benchmarks.cameras [CELLS]
 
 Every cell has another seed: another nozzle, board and camera, other noise. The figures stand in
-docs/camera-and-board.md.
+docs/reference/cameras.md 4.
 """
 
 import math

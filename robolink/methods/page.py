@@ -15,15 +15,20 @@ from robolink.methods.registry import all_methods
 _OPENING: Final = """\
 # Calibration methods
 
-This page is made from the code: `python -m robolink.methods.page > docs/methods.md`.
-[Calibrating a tool](calibrate.md) says how to choose a method and what to look out for;
-[Recipes](recipes.md) says what else is in a recipe.
+*For integrators. Reference.*
 
-A method has one name. It is used in the command `robolink calibrate NAME`, as the `kind` in the
-`[source]` table of a recipe, and for the method's module in `robolink/methods`. Its parameters are
-options of the command and keys of `[source]`, with the same limits. Limits are inclusive; a value
+What each method measures, what it needs, and every parameter with its limits. How to choose a
+method: [calibrating a tool](calibrate.md). What else is in a recipe: [recipes](recipes.md).
+
+    robolink calibrate n-angle --tool 1 --station PIN-07 --count 6
+
+A method has one name. It is the NAME in `robolink calibrate NAME`, the `kind` in the `[source]`
+table of a recipe, and the name of the method's module in `robolink/methods`. Its parameters are
+options of the command and keys of `[source]`, with the same limits. Limits are inclusive. A value
 outside them is refused before anything moves. Lengths are in mm, angles in degrees. Every command
 also has `--station`, `--sigma` and the other options of its help page.
+
+This page is made from the code: `python -m robolink.methods.page > docs/methods.md`.
 """
 _STATIONS: Final = {
     "pin": "a pin",

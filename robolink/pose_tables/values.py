@@ -38,8 +38,8 @@ class ColumnHead:
     """What one column holds.
 
     Attributes:
-        meaning: ``x``, ``u``, ``qw``, ``name`` and so on (docs/poses.md), ``-`` for nothing about a
-            pose.
+        meaning: ``x``, ``u``, ``qw``, ``name`` and so on (docs/reference/pose_files.md 4), ``-``
+            for nothing about a pose.
         unit: The unit that its name says.
         text: As the file has it.
         from_ros: Whether the name is that of a ROS message, whose lengths are metres.
@@ -78,7 +78,7 @@ class ReadingChoices:
     Attributes:
         columns: A name for every column, ``-`` for one to skip; ``x,y,z,u`` for example.
         length: ``mm``, ``m`` or ``in``.
-        euler: Name of the rule by which the angles turn (docs/poses.md, "Angles").
+        euler: Name of the rule by which the angles turn (docs/reference/pose_files.md 1).
     """
 
     columns: str | None = None

@@ -32,41 +32,41 @@ T = TypeVar("T")
 
 
 class Recipe(Table):
-    """A nozzle change, written down once by the integrator and run by whoever changes nozzles."""
+    """A nozzle change: the integrator writes it once, the person who changes nozzles runs it."""
 
     model_config = ConfigDict(validate_default=True)
 
     format: Annotated[Literal["robolink/recipe/1"], Field(alias="schema")]
     """What this file is, and which version of it."""
     name: Line
-    """What people call it; it goes on record with everything that the recipe does."""
+    """Its name for people. It goes on record with everything that the recipe does."""
     notes: Note = ""
     """For people."""
     cells: Annotated[tuple[Line, ...], Field(strict=False)] = ()
-    """Names of the cells that it is for; without it, any cell. At another it is neither offered
-    nor run: its poses would lead somewhere else there."""
+    """Names of the cells that it is for; without it, any cell. At another cell robolink neither
+    offers nor runs it, because its poses would lead elsewhere."""
     numbers: Literal["simulated"] | None = None
-    """Whose numbers these are: "simulated" stands in the copy of a recipe that comes along, which
-    runs on simulated controllers alone. Whoever has put in stations, poses, box and limits of the
-    cell deletes the line."""
+    """In a copy of a recipe that comes with robolink this is "simulated": it runs on simulated
+    controllers alone. Put in the stations, poses, box and limits of your cell, then delete the
+    line."""
     basis: Basis
-    """What is written: with "difference" the stored offset, moved by how much the tip moved
-    against the reference of the same tool at the same station; with "absolute" what was
-    measured."""
+    """What robolink writes. "difference": the stored offset, moved by how much the tip moved
+    against the reference of the same tool at the same station. "absolute": the measured
+    offset."""
     z: HeightRule
-    """Where Z of the offset comes from: "measured" on the pin, "typed" by the person each time,
-    or "kept", which the person confirms each time."""
+    """Where Z of the offset comes from: "measured" by the touch, "typed" by the person each time,
+    or "kept"."""
     verify: bool | None = None
-    """Whether the robot turns about the new tip after the write. If the robot moves at all, it
-    does so unless this is false."""
+    """Whether the robot makes the turn test after the write. If the robot moves at all, it does
+    so unless this is false."""
     source: Annotated[MethodTable, AnyKind()]
-    """Where the measurements come from."""
+    """Which method measures, and its parameters."""
     station: StationTable
-    """Where it is measured."""
+    """Where the tools are measured."""
     poses: Poses = Field(default_factory=Poses)
     """Poses of the whole change."""
     tools: Annotated[tuple[Tool, ...], Field(strict=False, min_length=1)]
-    """The tools, in the order in which they are measured: all are written, or none."""
+    """The tools, in the order in which they are measured. robolink writes all of them or none."""
     speeds: Speeds = Field(default_factory=Speeds)
     """How fast the robot goes, in Power Low."""
     box: Box = Field(default_factory=Box)
@@ -74,13 +74,13 @@ class Recipe(Table):
     tolerances: Tolerances = Field(default_factory=Tolerances)
     """Acceptance limits."""
     accuracy: AccuracyTable = Field(default_factory=AccuracyTable)
-    """What is known of errors that no measurement shows by itself."""
+    """Errors that no measurement shows by itself, as far as they are known."""
     refusal: RefusalTable = Field(default_factory=RefusalTable)
-    """What follows when a measurement is not believed."""
+    """What follows when a measurement is refused."""
     prompts: Annotated[tuple[Prompt, ...], Field(strict=False)] = ()
-    """What a person is asked, in this order."""
+    """Questions to a person, in this order."""
     outputs: Annotated[tuple[Output, ...], Field(strict=False)] = ()
-    """Outputs that are switched, in this order."""
+    """Outputs that robolink switches, in this order."""
 
     @property
     def verifies(self) -> bool:

@@ -68,23 +68,23 @@ class FlangePose(Table):
 
 
 class StationTable(Table):
-    """Where it is measured."""
+    """Where the tools are measured."""
 
     id: Line
-    """Name of the pin or gauge; it goes on record with every measurement. What this table does not
-    say about its place comes from the station of that name in the cell file and the journal."""
+    """Name of the pin or gauge; it goes on record with every measurement. What this table leaves
+    out of its place comes from the station of that name in the cell file and the journal."""
     x_mm: float | None = None
     """X of the pin's end (for the record only), of the place where the surface is touched, or of
-    the place where a camera looks; base, mm; together with y_mm."""
+    the place where a camera looks; base, mm. Give y_mm too."""
     y_mm: float | None = None
-    """Y of the same; base, mm; together with x_mm."""
+    """Y of the same; base, mm. Give x_mm too."""
     z_mm: float | None = None
-    """Z of the pin's end, of the surface, or of the height in focus; base, mm. z = "measured" needs
-    it, from here or from the station's record, when basis is "absolute", and source "z-touch"
-    always."""
+    """Z of the pin's end, of the surface, or of the height in focus; base, mm; from here or from
+    the station's record. Source "z-touch" always needs it, and z = "measured" if basis is
+    "absolute"."""
     sigma_mm: Length | None = None
-    """Standard deviation of each of them, mm, where it is known; one touch with basis "absolute"
-    needs it to say what it is repeatable to."""
+    """Standard deviation of each of them, mm, if it is known. Source "one-touch" with basis
+    "absolute" needs it to state what it is repeatable to."""
     note: Note = ""
     """For people."""
 
@@ -102,16 +102,16 @@ class Poses(Table):
     """Poses of the whole change."""
 
     safe: FlangePose | None = None
-    """Flange pose to which the robot goes first and last: up, over, down."""
+    """Flange pose to which the robot goes first and last: up, across, down."""
 
 
 class PoseFile(Table):
-    """A file of poses, and what it does not say itself (docs/poses.md, "Files of poses")."""
+    """A file of poses, and what the file itself leaves open (docs/poses.md, "Files of poses")."""
 
     file: Line
-    """The file; a path that is not absolute begins in the folder of the recipe."""
+    """Path of the file. A relative path begins in the folder of the recipe."""
     columns: Line | None = None
-    """A name for each of its columns, "-" for one to skip: "x,y,z,u"."""
+    """A name for each of its columns, such as "x,y,z,u"; "-" skips one."""
     length: Literal["mm", "cm", "m", "in"] | None = None
     """Unit of its lengths."""
     euler: Line | None = None
@@ -124,17 +124,17 @@ class Tool(Table):
     number: ToolNumber
     """Number of the tool in the controller."""
     name: Line | None = None
-    """What people call it."""
+    """Its name for people."""
     approach: FlangePose | None = None
-    """Flange pose from which the tool is measured: tip some mm beside the pin and above it. Without
-    it, the tool is measured from where the robot is."""
+    """Flange pose from which the tool is measured, with the tip some mm beside the pin and above
+    it. Without it, the tool is measured from where the robot is."""
     retreat: FlangePose | None = None
     """Flange pose to which the robot goes after the measurement."""
     points: Annotated[tuple[PointNumber, ...], Field(strict=False, min_length=2)] | None = None
-    """Numbers, 0 to 999, of the taught points that touch the pin with this tool, 2 for "two-pose",
-    3 and more for "n-angle"; source "points" only, which needs them or a file of poses."""
+    """Numbers, 0 to 999, of the taught points that touch the pin with this tool: 2 for "two-pose",
+    3 and more for "n-angle". For source "points" only, which needs them or a file of poses."""
     poses: PoseFile | None = None
-    """File with the poses that touch the pin with this tool, in place of points."""
+    """File with the poses that touch the pin with this tool, instead of points."""
 
 
 class Speeds(Table):
@@ -170,44 +170,44 @@ class Tolerances(Table):
     max_mm: Length | None = None
     """Largest single residual, mm, at least rms_mm; not for "two-pose"."""
     interval_mm: Length | None = None
-    """Largest distance from the truth within which the tip lies in 95 %, mm, all lengths that are
-    measured together and every row of the budget counted, see [accuracy]. "two-pose" needs
-    sigma_mm for it."""
+    """Largest value that the result may be accurate to in 95 %, mm: all measured lengths together,
+    with every row of the budget, see [accuracy]. "two-pose" needs sigma_mm for it."""
     sigma_mm: Length | None = None
-    """Standard deviation of one coordinate of one touch, or of one crossing, mm, where known."""
+    """Standard deviation of one coordinate of one touch or crossing, mm, if it is known."""
     jump_mm: Length = 2.0
-    """Largest change against the stored offset that a nozzle change explains, mm, over the lengths
-    that were measured; more is refused. A Z that is typed is not judged."""
+    """Largest change of the stored offset that a nozzle change explains, mm, over all measured
+    lengths together; more is refused. A typed Z is not judged."""
     drift_mm: Length = 0.2
-    """Largest drift about the new tip that passes the verification, mm."""
+    """Largest drift that passes the turn test, mm."""
 
 
 HalfWidth = Annotated[float, Field(ge=0.0001)]
 
 
 class AccuracyTable(Table):
-    """What is known of errors that no measurement shows by itself: half widths.
+    """Errors that no measurement shows by itself, as half widths.
 
-    What is not said here counts as in the cell file, as on record, or by its default
+    A row that is left out counts as in the cell file, as on record, or by its default
     (docs/accuracy.md).
     """
 
     touch_mm: HalfWidth | None = None
-    """How a person sees contact, mm: always beside, on the same side of the tool."""
+    """How far off a person sees contact, always on the same side of the tool, mm."""
     place_mm: HalfWidth | None = None
-    """Place of the station since it was learnt, mm; only where the method uses that place."""
+    """How far the station may have moved since it was learnt, mm; only if the method uses its
+    place."""
     camera_turn_deg: HalfWidth | None = None
-    """Turn of the camera since it was calibrated, degrees."""
+    """How far the camera may have turned since it was calibrated, degrees."""
     camera_scale_percent: HalfWidth | None = None
-    """Scale of the camera since it was calibrated, percent."""
+    """How much the scale of the camera may have changed since it was calibrated, percent."""
     plate_mm: HalfWidth | None = None
-    """Height of the surface, mm."""
+    """How far the height of the surface may be off, mm."""
     tip_image_px: HalfWidth | None = None
-    """What the camera sees of a tip beside its middle, pixels."""
+    """How far beside its middle the camera may see a tip, pixels."""
     bend_deg: HalfWidth | None = None
-    """Bend of the needle that is left after its correction, degrees."""
+    """Bend of the needle that may be left after its correction, degrees."""
     print_mm: HalfWidth | None = None
-    """Print of the fiducials, mm."""
+    """How far the fiducials may be printed from their drawing, mm."""
 
     @property
     def stated(self) -> dict[str, float]:
@@ -216,23 +216,24 @@ class AccuracyTable(Table):
 
 
 class RefusalTable(Table):
-    """What follows when a measurement is not believed."""
+    """What follows when a measurement is refused."""
 
     action: Literal["stop", "measure_again"] = "stop"
     """End the change with the old values, or measure that tool again."""
     attempts: Annotated[int, Field(ge=2, le=5)] | None = None
-    """How often a tool is measured at most; 2 if this is left out."""
+    """How often a tool is measured at most; 2 if it is left out."""
 
 
 class Prompt(Table):
-    """Something a person is asked."""
+    """A question to a person."""
 
     at: Literal["start", "before_measure", "before_write", "end"]
     """When: once at start, before_write and end; before_measure for each tool."""
     text: Line
     """The question, as the person reads it."""
     answer: Literal["yes", "nozzle", "lot", "text"] = "yes"
-    """A yes, without which the change ends; or the nozzle's id, its lot or a text to record."""
+    """What is asked for: a yes, without which the change ends; the nozzle's id, its lot, or a text
+    to record."""
     tool: ToolNumber | None = None
     """Ask before this tool only."""
 

@@ -11,12 +11,21 @@ from robolink.recipe._recipe import json_schema
 _OPENING: Final = """\
 # Every key of a recipe
 
-This page is made from the code: `python -m robolink.recipe.page > docs/recipe-keys.md`.
-[Recipes](recipes.md) says how to write one, and which decisions have no default.
+*For integrators. Reference.*
+
+How to write a recipe, and which decisions have no default: [recipes](recipes.md). How keys go
+together: [recipe rules](reference/recipe-rules.md).
+
+    basis = "absolute"     # a key at the top of the file, above the first [table]
+
+    [tolerances]           # a table
+    drift_mm = 0.2         # a key of the table
 
 Limits are inclusive. Lengths are in mm, angles in degrees. Poses are those of the flange (Tool 0),
-in base coordinates. The keys at the top go above the first line with a `[table]`. Which keys a
-`[source]` has besides its `kind` depends on the method: [methods](methods.md).
+in base coordinates. The keys of a `[source]` besides its `kind` depend on the method:
+[methods](methods.md).
+
+This page is made from the code: `python -m robolink.recipe.page > docs/recipe-keys.md`.
 """
 
 _TABLES: Final = {

@@ -1,6 +1,7 @@
 """What each shipped recipe is accurate to: its own course, made exactly, with the usual scatter.
 
-``python -m tests.calibration._recipe_statements`` prints the table of docs/recipes.md.
+``python -m tests.calibration._recipe_statements`` prints the table of
+docs/reference/recipe-rules.md 4.
 """
 
 import math

@@ -283,7 +283,7 @@ def test_seating_is_a_line_of_its_own():
 
 # Shipped recipes keep within their own limits by what they state, and the page says so.
 
-PAGE = (EXAMPLES.parents[1] / "docs" / "recipes.md").read_text(encoding="utf-8")
+PAGE = (EXAMPLES.parents[1] / "docs/reference/recipe-rules.md").read_text(encoding="utf-8")
 AGAIN = "run: python -m tests.calibration._recipe_statements"
 
 

@@ -280,7 +280,7 @@ UPRIGHT = (
     "G6-651S",
 )
 TILTING = ("C8-C1401CR", "C12-C1401S", "CX4-A601SR", "CX7-A701S", "C4-A601S", "VT6L")
-"""One robot of each family and mounting: docs/calibrate.md has what was counted on them."""
+"""One robot of each family and mounting: docs/reference/touches.md 11 has what was counted."""
 
 
 def counted(robots, cells, least, measures):

@@ -34,7 +34,11 @@ from tests.unit.test_spel_points import pts
 pytestmark = pytest.mark.simulator_only
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / "README.md", ROOT / "README.zh.md", *sorted(ROOT.glob("docs/*.md"))]
+PAGES = [
+    *(ROOT / name for name in ("README.md", "README.zh.md")),
+    *sorted(ROOT.glob("docs/*.md")),
+    *sorted(ROOT.glob("docs/reference/*.md")),
+]
 BLOCK = re.compile(r"^```console\n(.*?)^```", re.M | re.S)
 URL = "epson+sim://pages"
 
@@ -88,7 +92,7 @@ NOT_RUN = {
         "tests/contract/journal/_postgresql.py",
         ("postgresql+psycopg://",),
     ),
-    "poses.md 5, 1": Elsewhere(
+    "reference/jogging.md 1, 1": Elsewhere(
         "steps are typed one by one",
         "tests/contract/test_typed_answers.py",
         ('start("jog", "-c", url)',),
@@ -103,7 +107,7 @@ NOT_RUN = {
         "tests/cli/test_sim_run.py",
         ('"sim", "run"', "test_all_kinds_are_served_by_one_process"),
     ),
-    "poses.md 6": Elsewhere(
+    "reference/jogging.md 2": Elsewhere(
         "keys are held down on a terminal",
         "tests/contract/test_jog_keys.py",
         ('"jog", "--keys"',),

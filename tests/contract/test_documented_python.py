@@ -40,7 +40,11 @@ from robolink.transport import parse_url
 pytest_plugins = ["pytester"]
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / "README.md", ROOT / "simulators" / "README.md", *sorted(ROOT.glob("docs/*.md"))]
+PAGES = [
+    *(ROOT / name for name in ("README.md", "simulators/README.md")),
+    *sorted(ROOT.glob("docs/*.md")),
+    *sorted(ROOT.glob("docs/reference/*.md")),
+]
 FENCED = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
 ADDRESS = re.compile(r"(epson\+tcp|softmotion\+modbus-tcp)://192\.168\.0\.\d+:\d+")
 
@@ -338,10 +342,10 @@ MAKERS = {
     "README.md 1": with_password,
     "simulators/README.md 1": nothing,
     "records.md 1": nothing,
-    "stations.md 1": above_two_beams,
-    "stations.md 2": nothing,
-    "camera-and-board.md 1": lambda stack: {"SpotUnit": SpotUnit, "Spot": Spot, "TIP": TIP},
-    "camera-and-board.md 2": nothing,
+    "reference/sensors.md 1": above_two_beams,
+    "reference/sensors.md 2": nothing,
+    "reference/cameras.md 1": lambda stack: {"SpotUnit": SpotUnit, "Spot": Spot, "TIP": TIP},
+    "camera-and-board.md 1": nothing,
     "custom-kinematics.md 1": nothing,
     "extending.md 1": two_tools,
     "extending.md 2": one_client,

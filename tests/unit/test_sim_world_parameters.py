@@ -384,5 +384,7 @@ def test_an_option_that_makes_no_world_is_refused(name, text, said):
 
 
 def test_the_page_names_every_parameter():
-    page = (Path(__file__).parents[2] / "docs" / "camera-and-board.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[2] / "docs/reference/simulated-cell.md").read_text(
+        encoding="utf-8"
+    )
     assert [it.name for it in fields(WorldParameters) if f"`{it.name}`" not in page] == []

@@ -112,7 +112,7 @@ class AssistedOperator:
     """Stands in for the person on a simulator: looks at the tip and types jog steps.
 
     The one simulated person of demonstration, tests and ``--assist``; :meth:`with_eyes` makes it.
-    Their habits are parameters of the simulated world (docs/camera-and-board.md, "Habits").
+    Their habits are parameters of the simulated world (docs/reference/simulated-cell.md 2).
 
     Args:
         look: Returns the vector, in mm, that the simulated person sees from the tip to the

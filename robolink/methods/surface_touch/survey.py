@@ -70,8 +70,8 @@ class SphereSurvey:
 
     least_count: ClassVar[int] = 11
     """Seven unknowns and the share of the distances leave three by which they are judged. With two
-    that share is told so badly on six axes that good runs are refused: docs/calibrate.md,
-    "sphere-touch: a ball, and no pin"."""
+    that share is told so badly on six axes that good runs are refused
+    (docs/reference/touches.md 6)."""
 
     uprights: ClassVar[int] = 4
     """Touches in one orientation: they tell where the sphere is, but for the error of the tip."""

@@ -4,8 +4,7 @@ A pinhole: lengths at the height of focus have the stated scale, and things abov
 smaller. A lens that leans sees the plane askew, and things above or below it beside where they
 are. The finder errs by Gaussian noise, now and then by much more, and now and then finds nothing;
 or it answers with a fleck on the window, a reflection or a wrong circle, which stands still
-wherever the robot goes (docs/camera-and-board.md, "A spot that stands still"; how often is
-assumed).
+wherever the robot goes (docs/reference/cameras.md 3; how often is assumed).
 """
 
 import math

@@ -33,7 +33,7 @@ from tests.contract._terminal import Terminal
 
 PAGE = Path(__file__).parents[3] / "docs" / "wizard.md"
 # Who jogs for its own sake has nothing to go on to, so the main key stops too; that is a command
-# of its own (docs/poses.md).
+# of its own (docs/reference/jogging.md 2).
 SESSION = {name: make for name, make in SCREENS.items() if name != "free jog"}
 FIGURES = "12346789"
 

@@ -35,6 +35,7 @@ pytestmark = pytest.mark.simulator_only
 
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", ROOT / "README.zh.md", *sorted(ROOT.glob("docs/*.md"))]
+PAGES += sorted(ROOT.glob("docs/reference/*.md"))
 BLOCK = re.compile(r"^```console\n(.*?)^```", re.M | re.S)
 URL = "epson+sim://pages"
 

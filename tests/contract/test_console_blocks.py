@@ -94,7 +94,7 @@ NOT_RUN = {
         "tests/contract/test_typed_answers.py",
         ('start("jog", "-c", url)',),
     ),
-    "testing.md 2, 3": Elsewhere(
+    "reference/contract_checks.md 1, 3": Elsewhere(
         "a driver of one's own is needed",
         "tests/cli/test_check_contract.py",
         ('"check-contract", "--yes", "--write", "--tool", "3", "--driver"',),

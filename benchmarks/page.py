@@ -61,6 +61,8 @@ NOTES: Final = {
 
 _TOP: Final = """# Performance
 
+*For maintainers. Reference.*
+
 `make bench` measures all of this and writes this page; `make bench ONLY=fleet` runs one part and
 prints it. `build/bench.json` then has all measured numbers. Each figure is a median. It is compared
 with a floor (the least work that the task needs), a peer (what others offer) or a

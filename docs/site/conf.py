@@ -25,6 +25,7 @@ include_patterns = [
     "api/*.rst",
     "docs/**.md",
     "simulators/README.md",
+    "examples/README.md",
     "companions/**.md",
     "examples/**.md",
     "tests/**.md",

@@ -18,8 +18,8 @@ Signs of life of an open block: that somebody is at work, although nothing is se
 
 A change that is open while a person looks at the parts sends nothing, and who is silent for ten
 seconds counts as gone: his lease may be taken (docs/reference/rules.md 6), and a PLC gives its
-mailbox away (docs/mailbox.md, "Owners"). So as long as a block is open, both are told once a
-second that its program is there. That keeps nothing going: no command, and no heartbeat of a
+mailbox away (docs/reference/mailbox.md, "Owners"). So as long as a block is open, both are told
+once a second that its program is there. That keeps nothing going: no command, and no heartbeat of a
 movement. It ends with the block, with the thread that is in it, and with the process.
 """
 

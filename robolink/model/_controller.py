@@ -430,8 +430,8 @@ def are_simulated_facts(facts: ControllerFacts) -> bool:
 def says_it_is_simulated(controller: Controller, facts: ControllerFacts | None = None) -> bool:
     """Tell whether a controller says of itself that nothing real moves; an answer is not guessed.
 
-    A PLC says it of its axes, in the mailbox (docs/mailbox.md); a simulated EPSON controller by
-    its serial numbers. One that cannot be asked just now says nothing.
+    A PLC says it of its axes, in the mailbox (docs/reference/mailbox.md); a simulated EPSON
+    controller by its serial numbers. One that cannot be asked just now says nothing.
 
     Args:
         controller: The controller; what can be read is read.

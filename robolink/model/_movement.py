@@ -35,7 +35,8 @@ class InputEdge:
         """Refuse an input that shows already what the movement waits for.
 
         An EPSON controller would take such a movement for finished at once, and a PLC would drive
-        on to the target, the tip perhaps in contact (docs/reference/spel.md 7.1, docs/mailbox.md).
+        on to the target, the tip perhaps in contact (docs/reference/spel.md 7.1,
+        docs/reference/mailbox.md).
 
         Args:
             on: Whether the input is on before the movement begins.

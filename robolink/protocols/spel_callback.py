@@ -1,6 +1,6 @@
 """The lines between a SPEL+ program that calls back and this software, for both ends.
 
-docs/spel-callback.md, "The lines", is their description. Nothing here opens a port.
+docs/reference/spel_callback.md, "The lines", is their description. Nothing here opens a port.
 
 One line: what stands in it, and the sum by which a bent one is found.
 

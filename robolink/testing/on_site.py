@@ -48,7 +48,7 @@ _STOP_S: Final = 4.0
 """A stop logs in, stops and logs out within a second or two."""
 
 _SILENT_S: Final = 12.0
-"""After 10 s without a sign a PLC lets its owner go (docs/mailbox.md, "Owners")."""
+"""After 10 s without a sign a PLC lets its owner go (docs/reference/mailbox.md, "Owners")."""
 
 
 class Connect(Protocol):

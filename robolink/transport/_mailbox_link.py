@@ -1,4 +1,7 @@
-"""The contract of a link to a PLC mailbox (docs/reference/rules.md 11; docs/mailbox.md)."""
+"""The contract of a link to a PLC mailbox.
+
+Source: docs/reference/rules.md 11; docs/reference/mailbox.md.
+"""
 
 from collections.abc import Sequence
 from typing import Final, NamedTuple, Protocol

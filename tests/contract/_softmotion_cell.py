@@ -27,7 +27,10 @@ LINKS: Final = [
 """What a test of every link takes: the bus of one process is left to make soak, for the one
 between processes asks more."""
 OWNER_SILENCE_S: Final = 10.1
-"""After this long without a sign of its owner a mailbox is free (docs/mailbox.md, "Owners")."""
+"""After this long without a sign of its owner a mailbox is free.
+
+Source: docs/reference/mailbox.md, "Owners".
+"""
 
 QUICK: Final = MotionProfile(Path.STRAIGHT, speed_mm_s=1000.0)
 SLOW: Final = MotionProfile(Path.STRAIGHT, speed_mm_s=2.0)

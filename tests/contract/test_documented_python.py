@@ -40,11 +40,9 @@ from robolink.transport import parse_url
 pytest_plugins = ["pytester"]
 
 ROOT = Path(__file__).parents[2]
-PAGES = [
-    *(ROOT / name for name in ("README.md", "simulators/README.md")),
-    *sorted(ROOT.glob("docs/*.md")),
-    *sorted(ROOT.glob("docs/reference/*.md")),
-]
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", ROOT / "simulators" / "README.md", *sorted(DOCS.glob("*.md"))]
+PAGES += sorted((DOCS / "reference").glob("*.md"))
 FENCED = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
 ADDRESS = re.compile(r"(epson\+tcp|softmotion\+modbus-tcp)://192\.168\.0\.\d+:\d+")
 
@@ -372,7 +370,7 @@ MAKERS = {
     "spel-programs.md 2": nothing,
     "stopping.md 1": with_password,
     "stopping.md 2": with_password,
-    "plc-program.md 1": nothing,
+    "reference/structured_text.md 1": nothing,
 }
 
 TESTS = {name for name, block in BLOCKS.items() if "\ndef test_" in f"\n{block}"}
@@ -382,7 +380,7 @@ def test_every_block_is_run_and_no_python_stands_outside_of_a_fence():
     assert MAKERS.keys() | TESTS == BLOCKS.keys()
     assert not MAKERS.keys() & TESTS
     assert {
-        "plc-program.md 2",
+        "reference/structured_text.md 2",
         "testing.md 1",
         "testing.md 2",
         "testing.md 3",
@@ -411,7 +409,7 @@ def test_the_test_of_an_integrator_s_program_passes_and_sees_a_changed_line(pyte
     folder = pytester.mkdir("our-plc")
     for name, text in program_texts().items():
         (folder / name).write_text(text)
-    pytester.makepyfile(BLOCKS["plc-program.md 2"])
+    pytester.makepyfile(BLOCKS["reference/structured_text.md 2"])
     pytester.runpytest_inprocess("-p", "no:cacheprovider").assert_outcomes(passed=1)
     core = folder / "robolink_core.st"
     core.write_text(core.read_text().replace("kept.slots[o0].tool := pose;", "raw := 0;"))

@@ -25,7 +25,10 @@ from robolink.protocols.mailbox import from_frame, to_frame
 TOOLS: Final = (1, 2, 3)
 _UNIT_UM: Final = 1000.0
 _OWNER_SILENCE_S: Final = 10.1
-"""After this long without a sign of its owner a mailbox is free (docs/mailbox.md, "Owners")."""
+"""After this long without a sign of its owner a mailbox is free.
+
+Source: docs/reference/mailbox.md, "Owners".
+"""
 
 _names = count()
 

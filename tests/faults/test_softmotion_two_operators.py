@@ -91,7 +91,7 @@ def test_f47_a_frozen_owner_whose_mailbox_was_taken_writes_nothing_when_it_comes
     ann.thaw()
     refused = ann.end()
     # Her block went out, and the PLC refused it. If her first look shows his acknowledgement
-    # still, the write is unknown to her (docs/mailbox.md).
+    # still, the write is unknown to her (docs/reference/mailbox.md).
     assert refused.how in {"RejectedError", "OutcomeUnknownError"}
     assert "another client" in refused.said
     assert cell.values_written() == [BOBS]

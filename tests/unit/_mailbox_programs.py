@@ -8,7 +8,7 @@ MODELLED, EXECUTED = "modelled", "executed"
 
 DIFFERING = {
     "test_the_heartbeat_counts_the_cycles_of_the_motion_task": "cycles in which nothing happens "
-    "are left out (docs/plc-program.md)",
+    "are left out (docs/reference/structured_text.md 4.2)",
     "test_a_number_may_be_given_and_a_program_may_have_none": "the exported program has a number",
     "test_the_state_of_an_interrupted_movement_is_shown_while_it_is_the_last_command": "nothing "
     "tells a program that another one has interrupted its movement",

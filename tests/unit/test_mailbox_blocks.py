@@ -381,7 +381,7 @@ def test_the_probe_is_found_where_a_wrong_base_has_moved_it():
 
 
 def test_the_modes_of_a_movement_have_the_numbers_of_the_page():
-    """Operand i3 of opcodes 2102 and 2103 (docs/mailbox.md)."""
+    """Operand i3 of opcodes 2102 and 2103 (docs/reference/mailbox.md)."""
     numbered = {mode.name: mode.value for mode in BufferMode}
     assert numbered == {
         "ABORTING": 0,

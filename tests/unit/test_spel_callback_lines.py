@@ -1,4 +1,4 @@
-"""The lines of the call-back: any split, any damage (docs/spel-callback.md, "The lines")."""
+"""The lines of the call-back: any split, any damage (docs/reference/spel_callback.md)."""
 
 import pytest
 from hypothesis import given, settings

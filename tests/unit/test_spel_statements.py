@@ -162,26 +162,22 @@ def test_two_bytes_carry_the_number_of_a_bit(query):
             query(bit)
 
 
-# docs/spel-programs.md says what is so: each of its rows is sent, and the answer compared.
+# docs/reference/spel_statements.md says what is so: its rows are sent, and the answers compared.
 
-PAGE = Path(__file__).parents[2] / "docs" / "spel-programs.md"
+PAGE = Path(__file__).parents[2] / "docs/reference/spel_statements.md"
 _ROW = re.compile(r"^\| `(?P<statement>[^|]+)` \| (?P<who>[^|]+) \| (?P<answer>[^|]+) \|$")
 _LONGEST_S = 120
 
 
-def part():
-    page = PAGE.read_text(encoding="utf-8")
-    return page.partition("\n## Statements that the simulator answers\n")[2]
-
-
 def rows():
-    answered = part().partition("### Not carried out")[0]
+    tables = PAGE.read_text(encoding="utf-8").partition("\n## Sent by public clients\n")[2]
+    answered = tables.partition("\n## Not carried out\n")[0]
     found = map(_ROW.match, answered.splitlines())
     return [(row["statement"], row["answer"]) for row in found if row]
 
 
 def before():
-    (block,) = re.findall(r"```\n(.*?)```", part(), re.DOTALL)
+    (block,) = re.findall(r"```\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
     return block.strip().splitlines()
 
 

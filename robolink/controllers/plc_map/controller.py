@@ -328,7 +328,7 @@ def open_plc_map(
     Args:
         url: ``map`` names the map, seen from the working folder, ``simulated=yes`` stands in the
             address of a simulator; the other options are those of a Modbus client
-            (docs/mailbox.md).
+            (docs/reference/mailbox.md).
         outcomes: Opens the record of the PLC whose identity it is given.
         timeout_s: Longest wait for the connection, and for each answer.
         clock: Replaces the machine's clock.

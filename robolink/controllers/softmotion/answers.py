@@ -64,7 +64,8 @@ def _in_words(opcode: int, name: str, operands: tuple[int, ...], pose: tuple[flo
 def refused(command: Command, now: Response, error_class: int) -> RejectedError:
     """Return the error for a command that ended in ERROR: the PLC did not do it.
 
-    A refused tool write leaves the slot and the tool as they were (docs/mailbox.md, "Tools").
+    A refused tool write leaves the slot and the tool as they were (docs/reference/mailbox.md,
+    "Tools").
     """
     return RejectedError(
         tr(

@@ -1,6 +1,6 @@
 """Telling the PLC something, once, and knowing what became of it.
 
-Source: docs/mailbox.md, "When a command counts".
+Source: docs/reference/mailbox.md, "When a command counts".
 
 A command goes out with a number that is new, the owner's token, the epoch and the PLC start
 that was met. Its answer counts as ours only when owner, number and opcode are ours; an answer
@@ -9,10 +9,10 @@ PLC counts one more damaged block and has acknowledged nothing since. Never afte
 
 Bringing the axis group behind a mailbox to rest, and knowing that it rests.
 
-Stop (opcode 2003) needs neither ownership nor the machine's permit (docs/mailbox.md, "What ends by
-itself"). Its block is done when the group stands (docs/reference/softmotion.md 2.2). A group that
-is disabled, in error or held by an earlier stop refuses it, and may yet be braking, so there the
-axes themselves are compared.
+Stop (opcode 2003) needs neither ownership nor the machine's permit (docs/reference/mailbox.md,
+"What ends by itself"). Its block is done when the group stands (docs/reference/softmotion.md 2.2).
+A group that is disabled, in error or held by an earlier stop refuses it, and may yet be braking, so
+there the axes themselves are compared.
 """
 
 from collections.abc import Callable, Iterator
@@ -405,7 +405,7 @@ class CommandSender:
 
     def _unseen(self, command: Command) -> UnclearAnswerError:
         # Only what a stop ends is kept among the last ends; what had ended before it, well or
-        # not, is not shown any more (docs/mailbox.md, "When a command counts").
+        # not, is not shown any more (docs/reference/mailbox.md, "When a command counts").
         return UnclearAnswerError(
             tr(
                 "A stop came before robolink read the end of {request!r}.",
@@ -439,7 +439,7 @@ def is_own(command: Command, now: Response) -> bool:
 def _came_too_early(command: Command, before: Response, now: Response) -> bool:
     """Whether the PLC held a command back, which it then never carries out.
 
-    Source: docs/mailbox.md, "When a command counts".
+    Source: docs/reference/mailbox.md, "When a command counts".
 
     Its number was in none of the ends when it was sent, so an end of that number is its own.
     """

@@ -15,7 +15,7 @@ def is_moving(now: Response) -> bool:
 
 
 def status_of(now: Response) -> ControllerStatus:
-    """Translate a snapshot (docs/mailbox.md).
+    """Translate a snapshot (docs/reference/mailbox.md).
 
     ``remote`` is the machine's permit, ``paused`` an interrupted movement or a held stop,
     ``ready`` a group at rest that could move: enabled, its drives with power. ``code`` is
@@ -69,7 +69,9 @@ def require_permit(now: Response) -> None:
 
 
 def require_beats(whole_look_s: float) -> None:
-    """Hold back what must be kept going on a line that is too slow for it (docs/mailbox.md).
+    """Hold back what must be kept going on a line that is too slow for it.
+
+    Source: docs/reference/mailbox.md.
 
     Args:
         whole_look_s: How long a look at the response block and a beat take on the line.

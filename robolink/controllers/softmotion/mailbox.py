@@ -2,7 +2,7 @@
 
 Which PLC answers: the number that it drew once, the same on every link.
 
-Source: docs/mailbox.md, "Which PLC this is".
+Source: docs/reference/mailbox.md, "Which PLC this is".
 """
 
 import math
@@ -66,7 +66,9 @@ def read_device_id(link: DeviceReading) -> int | None:
 
 
 def identity_of(wire: MailboxWire, device_id: int | None) -> Identity:
-    """Return who a PLC is, the same over each medium (docs/mailbox.md, "Which PLC this is").
+    """Return who a PLC is, the same over each medium.
+
+    Source: docs/reference/mailbox.md, "Which PLC this is".
 
     Args:
         wire: The session.

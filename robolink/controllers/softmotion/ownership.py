@@ -2,8 +2,9 @@
 
 The PLC gives the mailbox to whoever asks when nobody owns it, when its owner has been silent
 for 10 s with nothing moving, or when a person insists; each time under a new epoch, so that a
-client that slept through it is refused (docs/mailbox.md, "Owners"; docs/reference/faults.md F46,
-F47). So is a block that was sent before and arrives late: to own the mailbox is to fence it off.
+client that slept through it is refused (docs/reference/mailbox.md, "Owners";
+docs/reference/faults.md F46, F47). So is a block that was sent before and arrives late: to own the
+mailbox is to fence it off.
 """
 
 from collections.abc import Callable
@@ -159,8 +160,9 @@ class Ownership:
 
         A block may arrive long after its client has given it up. The PLC refuses it once the
         mailbox was taken since, by this session or, after this session, by another one: its epoch
-        is old (docs/mailbox.md, "Owners"). A process that died keeps the mailbox for ten seconds;
-        they are waited out, in which nothing is sent that could stand in another client's way.
+        is old (docs/reference/mailbox.md, "Owners"). A process that died keeps the mailbox for ten
+        seconds; they are waited out, in which nothing is sent that could stand in another client's
+        way.
 
         Raises:
             LeaseHeldError: Another client owns it, and is alive.

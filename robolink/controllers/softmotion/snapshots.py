@@ -5,8 +5,9 @@ agree (docs/reference/faults.md F31). Only such snapshots decide anything; the h
 says when to read the next one.
 
 Words in a wrong order, or read one register too far, make plausible numbers. So the probe is
-looked for before anything is believed, and the error names what was found (docs/mailbox.md;
-docs/reference/softmotion.md 4.4; docs/reference/faults.md F33, F34, F70).
+looked for before anything is believed, and the error names what was found
+(docs/reference/mailbox.md; docs/reference/softmotion.md 4.4; docs/reference/faults.md F33, F34,
+F70).
 """
 
 from collections.abc import Callable, Iterable, Sequence

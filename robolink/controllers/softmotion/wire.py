@@ -5,7 +5,8 @@ used: a serial line finds its place again, TCP and CAN do not. A write is never 
 What ends the session ends it for good; a movement that was under way then is found again
 through its marker, not through this object.
 
-Movements that were sent and whose end is not read: at most four (docs/mailbox.md, "Movements").
+Movements that were sent and whose end is not read: at most four (docs/reference/mailbox.md,
+"Movements").
 
 The PLC names the last four ends by their sequence. Every snapshot is looked through for them,
 whatever it was read for, because a later end may push an earlier one out.
@@ -233,7 +234,8 @@ class MailboxWire:
         """Wait on what is unfinished: the exchanges of this thread keep it going meanwhile.
 
         Nothing else does. A thread that only looks, or a program that does something else, would
-        else keep a robot moving that nobody watches (docs/mailbox.md, "What ends by itself").
+        else keep a robot moving that nobody watches (docs/reference/mailbox.md, "What ends by
+        itself").
         """
         if self._attends:
             yield

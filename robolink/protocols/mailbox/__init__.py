@@ -1,4 +1,6 @@
-"""The PLC mailbox: blocks of 16-bit words between a client and a SoftMotion PLC (docs/mailbox.md).
+"""The PLC mailbox: blocks of 16-bit words between a client and a SoftMotion PLC.
+
+Source: docs/reference/mailbox.md.
 
 HOST encodes commands and decodes responses and slots; DEVICE decodes commands and encodes
 responses and slots.

@@ -1,14 +1,14 @@
-"""The command block: from a client to the PLC (docs/mailbox.md).
+"""The command block: from a client to the PLC (docs/reference/mailbox.md).
 
-The response block: from the PLC to every client (docs/mailbox.md).
+The response block: from the PLC to every client (docs/reference/mailbox.md).
 
 The answer words of a response, whose meaning depends on the opcode echoed beside them.
 
-One slot of the tool table (docs/mailbox.md, "Tools").
+One slot of the tool table (docs/reference/mailbox.md, "Tools").
 
 Which PLC this is: a number that it draws once and retains.
 
-Source: docs/mailbox.md, "Which PLC this is".
+Source: docs/reference/mailbox.md, "Which PLC this is".
 
 The number stands behind the last slot, and in CANopen object 1018h:4, so that a PLC is known
 again over TCP, RTU and CAN, and under whatever name or address it is reached.

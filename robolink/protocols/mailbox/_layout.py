@@ -3,14 +3,14 @@
 A block is the memory image of a packed little-endian structure: low word first, low byte
 first. So its layout is a list of fields, and reading one is unpacking a structure.
 
-Checksums and counters of the mailbox (docs/mailbox.md, "Words and bytes").
+Checksums and counters of the mailbox (docs/reference/mailbox.md, "Words and bytes").
 
 Finding out from the probe how a PLC, or a gateway before it, orders its words.
 
 It is the fault that users of Modbus report most (docs/reference/softmotion.md 4.4), and one that
 makes plausible numbers: so the probe is compared before anything is believed or written.
 
-The register map of mailbox version 1, once (docs/mailbox.md, "Words and bytes").
+The register map of mailbox version 1, once (docs/reference/mailbox.md, "Words and bytes").
 
 The codec, the register-map tables, the EDS and the Structured Text types all come from here.
 """

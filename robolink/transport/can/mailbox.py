@@ -1,4 +1,7 @@
-"""A PLC mailbox in the object dictionary of a CANopen node (docs/mailbox.md, "CANopen")."""
+"""A PLC mailbox in the object dictionary of a CANopen node.
+
+Source: docs/reference/mailbox.md, "CANopen".
+"""
 
 import struct
 from collections.abc import Callable, Iterator, Sequence

@@ -1,4 +1,4 @@
-"""A PLC mailbox in the registers of a Modbus server (docs/mailbox.md, "Registers")."""
+"""A PLC mailbox in the registers of a Modbus server (docs/reference/mailbox.md, "Registers")."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

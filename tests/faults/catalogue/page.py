@@ -12,6 +12,8 @@ from tests.faults.catalogue._shown_by import Showing, showings
 _OPENING: Final = """\
 # Faults
 
+*For maintainers. Reference.*
+
 What can go wrong between a PC and a robot, what you see then, and what never happens. This page is
 made from the catalogue in `tests/faults/catalogue/rows` and the marks of the tests:
 `python -m tests.faults.catalogue.page > docs/faults.md`.

@@ -1,7 +1,7 @@
 """A PLC mailbox in its documented DEVICE role.
 
-It plays docs/mailbox.md with the codec and nothing else: no kinematics, no path. A movement takes
-half a second and arrives where it was sent.
+It plays docs/reference/mailbox.md with the codec and nothing else: no kinematics, no path. A
+movement takes half a second and arrives where it was sent.
 """
 
 from collections.abc import Callable, Sequence

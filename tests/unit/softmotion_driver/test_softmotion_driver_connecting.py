@@ -22,7 +22,7 @@ from robolink.protocols.mailbox import Bits, Capability, ErrorClass, GroupState,
 from robolink.runner import Question, Runner, RunSettings
 from robolink.transaction import ToolChange, Wanted, change_tools, look, recover
 
-# Meeting a PLC mailbox: version, probe, heartbeat, whole snapshots (docs/mailbox.md).
+# Meeting a PLC mailbox: version, probe, heartbeat, whole snapshots (docs/reference/mailbox.md).
 
 
 def resealed(words):

@@ -1,6 +1,6 @@
 """Movements of an axis group: marked, sent once, kept alive by whoever waits.
 
-Source: docs/mailbox.md, "Movements".
+Source: docs/reference/mailbox.md, "Movements".
 """
 
 import math

@@ -301,7 +301,7 @@ def b15_jog_about_x(bench):
 
 
 def block_of_before(bench):
-    """Not one of the sixteen: docs/mailbox.md, "When a command counts"."""
+    """Not one of the sixteen: docs/reference/mailbox.md, "When a command counts"."""
     client = bench.client
     first = client.command(Opcode.WRITE_TOOL, 3, pose=(1.0, 2.0, 3.0, 0.0, 0.0, 0.0))
     for command in (first, client.command(Opcode.CLEAR_TOOL, 3), first):
@@ -315,7 +315,7 @@ def block_of_before(bench):
 
 
 def block_of_an_epoch_of_before(bench):
-    """Not one of the sixteen: docs/mailbox.md, "Owners"."""
+    """Not one of the sixteen: docs/reference/mailbox.md, "Owners"."""
     client = bench.client
     for refusal, takes in ((107, client.take), (106, lambda: taken_over(bench))):
         late = client.command(Opcode.WRITE_TOOL, 3, pose=(1.0, 2.0, 3.0, 0.0, 0.0, 0.0))
@@ -351,7 +351,7 @@ def without_places(bench):
 
 
 def jog_of_an_owner_who_lost_it(bench):
-    """Not one of the sixteen: docs/mailbox.md, "What ends by itself"."""
+    """Not one of the sixteen: docs/reference/mailbox.md, "What ends by itself"."""
     bench.enable()
     dynamics = {"dynamics": AT_SPEED}
     jog = bench.client.tell(Opcode.JOG, 0, BACK_ALONG_X, CoordinateSystem.MCS, **dynamics)
@@ -366,7 +366,7 @@ def jog_of_an_owner_who_lost_it(bench):
 
 
 def movements_of_an_owner_who_lost_it(bench):
-    """Not one of the sixteen: docs/mailbox.md, "What ends by itself"."""
+    """Not one of the sixteen: docs/reference/mailbox.md, "What ends by itself"."""
     bench.enable()
     pose = shifted(bench.client.now().tcp, z=-150.0)
     moves = [

@@ -2,7 +2,7 @@
 
 The CANopen objects of the mailbox.
 
-Source: docs/mailbox.md, "CANopen"; docs/reference/softmotion.md 4.7.
+Source: docs/reference/mailbox.md, "CANopen"; docs/reference/softmotion.md 4.7.
 """
 
 from collections.abc import Iterator, Sequence
@@ -111,7 +111,7 @@ MAILBOX_OBJECTS: Final = (
     _record(0x2110, "command_fields", *COMMAND_FIELDS),
     _array(0x2200, "tool_slot", *(Entry(f"slot_{n}", DOMAIN) for n in SLOTS)),
 )
-"""As docs/mailbox.md says, and 0x2103, because a PDO can only carry what stands somewhere."""
+"""As docs/reference/mailbox.md says, and 0x2103: a PDO can only carry what stands somewhere."""
 
 
 def _mapping(index: int, entries: tuple[Entry, ...]) -> Iterator[Entry]:

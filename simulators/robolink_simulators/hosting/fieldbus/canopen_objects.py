@@ -1,4 +1,4 @@
-"""The object dictionary of a simulated PLC on CANopen (docs/mailbox.md, "CANopen")."""
+"""The object dictionary of a simulated PLC on CANopen (docs/reference/mailbox.md, "CANopen")."""
 
 import io
 import struct

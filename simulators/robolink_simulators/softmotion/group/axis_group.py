@@ -58,9 +58,9 @@ class MoveBlocks(GroupCore):
     ) -> None:
         """``MC_MoveLinearAbsolute``: the TCP on a straight line, the elbow on its side.
 
-        With ``watch``, as the companion program's movement until an input (docs/mailbox.md,
-        opcode 30008): ``execution.latched`` is the TCP at the edge, in the coordinate system
-        of the target; without an edge the block ends in error.
+        With ``watch``, as the companion program's movement until an input
+        (docs/reference/mailbox.md, opcode 30008): ``execution.latched`` is the TCP at the edge, in
+        the coordinate system of the target; without an edge the block ends in error.
         """
         self.machine.require_motion()
         if watch is not None:

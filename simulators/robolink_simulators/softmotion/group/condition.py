@@ -22,7 +22,7 @@ class SmcGroupState(IntEnum):
 
 
 class ReadToolMode(IntEnum):
-    """Which tool SMC_GroupReadTool gives; numbers of opcode 30002 (docs/mailbox.md)."""
+    """Which tool SMC_GroupReadTool gives; numbers of opcode 30002 (docs/reference/mailbox.md)."""
 
     SET = 0
     ACTIVE_MOVEMENT = 1

@@ -11,7 +11,7 @@ from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 
 class CoordSystem(IntEnum):
-    """``SMC_COORD_SYSTEM``: members documented, numbers those of docs/mailbox.md.
+    """``SMC_COORD_SYSTEM``: members documented, numbers those of docs/reference/mailbox.md.
 
     Source: docs/reference/softmotion.md 2.6.
     """

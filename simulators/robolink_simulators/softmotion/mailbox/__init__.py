@@ -1,4 +1,4 @@
-"""The mailbox program of a simulated SoftMotion PLC (docs/mailbox.md). SIMULATED."""
+"""The mailbox program of a simulated SoftMotion PLC (docs/reference/mailbox.md). SIMULATED."""
 
 from typing import TYPE_CHECKING
 

@@ -29,7 +29,10 @@ _SEQUENCES: Final = 0xFFFF
 """1 to 65535, and 1 again."""
 
 _MOST_AHEAD: Final = _SEQUENCES // 2
-"""What is farther ahead than this is behind (docs/mailbox.md, "When a command counts")."""
+"""What is farther ahead than this is behind.
+
+Source: docs/reference/mailbox.md, "When a command counts".
+"""
 
 
 class Inbox:

@@ -259,7 +259,7 @@ class Jobs:
         """Sequence of the movement that runs or is interrupted, 0 for none.
 
         An interrupted one stays until it goes on or ends, whatever runs meanwhile
-        (docs/mailbox.md, "Movements").
+        (docs/reference/mailbox.md, "Movements").
         """
         status = self._group.status()
         number = status.interrupted_movement or status.active_movement

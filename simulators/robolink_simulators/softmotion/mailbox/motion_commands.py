@@ -1,4 +1,7 @@
-"""The opcodes that move the axis group, or change its state (docs/mailbox.md, "Movements")."""
+"""The opcodes that move the axis group, or change its state.
+
+Source: docs/reference/mailbox.md, "Movements".
+"""
 
 from collections.abc import Mapping
 from dataclasses import replace

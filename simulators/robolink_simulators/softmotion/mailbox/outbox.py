@@ -1,4 +1,7 @@
-"""What the mailbox program gives out: the response block and the tool slots (docs/mailbox.md)."""
+"""What the mailbox program gives out: the response block and the tool slots.
+
+Source: docs/reference/mailbox.md.
+"""
 
 from dataclasses import replace
 from typing import Any, Final
@@ -166,8 +169,8 @@ class Outbox:
 def _raw_error(job: Job | None, status: GroupStatus) -> int:
     """Return the ErrorID of the block, or of the group where the block shows no error.
 
-    The two are never mixed (docs/mailbox.md, "Errors"): a block in error whose number nobody
-    knows shows 0, whatever the group shows beside it.
+    The two are never mixed (docs/reference/mailbox.md, "Errors"): a block in error whose number
+    nobody knows shows 0, whatever the group shows beside it.
     """
     if job is not None and job.error_class:
         return job.raw

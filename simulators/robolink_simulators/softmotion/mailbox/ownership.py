@@ -1,4 +1,4 @@
-"""Who may command the mailbox (docs/mailbox.md)."""
+"""Who may command the mailbox (docs/reference/mailbox.md)."""
 
 from typing import Final
 

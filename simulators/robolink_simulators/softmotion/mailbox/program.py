@@ -1,4 +1,6 @@
-"""The mailbox program of a PLC: what it does with a command, and meanwhile (docs/mailbox.md).
+"""The mailbox program of a PLC: what it does with a command, and meanwhile.
+
+Source: docs/reference/mailbox.md.
 
 Theory of operation. Clients write words. In the next cycle of its task the program looks at
 them: a whole new command is accepted, once, and handed to one of the desks, which call the
@@ -179,7 +181,7 @@ class MailboxProgram:
         self.jobs.add(job)
 
     def _require_admitted(self, command: Command) -> None:
-        """Refuse what is refused whatever the opcode demands, in the order of docs/mailbox.md."""
+        """Refuse what is refused for every opcode, in the order of docs/reference/mailbox.md."""
         refusal = command.refusal()
         if refusal:
             raise Rejected(refusal)

@@ -21,7 +21,7 @@ SCHEMA: Final = "robolink/plc-state/1"
 
 
 class RetainedMemory:
-    """The retained variables of the mailbox program (docs/mailbox.md).
+    """The retained variables of the mailbox program (docs/reference/mailbox.md).
 
     Attributes:
         boot_id: Counts PLC starts; 0 before the first.

@@ -1,4 +1,4 @@
-"""The opcodes about tools and kinematics (docs/mailbox.md, "Tools")."""
+"""The opcodes about tools and kinematics (docs/reference/mailbox.md, "Tools")."""
 
 from collections.abc import Mapping
 from types import MappingProxyType
@@ -41,7 +41,7 @@ from robolink_simulators.softmotion.smc_errors import BlockRefused
 _NO_TOOL: Final[Six] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _COUPLING: Final = "+"
 _LONGEST_MM: Final = 10_000.0
-"""What is longer is no tool but a mistake (docs/mailbox.md, "Tools")."""
+"""What is longer is no tool but a mistake (docs/reference/mailbox.md, "Tools")."""
 
 
 class ToolDesk:

@@ -6,7 +6,7 @@ from robolink.protocols.mailbox import beats_for
 from robolink_simulators.device.wire_time import WireTime
 
 PATIENCE_NS: Final = 500_000_000
-"""Without a new beat for this long, what moves is halted (docs/mailbox.md, "What ends by
+"""Without a new beat for this long, what moves is halted (docs/reference/mailbox.md, "What ends by
 itself")."""
 
 

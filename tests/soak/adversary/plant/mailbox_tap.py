@@ -36,10 +36,10 @@ _FOLLOWED: Final = (Opcode.MOVE_DIRECT, Opcode.MOVE_LINEAR, Opcode.MOVE_UNTIL_IN
 class SeenSession:
     """Follows the blocks of a session; knows nothing of the driver.
 
-    The rules are those of docs/mailbox.md, "When a command counts": a session ends with the start
-    of the PLC that it met, and with an acknowledgement of another client in place of its own; a
-    block is written again only after the PLC has counted a damaged one. Who has seen that is one
-    thread: another one may be about to write, and learns it with its own next look.
+    The rules are those of docs/reference/mailbox.md, "When a command counts": a session ends with
+    the start of the PLC that it met, and with an acknowledgement of another client in place of its
+    own; a block is written again only after the PLC has counted a damaged one. Who has seen that is
+    one thread: another one may be about to write, and learns it with its own next look.
 
     Attributes:
         overtaken: Whether another client was acknowledged in the place of its last command.

@@ -108,31 +108,49 @@ def signals_of_a_terminal(monkeypatch):
 
 
 @pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup():
+    """Forget what was said and printed before this test.
+
+    What is done for each test is a hook: a fixture for it would cost ten times as much.
+    """
+    CANARIES.begin()
+    DOCUMENTS.begin()
+
+
+@pytest.hookimpl(wrapper=True, trylast=True)
 def pytest_runtest_teardown(item):
-    """Hear what a test left unread, before its capture ends."""
-    captured = item.funcargs.get("capsys")
+    """Close the journal of each test, and look at what it said.
+
+    Thousands of open files would be too many. What a test left unread is heard before its capture
+    ends.
+    """
+    given = getattr(item, "funcargs", {})
+    captured = given.get("capsys")
     if captured is not None and CANARIES.passwords:
         captured.readouterr()
+    try:
+        answer = yield
+    finally:
+        if "robolink.journal" in sys.modules:
+            from robolink.journal import close_files
+
+            close_files()
+    _no_password_shows(given)
+    _documents_fit_their_schemas()
+    return answer
 
 
-@pytest.fixture(autouse=True)
-def no_password_shows(request):
+def _no_password_shows(given):
     """Fail a test whose password stands in anything that was written, said or logged."""
-    CANARIES.begin()
-    yield
     if not CANARIES.passwords:
         return
-    given = request.node.funcargs
     folders = {given[name] for name in ("tmp_path", "robolink_state") if name in given}
     if leaks := CANARIES.leaks(*folders):
         pytest.fail("a password shows: " + ", ".join(leaks), pytrace=False)
 
 
-@pytest.fixture(autouse=True)
-def documents_fit_their_schemas():
+def _documents_fit_their_schemas():
     """Fail a test in which a command printed a document that docs/documents.schema.json denies."""
-    DOCUMENTS.begin()
-    yield
     if DOCUMENTS.wrong:
         pytest.fail("\n".join(DOCUMENTS.wrong[:9]), pytrace=False)
 
@@ -166,13 +184,3 @@ def pytest_collection_finish():
     gc.freeze()
     # And search less often: a test makes and drops much, and little of it is garbage in circles.
     gc.set_threshold(10_000, 10, 10)
-
-
-@pytest.fixture(autouse=True)
-def _journals_are_closed():
-    """Close the journal of each test: thousands of open files would be too many."""
-    yield
-    if "robolink.journal" in sys.modules:
-        from robolink.journal import close_files
-
-        close_files()

@@ -10,15 +10,19 @@ import os
 import pickle
 import struct
 import sys
+import time
 import traceback
 from collections.abc import Iterator
 from itertools import groupby
 from multiprocessing.connection import Connection, Pipe, wait
+from typing import Any
 
 import pytest
 
 _NUMBER = struct.Struct("H")
 """How the number of a module stands in the pipe from which the processes take them."""
+_LONGEST_KEPT_S = 0.1
+"""A report of a test that passed is handed on with the first one after so long."""
 _OF_THE_PRINTER = ("LFPlugin", "NFPlugin", "StepwisePlugin", "LogXML")
 """Plug-ins that write down how the whole run went; none of the processes knows."""
 
@@ -80,8 +84,9 @@ def _start(
         return reading, pid
     try:
         reading.close()
-        _prepare(session.config, writing, number)
+        sender = _prepare(session.config, writing, number)
         _run(session, modules, queue)
+        sender.send()
         writing.send_bytes(b"")
     except (BrokenPipeError, KeyboardInterrupt):
         pass  # the printer wants no more
@@ -91,33 +96,60 @@ def _start(
         os._exit(0)
 
 
-def _prepare(config: pytest.Config, writing: Connection, number: int) -> None:
+def _prepare(config: pytest.Config, writing: Connection, number: int) -> "_Sender":
     """Give this process captures and a folder of its own, and lead its reports to the printer."""
     capture = config.pluginmanager.getplugin("capturemanager")
     if capture is not None and capture.is_globally_capturing():
         capture.stop_global_capturing()
         capture.start_global_capturing()
-    config.get_terminal_writer()._file = open(os.devnull, "w")  # noqa: SIM115 - as long as it runs
-    for plugin in config.pluginmanager.get_plugins():
+    plugins, writer = config.pluginmanager, config.get_terminal_writer()
+    writer._file = open(os.devnull, "w")  # noqa: SIM115 - as long as it runs
+    plugins.unregister(name="terminalreporter")
+    plugins.register(_Silent(writer), "terminalreporter")
+    for plugin in plugins.get_plugins():
         if type(plugin).__name__ in _OF_THE_PRINTER:
-            config.pluginmanager.unregister(plugin)
+            plugins.unregister(plugin)
     folders = config._tmp_path_factory  # type: ignore[attr-defined]
     folders._given_basetemp = folders.getbasetemp() / f"process-{number}"
     folders._basetemp = None
-    config.pluginmanager.register(_Sender(config, writing))
+    sender = _Sender(config, writing)
+    plugins.register(sender)
+    return sender
+
+
+class _Silent:
+    """Stands where pytest and plug-ins look for what prints."""
+
+    def __init__(self, writer: Any) -> None:
+        self._tw = writer
 
 
 class _Sender:
-    """A plug-in that hands reports on."""
+    """A plug-in that hands reports on, some together: to wake the printer costs as much as a test.
+
+    What did not pass is handed on at once.
+    """
 
     def __init__(self, config: pytest.Config, writing: Connection) -> None:
         self._config = config
         self._writing = writing
+        self._reports: list[Any] = []
+        self._sent_s = 0.0
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Send a report."""
-        data = self._config.hook.pytest_report_to_serializable(config=self._config, report=report)
-        self._writing.send_bytes(pickle.dumps(data))
+        """Send a report, or keep it for a moment."""
+        hook = self._config.hook
+        self._reports.append(hook.pytest_report_to_serializable(config=self._config, report=report))
+        now_s = time.monotonic()
+        if not report.passed or now_s - self._sent_s > _LONGEST_KEPT_S:
+            self._sent_s = now_s
+            self.send()
+
+    def send(self) -> None:
+        """Send what is kept."""
+        reports, self._reports = self._reports, []
+        if reports:
+            self._writing.send_bytes(pickle.dumps(reports))
 
 
 def _run(session: pytest.Session, modules: list[list[pytest.Item]], queue: int) -> None:
@@ -150,11 +182,10 @@ def _hear(session: pytest.Session, runs: dict[Connection, int]) -> None:
             if not data:
                 open_ends.discard(end)
                 continue
-            report = hook.pytest_report_from_serializable(
-                config=session.config, data=pickle.loads(data)
-            )
-            if report.when == "setup":
-                hook.pytest_runtest_logstart(nodeid=report.nodeid, location=report.location)
-            hook.pytest_runtest_logreport(report=report)
-            if report.when == "teardown":
-                hook.pytest_runtest_logfinish(nodeid=report.nodeid, location=report.location)
+            for told in pickle.loads(data):
+                report = hook.pytest_report_from_serializable(config=session.config, data=told)
+                if report.when == "setup":
+                    hook.pytest_runtest_logstart(nodeid=report.nodeid, location=report.location)
+                hook.pytest_runtest_logreport(report=report)
+                if report.when == "teardown":
+                    hook.pytest_runtest_logfinish(nodeid=report.nodeid, location=report.location)

@@ -14,6 +14,9 @@ from tests._canary import Watch, install
 from tests._documents import DOCUMENTS
 from tests._processes import pytest_addoption, pytest_runtestloop  # noqa: F401 - hooks
 
+# Nothing of what is imported and collected is garbage: a search for it begins with the tests.
+gc.disable()
+
 # Before anything imports numpy: threads for matrices of six rows cost far more than they bring,
 # the more so the more cores a machine has.
 for _library in ("OPENBLAS", "OMP", "MKL"):
@@ -57,6 +60,9 @@ def pytest_configure(config):
 
 def pytest_sessionstart():
     """Prepare what every test of this process needs."""
+    # The tester's own passwords are nobody's business; and looking anew for a package that is not
+    # there is a tenth of a short command's time.
+    sys.modules["keyring"] = None  # type: ignore[assignment]
     hear_signals()
     install(CANARIES)
     DOCUMENTS.install()
@@ -108,31 +114,49 @@ def signals_of_a_terminal(monkeypatch):
 
 
 @pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup():
+    """Forget what was said and printed before this test.
+
+    What is done for each test is a hook: a fixture for it would cost ten times as much.
+    """
+    CANARIES.begin()
+    DOCUMENTS.begin()
+
+
+@pytest.hookimpl(wrapper=True, trylast=True)
 def pytest_runtest_teardown(item):
-    """Hear what a test left unread, before its capture ends."""
-    captured = item.funcargs.get("capsys")
+    """Close the journal of each test, and look at what it said.
+
+    Thousands of open files would be too many. What a test left unread is heard before its capture
+    ends.
+    """
+    given = getattr(item, "funcargs", {})
+    captured = given.get("capsys")
     if captured is not None and CANARIES.passwords:
         captured.readouterr()
+    try:
+        answer = yield
+    finally:
+        if "robolink.journal" in sys.modules:
+            from robolink.journal import close_files
+
+            close_files()
+    _no_password_shows(given)
+    _documents_fit_their_schemas()
+    return answer
 
 
-@pytest.fixture(autouse=True)
-def no_password_shows(request):
+def _no_password_shows(given):
     """Fail a test whose password stands in anything that was written, said or logged."""
-    CANARIES.begin()
-    yield
     if not CANARIES.passwords:
         return
-    given = request.node.funcargs
     folders = {given[name] for name in ("tmp_path", "robolink_state") if name in given}
     if leaks := CANARIES.leaks(*folders):
         pytest.fail("a password shows: " + ", ".join(leaks), pytrace=False)
 
 
-@pytest.fixture(autouse=True)
-def documents_fit_their_schemas():
+def _documents_fit_their_schemas():
     """Fail a test in which a command printed a document that docs/documents.schema.json denies."""
-    DOCUMENTS.begin()
-    yield
     if DOCUMENTS.wrong:
         pytest.fail("\n".join(DOCUMENTS.wrong[:9]), pytrace=False)
 
@@ -164,15 +188,6 @@ def pytest_collection_finish():
     """Leave thousands of collected tests out of each later search for garbage; it is rarer, too."""
     gc.collect()
     gc.freeze()
+    gc.enable()
     # And search less often: a test makes and drops much, and little of it is garbage in circles.
     gc.set_threshold(10_000, 10, 10)
-
-
-@pytest.fixture(autouse=True)
-def _journals_are_closed():
-    """Close the journal of each test: thousands of open files would be too many."""
-    yield
-    if "robolink.journal" in sys.modules:
-        from robolink.journal import close_files
-
-        close_files()

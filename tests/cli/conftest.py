@@ -1,7 +1,6 @@
 """A command line of the tests' own, apart from the tester's passwords and settings."""
 
 import os
-import sys
 from itertools import count
 
 import click
@@ -22,7 +21,6 @@ _numbers = count()
 def plain_environment(monkeypatch, tmp_path):
     for name in [name for name in os.environ if name.startswith(("ROBOLINK", "_ROBOLINK"))]:
         monkeypatch.delenv(name)
-    monkeypatch.setitem(sys.modules, "keyring", None)
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
 
 

@@ -1,7 +1,7 @@
 """Every document that a command prints is published, and fits what is published.
 
-What commands print in the other tests of this process is held to the schemas by the fixture
-``documents_fit_their_schemas``, the errors of every command among it
+What commands print in the other tests of this process is held to the schemas by
+``pytest_runtest_teardown`` in ``tests/conftest.py``, the errors of every command among it
 (``test_refusals_of_every_command``). Here: that nothing is left out, and what no other test prints.
 """
 

@@ -2,7 +2,6 @@
 
 import json
 import os
-import sys
 from dataclasses import replace
 
 import pytest
@@ -38,7 +37,6 @@ def plain_environment(monkeypatch):
     for name in [name for name in os.environ if name.startswith("ROBOLINK")]:
         if name != "ROBOLINK_STATE_DIR":
             monkeypatch.delenv(name)
-    monkeypatch.setitem(sys.modules, "keyring", None)
 
 
 @pytest.fixture

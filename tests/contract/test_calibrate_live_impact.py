@@ -1,7 +1,6 @@
 """A live calibration that also says what its write will do at taught points."""
 
 import json
-import sys
 
 import pytest
 from robolink_cli import main
@@ -16,7 +15,6 @@ from robolink.model import Pose
 
 def test_the_impact_stands_beside_the_measured_proposal(capsys, monkeypatch):
     monkeypatch.delenv("ROBOLINK_PASSWORD", raising=False)
-    monkeypatch.setitem(sys.modules, "keyring", None)
     simulator = EpsonSimulator(seed=7)
     simulator.machine.points.store(3, Point.at(Pose(250, 200, -30, 0)))
     clock = ScaledClock(60)

@@ -1,7 +1,6 @@
 """``--report`` of ``impact`` and ``calibrate``: a page whatever the end is."""
 
 import json
-import sys
 
 import pytest
 from robolink_cli import main
@@ -21,7 +20,6 @@ FROM_POSES = ("calibrate", "two-pose", "--tool", "1", *POSES, "--impact", "1-5")
 @pytest.fixture(autouse=True)
 def plain_environment(tmp_path, monkeypatch):
     monkeypatch.delenv("ROBOLINK_PASSWORD", raising=False)
-    monkeypatch.setitem(sys.modules, "keyring", None)
     monkeypatch.chdir(tmp_path)
 
 

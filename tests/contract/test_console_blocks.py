@@ -164,7 +164,6 @@ TOUCHES = "x,y,z,a,b,c\n287.5,103.25,-60,0,0,180\n312.5,96.75,-60,180,0,180\n"
 @pytest.fixture
 def cell(tmp_path, monkeypatch):
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
-    monkeypatch.setitem(sys.modules, "keyring", None)
     monkeypatch.chdir(tmp_path)
     simulator = EpsonSimulator(seed=3, serial="SIM00001", state_path=tmp_path / "flash.json")
     for number, heading_deg in ((3, 2.0), (4, 91.0)):

@@ -25,7 +25,6 @@ JOG = r"When it is there: done"
 def simulator(monkeypatch):
     for name in ("ROBOLINK_PASSWORD", "ROBOLINK_CONTROLLER"):
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setitem(sys.modules, "keyring", None)
     return EpsonSimulator(seed=7, options=EpsonOptions(remote_timeout_s=0.0))
 
 

@@ -6,7 +6,6 @@ each with its exit code, in the order in which the day brings them.
 
 import json
 import os
-import sys
 from contextlib import contextmanager
 
 import pytest
@@ -28,7 +27,6 @@ def plain_environment(monkeypatch):
     for name in [name for name in os.environ if name.startswith("ROBOLINK")]:
         if name != "ROBOLINK_STATE_DIR":
             monkeypatch.delenv(name)
-    monkeypatch.setitem(sys.modules, "keyring", None)
 
 
 def place_points(simulator):

@@ -1,7 +1,6 @@
 """Jogging by keys: the real command on a real terminal pair, against a served simulator."""
 
 import os
-import sys
 import termios
 import time
 
@@ -35,7 +34,6 @@ def speed():
 def host(simulator, monkeypatch, capsys, speed):
     for name in ("ROBOLINK_PASSWORD", "ROBOLINK_CONTROLLER"):
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setitem(sys.modules, "keyring", None)
     with serve_tcp(simulator, clock=ScaledClock(speed)) as host:
         assert main.run(["-c", host.url, "motors", "on", "--yes"]) == 0
         yield host

@@ -7,7 +7,6 @@ place of every address.
 
 import re
 import shlex
-import sys
 from pathlib import Path
 
 import pytest
@@ -46,7 +45,6 @@ TYPED: dict[str, tuple[pytest.MarkDecorator, ...]] = {
 @pytest.fixture
 def cell(tmp_path, monkeypatch):
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
-    monkeypatch.setitem(sys.modules, "keyring", None)
     monkeypatch.chdir(tmp_path)
     simulator = EpsonSimulator(seed=3, serial="SIM00001", state_path=tmp_path / "flash.json")
     for number, heading_deg in ((3, 2.0), (4, 91.0)):

@@ -2,6 +2,7 @@
 
 import logging
 import sys
+from contextlib import contextmanager
 
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
@@ -31,21 +32,38 @@ def cell():
     unregister("log-test")
 
 
-@pytest.fixture
-def heard(caplog):
-    """Every record of robolink, as it is made."""
-    caplog.set_level(logging.DEBUG, logger="robolink")
-    return Heard(caplog)
-
-
-class Heard:
+class Heard(logging.Handler):
     """What was logged since the test began."""
 
-    def __init__(self, caplog):
-        self._caplog = caplog
+    def __init__(self):
+        super().__init__()
+        self.records = []
+
+    def emit(self, record):
+        self.records.append(record)
 
     def __iter__(self):
-        return iter(self._caplog.records)
+        return iter(self.records)
+
+
+@contextmanager
+def listening(level):
+    logger, heard = logging.getLogger("robolink"), Heard()
+    before = logger.level
+    logger.setLevel(level)
+    logger.addHandler(heard)
+    try:
+        yield heard
+    finally:
+        logger.removeHandler(heard)
+        logger.setLevel(before)
+
+
+@pytest.fixture
+def heard():
+    """Every record of robolink, as it is made."""
+    with listening(logging.DEBUG) as heard:
+        yield heard
 
 
 def decisions(records):
@@ -129,12 +147,14 @@ def test_a_stop_from_outside_is_told(cell, heard):
     assert decisions(heard) == [f"{url.partition('?')[0]}: stop acknowledged: it rests"]
 
 
-def test_nothing_is_made_while_nobody_listens(cell, caplog):
+def test_nothing_is_made_while_nobody_listens(cell):
     _, url = cell
-    caplog.set_level(logging.WARNING, logger="robolink")
-    with robolink.connect(url, password=PASSWORD) as controller:
+    with (
+        listening(logging.WARNING) as heard,
+        robolink.connect(url, password=PASSWORD) as controller,
+    ):
         controller.status()
-    assert caplog.records == []
+    assert heard.records == []
 
 
 def test_a_process_without_logging_is_not_made_to_load_it(monkeypatch):

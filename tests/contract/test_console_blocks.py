@@ -34,8 +34,11 @@ from tests.unit.test_spel_points import pts
 pytestmark = pytest.mark.simulator_only
 
 ROOT = Path(__file__).parents[2]
-PAGES = [ROOT / "README.md", ROOT / "README.zh.md", *sorted(ROOT.glob("docs/*.md"))]
-PAGES += sorted(ROOT.glob("docs/reference/*.md"))
+PAGES = [
+    *(ROOT / name for name in ("README.md", "README.zh.md")),
+    *sorted(ROOT.glob("docs/*.md")),
+    *sorted(ROOT.glob("docs/reference/*.md")),
+]
 BLOCK = re.compile(r"^```console\n(.*?)^```", re.M | re.S)
 URL = "epson+sim://pages"
 

@@ -40,9 +40,11 @@ from robolink.transport import parse_url
 pytest_plugins = ["pytester"]
 
 ROOT = Path(__file__).parents[2]
-DOCS = ROOT / "docs"
-PAGES = [ROOT / "README.md", ROOT / "simulators" / "README.md", *sorted(DOCS.glob("*.md"))]
-PAGES += sorted((DOCS / "reference").glob("*.md"))
+PAGES = [
+    *(ROOT / name for name in ("README.md", "simulators/README.md")),
+    *sorted(ROOT.glob("docs/*.md")),
+    *sorted(ROOT.glob("docs/reference/*.md")),
+]
 FENCED = re.compile(r"^```python\n(.*?)^```", re.MULTILINE | re.DOTALL)
 ADDRESS = re.compile(r"(epson\+tcp|softmotion\+modbus-tcp)://192\.168\.0\.\d+:\d+")
 

@@ -1,0 +1,134 @@
+"""What callers give: numbers of other libraries, and tuples where a value belongs."""
+
+import inspect
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import MISSING, fields, is_dataclass
+from numbers import Integral, Real
+from types import UnionType
+from typing import Any, Union, get_args, get_origin, get_type_hints
+
+from robolink.errors import ConfigError
+from robolink.messages import tr
+
+
+def plain_number(value: Any) -> float | None:  # noqa: ANN401 - whatever a caller gave
+    """Return a number as Python's own ``int`` or ``float``, ``None`` for what is no number.
+
+    A truth value is no number. A number wider than a float is rounded to the nearest one.
+
+    Args:
+        value: What was given.
+    """
+    if isinstance(value, float):  # first, and without the look at an ABC: numpy's float64 is one
+        return float(value)
+    if getattr(value, "shape", None) == ():  # numpy's, which this module does not import
+        value = value.item()
+    if isinstance(value, bool) or not isinstance(value, Real):
+        return None
+    return int(value) if isinstance(value, Integral) else float(value)
+
+
+def required_number(value: object, name: str) -> float:
+    """Return a number that a frozen value holds, which from now on is one of Python's own.
+
+    Args:
+        value: The value that is being made.
+        name: The field.
+
+    Raises:
+        ConfigError: The field holds no number.
+    """
+    given = getattr(value, name)
+    number = plain_number(given)
+    if number is None:
+        raise not_a_number(name, given)
+    if type(number) is not type(given):
+        object.__setattr__(value, name, number)
+    return number
+
+
+def not_a_number(name: str, value: object) -> ConfigError:
+    """Return the error for a field that holds no number, or one that is not finite."""
+    return ConfigError(
+        tr("{name} is not a number: {value!r}.", name=name, value=value),
+        remedy=tr("Give a finite decimal number."),
+    )
+
+
+def misgiven(
+    function: Callable[..., object], args: Iterable[object], named: Mapping[str, Any]
+) -> Iterator[ConfigError]:
+    """Yield an error for each argument that is not the value that its annotation names.
+
+    Args:
+        function: What was called.
+        args: The arguments that were given by their place.
+        named: Those that were given by name.
+
+    Example:
+        >>> from robolink.model import describe_pose, misgiven
+        >>> [error.what for error in misgiven(describe_pose, [(1, 2, 3)], {})]
+        ['pose is not a Pose but (1, 2, 3) (tuple).']
+    """
+    try:
+        given = inspect.signature(function).bind(*args, **named).arguments
+        hints = get_type_hints(function)
+    except (NameError, TypeError):  # no such arguments at all: Python's own sentence says so
+        return
+    for name, value in given.items():
+        yield from _wrong_at(name, value, hints.get(name))
+
+
+def _wrong_at(name: str, value: object, kind: Any) -> Iterator[ConfigError]:  # noqa: ANN401 - any annotation
+    members = _members(kind)
+    if any(isinstance(one, type) and isinstance(value, one) for one in members):
+        return
+    for wanted in filter(is_dataclass, members):
+        yield not_of_class(name, value, wanted)
+        return
+    for one in members:
+        inner = [it for it in get_args(one)[:1] if any(map(is_dataclass, _members(it)))]
+        if get_origin(one) is not None and inner:
+            kinds = [it for it in _members(inner[0]) if is_dataclass(it)]
+            if isinstance(value, str) or not isinstance(value, Iterable):
+                yield not_of_class(f"{name}[0]", value, kinds[0])
+                continue
+            for number, item in enumerate(value):
+                yield from _wrong_at(f"{name}[{number}]", item, inner[0])
+
+
+def _members(kind: Any) -> tuple[Any, ...]:  # noqa: ANN401 - any annotation
+    return get_args(kind) if get_origin(kind) in (UnionType, Union) else (kind,)
+
+
+def not_of_class(name: str, value: object, kind: Any) -> ConfigError:  # noqa: ANN401 - a dataclass
+    """Return the error for an argument that is not of a class.
+
+    Args:
+        name: The argument.
+        value: What was given.
+        kind: The class, a dataclass.
+
+    Example:
+        >>> from robolink import ToolOffset
+        >>> from robolink.model import not_of_class
+        >>> print(not_of_class("offset", (1, 2, 3), ToolOffset))
+        offset is not a ToolOffset but (1, 2, 3) (tuple). Write ToolOffset(x_mm, y_mm, z_mm, \
+u_deg, v_deg, w_deg).
+    """
+    needed = [
+        field.name
+        for field in fields(kind)
+        if field.default is MISSING and field.default_factory is MISSING
+    ]
+    names = needed or [field.name for field in fields(kind)]
+    return ConfigError(
+        tr(
+            "{name} is not a {kind} but {given!r} ({type}).",
+            name=name,
+            kind=kind.__name__,
+            given=value,
+            type=type(value).__name__,
+        ),
+        remedy=tr("Write {call}.", call=f"{kind.__name__}({', '.join(names)})"),
+    )

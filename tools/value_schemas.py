@@ -13,7 +13,8 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import is_dataclass
 from datetime import datetime
-from enum import Enum
+from enum import Enum, Flag
+from importlib import import_module
 from pathlib import Path
 from types import NoneType
 from typing import Any, Final, Literal, get_args, get_origin
@@ -27,7 +28,6 @@ from robolink.model._documents import (
     schema_of,
     value_fields,
 )
-from tools.api import public
 
 FILE: Final = Path(__file__).parents[1] / "docs" / "values.schema.json"
 _DIALECT: Final = "https://json-schema.org/draft/2020-12/schema"
@@ -35,8 +35,7 @@ _TITLE: Final = "What robolink.to_json makes of values"
 _ABOUT: Final = (
     "One entry of $defs for each class, named after its schema: ToolOffset-1 describes the "
     "document robolink/value/ToolOffset/1, whose schema key says so. A value inside another has "
-    "that key only where its class is not the one that the field names. Names of numbers end "
-    "with their unit."
+    "that key too. Names of numbers end with their unit."
 )
 _PLAIN: Final[Mapping[Any, dict[str, Any]]] = {
     str: {"type": "string"},
@@ -70,6 +69,9 @@ RESULTS: Final = (
 )
 """The packages whose values a program keeps or hands on."""
 
+BESIDE: Final = ("robolink.runner", "robolink.transport")
+"""The packages of values that stand in those; a long test knows that no other has any."""
+
 
 class NotDataError(Exception):
     """A field of a class holds what no document can."""
@@ -81,12 +83,17 @@ def key_of(kind: type) -> str:
     return f"{name}-{version}"
 
 
-def values() -> dict[str, type]:
-    """Return every public class of values, by where it is imported from."""
+def values(others: Iterable[str] = BESIDE) -> dict[str, type]:
+    """Return every public class of values, by where it is imported from.
+
+    Args:
+        others: The packages beside :data:`RESULTS`.
+    """
     found: dict[type, str] = {}
-    offered = public()
-    for package in (*RESULTS, *offered):  # the others name what stands in a result
-        for name, thing in offered[package].items():
+    for package in (*RESULTS, *others):
+        module = import_module(package)
+        for name in module.__all__:
+            thing = getattr(module, name)
             if is_dataclass(thing) and isinstance(thing, type):
                 found.setdefault(thing, f"{package}.{name}")
     return {name: kind for kind, name in found.items()}
@@ -113,7 +120,7 @@ class Writer:
         return {
             "description": name,
             "type": "object",
-            "required": [*annotations],
+            "required": [*properties],
             "properties": properties,
             "additionalProperties": False,
         }
@@ -140,6 +147,8 @@ class Writer:
             return {"type": "array", "items": self._held(inner[0], at, inside)}
         if origin in (Mapping, dict) and self._is_key(inner[0]):
             return {"type": "object", "additionalProperties": self._held(inner[1], at, inside)}
+        if isinstance(kind, type) and issubclass(kind, Flag):
+            return {"type": "integer"}
         if isinstance(kind, type) and issubclass(kind, Enum):
             return {"enum": [enum_word(one) for one in kind]}
         if is_value(kind):
@@ -169,11 +178,15 @@ class Writer:
         return kind in (int, str) or (isinstance(kind, type) and issubclass(kind, Enum))
 
 
-def schemas() -> tuple[dict[str, Any], dict[str, str]]:
-    """Return the schema of each class, and of each that has none why it has none."""
+def schemas(others: Iterable[str] = BESIDE) -> tuple[dict[str, Any], dict[str, str]]:
+    """Return the schema of each class, and of each that has none why it has none.
+
+    Args:
+        others: The packages beside :data:`RESULTS`.
+    """
     found: dict[str, Any] = {}
     without: dict[str, str] = {}
-    named = values()
+    named = values(others)
     fit: dict[str, type] = {}
     for name, kind in named.items():
         if name.rpartition(".")[0] not in RESULTS:
@@ -206,13 +219,13 @@ def _beneath(kinds: Iterable[type], writer: Writer) -> dict[str, type]:
     return found
 
 
-def whole(earlier: Mapping[str, Any]) -> dict[str, Any]:
+def whole(earlier: Mapping[str, Any], found: Mapping[str, Any]) -> dict[str, Any]:
     """Return the file.
 
     Args:
         earlier: What is published; of it stays what no class has any more in this version.
+        found: The schemas of the classes.
     """
-    found, _ = schemas()
     return {
         "$schema": _DIALECT,
         "title": _TITLE,
@@ -245,10 +258,10 @@ def _definition(one: Mapping[str, Any]) -> str:
 def main() -> None:
     """Write the file, unless that would change what is published."""
     earlier = json.loads(FILE.read_text(encoding="utf-8"))["$defs"] if FILE.exists() else {}
-    made = whole(earlier)
-    if wrong := changed(earlier, made["$defs"]):
+    found, _ = schemas()
+    if wrong := changed(earlier, found):
         sys.exit(f"Raise json_version, and that of what holds it: {', '.join(wrong)}")
-    FILE.write_text(text_of(made), encoding="utf-8")
+    FILE.write_text(text_of(whole(earlier, found)), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -328,6 +328,9 @@ class ShaftSeen:
     above_mm: float
     deeper_mm: float
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "crossings", tuple(self.crossings))
+
 
 @dataclass(frozen=True, slots=True)
 class Lean:

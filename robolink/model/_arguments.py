@@ -1,6 +1,7 @@
 """What callers give: numbers of other libraries, and tuples where a value belongs."""
 
 import inspect
+import reprlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from numbers import Integral, Real
@@ -53,6 +54,14 @@ def not_a_number(name: str, value: object) -> ConfigError:
         tr("{name} is not a number: {value!r}.", name=name, value=value),
         remedy=tr("Give a finite decimal number."),
     )
+
+
+def shown(value: object) -> str:
+    """Return a value for a sentence: on one line, and cut where it is long."""
+    try:
+        return " ".join(reprlib.repr(value).split())
+    except Exception:
+        return f"<{type(value).__name__}>"
 
 
 def misgiven(
@@ -124,10 +133,10 @@ u_deg, v_deg, w_deg).
     names = needed or [field.name for field in fields(kind)]
     return ConfigError(
         tr(
-            "{name} is not a {kind} but {given!r} ({type}).",
+            "{name} is not a {kind} but {given} ({type}).",
             name=name,
             kind=kind.__name__,
-            given=value,
+            given=shown(value),
             type=type(value).__name__,
         ),
         remedy=tr("Write {call}.", call=f"{kind.__name__}({', '.join(names)})"),

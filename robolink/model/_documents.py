@@ -1,16 +1,18 @@
 """Values as JSON documents that lose nothing, and the same values again (docs/json.md).
 
-A document names its schema, ``robolink/value/ToolOffset/1``: package, class and version. It holds
-each field under its own name. What each becomes is decided by the annotations of the class alone.
+A document names its schema, ``robolink/value/ToolOffset/1``: package, class and version, and so
+does each value in it. It holds each field under its own name. What each becomes is decided by the
+annotations of the class alone.
 """
 
+import re
 import sys
-from collections.abc import Callable, Collection, Hashable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Hashable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import MISSING, fields, is_dataclass
 from datetime import datetime
 from difflib import get_close_matches
-from enum import Enum
+from enum import Enum, Flag
 from functools import cache
 from math import inf, isfinite, nan
 from types import NoneType, UnionType
@@ -19,6 +21,7 @@ from typing import (
     Any,
     Final,
     Literal,
+    TypeGuard,
     TypeVar,
     Union,
     get_args,
@@ -29,7 +32,7 @@ from typing import (
 from robolink.deprecation import read_without_schema
 from robolink.errors import DocumentError, RobolinkError
 from robolink.messages import tr
-from robolink.model._arguments import plain_number
+from robolink.model._arguments import plain_number, shown
 from robolink.model._json_values import from_fields
 
 T = TypeVar("T")
@@ -40,12 +43,7 @@ NOT_FINITE: Final[Mapping[str, float]] = {"Infinity": inf, "-Infinity": -inf, "N
 MOST: Final = 2**1023
 """Beyond this no whole number is a float."""
 
-_LISTS: Final[Mapping[Any, Callable[[Any], Any]]] = {
-    tuple: tuple,
-    Sequence: tuple,
-    list: list,
-    frozenset: frozenset,
-}
+_LISTS: Final[Mapping[Any, Any]] = {Sequence: tuple} | {it: it for it in (tuple, list, frozenset)}
 _MAPPINGS: Final = (Mapping, dict)
 _SCALARS: Final = frozenset({str, bool, int, float})
 _ANYTHING: Final = (object, Any)
@@ -110,7 +108,7 @@ def from_json(kind: type[T], document: Mapping[str, Any]) -> T:
 this one knows robolink/value/ToolOffset/1. Update robolink here, or write the document with this \
 version.
     """
-    if not isinstance(document, Mapping) or not isinstance(document.get("schema"), str):
+    if not _names_its_schema(document):
         raise DocumentError(
             tr("This is no document of to_json: it names no schema."),
             remedy=tr(
@@ -119,6 +117,10 @@ version.
             ),
         )
     return _untagged(kind, document, kind.__name__)  # type: ignore[no-any-return]
+
+
+def _names_its_schema(document: object) -> TypeGuard[Mapping[str, Any]]:
+    return isinstance(document, Mapping) and isinstance(document.get("schema"), str)
 
 
 def is_value(kind: Any) -> bool:  # noqa: ANN401 - any annotation
@@ -155,15 +157,10 @@ def members_of(kind: Any) -> tuple[Any, ...]:  # noqa: ANN401 - any annotation
 
 
 def _tagged(value: object, at: str) -> dict[str, Any]:
-    own = _fields_of(value, at)
-    if "schema" in own:
-        raise _not_for_json(value, f"{at}.schema")
-    return {"schema": schema_of(type(value)), **own}
-
-
-def _fields_of(value: object, at: str) -> dict[str, Any]:
     annotations = value_fields(type(value))  # type: ignore[arg-type] # a class can be hashed
-    return {
+    if "schema" in annotations:
+        raise _not_for_json(value, f"{at}.schema")
+    return {"schema": schema_of(type(value))} | {
         name: _written(kind, getattr(value, name), f"{at}.{name}")
         for name, kind in annotations.items()
     }
@@ -192,25 +189,23 @@ def _written_as(kind: Any, value: Any, at: str) -> Any:  # noqa: ANN401 - as abo
     if kind in _SCALARS:
         return _scalar_written(kind, value, at)
     if kind in _ANYTHING:
-        return _plain(value, at)
+        return _anything(value, at)
     origin, inner = get_origin(kind), get_args(kind)
     if origin is Literal:
         if value in inner:
             return enum_word(value) if isinstance(value, Enum) else value
     elif origin in _LISTS:
         if isinstance(value, Sequence | frozenset) and not isinstance(value, str | bytes):
-            ordered = sorted(value) if isinstance(value, frozenset) else value
+            ordered = sorted(value, key=repr) if isinstance(value, frozenset) else value
             return [_written(as_, one, f"{at}[{n}]") for n, as_, one in _each(inner, ordered, at)]
     elif origin in _MAPPINGS:
-        if isinstance(value, Mapping):
+        if isinstance(value, Mapping) and _may_be_key(inner[0]):
             return {
-                _key_written(inner[0], key, at): _written(inner[1], one, f"{at}[{key!r}]")
+                str(_written(inner[0], key, at)): _written(inner[1], one, f"{at}[{key!r}]")
                 for key, one in value.items()
             }
     elif is_value(kind):
-        if type(value) is kind:
-            return _fields_of(value, at)
-        if isinstance(value, kind):  # a class that derives from it says which
+        if isinstance(value, kind):
             return _tagged(value, at)
     elif isinstance(kind, type):
         return _leaf_written(kind, value, at)
@@ -258,6 +253,15 @@ def _by_word(kind: type[Enum]) -> Mapping[str | int, Enum]:
     return {enum_word(one): one for one in kind}
 
 
+def _anything(value: Any, at: str) -> Any:  # noqa: ANN401 - as above
+    try:
+        return _plain(value, at)
+    except RecursionError:
+        raise DocumentError(
+            tr("{field} is nested too deeply.", field=at), remedy=_give_its_type()
+        ) from None
+
+
 def _plain(value: Any, at: str) -> Any:  # noqa: ANN401 - as above
     """Return plain JSON values as they are; what stands in a field of any type is nothing else."""
     if value is None or isinstance(value, str | bool):
@@ -285,15 +289,9 @@ def _each(inner: tuple[Any, ...], values: Any, at: str) -> Iterator[tuple[int, A
                 found=len(values),
                 count=len(kinds),
             ),
-            remedy=tr("Give the field a value of its type."),
+            remedy=_give_its_type(),
         )
     return zip(range(len(kinds)), kinds, values, strict=True)
-
-
-def _key_written(kind: type, key: Any, at: str) -> str:  # noqa: ANN401 - as above
-    if _may_be_key(kind):
-        return str(_written(kind, key, at))
-    raise _not_for_json(key, at)
 
 
 def _may_be_key(kind: Any) -> bool:  # noqa: ANN401 - any annotation
@@ -309,9 +307,13 @@ def _no_document(kind: type) -> DocumentError:
 
 def _not_for_json(value: object, at: str) -> DocumentError:
     return DocumentError(
-        tr("{field} holds {value!r}, which JSON cannot hold there.", field=at, value=value),
-        remedy=tr("Give the field a value of its type."),
+        tr("{field} holds {value}, which JSON cannot hold there.", field=at, value=shown(value)),
+        remedy=_give_its_type(),
     )
+
+
+def _give_its_type() -> str:
+    return tr("Give the field a value of its type.")
 
 
 # Back.
@@ -321,9 +323,8 @@ def _untagged(kind: type, document: Mapping[str, Any], at: str) -> Any:  # noqa:
     """Return the value of a document that names its schema: of this class or one derived."""
     schema = document["schema"]
     stem, _, given = schema.rpartition("/")
-    known_kinds = (one for one in _derived(kind, stem) if is_value(one))
-    found = next((one for one in known_kinds if _stem(one) == stem), None)
-    if found is None or not given.isascii() or not given.isdigit():
+    found = _class_named(stem, kind)
+    if found is None or not re.fullmatch("[0-9]{1,9}", given):
         raise DocumentError(
             tr(
                 "{field} is {schema}, not {expected}.",
@@ -351,8 +352,10 @@ def _untagged(kind: type, document: Mapping[str, Any], at: str) -> Any:  # noqa:
     return _made(found, own, at, older=int(given) < newest)
 
 
-def _stem(kind: type) -> str:
-    return schema_of(kind).rpartition("/")[0]
+def _class_named(stem: str, kind: type) -> type | None:
+    """Return the class of this name, which is ``kind`` or derives from it."""
+    known = (one for one in _derived(kind, stem) if is_value(one))
+    return next((one for one in known if schema_of(one).rpartition("/")[0] == stem), None)
 
 
 def _derived(kind: type, stem: str) -> Iterator[type]:
@@ -382,13 +385,10 @@ def _made(kind: type, document: Mapping[str, Any], at: str, *, older: bool) -> A
         needed = not older or (field.default is MISSING and field.default_factory is MISSING)
         if field.init and needed and field.name not in document:
             raise _misread(tr("{field} is missing.", field=f"{at}.{field.name}"))
-    own = {
-        name: _read(annotations[name], one, f"{at}.{name}", older=older)
-        for name, one in document.items()
-    }
+    own = {name: _read(annotations[name], one, f"{at}.{name}") for name, one in document.items()}
     try:
         return kind(**own)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, RobolinkError) as error:
         said = error.what if isinstance(error, RobolinkError) else str(error)
         raise DocumentError(
             tr("{field} cannot be made of this document: {why}", field=at, why=said),
@@ -396,28 +396,30 @@ def _made(kind: type, document: Mapping[str, Any], at: str, *, older: bool) -> A
         ) from error
 
 
-def _read(kind: Any, value: Any, at: str, *, older: bool) -> Any:  # noqa: ANN401 - any JSON, any value
+def _read(kind: Any, value: Any, at: str) -> Any:  # noqa: ANN401 - any JSON, any value
     members = members_of(kind)
     if value is None and NoneType in members:
         return None
     others = [one for one in members if one is not NoneType]
-    if isinstance(value, Mapping) and len(others) > 1 and "schema" in value:
-        others = [one for one in others if is_value(one)]
+    if len(others) > 1 and _names_its_schema(value):
+        stem = value["schema"].rpartition("/")[0]
+        named = [one for one in others if is_value(one) and _class_named(stem, one)]
+        others = named or others
     if len(others) == 1:
-        return _read_as(others[0], value, at, older=older)
+        return _read_as(others[0], value, at)
     for one in sorted(others, key=lambda one: one is not type(value)):  # the exact one first
         try:
-            return _read_as(one, value, at, older=older)
+            return _read_as(one, value, at)
         except DocumentError:
             continue
     raise _of_another_type(value, at)
 
 
-def _read_as(kind: Any, value: Any, at: str, *, older: bool) -> Any:  # noqa: ANN401 - as above
+def _read_as(kind: Any, value: Any, at: str) -> Any:  # noqa: ANN401 - as above
     if kind in _SCALARS:
         return _scalar_read(kind, value, at)
     if kind in _ANYTHING:
-        return value
+        return _anything(value, at)
     origin, inner = get_origin(kind), get_args(kind)
     if origin is Literal:
         words = {enum_word(one) if isinstance(one, Enum) else one: one for one in inner}
@@ -426,19 +428,16 @@ def _read_as(kind: Any, value: Any, at: str, *, older: bool) -> Any:  # noqa: AN
     elif origin in _LISTS:
         if isinstance(value, list):
             each = _each(inner, value, at)
-            made = (_read(as_, one, f"{at}[{n}]", older=older) for n, as_, one in each)
-            return _LISTS[origin](made)
+            return _LISTS[origin](_read(as_, one, f"{at}[{n}]") for n, as_, one in each)
     elif origin in _MAPPINGS:
         if isinstance(value, Mapping) and _may_be_key(inner[0]):
             return {
-                _key_read(inner[0], key, at): _read(inner[1], one, f"{at}[{key!r}]", older=older)
+                _key_read(inner[0], key, at): _read(inner[1], one, f"{at}[{key!r}]")
                 for key, one in value.items()
             }
     elif is_value(kind):
-        if isinstance(value, Mapping):
-            if isinstance(value.get("schema"), str) and "schema" not in value_fields(kind):
-                return _untagged(kind, value, at)
-            return _made(kind, value, at, older=older)
+        if _names_its_schema(value):
+            return _untagged(kind, value, at)
     elif isinstance(kind, type):
         return _leaf_read(kind, value, at)
     raise _of_another_type(value, at)
@@ -457,7 +456,9 @@ def _scalar_read(kind: type, value: Any, at: str) -> Any:  # noqa: ANN401 - as a
 
 def _leaf_read(kind: type, value: Any, at: str) -> Any:  # noqa: ANN401 - as above
     with suppress(KeyError, TypeError, ValueError):
-        if issubclass(kind, Enum):
+        if issubclass(kind, Enum) and type(value) is not bool:
+            if issubclass(kind, Flag) and (found := kind(value)).value == value:
+                return found
             return _by_word(kind)[value]
         if kind is bytes:
             return bytes.fromhex(value)
@@ -467,11 +468,12 @@ def _leaf_read(kind: type, value: Any, at: str) -> Any:  # noqa: ANN401 - as abo
 
 
 def _key_read(kind: type, key: str, at: str) -> Any:  # noqa: ANN401 - as above
-    if kind is int:
-        with suppress(ValueError):
-            return int(key)
-        raise _of_another_type(key, at)
-    return _read_as(kind, key, at, older=False)
+    if kind is not int:
+        return _read_as(kind, key, at)
+    with suppress(ValueError):
+        if str(found := int(key)) == key:
+            return found
+    raise _of_another_type(key, at)
 
 
 def _not_known(key: str, known: Collection[str], at: str) -> DocumentError:
@@ -483,7 +485,9 @@ def _not_known(key: str, known: Collection[str], at: str) -> DocumentError:
 
 
 def _of_another_type(value: object, at: str) -> DocumentError:
-    return _misread(tr("{field} is {value!r}, a value of another type.", field=at, value=value))
+    return _misread(
+        tr("{field} is {value}, a value of another type.", field=at, value=shown(value))
+    )
 
 
 def _misread(what: str, hint: str = "") -> DocumentError:

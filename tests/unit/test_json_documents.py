@@ -1,28 +1,38 @@
 """Values as JSON documents and back: every public one, and what is refused."""
 
 import copy
+import itertools
 import json
 import math
 import pickle
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from datetime import UTC, datetime
-from enum import Enum
+from enum import Enum, Flag
 from types import NoneType
 from typing import Any, ClassVar, Literal, cast, get_args, get_origin
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from robolink import Pose, ToolOffset, from_json, model, to_json
-from robolink.calibration import BudgetRow, CalibrationResult, UncertaintyBudget, ZTouchResult
+from robolink.calibration import (
+    BudgetRow,
+    CalibrationResult,
+    Crossing,
+    ShaftSeen,
+    StationPart,
+    UncertaintyBudget,
+    ZTouchResult,
+)
+from robolink.controllers import MailboxFacts
 from robolink.errors import DocumentError
 from robolink.model import RotationMatrix, ToolReceipt, ValueReceipt
 from robolink.model._documents import members_of, schema_of, value_fields
+from robolink.protocols.mailbox import Capability
 from tests._json_schema import Schemas
 from tools import value_schemas
+from tools.api import public
 
 PUBLISHED = json.loads(value_schemas.FILE.read_text(encoding="utf-8"))
 CHECK = Schemas(PUBLISHED)
@@ -76,6 +86,8 @@ def sample(kind, last):
         return frozenset([sample(inner[0], last)])
     if origin is Mapping:
         return {sample(inner[0], last): sample(inner[1], last)}
+    if issubclass(kind, Flag):
+        return ~kind(0) if last else kind(0)
     if issubclass(kind, Enum):
         return [*kind][-1]
     try:
@@ -95,10 +107,16 @@ def made():
 def test_the_published_schemas_are_those_of_the_classes(made):
     found, without, kinds = made
     again = "run: python -m tools.value_schemas"
-    assert value_schemas.whole(PUBLISHED["$defs"]) == PUBLISHED, again
+    assert value_schemas.whole(PUBLISHED["$defs"], found) == PUBLISHED, again
     assert without.keys() == NOT_DATA.keys()
     assert found.keys() == kinds.keys()
     assert len(found) > 140
+
+
+@pytest.mark.soak
+def test_no_other_package_has_a_value_that_stands_in_a_result(made):
+    others = [it for it in public() if "simulators" not in it]
+    assert value_schemas.schemas(others) == made[:2]
 
 
 def test_every_public_value_comes_back_equal_and_is_hashed_copied_and_pickled(made):
@@ -123,6 +141,13 @@ def test_working_material_of_arrays_is_compared_without_an_error():
     fit = value_schemas.values()["robolink.calibration.PivotFit"]
     a, b = (fit(*[np.ones(3)] * len(fields(fit))) for _ in range(2))
     assert (a == b, a == a, len({a, b})) == (False, True, 2)
+
+
+def test_a_list_in_a_value_is_kept_as_a_tuple():
+    crossings = [sample(Crossing, last=False)]
+    for value in (StationPart("pin", [[1.0, 0.0], [0.0, 1.0]]), ShaftSeen(crossings, 1.0, 2.0)):
+        assert back(value) == value
+        assert hash(back(value)) == hash(value)
 
 
 class Ink(Enum):
@@ -162,7 +187,8 @@ SHEET = Sheet((ROW, WideRow("x", -math.inf, 2)), {3: ROW, 4: None}, AT, Ink.RED,
 def test_what_a_value_of_another_package_holds_comes_back():
     document = to_json(SHEET)
     assert document["schema"] == "tests/value/Sheet/1"
-    assert document["rows"][0] == {"name": "pin", "u_mm": "Infinity", "count": 1, "sure": False}
+    plain = {"name": "pin", "u_mm": "Infinity", "count": 1, "sure": False}
+    assert document["rows"][0] == {"schema": "tests/value/Row/1"} | plain
     assert document["rows"][1]["schema"] == "tests/value/WideRow/1"
     assert back(SHEET) == SHEET
     for said in (True, 1, 2.5, "NaN", "1"):
@@ -189,29 +215,30 @@ def test_a_result_whose_class_nobody_has_loaded_is_found_in_its_package():
 
 
 FLOATS = [np.float16, np.float32, np.float64, np.longdouble, float]
+WHOLE_NUMBERS = [np.int8, np.uint8, np.int16, np.uint64, np.int64, int]
 
 
-@settings(max_examples=30, deadline=None)
-@given(
-    st.floats(width=16) | st.sampled_from([math.inf, -math.inf, math.nan]),
-    st.integers(0, 127),
-    st.sampled_from(FLOATS),
-    st.sampled_from([np.int8, np.uint8, np.int16, np.uint64, np.int64, int]),
-    st.booleans(),
-)
-def test_a_row_of_any_numbers_comes_back(u_mm, count, floating, whole, zero_d):
-    wrap = np.array if zero_d else lambda it: it
-    numbers: list[Any] = [wrap(floating(u_mm)), wrap(whole(count)), wrap(np.bool_(count > 9))]
-    found = back(Row("pin", *numbers))
-    assert [type(it) for it in (found.u_mm, found.count, found.sure)] == [float, int, bool]
-    assert (found.count, found.sure) == (count, count > 9)
-    assert found.u_mm == u_mm or (math.isnan(found.u_mm) and math.isnan(u_mm))
+@pytest.mark.parametrize("wrap", [lambda it: it, np.array], ids=["scalar", "array"])
+@pytest.mark.parametrize("number", [0.0, -0.0, 1.5, -65504.0, math.inf, -math.inf, math.nan])
+def test_a_row_of_numbers_of_any_width_comes_back(number, wrap):
+    for floating, whole in itertools.product(FLOATS, WHOLE_NUMBERS):
+        for count in (0, 127):
+            given: list[Any] = [floating(number), whole(count), np.bool_(count > 9)]
+            found = back(Row("pin", *map(wrap, given)))
+            assert [type(it) for it in (found.u_mm, found.count, found.sure)] == [float, int, bool]
+            assert (found.count, found.sure) == (count, count > 9)
+            assert repr(found.u_mm) == repr(number)
 
 
 def test_a_budget_keeps_its_infinite_degrees_of_freedom():
     budget = UncertaintyBudget.of([BudgetRow("pin", 0.04)])
     assert back(budget) == budget
     assert back(budget).rows[0].nu == math.inf
+
+
+WHOLE = to_json(ToolOffset(1, 2, 3))
+ENDLESS: list[object] = []
+ENDLESS.append(ENDLESS)
 
 
 @pytest.mark.parametrize(
@@ -225,7 +252,13 @@ def test_a_budget_keeps_its_infinite_degrees_of_freedom():
         (Row("pin", 1.0, 1.5), "Row.count holds 1.5"),  # type: ignore[arg-type]
         (Row("pin", 2**53 + 1), "Row.u_mm holds 9007199254740993"),
         (Row("pin", 10**400), "Row.u_mm holds 1000"),
+        (Row("pin", 10**5000), "Row.u_mm holds <int>"),
         (Row("pin", True), "Row.u_mm holds True"),
+        (replace(SHEET, details=ENDLESS), "Sheet.details is nested too deeply"),
+        (
+            replace(SHEET, data=cast("Any", ["x" * 99] * 99)),
+            r"Sheet.data holds \[.{0,300}\], which",
+        ),
         ({"x_mm": 1}, "A dict cannot become"),
         (Row, "A type cannot become"),
     ],
@@ -235,15 +268,14 @@ def test_what_json_cannot_hold_is_refused_by_its_place(value, said):
         to_json(value)
 
 
-WHOLE = to_json(ToolOffset(1, 2, 3))
-
-
 @pytest.mark.parametrize(
     ("change", "said"),
     [
         ({"schema": "robolink/value/ToolOffset/2"}, "from a newer version.*Update robolink"),
         ({"schema": "robolink/value/ToolOffset/0"}, "from a newer|not robolink"),
         ({"schema": "robolink/value/ToolOffset/one"}, "not robolink/value/ToolOffset/1"),
+        ({"schema": "robolink/value/ToolOffset/" + "9" * 5000}, "not robolink/value/ToolOffset/1"),
+        ({"schema": "robolink/value/ToolOffset/²"}, "not robolink/value/ToolOffset/1"),
         ({"schema": "robolink/value/Pose/1"}, "is robolink/value/Pose/1, not robolink/value/ToolO"),
         ({"schema": "robolink/tool/1"}, "is robolink/tool/1, not"),
         ({"schema": 1}, "names no schema"),
@@ -269,6 +301,47 @@ def test_a_document_that_lacks_a_key_is_refused():
     inner["requested"]["u"] = 1
     with pytest.raises(DocumentError, match=r"ToolReceipt\.requested\.u is not known"):
         from_json(ToolReceipt, inner)
+    del inner["requested"]["u"], inner["requested"]["schema"]
+    with pytest.raises(DocumentError, match=r"ToolReceipt\.requested is \{.*of another type"):
+        from_json(ToolReceipt, inner)
+
+
+DEEP: list[object] = []
+for _ in range(100_000):
+    DEEP = [DEEP]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"by_tool": {" 3": None}}, "Sheet.by_tool is ' 3', a value of another type"),
+        ({"by_tool": {"03": None}}, "Sheet.by_tool is '03'"),
+        ({"ink": "BLUE"}, "Sheet.ink is 'BLUE'"),
+        ({"ink": ["RED"]}, "Sheet.ink is"),
+        ({"data": "0g"}, "Sheet.data is '0g'"),
+        ({"at": "yesterday"}, "Sheet.at is 'yesterday'"),
+        ({"rows": {"0": None}}, "Sheet.rows is"),
+        ({"details": {"a": math.nan}}, r"Sheet.details\['a'\] holds nan"),
+        ({"details": DEEP}, "Sheet.details is nested too deeply"),
+        ({"place": WHOLE | {"schema": "robolink/value/ToolOffset/2"}}, "from a newer version"),
+        ({"place": WHOLE | {"schema": "robolink/value/Pose/1"}}, "Sheet.place is"),
+        ({"place": WHOLE | {"w_deg": "1"}}, "Sheet.place.w_deg is '1'"),
+    ],
+)
+def test_a_tampered_document_is_refused_by_the_place_of_what_is_wrong(change, said):
+    with pytest.raises(DocumentError, match=said):
+        from_json(Sheet, to_json(SHEET) | change)
+
+
+def test_the_bits_of_a_flag_come_back_and_a_truth_value_is_none():
+    facts = MailboxFacts(
+        "1.0", "Kin_Scara3_Z", "", 4, 1.0, Capability.TOOLS | Capability.LATCH, 1, None
+    )
+    document = to_json(facts)
+    assert back(facts) == facts
+    for wrong in (True, -1, "TOOLS", 1.5):
+        with pytest.raises(DocumentError, match=r"^MailboxFacts\.capabilities is"):
+            from_json(MailboxFacts, document | {"capabilities": wrong})
 
 
 @pytest.mark.parametrize("document", [None, [], "{}", 5])
@@ -296,6 +369,23 @@ def test_an_older_document_may_lack_what_has_a_default_and_nothing_else():
         from_json(Later, {"schema": "tests/value/Later/1"})
 
 
+@dataclass(frozen=True)
+class Holder:
+    """A class of somebody else that holds a value whose class has a later version."""
+
+    later: Later
+
+
+def test_a_value_in_a_document_is_read_by_its_own_version():
+    document = to_json(Holder(Later(1.0)))
+    assert document["later"] == {"schema": "tests/value/Later/2", "x_mm": 1.0, "y_mm": 5.0}
+    document["later"] = {"schema": "tests/value/Later/1", "x_mm": 1.0}
+    assert from_json(Holder, document) == Holder(Later(1.0))
+    document["later"] |= {"schema": "tests/value/Later/3"}
+    with pytest.raises(DocumentError, match="tests/value/Later/3, from a newer version"):
+        from_json(Holder, document)
+
+
 def test_fields_without_a_schema_are_read_for_one_more_version_with_a_warning():
     with pytest.warns(DeprecationWarning, match="now robolink.model.from_fields") as caught:
         found = model.from_json(Pose, {"x_mm": 1, "y_mm": 2, "z_mm": 3, "u_deg": 4}, partial=True)  # type: ignore[call-arg]
@@ -305,11 +395,11 @@ def test_fields_without_a_schema_are_read_for_one_more_version_with_a_warning():
         from_json(ToolOffset, {"x_mm": 1})
 
 
-def test_a_changed_class_needs_the_next_version():
-    now = value_schemas.schemas()[0]
+def test_a_changed_class_needs_the_next_version(made):
+    now = made[0]
     before = now | {"Drift-1": {"type": "object"}, "Gone-1": {}}
     assert value_schemas.changed(before, now) == ["Drift-1"]
-    assert {"Gone-1", "Drift-1"} <= value_schemas.whole(before)["$defs"].keys()
+    assert {"Gone-1", "Drift-1"} <= value_schemas.whole(before, now)["$defs"].keys()
 
 
 def test_a_value_of_a_variable_keeps_its_type():

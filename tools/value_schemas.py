@@ -57,6 +57,7 @@ RESULTS: Final = (
     "robolink.backup",
     "robolink.calibration",
     "robolink.calibration_run",
+    "robolink.controller_outcome",
     "robolink.controllers",
     "robolink.controllers.epson.verify",
     "robolink.drift",
@@ -64,6 +65,7 @@ RESULTS: Final = (
     "robolink.journal",
     "robolink.model",
     "robolink.pose_tables",
+    "robolink.report",
     "robolink.stations",
     "robolink.transaction",
 )

@@ -65,9 +65,9 @@ def to_json(value: object) -> dict[str, Any]:
     """Return a value as a JSON document, from which :func:`from_json` makes an equal one.
 
     A number that JSON has not is ``"NaN"``, ``"Infinity"`` or ``"-Infinity"``; a number of numpy is
-    a plain one, bytes are hexadecimal, a time is ISO 8601. Every value of robolink that holds data
-    alone has a schema in ``docs/values.schema.json``; a frozen dataclass of another package works
-    alike.
+    a plain one, bytes are hexadecimal, a time is ISO 8601. In a field of any type, such as
+    ``details``, a tuple comes back as a list. What robolink returns has a schema in
+    ``docs/values.schema.json``; a frozen dataclass of another package works alike.
 
     Args:
         value: A frozen dataclass, such as a ``ToolOffset`` or a ``CalibrationResult``.

@@ -63,9 +63,9 @@ class Schemas:
             if tried.count([]) != 1:
                 found.append(f"{at} fits {tried.count([])} of {len(tried)}: {tried}")
         if "anyOf" in schema:
-            tried = [self._differs(part, value, at) for part in schema["anyOf"]]
-            if [] not in tried:
-                found.append(f"{at} fits none of {len(tried)}: {tried}")
+            parts = schema["anyOf"]
+            if all(self._differs(part, value, at) for part in parts):  # to the first that fits
+                found.append(f"{at} fits none of {len(parts)}")
         if "pattern" in schema and not re.search(schema["pattern"], value):
             found.append(f"{at} is {value!r}")
         if "const" in schema and value != schema["const"]:

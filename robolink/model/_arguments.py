@@ -51,7 +51,7 @@ def required_number(value: object, name: str) -> float:
 def not_a_number(name: str, value: object) -> ConfigError:
     """Return the error for a field that holds no number, or one that is not finite."""
     return ConfigError(
-        tr("{name} is not a number: {value!r}.", name=name, value=value),
+        tr("{name} is not a number: {value}.", name=name, value=shown(value)),
         remedy=tr("Give a finite decimal number."),
     )
 

@@ -110,7 +110,7 @@ version.
     """
     if not _names_its_schema(document):
         raise DocumentError(
-            tr("This is no document of to_json: it names no schema."),
+            tr("This is not a document of to_json: it names no schema."),
             remedy=tr(
                 "Give what to_json returned. Fields without a schema are read by "
                 "robolink.model.from_fields."
@@ -301,7 +301,7 @@ def _may_be_key(kind: Any) -> bool:  # noqa: ANN401 - any annotation
 def _no_document(kind: type) -> DocumentError:
     return DocumentError(
         tr("A {kind} cannot become a JSON document.", kind=kind.__name__),
-        remedy=tr("Give a value of robolink or another frozen dataclass that holds data alone."),
+        remedy=tr("Give a value of robolink or another frozen dataclass that holds only data."),
     )
 
 
@@ -333,8 +333,8 @@ def _untagged(kind: type, document: Mapping[str, Any], at: str) -> Any:  # noqa:
                 expected=schema_of(kind),
             ),
             remedy=tr(
-                "Read it as the class that its schema names; a class of another package has to "
-                "be imported first."
+                "Read it as the class that its schema names. Import a class of another package "
+                "first."
             ),
         )
     known = schema_of(found)

@@ -201,7 +201,7 @@ def test_a_class_that_derives_is_read_as_its_base_too():
     document = to_json(SHEET)["rows"][1]
     with pytest.raises(DocumentError, match="not tests/value/WideRow/1"):
         from_json(WideRow, to_json(ROW))
-    with pytest.raises(DocumentError, match="imported first"):
+    with pytest.raises(DocumentError, match="Import a class of another package first"):
         from_json(Row, document | {"schema": "other_package/value/WideRow/1"})
 
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING
 from robolink.lazy_exports import lazy_exports, old_names
 
 if TYPE_CHECKING:
+    from robolink.model._arguments import checks_arguments as checks_arguments
     from robolink.model._arguments import misgiven as misgiven
     from robolink.model._arguments import not_of_class as not_of_class
     from robolink.model._change_limits import ChangeGuard as ChangeGuard
@@ -128,7 +129,7 @@ else:
     __getattr__, __dir__, __all__ = lazy_exports(
         __name__,
         {
-            "_arguments": "misgiven not_of_class",
+            "_arguments": "checks_arguments misgiven not_of_class",
             "_change_limits": (
                 "ChangeGuard ChangeLimits PersonRole refuse_operator require_engineer"
             ),

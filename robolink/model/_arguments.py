@@ -4,12 +4,16 @@ import inspect
 import reprlib
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import MISSING, fields, is_dataclass
+from functools import wraps
 from numbers import Integral, Real
-from types import UnionType
-from typing import Any, Union, get_args, get_origin, get_type_hints
+from types import SimpleNamespace, UnionType
+from typing import Any, ParamSpec, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
 
 
 def plain_number(value: Any) -> float | None:  # noqa: ANN401 - whatever a caller gave
@@ -81,11 +85,43 @@ def misgiven(
     """
     try:
         given = inspect.signature(function).bind(*args, **named).arguments
-        hints = get_type_hints(function)
-    except (NameError, TypeError):  # no such arguments at all: Python's own sentence says so
+    except TypeError:  # no such arguments at all: Python's own sentence says so
         return
     for name, value in given.items():
-        yield from _wrong_at(name, value, hints.get(name))
+        yield from _wrong_at(name, value, _hint(inspect.unwrap(function), name))
+
+
+def checks_arguments(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Let a procedure refuse at its call what is no ``Pose``, ``ToolOffset`` or other value.
+
+    Otherwise it would show once the robot has moved.
+
+    Example:
+        >>> from robolink.model import Pose, checks_arguments
+        >>> @checks_arguments
+        ... def approach(target: Pose):
+        ...     yield target
+        >>> approach((300, 0, 100, 0))
+        Traceback (most recent call last):
+        robolink.errors.ConfigError: target is not a Pose but (300, 0, 100, 0) (tuple). Write \
+Pose(x_mm, y_mm, z_mm, u_deg).
+    """
+
+    @wraps(function)
+    def checking(*args: _P.args, **kwargs: _P.kwargs) -> _R:
+        for wrong in misgiven(function, args, kwargs):
+            raise wrong
+        return function(*args, **kwargs)
+
+    return checking
+
+
+def _hint(function: Callable[..., object], name: str) -> Any:  # noqa: ANN401 - any annotation
+    only = SimpleNamespace(__annotations__={name: function.__annotations__.get(name)})
+    try:
+        return get_type_hints(only, function.__globals__)[name]
+    except NameError:  # a name that only the type checker knows
+        return None
 
 
 def _wrong_at(name: str, value: object, kind: Any) -> Iterator[ConfigError]:  # noqa: ANN401 - any annotation
@@ -101,6 +137,8 @@ def _wrong_at(name: str, value: object, kind: Any) -> Iterator[ConfigError]:  # 
             kinds = [it for it in _members(inner[0]) if is_dataclass(it)]
             if isinstance(value, str) or not isinstance(value, Iterable):
                 yield not_of_class(f"{name}[0]", value, kinds[0])
+                continue
+            if isinstance(value, Iterator):  # it can be gone through once
                 continue
             for number, item in enumerate(value):
                 yield from _wrong_at(f"{name}[{number}]", item, inner[0])

@@ -17,7 +17,7 @@ import pytest
 from robolink_simulators.faults import Fault, FaultAction, FaultPlan
 
 import robolink
-from robolink import ANY, Pose, ToolOffset, calibration, drift, errors, journal
+from robolink import ANY, Pose, ToolOffset, calibration, drift, errors, journal, methods
 from robolink.calibration_run import WriteSubject
 from robolink.controllers import SimpleController
 from robolink.deprecation import GONE_IN, OLD_NAMES, deprecated
@@ -433,6 +433,25 @@ def test_what_is_no_value_is_refused_by_the_name_of_its_argument(argument):
             TAKES[argument](given)
         assert argument in caught.value.what
         assert caught.value.remedy
+
+
+MOVING = ("measure_", "verify_b", "learn_", "trace_")
+PROCEDURES = [it for it in sorted(vars(methods)["__all__"]) if it.startswith(MOVING)]
+
+
+@pytest.mark.parametrize("name", PROCEDURES)
+def test_a_procedure_refuses_at_its_call_what_would_show_once_the_robot_has_moved(name):
+    procedure = getattr(methods, name)
+    asked = inspect.signature(procedure).parameters.values()
+    given = {it.name: (1, 2, 3) for it in asked if it.default is it.empty}
+    with pytest.raises(ConfigError, match=r"^\w+ is not a \w+ but \(1, 2, 3\)"):
+        procedure(**given)
+
+
+def test_an_offset_in_a_tuple_is_refused_before_the_first_touch():
+    stored: Any = (12, -4, -20)
+    with pytest.raises(ConfigError, match=r"^stored is not a ToolOffset"):
+        measure_two_pose(TouchPlan(turn_deg=120), stored=stored)
 
 
 def test_a_wrong_call_is_told_by_python_itself():

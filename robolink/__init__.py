@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from robolink.model import SpotUnit as SpotUnit
     from robolink.model import TipSensor as TipSensor
     from robolink.model import ToolOffset as ToolOffset
+    from robolink.model import from_json as from_json
+    from robolink.model import to_json as to_json
     from robolink.runner import Operator as Operator
     from robolink.runner import Question as Question
 
@@ -35,7 +37,7 @@ __getattr__, __dir__, __all__ = lazy_exports(
     {
         "controllers": "connect",
         "errors": "RobolinkError",
-        "model": "ANY Controller Pose Secret Spot SpotUnit TipSensor ToolOffset",
+        "model": "ANY Controller Pose Secret Spot SpotUnit TipSensor ToolOffset from_json to_json",
         "runner": "Operator Question",
     },
 )

@@ -69,7 +69,7 @@ class ControllerOutcome:
             else: ``recover`` is refused until then.
     """
 
-    tools: Mapping[int, ToolOutcome] = field(default_factory=dict)
+    tools: Mapping[int, ToolOutcome] = field(default_factory=dict, hash=False)
     selected: int | None = None
     selected_before: int | None = None
     selection_known: bool = True

@@ -9,6 +9,7 @@ given up keeps its body and has :func:`deprecated` before it.
 import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from functools import wraps
 from importlib import import_module
 from typing import Final, ParamSpec, TypeVar, cast
@@ -159,6 +160,7 @@ _GATE: Final = "robolink.lazy_exports"
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
+_F = TypeVar("_F", bound=Callable[..., object])
 
 
 def under_old_name(package: str, name: str) -> object:
@@ -240,6 +242,29 @@ def without_sign(sentence: Callable[_P, _R]) -> Callable[_P, _R]:
         return (one.replace("+-", sign) for one in found)
 
     return cast("Callable[_P, _R]", warned)
+
+
+def read_without_schema(fields: Callable[..., object]) -> Callable[[_F], _F]:
+    """Mark the reader of documents that read fields without a schema too: it still does, and warns.
+
+    Args:
+        fields: What reads fields alone, and takes ``partial``.
+    """
+
+    def marked(reads: _F) -> _F:
+        @wraps(reads)
+        def warned(kind: type, document: object, **partial: bool) -> object:
+            if partial or not (isinstance(document, Mapping) and "schema" in document):
+                with suppress(KeyError, TypeError, ValueError, AttributeError):
+                    found = fields(kind, document, **partial)
+                    old = f"{reads.__name__} without a schema"
+                    warn_of_old_name(old, "robolink.model.from_fields", 3)
+                    return found
+            return reads(kind, document)
+
+        return cast("_F", warned)
+
+    return marked
 
 
 def old_hook(kind: type, old: str, new: str, adapted: object) -> None:

@@ -6,6 +6,7 @@
     ├── ConfigError (ValueError)           a URL, an option or a file is wrong; nothing was sent
     │   ├── LimitError                     a target or a change lies outside the stated limits
     │   ├── AmbiguousPosesError            a file of poses does not say everything (.asks)
+    │   ├── DocumentError                  a JSON document of another class or a newer version
     │   ├── NotComparedError               nobody compared with the machine what would change
     │   └── JournalError                   the record cannot be kept or read
     ├── TransportError                     the wire
@@ -59,6 +60,7 @@ __all__ = [
     "ControllerError",
     "ControllerFaultError",
     "DeclinedError",
+    "DocumentError",
     "HeartbeatLostError",
     "JournalError",
     "LeaseHeldError",
@@ -129,6 +131,9 @@ class RobolinkError(Exception):
     def __str__(self) -> str:
         return f"{self.what} {self.remedy}".rstrip()
 
+    def __reduce__(self) -> tuple[object, ...]:
+        return (_restored, (type(self), self.args, vars(self)))
+
     def concern(self, controller: str, request: str = "") -> None:
         """Name the controller and the request, where neither was named nearer to the cause."""
         self.controller = self.controller or controller
@@ -150,6 +155,15 @@ class RobolinkError(Exception):
     @controller_state.setter
     def controller_state(self, outcome: "ControllerOutcome") -> None:
         self._standing = outcome
+
+
+def _restored(
+    kind: type[RobolinkError], args: tuple[object, ...], held: dict[str, object]
+) -> RobolinkError:
+    """Return a copied or pickled error, whatever else its class asks for when one is made."""
+    error = kind.__new__(kind, *args)
+    vars(error).update(held)
+    return error
 
 
 class Concerning:
@@ -200,6 +214,10 @@ class AmbiguousPosesError(ConfigError):
         super().__init__(what, remedy=remedy)
         self.asks = asks
         self.reason = ",".join(asks)
+
+
+class DocumentError(ConfigError):
+    """A value has no JSON document, or a document is of another class or a newer version."""
 
 
 class NotComparedError(ConfigError):

@@ -5,7 +5,7 @@ For a job that runs every night, and for whoever comes to a cell in the morning
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from robolink.backup import ToolState
@@ -73,7 +73,7 @@ class Inspection:
     """
 
     controller: str
-    tools: Mapping[int, ToolOffset | None]
+    tools: Mapping[int, ToolOffset | None] = field(hash=False)
     selected: int | None
     stations: tuple[str, ...]
     changes: int

@@ -4,6 +4,7 @@ A key that no schema names is wrong here, although a client has to bear it: so n
 answered that is not described.
 """
 
+import re
 from typing import Any, Final
 
 _TYPES: Final[dict[str, tuple[type, ...]]] = {
@@ -18,8 +19,11 @@ _TYPES: Final[dict[str, tuple[type, ...]]] = {
 _KNOWN: Final = frozenset(
     {"description", "type", "enum", "const", "properties", "required", "additionalProperties"}
     | {"unevaluatedProperties"}
-    | {"items", "minItems", "maxItems", "oneOf", "allOf", "$ref", "x-commands"}
+    | {"items", "minItems", "maxItems", "oneOf", "anyOf", "allOf", "$ref", "x-commands"}
+    | {"pattern", "format"}
 )
+
+_PARTS: Final = ("allOf", "oneOf", "anyOf")
 
 
 class Schemas:
@@ -42,6 +46,8 @@ class Schemas:
 
     def wrong(self, schema: dict[str, Any], value: object, at: str = "") -> list[str]:
         """Return what is wrong with a value, each with its place."""
+        if not schema:  # anything
+            return []
         found = self._differs(schema, value, at)
         if isinstance(value, dict) and not self._says_what_else(schema):
             found += self._undescribed(schema, value, at)
@@ -56,6 +62,12 @@ class Schemas:
             tried = [self._differs(part, value, at) for part in schema["oneOf"]]
             if tried.count([]) != 1:
                 found.append(f"{at} fits {tried.count([])} of {len(tried)}: {tried}")
+        if "anyOf" in schema:
+            parts = schema["anyOf"]
+            if all(self._differs(part, value, at) for part in parts):  # to the first that fits
+                found.append(f"{at} fits none of {len(parts)}")
+        if "pattern" in schema and not re.search(schema["pattern"], value):
+            found.append(f"{at} is {value!r}")
         if "const" in schema and value != schema["const"]:
             found.append(f"{at} is {value!r}")
         if "enum" in schema and value not in schema["enum"]:
@@ -93,7 +105,7 @@ class Schemas:
         """Tell whether a schema itself says which other keys there may be, or one of several."""
         if "$ref" in schema:
             return self._says_what_else(self._referred(schema))
-        parts = (*schema.get("allOf", ()), *schema.get("oneOf", ()))
+        parts = [it for key in _PARTS for it in schema.get(key, ())]
         says = {"additionalProperties", "unevaluatedProperties"} & schema.keys()
         return bool(says) or any(map(self._says_what_else, parts))
 
@@ -105,7 +117,7 @@ class Schemas:
         """Return the keys that a schema names, whichever of several it is."""
         if "$ref" in schema:
             return self._names(self._referred(schema))
-        parts = (*schema.get("allOf", ()), *schema.get("oneOf", ()))
+        parts = [it for key in _PARTS for it in schema.get(key, ())]
         return {*schema.get("properties", ())}.union(*map(self._names, parts))
 
     def _referred(self, schema: dict[str, Any]) -> dict[str, Any]:

@@ -41,7 +41,7 @@ class MeasuredRow:
     station: str = ""
     count: int = 0
     records: tuple[int, ...] = ()
-    details: Mapping[str, object] = field(default_factory=dict)
+    details: Mapping[str, object] = field(default_factory=dict, hash=False)
     number: int | None = None
     at: str = ""
 

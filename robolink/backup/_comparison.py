@@ -1,7 +1,7 @@
 """What a backup holds, taking one, and what differs from the tools of a controller."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, Protocol
 
 from robolink.errors import ConfigError
@@ -52,7 +52,7 @@ class ToolState:
             tell.
     """
 
-    tools: Mapping[int, ToolOffset | None]
+    tools: Mapping[int, ToolOffset | None] = field(hash=False)
     selected: int | None
 
 

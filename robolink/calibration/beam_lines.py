@@ -27,7 +27,7 @@ import numpy as np
 from robolink.calibration.core.accuracy import BudgetRow
 from robolink.calibration.core.dispersion import Dispersion
 from robolink.calibration.core.least_squares import Floats, LinearFit, linear_fit
-from robolink.calibration.core.pose_checks import check_poses
+from robolink.calibration.core.pose_checks import check_poses, refuses_by_name
 from robolink.calibration.core.statistics import NORMAL_95, chi_square_quantile
 from robolink.calibration.flange_plane import FlangePlane, require_flange_in_base, solvable_planes
 from robolink.errors import CalibrationError
@@ -132,6 +132,7 @@ class Crossing:
         return math.copysign(1.0, across)
 
 
+@refuses_by_name
 def find_beams(
     crossings: Sequence[Crossing],
     tip_mm: tuple[float, float],
@@ -326,6 +327,9 @@ class ShaftSeen:
     crossings: Sequence[Crossing]
     above_mm: float
     deeper_mm: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "crossings", tuple(self.crossings))
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,6 +34,7 @@ from robolink.calibration.core.pose_checks import (
     MIN_ROTATION_DEG,
     angle_spread_deg,
     components,
+    refuses_by_name,
 )
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.rotations import rotation_of
@@ -127,6 +128,7 @@ class BeamsResult(CalibrationResult):
         return 4
 
 
+@refuses_by_name
 def solve_crossed_beams(
     crossings: Sequence[Crossing],
     beams: tuple[Beam, Beam],

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final, TypeVar
 
-from robolink.calibration.core.pose_checks import UPRIGHT_WITHIN_DEG
+from robolink.calibration.core.pose_checks import UPRIGHT_WITHIN_DEG, refuses_by_name
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.statistics import NORMAL_95, chi_square_quantile
 from robolink.errors import CalibrationError
@@ -125,6 +125,7 @@ class FlangePlane:
         return self.level[0] * tip.x_mm + self.level[1] * tip.y_mm + self.r33 * tip.z_mm
 
 
+@refuses_by_name
 def carrying(frame: Pose, tip: ToolOffset, place_mm: tuple[float, float, float]) -> Pose:
     """Return where a frame is when what lies at ``tip`` in its axes is at a place of the base.
 

@@ -105,7 +105,7 @@ class ToolPlan:
     method: str = ""
     station: str = ""
     at: str = ""
-    rows: Mapping[str, RowFact] = field(default_factory=dict)
+    rows: Mapping[str, RowFact] = field(default_factory=dict, hash=False)
 
     def named(self, result: CalibrationResult) -> CalibrationResult:
         """Return a result under the name of the method, whichever solver it borrows.

@@ -64,8 +64,8 @@ class Proposal:
     measured: ToolOffset | None = None
     notes: tuple[str, ...] = ()
     z_from: Literal["measured", "typed", "kept"] = "kept"
-    record: Mapping[str, object] = field(default_factory=dict)
-    kept_record: Mapping[str, object] = field(default_factory=dict)
+    record: Mapping[str, object] = field(default_factory=dict, hash=False)
+    kept_record: Mapping[str, object] = field(default_factory=dict, hash=False)
     length: LengthChange | None = None
     pin_z_mm: float | None = None
     pin_touches: int = 0
@@ -132,7 +132,7 @@ class WriteSubject:
     verdicts: tuple[tuple[LimitVerdict, ...], ...]
     again: int | None = None
     can_add_touch: bool = False
-    stations: Mapping[int, tuple[str, ...]] = field(default_factory=dict)
+    stations: Mapping[int, tuple[str, ...]] = field(default_factory=dict, hash=False)
 
     @property
     def tools(self) -> tuple[int, ...]:

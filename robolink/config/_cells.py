@@ -3,7 +3,7 @@
 import json
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
@@ -122,7 +122,7 @@ class Cell:
     name: str
     url: str
     settings: "CellSettings"
-    origins: Mapping[str, Path]
+    origins: Mapping[str, Path] = field(hash=False)
 
     @property
     def expected(self) -> Expected:

@@ -8,7 +8,7 @@ copy counts that the last successful connection left in the state folder.
 import json
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from hashlib import sha256
 from pathlib import Path
 
@@ -38,7 +38,7 @@ class Expected:
     tool: int | None = None
     robot: str | None = None
     robot_file: str = ""
-    people: Mapping[str, PersonRole] | None = None
+    people: Mapping[str, PersonRole] | None = field(default=None, hash=False)
 
 
 @dataclass(frozen=True, slots=True)

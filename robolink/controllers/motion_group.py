@@ -33,6 +33,7 @@ from robolink.model import (
     Pose,
     ToolTable,
     WorkBox,
+    require_target,
 )
 from robolink.timing import Deadline
 
@@ -215,7 +216,7 @@ class PolledGroup(MotionGroupCore):
 
     def move_to(self, target: Pose, profile: MotionProfile, *, box: WorkBox) -> "PolledMotion":
         """Start one movement; see :class:`robolink.model.MotionGroup`."""
-        box.check(target)
+        require_target(target, box, profile)
         link, markers = self._driver, self._driver.markers
         request = "; ".join(self.requests_for(target, profile))
         try:

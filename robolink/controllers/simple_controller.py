@@ -30,6 +30,7 @@ from robolink.model import (
     ToolOffset,
     ToolReceipt,
     ToolTable,
+    require_offset,
     rotate_xy,
 )
 from robolink.stop_latch import CommandClass, StopLatch
@@ -227,7 +228,10 @@ class _MemoryTools(ToolTableCore):
         return _TOOLS
 
     def same(self, a: ToolOffset | None, b: ToolOffset | None) -> bool:
-        return a is b if a is None or b is None else a.matches(b, _TOLERANCE)
+        if a is None or b is None:
+            return a is b
+        require_offset("a", a)
+        return a.matches(b, _TOLERANCE)
 
     def _storable(self, tool: int, offset: ToolOffset) -> ToolOffset:  # noqa: ARG002 - alike for all
         if offset.v_deg or offset.w_deg:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from itertools import combinations
 from statistics import fmean
@@ -105,7 +105,7 @@ class DriftFinding:
     subject: tuple[int | str, ...]
     since: str
     change: str
-    shift_mm: Mapping[str, float]
+    shift_mm: Mapping[str, float] = field(hash=False)
     sentence: str
     remedy: str
 

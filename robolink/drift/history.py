@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from statistics import fmean, median, variance
 from typing import Final
 
@@ -44,8 +44,8 @@ class MeasuredChange:
     tool: int
     nozzle: str
     station: str
-    tip_mm: Mapping[str, float]
-    pin_mm: Mapping[str, float] | None
+    tip_mm: Mapping[str, float] = field(hash=False)
+    pin_mm: Mapping[str, float] | None = field(hash=False)
     turn_test_mm: float | None
     repeatable_to_mm: float | None = None
     accurate_to_mm: float | None = None

@@ -37,7 +37,7 @@ from robolink.methods.shared_parameters import (
     Turns,
     camera_at,
 )
-from robolink.model import Pose, ToolOffset
+from robolink.model import Pose, ToolOffset, checks_arguments
 from robolink.procedures import (
     NO_ERROR,
     NO_OFFSET,
@@ -141,6 +141,7 @@ def _apart(places: Sequence[Pair]) -> Iterator[Problem]:
             )
 
 
+@checks_arguments
 def measure_board(
     station: CameraStation,
     plan: LookPlan,
@@ -190,6 +191,7 @@ def measure_board(
     return BoardSource("", station, board, plan, sigma_mm, retake).procedure(stored, here)
 
 
+@checks_arguments
 def verify_board(
     station: CameraStation,
     plan: LookPlan,

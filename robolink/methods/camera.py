@@ -21,7 +21,7 @@ from robolink.methods.shared_parameters import (
     LookParameters,
     camera_at,
 )
-from robolink.model import Pose, TipSensor, ToolOffset
+from robolink.model import Pose, TipSensor, ToolOffset, checks_arguments
 from robolink.procedures import (
     NO_OFFSET,
     CameraDrive,
@@ -62,6 +62,7 @@ class CameraParameters(LookParameters):
         )
 
 
+@checks_arguments
 def measure_camera(
     station: CameraStation,
     plan: LookPlan,

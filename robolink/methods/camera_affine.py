@@ -38,7 +38,7 @@ from robolink.methods.shared_parameters import (
     LookParameters,
     camera_at,
 )
-from robolink.model import Pose, TipSensor, ToolOffset, json_fields
+from robolink.model import Pose, TipSensor, ToolOffset, checks_arguments, json_fields
 from robolink.procedures import (
     NO_OFFSET,
     CameraDrive,
@@ -175,6 +175,7 @@ class CameraAffineParameters(LookParameters):
         return (*((dx, dy, 0.0) for dx, dy in cross), *((0.0, 0.0, t) for t in self.turns_deg))
 
 
+@checks_arguments
 def measure_camera_affine(
     station: CameraStation,
     plan: CameraAffineParameters,

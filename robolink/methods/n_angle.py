@@ -31,7 +31,7 @@ from robolink.methods.method import (
     Site,
 )
 from robolink.methods.shared_parameters import Retake, UprightPinParameters
-from robolink.model import Pose, ToolOffset, angle_difference_deg
+from robolink.model import Pose, ToolOffset, angle_difference_deg, checks_arguments
 from robolink.procedures import (
     TAKE_ALL,
     ManualPinSource,
@@ -324,6 +324,7 @@ class NAngleSource(ManualPinSource):
         return result
 
 
+@checks_arguments
 def measure_n_angle(
     plan: TouchPlan,
     *,

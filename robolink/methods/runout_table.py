@@ -17,7 +17,7 @@ from robolink.methods.shared_parameters import (
     LookParameters,
     camera_at,
 )
-from robolink.model import Pose, ToolOffset
+from robolink.model import Pose, ToolOffset, checks_arguments
 from robolink.procedures import LookPlan, ProofBasis
 from robolink.runner import Procedure
 from robolink.sensing import sensor_name
@@ -123,6 +123,7 @@ class RunoutTableSource(CameraSource):
         return WobbleTest(**plain, table=basis.result.table)
 
 
+@checks_arguments
 def measure_runout_table(
     station: CameraStation,
     plan: LookPlan,

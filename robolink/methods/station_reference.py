@@ -10,7 +10,7 @@ from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
 from robolink.methods.beams import BeamsParameters
 from robolink.methods.z_touch import ZTouchParameters, measure_z_touch
-from robolink.model import Pose, ToolOffset
+from robolink.model import Pose, ToolOffset, checks_arguments
 from robolink.procedures import PinTouches, TouchPlan
 from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.runner import Procedure
@@ -23,6 +23,7 @@ _MOST_APART_MM: Final = 0.3
 _USUAL: Final = TouchPlan()
 
 
+@checks_arguments
 def learn_station(
     station: Station,
     *,

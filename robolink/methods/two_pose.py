@@ -27,7 +27,7 @@ from robolink.methods.method import (
     Site,
 )
 from robolink.methods.shared_parameters import UprightPinParameters, two_poses_agree
-from robolink.model import Pose, ToolOffset
+from robolink.model import Pose, ToolOffset, checks_arguments
 from robolink.procedures import (
     ManualPinSource,
     PinTouches,
@@ -147,6 +147,7 @@ class TwoPoseSource(ManualPinSource):
         return solve_two_pose(first, second, stored=stored, sigma_mm=self.sigma_mm)
 
 
+@checks_arguments
 def measure_two_pose(
     plan: TouchPlan, *, stored: ToolOffset | None, sigma_mm: float | None = None
 ) -> Procedure[CalibrationResult]:

@@ -5,6 +5,9 @@ from typing import TYPE_CHECKING
 from robolink.lazy_exports import lazy_exports, old_names
 
 if TYPE_CHECKING:
+    from robolink.model._arguments import checks_arguments as checks_arguments
+    from robolink.model._arguments import misgiven as misgiven
+    from robolink.model._arguments import not_of_class as not_of_class
     from robolink.model._change_limits import ChangeGuard as ChangeGuard
     from robolink.model._change_limits import ChangeLimits as ChangeLimits
     from robolink.model._change_limits import PersonRole as PersonRole
@@ -23,6 +26,8 @@ if TYPE_CHECKING:
     from robolink.model._controller import are_simulated_facts as are_simulated_facts
     from robolink.model._controller import is_simulated_name as is_simulated_name
     from robolink.model._controller import says_it_is_simulated as says_it_is_simulated
+    from robolink.model._documents import from_json as from_json
+    from robolink.model._documents import to_json as to_json
     from robolink.model._geometry import Elbow as Elbow
     from robolink.model._geometry import Hand as Hand
     from robolink.model._geometry import Pose as Pose
@@ -48,7 +53,7 @@ if TYPE_CHECKING:
     from robolink.model._journal_entries import finding_named_now as finding_named_now
     from robolink.model._journal_entries import method_name_now as method_name_now
     from robolink.model._journal_entries import with_method_name_now as with_method_name_now
-    from robolink.model._json_values import from_json as from_json
+    from robolink.model._json_values import from_fields as from_fields
     from robolink.model._json_values import json_fields as json_fields
     from robolink.model._json_values import json_value as json_value
     from robolink.model._kinematics import AxisKind as AxisKind
@@ -85,6 +90,7 @@ if TYPE_CHECKING:
     from robolink.model._movement import MotionUntilInput as MotionUntilInput
     from robolink.model._movement import Path as Path
     from robolink.model._movement import WorkBox as WorkBox
+    from robolink.model._movement import require_target as require_target
     from robolink.model._outcomes import ClientRun as ClientRun
     from robolink.model._outcomes import Finding as Finding
     from robolink.model._outcomes import Marker as Marker
@@ -117,11 +123,13 @@ if TYPE_CHECKING:
     from robolink.model._tools import put_right as put_right
     from robolink.model._tools import read_for_verdict as read_for_verdict
     from robolink.model._tools import read_offset as read_offset
+    from robolink.model._tools import require_offset as require_offset
     from robolink.model._tools import tool_changed as tool_changed
 else:
     __getattr__, __dir__, __all__ = lazy_exports(
         __name__,
         {
+            "_arguments": "checks_arguments misgiven not_of_class",
             "_change_limits": (
                 "ChangeGuard ChangeLimits PersonRole refuse_operator require_engineer"
             ),
@@ -130,6 +138,7 @@ else:
                 "ValueReceipt ValueT VariableTable are_simulated_facts "
                 "is_simulated_name says_it_is_simulated"
             ),
+            "_documents": "from_json to_json",
             "_geometry": (
                 "Elbow Hand Pose Posture Wrist angle_difference_deg describe_pose rotate_xy"
             ),
@@ -139,7 +148,7 @@ else:
                 "Signature answer_entry answered_by_in_words finding_named_now "
                 "method_name_now with_method_name_now"
             ),
-            "_json_values": "from_json json_fields json_value",
+            "_json_values": "from_fields json_fields json_value",
             "_kinematics": (
                 "AxisKind AxisPositions CsTool Direction3 FlangeFrame "
                 "ISMKinematicsWithOrientationImage "
@@ -151,7 +160,7 @@ else:
             "_ledger": "Account Ledger describe_outcome",
             "_movement": (
                 "InputEdge Motion MotionGroup MotionOutcome MotionProfile MotionTerms "
-                "MotionUntilInput Path WorkBox"
+                "MotionUntilInput Path WorkBox require_target"
             ),
             "_outcomes": (
                 "ClientRun Finding Marker MarkerKind OutcomeLog Resolver Verdict "
@@ -162,7 +171,7 @@ else:
             "_tools": (
                 "ANY COMPONENTS Expect Expected Jump KinematicToolTable ToolOffset ToolReceipt "
                 "ToolTable describe_offset of_no_tool plain_offset put_right "
-                "read_for_verdict read_offset "
+                "read_for_verdict read_offset require_offset "
                 "tool_changed"
             ),
         },

@@ -9,6 +9,26 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Final
+
+_NUMBERS: Final = frozenset({float, int})
+
+
+def require_numbers(value: object, *names: str) -> None:
+    """Refuse a frozen value that holds no numbers; those of other libraries become Python's own.
+
+    Args:
+        value: The value that is being made.
+        names: Its fields.
+
+    Raises:
+        ConfigError: One holds no number.
+    """
+    for name in names:
+        if type(getattr(value, name)) not in _NUMBERS:  # hardly ever, and nothing is loaded before
+            from robolink.model._arguments import required_number
+
+            required_number(value, name)
 
 
 class Hand(StrEnum):
@@ -70,7 +90,11 @@ class Pose:
     """Where a frame carried by the robot is, seen from the base.
 
     ``tool`` says which frame: 0 is the flange, 1 to 15 a tool's tip, ``None`` unknown. ``posture``
-    is ``None`` where the controller tells none, as of a SCARA.
+    is ``None`` where the controller tells none, as of a SCARA. Numbers of other libraries, such as
+    numpy's, become Python's own.
+
+    Raises:
+        ConfigError: A coordinate is not a number.
     """
 
     x_mm: float
@@ -83,6 +107,9 @@ class Pose:
     local: int = 0
     tool: int | None = None
     posture: Posture | None = None
+
+    def __post_init__(self) -> None:
+        require_numbers(self, "x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
 
     def coordinates(self) -> tuple[float, float, float, float, float, float]:
         """Return x, y, z in mm and u, v, w in degrees."""
@@ -108,6 +135,10 @@ def describe_pose(pose: Pose) -> str:
         >>> describe_pose(Pose(250, 200, 83, 90, 0, 165))
         'X 250.000 Y 200.000 Z 83.000 U 90.000 W 165.000'
     """
+    if not isinstance(pose, Pose):
+        from robolink.model._arguments import not_of_class
+
+        raise not_of_class("pose", pose, Pose)
     return described(pose.coordinates())
 
 

@@ -78,7 +78,7 @@ class NewEntry:
     tool: int | None = None
     tolerance: str = ""
     verdict: str = ""
-    details: Mapping[str, object] = field(default_factory=dict)
+    details: Mapping[str, object] = field(default_factory=dict, hash=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +139,7 @@ class Recorded:
     tool: int | None
     tolerance: str
     verdict: str
-    details: Mapping[str, object]
+    details: Mapping[str, object] = field(hash=False)
     signature: Signature
     previous: str
     hash: str

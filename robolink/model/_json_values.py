@@ -3,6 +3,7 @@
 What is kept or printed names each field of a value once, here by its own name, with its unit in
 it. A class whose document is more than its fields says so in methods of its own, ``as_json`` and
 ``from_json``, which are used wherever such a value stands in another (docs/decisions/0005).
+What loses nothing and is read strictly is a document of ``to_json``.
 """
 
 from collections.abc import Mapping, Sequence
@@ -66,7 +67,7 @@ def json_fields(value: object, *names: str, **renamed: str) -> dict[str, Any]:
     return own | {key: json_value(getattr(value, name)) for key, name in renamed.items()}
 
 
-def from_json(kind: type[T], document: Mapping[str, Any], *, partial: bool = False) -> T:
+def from_fields(kind: type[T], document: Mapping[str, Any], *, partial: bool = False) -> T:
     """Return the dataclass whose fields a JSON object holds; what it holds beside is left.
 
     Args:
@@ -78,8 +79,8 @@ def from_json(kind: type[T], document: Mapping[str, Any], *, partial: bool = Fal
         KeyError, TypeError, ValueError: It is no such object.
 
     Example:
-        >>> from robolink.model import ToolOffset, from_json
-        >>> from_json(ToolOffset, {"x_mm": 12, "y_mm": -3.5}, partial=True).x_mm
+        >>> from robolink.model import ToolOffset, from_fields
+        >>> from_fields(ToolOffset, {"x_mm": 12, "y_mm": -3.5}, partial=True).x_mm
         12.0
     """
     found = _annotations(kind).items()  # type: ignore[arg-type] # a class can be hashed
@@ -105,5 +106,5 @@ def _read(kind: Any, value: Any, partial: bool) -> Any:  # noqa: ANN401 - any of
     if own := getattr(kind, "from_json", None):
         return own(value)
     if isinstance(kind, type) and is_dataclass(kind):
-        return from_json(kind, value, partial=partial)
+        return from_fields(kind, value, partial=partial)
     return kind(value)

@@ -5,11 +5,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum, StrEnum
 from numbers import Real
-from typing import Protocol
+from typing import Final, Protocol
 
 from robolink.errors import ConfigError, LimitError, NotReadyError, NotReadyReason
 from robolink.messages import tr
-from robolink.model._geometry import Pose
+from robolink.model._geometry import Pose, require_numbers
+
+_LIMITS: Final = ("x_min_mm", "x_max_mm", "y_min_mm", "y_max_mm", "z_min_mm", "z_max_mm")
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +102,7 @@ class MotionProfile:
     ``speed_percent`` rules joint moves, ``speed_mm_s`` straight ones.
 
     Raises:
-        ConfigError: There is no such path.
+        ConfigError: There is no such path, or a speed is no number.
     """
 
     path: Path = Path.JOINT
@@ -116,6 +118,7 @@ class MotionProfile:
                     tr("There is no path {given!r}.", given=self.path),
                     remedy=tr("Give Path.JOINT or Path.STRAIGHT. Nothing moved."),
                 ) from None
+        require_numbers(self, "speed_percent", "speed_mm_s")
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +127,9 @@ class WorkBox:
 
     A plan holds it about the place where the frame will be at the start (:meth:`reaching`); there
     it is put when that place is known (:meth:`about`).
+
+    Raises:
+        ConfigError: A limit is no number.
     """
 
     x_min_mm: float = -math.inf
@@ -132,6 +138,9 @@ class WorkBox:
     y_max_mm: float = math.inf
     z_min_mm: float = -math.inf
     z_max_mm: float = math.inf
+
+    def __post_init__(self) -> None:
+        require_numbers(self, *_LIMITS)
 
     @classmethod
     def reaching(cls, sideways_mm: float, *, down_mm: float, up_mm: float) -> "WorkBox":
@@ -234,6 +243,37 @@ class WorkBox:
                     ),
                     remedy=tr("Jog closer to the pin and start again, or widen the allowed area."),
                 )
+
+
+_USUAL: Final = MotionProfile()
+
+
+def require_target(target: Pose, box: WorkBox, profile: MotionProfile = _USUAL) -> None:
+    """Refuse a movement whose arguments are not what they stand for, or that leaves the box.
+
+    Args:
+        target: Where it goes.
+        box: What it may not leave.
+        profile: How fast it goes, and on which path.
+
+    Raises:
+        ConfigError: It names the argument.
+        LimitError: The target lies outside.
+
+    Example:
+        >>> from robolink import Pose
+        >>> from robolink.model import WorkBox, require_target
+        >>> require_target(Pose(300, 0, 0, 0), WorkBox(x_max_mm=200))
+        Traceback (most recent call last):
+        robolink.errors.LimitError: X 300.000 would leave the allowed area (-inf to 200.000 mm). \
+Nothing moved. Jog closer to the pin and start again, or widen the allowed area.
+    """
+    for name, value, kind in (("box", box, WorkBox), ("profile", profile, MotionProfile)):
+        if not isinstance(value, kind):
+            from robolink.model._arguments import not_of_class
+
+            raise not_of_class(name, value, kind)
+    box.check(target)
 
 
 class MotionOutcome(Enum):

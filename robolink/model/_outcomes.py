@@ -47,7 +47,7 @@ class Marker:
     kind: MarkerKind
     request: str
     begun_at: str
-    details: Mapping[str, object] = field(default_factory=dict)
+    details: Mapping[str, object] = field(default_factory=dict, hash=False)
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,6 @@ import math
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from numbers import Real
 from typing import Final, Literal, Protocol, runtime_checkable
 
 from robolink.errors import ConfigError, ToolChangedError, UnclearAnswerError
@@ -47,15 +46,11 @@ class ToolOffset:
         values = self.components()
         if _NUMBERS.issuperset(map(type, values)) and all(map(math.isfinite, values)):
             return  # nearly always; what is another kind of number is looked at one by one
+        from robolink.model._arguments import not_a_number, required_number
+
         for name, value in zip(COMPONENTS, values, strict=True):
-            if isinstance(value, Real) and not isinstance(value, (int, float)):
-                # A number of numpy, say; what is kept and sent is Python's own.
-                object.__setattr__(self, name, float(value))
-            if not isinstance(value, Real) or not math.isfinite(value):
-                raise ConfigError(
-                    tr("{name} is not a number: {value!r}.", name=name, value=value),
-                    remedy=tr("Give a finite decimal number."),
-                )
+            if not math.isfinite(required_number(self, name)):
+                raise not_a_number(name, value)
 
     def components(self) -> tuple[float, float, float, float, float, float]:
         """Return x, y, z in mm and u, v, w in degrees."""
@@ -75,6 +70,7 @@ class ToolOffset:
 
         Angles are compared modulo 360: a controller may store 270 as -90.
         """
+        require_offset("other", other)
         ours, theirs = self.components(), other.components()
         if ours == theirs:
             return True
@@ -86,6 +82,22 @@ class ToolOffset:
         )
 
 
+def require_offset(name: str, offset: object) -> None:
+    """Refuse what is no ``ToolOffset``.
+
+    Args:
+        name: The argument.
+        offset: What was given.
+
+    Raises:
+        ConfigError: It names the argument, and how an offset is written.
+    """
+    if not isinstance(offset, ToolOffset):
+        from robolink.model._arguments import not_of_class
+
+        raise not_of_class(name, offset, ToolOffset)
+
+
 def of_no_tool(values: Sequence[float]) -> bool:
     """Tell whether one of these numbers is none that a tool has, in whatever unit."""
     return any(value and not _LEAST < abs(value) < _MOST for value in values)
@@ -95,6 +107,7 @@ def describe_offset(offset: ToolOffset | None) -> str:
     """Return an offset as a person reads it; V and W only where they are not 0."""
     if offset is None:
         return tr("undefined")
+    require_offset("offset", offset)
     if offset.of_no_tool:
         numbers = ", ".join(f"{value:g}" for value in offset.components())
         return tr("not the values of a tool ({numbers})", numbers=numbers)
@@ -112,7 +125,10 @@ def put_right(offset: ToolOffset | None) -> str:
 
 def plain_offset(offset: ToolOffset | None) -> list[float] | None:
     """Return an offset as plain JSON, ``None`` for an undefined tool."""
-    return None if offset is None else list(offset.components())
+    if offset is None:
+        return None
+    require_offset("offset", offset)
+    return list(offset.components())
 
 
 def read_offset(value: object) -> ToolOffset | None:

@@ -5,7 +5,7 @@ from typing import Final, Generic
 
 from robolink.calibration import Drift, FlangePlane, VerifyResult
 from robolink.messages import tr
-from robolink.model import TIP, Pose, ToolOffset
+from robolink.model import TIP, Pose, ToolOffset, checks_arguments
 from robolink.procedures.approach import NO_OFFSET
 from robolink.procedures.camera_drive import CameraDrive, LookPlan, Place
 from robolink.procedures.sample_sequence import finalize_samples
@@ -106,6 +106,7 @@ class CameraSamples(Generic[ResultT]):
 NO_ERROR: Final = (0.0, 0.0)
 
 
+@checks_arguments
 def verify_by_looking(
     station: CameraStation,
     plan: LookPlan,

@@ -17,7 +17,7 @@ from robolink.calibration import (
     tip_pose,
 )
 from robolink.messages import tr
-from robolink.model import Pose, ToolOffset
+from robolink.model import Pose, ToolOffset, checks_arguments
 from robolink.procedures.approach import NO_OFFSET, offset_z
 from robolink.procedures.kept_proof import KeptProof
 from robolink.procedures.pin_touches import PinTouches
@@ -29,6 +29,7 @@ MOST_MORE: Final = 2
 """Touches that a drift may take which is neither surely inside nor surely outside."""
 
 
+@checks_arguments
 def verify_by_turning(
     plan: TouchPlan,
     *,

@@ -86,9 +86,9 @@ class Answers:
     yes: bool = False
     nozzle: str = ""
     lot: str = ""
-    texts: Mapping[int, str] = field(default_factory=dict)
-    z_mm: Mapping[int, float] = field(default_factory=dict)
-    early: Mapping[tuple[int, int | None], str] = field(default_factory=dict)
+    texts: Mapping[int, str] = field(default_factory=dict, hash=False)
+    z_mm: Mapping[int, float] = field(default_factory=dict, hash=False)
+    early: Mapping[tuple[int, int | None], str] = field(default_factory=dict, hash=False)
 
     def prepared(self, number: int, prompt: "Prompt", tool: int | None = None) -> str | None:
         """Return the answer that was given beforehand, ``None`` when there is none.

@@ -8,7 +8,7 @@ its host it is the same, and with a number another one in its place is not.
 
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Final
 
@@ -40,7 +40,7 @@ class Confirmation:
 
     by: str
     at: str
-    compared: Mapping[MapValue, ComparedValue]
+    compared: Mapping[MapValue, ComparedValue] = field(hash=False)
 
     def knows_tool(self, tool: int) -> bool:
         """Whether a comparison showed that this tool's place is not another one's."""

@@ -276,7 +276,7 @@ class MapSlot:
 
     tool: int
     name: str
-    components: Mapping[str, Number]
+    components: Mapping[str, Number] = field(hash=False)
     defined: Signal | None = None
 
     @property
@@ -332,7 +332,7 @@ class Commit:
     busy: Signal | None = None
     error: Signal | None = None
     error_code: Word | None = None
-    error_texts: Mapping[int, str] = field(default_factory=dict)
+    error_texts: Mapping[int, str] = field(default_factory=dict, hash=False)
     tool_number: Word | None = None
     timeout_s: float = 2.0
     settle_s: float = 0.0
@@ -377,14 +377,14 @@ class RegisterMap:
 
     name: str
     sha256: str
-    slots: Mapping[int, MapSlot]
+    slots: Mapping[int, MapSlot] = field(hash=False)
     commit: Commit = field(default_factory=Commit)
     probe: MapProbe | None = None
     permit: Signal | None = None
     selected: Word | None = None
     device_id: RegisterWords | None = None
-    flange: Mapping[str, Number] = field(default_factory=dict)
-    inputs: Mapping[int, Input] = field(default_factory=dict)
+    flange: Mapping[str, Number] = field(default_factory=dict, hash=False)
+    inputs: Mapping[int, Input] = field(default_factory=dict, hash=False)
     all_zero: AllZero = AllZero.REFUSE
     largest_mm: float = 2000.0
 

@@ -21,7 +21,7 @@ from robolink.model import (
     answered_by_in_words,
     are_simulated_facts,
     describe_offset,
-    from_json,
+    from_fields,
     is_simulated_name,
     method_name_now,
     read_offset,
@@ -57,12 +57,12 @@ def recorded_fit(details: Mapping[str, Any]) -> CalibrationResult:
         "inputs": tuple(map(recorded_pose, details.get("poses", ()))),
         "notes": details.get("information", ()),
     }
-    return from_json(CalibrationResult, said, partial=True)
+    return from_fields(CalibrationResult, said, partial=True)
 
 
 def recorded_pose(pose: Mapping[str, Any]) -> Pose:
     """Return a pose of an entry, which has no key for what the controller does not tell."""
-    return from_json(Pose, pose, partial=True)
+    return from_fields(Pose, pose, partial=True)
 
 
 _ENDS: Final = {
@@ -131,7 +131,7 @@ def report_of_tool(
 
 def _facts(said: Mapping[str, Any] | None) -> ControllerFacts:
     """Return what the controller said of itself when it was measured; nothing in old entries."""
-    return from_json(ControllerFacts, said or {}, partial=True)
+    return from_fields(ControllerFacts, said or {}, partial=True)
 
 
 def _touch(said: Mapping[str, Any]) -> TouchOnRecord:

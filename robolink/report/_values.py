@@ -173,8 +173,8 @@ class Report:
     local_time: str = ""
     gauges: tuple[GaugeOnRecord, ...] = ()
     touches: tuple[TouchOnRecord, ...] = ()
-    evidence: Mapping[str, Any] = field(default_factory=dict)
-    seating: Mapping[str, Any] | None = None
+    evidence: Mapping[str, Any] = field(default_factory=dict, hash=False)
+    seating: Mapping[str, Any] | None = field(default=None, hash=False)
     simulated: bool = False
 
     @property

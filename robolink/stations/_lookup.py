@@ -8,7 +8,7 @@ from robolink.calibration import ACCURACY_ROWS
 from robolink.config import Cell
 from robolink.errors import ConfigError, NotReadyError, NotReadyReason, RobolinkError
 from robolink.messages import tr
-from robolink.model import Controller, EntryKind, Recorded, from_json
+from robolink.model import Controller, EntryKind, Recorded, from_fields
 from robolink.stations._station import Station, StationKind, apart_mm, station_of
 
 _PLACE = (
@@ -115,7 +115,7 @@ def _station(name: str, said: object) -> Station:
     known = {key: value for key, value in values.items() if key in _PLACE}
     known |= {"id": name, "how": tr("stated in the cell file"), "declared": True}
     details = {key: value for key, value in values.items() if key not in _PLACE}
-    return from_json(Station, {**known, "details": details}, partial=True)
+    return from_fields(Station, {**known, "details": details}, partial=True)
 
 
 def _together(declared: Station, learnt: Station) -> Station:

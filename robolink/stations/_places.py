@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, cast
 from robolink.calibration import CameraModel, Sighting
 from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
-from robolink.model import InputEdge, SpotUnit, from_json
+from robolink.model import InputEdge, SpotUnit, from_fields
 from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.runner import SeenAt
 from robolink.stations._station import Station
@@ -177,7 +177,7 @@ def _beam(line: Mapping[str, float], sigma_mm: float) -> "Beam":
     """Return a beam as it is on record; one of before says nothing of how sure it is."""
     from robolink.calibration import Beam  # numpy, which a look does without
 
-    return from_json(Beam, {"sigma_mm": sigma_mm, **line}, partial=True)
+    return from_fields(Beam, {"sigma_mm": sigma_mm, **line}, partial=True)
 
 
 def camera_station(station: Station) -> CameraStation:

@@ -78,7 +78,7 @@ class Station:
     check_every_days: float | None = None
     declared: bool = False
     apart_mm: float = 0.0
-    details: Mapping[str, object] = field(default_factory=dict)
+    details: Mapping[str, object] = field(default_factory=dict, hash=False)
 
     def at(
         self,
@@ -217,7 +217,7 @@ class Found:
     how: str = ""
     gauge: str = ""
     tool: int | None = None
-    details: Mapping[str, object] = field(default_factory=dict)
+    details: Mapping[str, object] = field(default_factory=dict, hash=False)
 
 
 def station_entry(found: Found, *, base: tuple[float, ...] | None = None) -> NewEntry:

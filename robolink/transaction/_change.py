@@ -8,7 +8,7 @@ until :meth:`ToolChange.keep`; whatever ends it earlier puts the old values back
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from types import TracebackType
 from typing import Self
 
@@ -39,7 +39,9 @@ from robolink.model import (
     ToolOffset,
     ToolReceipt,
     new_operation,
+    not_of_class,
     plain_offset,
+    require_offset,
     tool_changed,
 )
 from robolink.transaction._orders import Describe, Order, OrderedChange, plain_result
@@ -57,13 +59,22 @@ class Wanted:
         details: More for the journal, plain JSON.
         then_select: The tool to put in force before this one is cleared, should this one be in
             force; without it that is refused.
+
+    Raises:
+        ConfigError: The offset or what is expected is not a ``ToolOffset``.
     """
 
     tool: int
     offset: ToolOffset | None
     expected: Expected
-    details: Mapping[str, object] | None = None
+    details: Mapping[str, object] | None = field(default=None, hash=False)
     then_select: int | None = None
+
+    def __post_init__(self) -> None:
+        if self.offset is not None:
+            require_offset("offset", self.offset)
+        if self.expected is not None and self.expected is not ANY:
+            require_offset("expected", self.expected)
 
 
 _OUT_OF_REACH = (OutcomeUnknownError, TransportError, RemoteProtocolError, LeaseLostError)
@@ -112,6 +123,9 @@ class ToolChange:
     ) -> None:
         self._controller = controller
         self._wanted = tuple(wanted)
+        for number, one in enumerate(self._wanted):
+            if not isinstance(one, Wanted):
+                raise not_of_class(f"wanted[{number}]", one, Wanted)
         # An order counts as carried out in the transaction that keeps the value: that takes a
         # change which is open until then.
         self._several_steps = verify or len(self._wanted) > 1 or order is not None

@@ -9,7 +9,7 @@ moved or sent (docs/commands.md).
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 from robolink.errors import ConfigError, ToolChangedError
@@ -49,7 +49,7 @@ class DoneOrder:
 
     change: str
     at: str
-    result: Mapping[str, object]
+    result: Mapping[str, object] = field(hash=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ class Order:
     """
 
     id: str
-    job: Mapping[str, object]
+    job: Mapping[str, object] = field(hash=False)
     done: DoneOrder | None = None
 
 

@@ -8,7 +8,7 @@ and of how it was changed, is read here.
 import math
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from robolink.errors import ConfigError, ToolChangedError
 from robolink.messages import joined, tr
@@ -250,7 +250,7 @@ class UndoPlan:
     unchanged: tuple[int, ...]
     sentence: str
     remarks: tuple[str, ...]
-    details: Mapping[str, object]
+    details: Mapping[str, object] = field(hash=False)
 
 
 @dataclass(frozen=True, slots=True)

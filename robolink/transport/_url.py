@@ -51,7 +51,7 @@ class LinkUrl:
     host: str
     port: int | None
     path: str
-    options: Mapping[str, str] = field(default_factory=dict)
+    options: Mapping[str, str] = field(default_factory=dict, hash=False)
 
     @property
     def scheme(self) -> str:

@@ -30,6 +30,7 @@ from robolink.calibration import (
     verify_drift,
 )
 from robolink.calibration.pin.one_touch import Pin
+from robolink.errors import ConfigError
 from robolink.model import Hand, Pose, ToolOffset, rotate_xy
 from tests.calibration._simulated import pivoting, refused, touching
 
@@ -83,8 +84,6 @@ CASES = {
     ),
     "NaN": ("non_finite", lambda: solve_n_angle(changed(ROUND, 1, x_mm=math.nan))),
     "infinity": ("non_finite", lambda: solve_pivot(changed(PIVOT, 2, w_deg=math.inf))),
-    "None": ("non_finite", lambda: solve_n_angle(changed(ROUND, 1, u_deg=None))),
-    "text": ("non_finite", lambda: solve_n_angle(changed(ROUND, 1, y_mm="12,5"))),
     "NaN from a camera": ("non_finite", lambda: solve_up_camera(fiducial(math.nan, 1))),
     "metres": (
         "suspect_units",
@@ -177,6 +176,12 @@ def test_bad_input_is_refused_by_name(name):
     code, act = CASES[name]
     with refused(code):
         act()
+
+
+@pytest.mark.parametrize("value", [None, "12,5"])
+def test_what_is_no_number_never_becomes_a_pose(value):
+    with pytest.raises(ConfigError, match="u_deg is not a number"):
+        changed(ROUND, 1, u_deg=value)
 
 
 def test_a_pose_that_is_no_number_is_named_with_its_field():

@@ -44,6 +44,7 @@ CODES = {
     "AmbiguousPosesError": 2,
     "LimitError": 2,
     "NotComparedError": 2,
+    "DocumentError": 2,
     "JournalError": 2,
     "TransportError": 3,
     "ConnectError": 3,

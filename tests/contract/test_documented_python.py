@@ -359,6 +359,7 @@ MAKERS = {
     "monitor-only.md 1": with_variables,
     "journal.md 1": a_journal,
     "json.md 1": as_in_a_wheel,
+    "json.md 2": nothing,
     "commands.md 1": undelivered,
     "plc-maps.md 1": a_map,
     "recipes.md 1": a_recipe,

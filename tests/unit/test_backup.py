@@ -70,6 +70,38 @@ def test_everything_comes_back(tmp_path):
     assert load(path) == FULL
 
 
+OF_0_1 = """{
+  "schema": "robolink/backup/1",
+  "saved_at": "2026-01-01T00:00:00+00:00",
+  "robolink_version": "0.1.0",
+  "controller": "epson+tcp://192.168.0.1:5000",
+  "facts": {
+    "controller_name": "Zelle 5, S\\u00fcd",
+    "controller_type": null,
+    "controller_serial": "7",
+    "firmware": "7.5.4.0",
+    "project": null,
+    "robot_number": 1,
+    "robot_models": ["T6-602S"],
+    "robot_serials": ["SIM00001", ""]
+  },
+  "selected_tool": 1,
+  "tools": {
+    "1": {"x_mm": 12.345, "y_mm": -3.25, "z_mm": -20.002, "u_deg": 90.0,
+          "v_deg": 0.0, "w_deg": 0.0},
+    "2": null, "3": null, "4": null, "5": null, "6": null, "7": null, "8": null,
+    "9": null, "10": null, "11": null, "12": null, "13": null, "14": null,
+    "15": {"x_mm": 0, "y_mm": 0, "z_mm": 1e-07, "u_deg": -180, "v_deg": 5, "w_deg": 6}
+  }
+}
+"""
+"""What robolink 0.1.0 wrote; it is never remade (docs/api.md)."""
+
+
+def test_a_backup_of_an_earlier_version_is_read():
+    assert backup_from_text(OF_0_1, source="golden.json") == FULL
+
+
 @settings(max_examples=40, deadline=None)
 @given(st.fixed_dictionaries(dict.fromkeys(TOOLS, offsets)), st.integers(0, 15))
 def test_any_tools_come_back(tools, selected):

@@ -9,7 +9,7 @@ from typing import Literal, Self
 import pytest
 
 from robolink.messages import Translated
-from robolink.model import Hand, Pose, from_json, json_fields, json_value
+from robolink.model import Hand, Pose, from_fields, json_fields, json_value
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def test_a_value_comes_back_from_its_json():
     document = json.loads(json.dumps(json_value(SHEET)))
     assert document["rows"][1] == {"name": "touch", "u_mm": 0.03, "kind": "A"}
     assert (document["share"], document["hand"]) == ({"percent": 30}, "left")
-    assert from_json(Sheet, document) == SHEET
+    assert from_fields(Sheet, document) == SHEET
 
 
 def test_keys_stand_in_the_order_in_which_they_are_named():
@@ -86,13 +86,13 @@ def test_what_json_cannot_hold_is_refused():
 def test_what_is_no_such_value_is_never_guessed(change, error):
     document: Mapping[str, object] = {**json_value(SHEET), **change}
     with pytest.raises(error):
-        from_json(Sheet, document)
+        from_fields(Sheet, document)
 
 
 def test_a_record_of_before_keeps_defaults_only_where_that_is_asked_for():
     old = {"x_mm": 1, "y_mm": 2, "z_mm": 3, "u_deg": 4}
     with pytest.raises(KeyError):
-        from_json(Pose, old)
-    assert from_json(Pose, old, partial=True) == Pose(1, 2, 3, 4)
+        from_fields(Pose, old)
+    assert from_fields(Pose, old, partial=True) == Pose(1, 2, 3, 4)
     with pytest.raises(TypeError):
-        from_json(Pose, {"x_mm": 1}, partial=True)
+        from_fields(Pose, {"x_mm": 1}, partial=True)

@@ -1,6 +1,7 @@
 """What a script meets: names, arguments that are mistaken, representations, the tree of errors."""
 
 import contextlib
+import copy
 import importlib
 import inspect
 import pickle
@@ -16,15 +17,22 @@ import pytest
 from robolink_simulators.faults import Fault, FaultAction, FaultPlan
 
 import robolink
-from robolink import ANY, Pose, ToolOffset, calibration, drift, errors, journal
+from robolink import ANY, Pose, ToolOffset, calibration, drift, errors, journal, methods
 from robolink.calibration_run import WriteSubject
 from robolink.controllers import SimpleController
 from robolink.deprecation import GONE_IN, OLD_NAMES, deprecated
 from robolink.errors import ConfigError, ToolIndexError
 from robolink.journal import open_journal
 from robolink.methods import OneTouchSource, TwoPoseSource, measure_two_pose
-from robolink.model import EntryKind, NewEntry, WorkBox
-from robolink.model._movement import MotionProfile, Path
+from robolink.model import (
+    EntryKind,
+    MotionProfile,
+    NewEntry,
+    Path,
+    WorkBox,
+    describe_offset,
+    describe_pose,
+)
 from robolink.procedures import (
     InputSource,
     LazySource,
@@ -37,6 +45,7 @@ from robolink.procedures import (
 from robolink.procedures.source import touching_further
 from robolink.runner import foreseen_steps
 from robolink.testing import PaperCell
+from robolink.transaction import Wanted, change_tools
 from robolink.version import VERSION
 
 # A public name that was given up works for one more version, and says what it is now.
@@ -344,14 +353,27 @@ def test_numbers_of_numpy_are_numbers(controller):
     given: list[Any] = [np.float32(1.5), np.float64(2.25), np.int32(3), np.int64(30)]
     offset = ToolOffset(*given)
     assert offset == ToolOffset(1.5, 2.25, 3.0, 30.0)
-    assert {type(value) for value in offset.components()} <= {int, float, np.float64}
     receipt = controller.tools.write(1, offset, expected=ANY)
     assert receipt.read_back == offset
 
 
-@pytest.mark.parametrize("value", [np.float32("nan"), np.float64("inf"), "1", None, 1j])
+WIDTHS = [np.float16, np.float32, np.float64, np.longdouble, np.array]
+WIDTHS += [getattr(np, f"{sign}int{bits}") for sign in ("", "u") for bits in (8, 16, 32, 64)]
+
+
+@pytest.mark.parametrize("width", WIDTHS, ids=lambda width: width.__name__)
+def test_a_number_of_any_width_becomes_one_of_python(width):
+    offset, pose = ToolOffset(width(3), 1), Pose(1, width(3), 0, 0)
+    assert (offset, pose) == (ToolOffset(3, 1), Pose(1, 3, 0, 0))
+    assert {type(it) for it in (*offset.components(), *pose.coordinates())} == {int, float}
+
+
+@pytest.mark.parametrize(
+    "value",
+    [np.float32("nan"), np.float64("inf"), "1", None, 1j, True, np.True_, np.zeros((99, 99))],
+)
 def test_what_is_no_number_is_refused(value):
-    with pytest.raises(ConfigError, match="x_mm is not a number"):
+    with pytest.raises(ConfigError, match=r"^x_mm is not a number: .{1,60}\. Give a finite"):
         ToolOffset(value)
 
 
@@ -377,13 +399,82 @@ def test_an_offset_is_a_tool_offset(controller):
     assert controller.tools.read(1) == before
 
 
-@pytest.mark.parametrize(
-    "target", [(1, 2, 3, 4), replace(Pose(1, 2, 3, 4), x_mm=cast("Any", "1")), None]
-)
+@pytest.mark.parametrize("target", [(1, 2, 3, 4), ToolOffset(1, 2, 3, 4), None])
 def test_a_target_is_a_pose(controller, target):
     box = WorkBox(-500, 500, -500, 500, -500, 500)
     with pytest.raises(ConfigError, match="A target is a Pose of numbers"):
         controller.groups[0].move_to(target, MotionProfile(), box=box)
+
+
+MISTAKEN: list[Any] = [(1, 2, 3, 4), [1, 2, 3, 4], np.ones(4), "1,2,3,4"]
+HERE = Pose(300, 0, 100, 0)
+THERE = replace(HERE, u_deg=180)
+TAKES: dict[str, Callable[[Any], object]] = {
+    "x_mm": lambda it: Pose(it, 0, 0, 0),
+    "pose": lambda it: describe_pose(it),
+    "other": lambda it: ToolOffset().matches(it, 0.1),
+    "offset": lambda it: describe_offset(it),
+    "first": lambda it: calibration.solve_two_pose(it, HERE),
+    "stored": lambda it: calibration.solve_two_pose(HERE, THERE, stored=it),
+    "poses[0]": lambda it: calibration.solve_n_angle([it, HERE, THERE]),
+    "poses[1]": lambda it: calibration.solve_pivot([HERE, it, HERE, THERE]),
+    "tip": lambda it: calibration.flange_pose(it, ToolOffset()),
+    "x_min_mm": lambda it: WorkBox(it),
+    "speed_percent": lambda it: MotionProfile(speed_percent=it),
+    "path": lambda it: MotionProfile(it),
+    "expected": lambda it: Wanted(1, ToolOffset(), it),
+}
+
+
+@pytest.mark.parametrize("argument", TAKES)
+def test_what_is_no_value_is_refused_by_the_name_of_its_argument(argument):
+    for given in MISTAKEN:
+        with pytest.raises(ConfigError) as caught:
+            TAKES[argument](given)
+        assert argument in caught.value.what
+        assert caught.value.remedy
+
+
+MOVING = ("measure_", "verify_b", "learn_", "trace_")
+PROCEDURES = [it for it in sorted(vars(methods)["__all__"]) if it.startswith(MOVING)]
+
+
+@pytest.mark.parametrize("name", PROCEDURES)
+def test_a_procedure_refuses_at_its_call_what_would_show_once_the_robot_has_moved(name):
+    procedure = getattr(methods, name)
+    asked = inspect.signature(procedure).parameters.values()
+    given = {it.name: (1, 2, 3) for it in asked if it.default is it.empty}
+    with pytest.raises(ConfigError, match=r"^\w+ is not a \w+ but \(1, 2, 3\)"):
+        procedure(**given)
+
+
+def test_an_offset_in_a_tuple_is_refused_before_the_first_touch():
+    stored: Any = (12, -4, -20)
+    with pytest.raises(ConfigError, match=r"^stored is not a ToolOffset"):
+        measure_two_pose(TouchPlan(turn_deg=120), stored=stored)
+
+
+def test_a_wrong_call_is_told_by_python_itself():
+    solve: Any = calibration.solve_two_pose
+    with pytest.raises(TypeError, match="missing"):
+        solve(HERE)
+    with pytest.raises(TypeError, match="unexpected"):
+        solve(HERE, THERE, poses=())
+
+
+@pytest.mark.parametrize("given", MISTAKEN, ids=lambda it: type(it).__name__)
+def test_nothing_is_sent_for_a_box_a_profile_or_a_change_that_is_none(controller, given):
+    group, box = controller.groups[0], WorkBox(-500, 500, -500, 500, -500, 500)
+    sent = controller.exchanges
+    for name, act in (
+        ("box", lambda: group.move_to(HERE, MotionProfile(), box=given)),
+        ("profile", lambda: group.move_to(HERE, given, box=box)),
+        (r"wanted\[0\]", lambda: change_tools(controller, given)),
+        ("a", lambda: controller.tools.same(given, ToolOffset())),
+    ):
+        with pytest.raises(ConfigError, match=rf"^{name} is not a "):
+            act()
+    assert controller.exchanges == sent
 
 
 @pytest.mark.parametrize("url", [5, None, b"epson+tcp://192.168.0.1"])
@@ -460,6 +551,26 @@ def drawn():
             found[name] = path[depth - 1] if depth else None
         path = [*path[:depth], names[-1]]
     return found
+
+
+def made(kind):
+    """Return an error with whatever its class asks for."""
+    asked = [*inspect.signature(kind).parameters.values()]
+    needed = [it for it in asked if it.default is it.empty and it.kind is not it.VAR_KEYWORD]
+    last = [it for it in needed if it.kind is it.KEYWORD_ONLY]
+    first = [it.name for it in needed if it.kind is it.POSITIONAL_OR_KEYWORD]
+    return kind(*first, **{it.name: it.name for it in last})
+
+
+def test_every_error_can_be_copied_and_pickled():
+    for name in errors.__all__:
+        kind = getattr(errors, name)
+        if not issubclass(kind, errors.RobolinkError):
+            continue
+        error = made(kind)
+        error.concern("192.0.2.1", "request")
+        for other in (copy.copy(error), pickle.loads(pickle.dumps(error))):
+            assert (type(other), str(other), vars(other)) == (kind, str(error), vars(error))
 
 
 def test_every_class_is_drawn_under_its_parent():

@@ -26,7 +26,12 @@ from robolink.calibration.camera.camera_uncertainty import (
     print_source,
 )
 from robolink.calibration.core.dispersion import Dispersion, interval_of
-from robolink.calibration.core.pose_checks import components, require_finite, require_poses
+from robolink.calibration.core.pose_checks import (
+    components,
+    refuses_by_name,
+    require_finite,
+    require_poses,
+)
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.flange_plane import FlangePlane, TipHeight, height_of, with_height_error
 from robolink.calibration.quality.station import with_station
@@ -40,6 +45,7 @@ SPACING_TOLERANCE = 0.01
 """Largest relative difference from the nominal spacing (docs/reference/calibration.md 3)."""
 
 
+@refuses_by_name
 def solve_board(
     first: Sighting,
     second: Sighting,

@@ -37,6 +37,7 @@ from robolink.calibration.core.pose_checks import (
     angle_spread_deg,
     components,
     keep_unmeasured,
+    refuses_by_name,
     require_finite,
     require_poses,
 )
@@ -59,6 +60,7 @@ from robolink.model import ToolOffset
 UNKNOWNS = 3
 
 
+@refuses_by_name
 def solve_board_fit(
     sightings: Sequence[Sighting],
     drawing_mm: Sequence[tuple[float, float]],
@@ -232,6 +234,7 @@ def _in_base(
 ROUND_UNKNOWNS = 5
 
 
+@refuses_by_name
 def solve_board_round(
     sightings: Sequence[Sighting],
     drawing_mm: Sequence[tuple[float, float]],

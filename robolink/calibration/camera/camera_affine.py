@@ -23,6 +23,7 @@ from robolink.calibration.core.least_squares import Floats, LinearFit, linear_fi
 from robolink.calibration.core.pose_checks import (
     check_poses,
     components,
+    refuses_by_name,
     require_finite,
     require_poses,
 )
@@ -78,6 +79,7 @@ class CameraCalibration(CalibrationResult):
         return {"camera": {**json_fields(self.camera, *shown), "rms_px": self.rms_px}}
 
 
+@refuses_by_name
 def solve_camera_affine(
     sightings: Sequence[PixelSighting],
     *,

@@ -21,6 +21,7 @@ from robolink.calibration.core.pose_checks import (
     MIN_ROTATION_DEG,
     check_planar,
     components,
+    refuses_by_name,
     require_poses,
 )
 from robolink.calibration.core.result import CalibrationResult
@@ -60,6 +61,7 @@ class CameraRound(CalibrationResult):
         return {"camera_error_mm": None if error_mm is None else list(error_mm)}
 
 
+@refuses_by_name
 def solve_camera_round(
     sightings: Sequence[Sighting],
     *,

@@ -36,6 +36,7 @@ from robolink.calibration.core.pose_checks import (
     MIN_ROTATION_DEG,
     check_planar,
     components,
+    refuses_by_name,
     require_poses,
 )
 from robolink.calibration.core.result import CalibrationResult
@@ -111,6 +112,7 @@ class RunoutReport:
         return math.hypot(*self.tip_mm)
 
 
+@refuses_by_name
 def runout_report(sightings: Sequence[Sighting], *, sigma_mm: float | None = None) -> RunoutReport:
     """Return offset and wobble of a tip that was seen at several angles.
 
@@ -337,6 +339,7 @@ class RunoutTableResult(CameraRound):
         }
 
 
+@refuses_by_name
 def solve_runout_table(
     sightings: Sequence[Sighting],
     *,

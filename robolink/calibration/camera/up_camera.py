@@ -18,7 +18,7 @@ from robolink.calibration.camera.camera_model import (
 )
 from robolink.calibration.camera.camera_uncertainty import camera_sources
 from robolink.calibration.core.dispersion import Dispersion, interval_of
-from robolink.calibration.core.pose_checks import components
+from robolink.calibration.core.pose_checks import components, refuses_by_name
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.flange_plane import (
     TipHeight,
@@ -32,6 +32,7 @@ from robolink.messages import tr
 from robolink.model import ToolOffset
 
 
+@refuses_by_name
 def solve_up_camera(
     sighting: Sighting,
     *,

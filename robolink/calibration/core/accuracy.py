@@ -20,7 +20,7 @@ from typing import Any, Final, Literal, Self
 
 from robolink.calibration.core.statistics import student_t
 from robolink.messages import declared
-from robolink.model import from_json, json_fields
+from robolink.model import from_fields, json_fields
 
 DIVISORS: Final = {
     "rectangular": math.sqrt(3),
@@ -105,7 +105,7 @@ class UncertaintyBudget:
         rows = [
             {**row, "nu": math.inf if row["nu"] is None else row["nu"]} for row in document["rows"]
         ]
-        return from_json(cls, {**document, "rows": rows})
+        return from_fields(cls, {**document, "rows": rows})
 
     def with_row(self, row: BudgetRow) -> "UncertaintyBudget":
         """Return the budget with one row more, which then counts as assessed."""
@@ -303,7 +303,7 @@ class AccuracyFacts:
         look_nu: Its degrees of freedom.
     """
 
-    rows: Mapping[str, RowFact] = field(default_factory=dict)
+    rows: Mapping[str, RowFact] = field(default_factory=dict, hash=False)
     months: float | None = None
     by_contact: bool = False
     by_program: bool = False
@@ -415,4 +415,4 @@ class Accuracy:
         halves = document["half_width95"]
         values = halves.values() if isinstance(halves, Mapping) else halves
         rows = [{**row, "key": row["row"]} for row in document["rows"]]
-        return from_json(cls, {**document, "half_width95": values, "rows": rows})
+        return from_fields(cls, {**document, "half_width95": values, "rows": rows})

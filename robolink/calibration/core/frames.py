@@ -5,11 +5,13 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Final
 
+from robolink.calibration.core.pose_checks import refuses_by_name
 from robolink.model import Pose, ToolOffset, rotate_xy
 
 _NONE: Final[Mapping[int, ToolOffset]] = MappingProxyType({})
 
 
+@refuses_by_name
 def flange_pose(tip: Pose, offset: ToolOffset) -> Pose:
     """Return where the flange is when a four-axis robot's tool tip is at ``tip``.
 
@@ -28,6 +30,7 @@ def flange_pose(tip: Pose, offset: ToolOffset) -> Pose:
     )
 
 
+@refuses_by_name
 def tilted_flange_pose(tip: Pose, offset: ToolOffset) -> Pose:
     """Return where the flange is when a six-axis robot's tool is at ``tip``.
 
@@ -65,6 +68,7 @@ def tilted_from(written: ToolOffset, tip: ToolOffset) -> ToolOffset:
     return ToolOffset(x_mm, y_mm, z_mm)
 
 
+@refuses_by_name
 def flange_poses(
     poses: Sequence[Pose],
     *,
@@ -100,6 +104,7 @@ def _converted(
     return flange_of(pose, tools[pose.tool]) if pose.tool and pose.tool in tools else pose
 
 
+@refuses_by_name
 def in_base(pose: Pose, local: ToolOffset) -> Pose:
     """Return a pose of a local as a pose of the base: ``R_l p + p_l``, orientation ``R_l R``."""
     if (pose.v_deg, pose.w_deg, local.v_deg, local.w_deg) == (0.0, 0.0, 0.0, 0.0):
@@ -123,12 +128,14 @@ def in_base(pose: Pose, local: ToolOffset) -> Pose:
     return Pose(x_mm, y_mm, z_mm, *uvw, hand=pose.hand, tool=pose.tool, posture=pose.posture)
 
 
+@refuses_by_name
 def flange_of(tip: Pose, offset: ToolOffset) -> Pose:
     """Return where the flange is, on four axes and on more."""
     tilted = (tip.v_deg, tip.w_deg, offset.v_deg, offset.w_deg) != (0.0, 0.0, 0.0, 0.0)
     return tilted_flange_pose(tip, offset) if tilted else flange_pose(tip, offset)
 
 
+@refuses_by_name
 def tip_pose(flange: Pose, offset: ToolOffset, *, tool: int | None) -> Pose:
     """Return where a tool's tip is under a flange, on four axes and on more.
 
@@ -172,6 +179,7 @@ def tip_pose(flange: Pose, offset: ToolOffset, *, tool: int | None) -> Pose:
     )
 
 
+@refuses_by_name
 def seen_from(written: ToolOffset, tip: ToolOffset) -> ToolOffset:
     """Return where a tip is, seen from the frame of a written offset of a four-axis robot."""
     dx, dy = rotate_xy(tip.x_mm - written.x_mm, tip.y_mm - written.y_mm, -written.u_deg)

@@ -1,9 +1,10 @@
 """What makes poses and other numbers unfit, by name (docs/reference/calibration.md 3)."""
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
-from typing import Any
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar
 
 from robolink.errors import CalibrationError
 from robolink.messages import tr
@@ -25,6 +26,31 @@ _LIKE_A_NEEDLE_MM = 150.0
 
 UPRIGHT_WITHIN_DEG = 0.01
 """A flange that leans less is upright: at 120 mm of tool it moves the tip by 0.02 mm."""
+
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+
+
+def refuses_by_name(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Let a function say which argument is no ``Pose``, ``ToolOffset`` or other value it takes.
+
+    Its arguments are looked at when it has failed, so what is right costs nothing. It is for
+    functions that only calculate: what sends looks first (:func:`robolink.model.not_of_class`).
+    """
+
+    @wraps(function)
+    def refusing(*args: _P.args, **kwargs: _P.kwargs) -> _R:
+        try:
+            return function(*args, **kwargs)
+        except (AttributeError, TypeError) as error:
+            from robolink.model import misgiven
+
+            for wrong in misgiven(function, args, kwargs):
+                raise wrong from error
+            raise
+
+    return refusing
 
 
 def check_poses(
@@ -317,6 +343,7 @@ def angle_spread_deg(angles_deg: Sequence[float]) -> float:
     return 360.0 - max(gaps)
 
 
+@refuses_by_name
 def planar_sigma_gain(poses: Sequence[Pose]) -> float:
     """Return by how much a placement error counts in each offset axis; inf if for ever."""
     angles = [math.radians(heading_deg(pose)) for pose in poses]

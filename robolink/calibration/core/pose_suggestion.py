@@ -14,6 +14,7 @@ import numpy as np
 
 from robolink.calibration.core.dispersion import require_positive
 from robolink.calibration.core.least_squares import Floats
+from robolink.calibration.core.pose_checks import refuses_by_name
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.rotations import pose_arrays, rotations
 from robolink.errors import CalibrationError, ConfigError, LimitError
@@ -59,6 +60,7 @@ class PosePlan:
     sigma_gains: tuple[float, ...]
 
 
+@refuses_by_name
 def suggest_poses(
     count: int,
     *,

@@ -17,6 +17,7 @@ from robolink.calibration.core.pose_checks import (
     METRES_BELOW,
     check_frames,
     refuse_metres,
+    refuses_by_name,
     require_finite_poses,
 )
 from robolink.model import Pose
@@ -100,6 +101,7 @@ def _table_of_one_frame(poses: Sequence[Pose]) -> Floats | None:
     return np.frombuffer(b"".join(rows)).reshape(-1, 6) if len(rows) == len(poses) else None
 
 
+@refuses_by_name
 def rotation_of(pose: Pose) -> Floats:
     """Return the rotation of one pose."""
     matrix: Floats = rotations(np.array([pose.coordinates()[3:]]))[0]

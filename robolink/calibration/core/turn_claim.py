@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Final, Self
 
-from robolink.model import from_json, json_fields
+from robolink.model import from_fields, json_fields
 
 CONTRADICTS_REPEATABILITY: Final = "proof_contradicts_repeatability"
 CONTRADICTS_ACCURACY: Final = "proof_contradicts_accuracy"
@@ -150,7 +150,7 @@ class TurnJudgement:
         """
         later = {"tests": 1, "apart_mm": None, "shows_from_mm": None, "shows_z_from_mm": None}
         later |= {"misses_z": False, "accurate_mm": None}
-        return from_json(cls, {**later, **document, "code": document["code"] or ""})
+        return from_fields(cls, {**later, **document, "code": document["code"] or ""})
 
     def as_json(self) -> dict[str, object]:
         """Return it as plain values."""

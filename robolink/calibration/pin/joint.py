@@ -8,7 +8,7 @@ each alone; a tool may even have a single touch, if others find the pin
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from robolink.calibration.core.least_squares import Floats, LinearFit, linear_fi
 from robolink.calibration.core.pose_checks import (
     check_poses,
     components,
+    refuses_by_name,
     require_poses,
 )
 from robolink.calibration.core.result import CalibrationResult
@@ -64,8 +65,8 @@ class JointResult:
         factor95: What a standard deviation is multiplied by for half a 95 % interval.
     """
 
-    tools: Mapping[int, CalibrationResult]
-    pins_mm: Mapping[int, tuple[float, ...]]
+    tools: Mapping[int, CalibrationResult] = field(hash=False)
+    pins_mm: Mapping[int, tuple[float, ...]] = field(hash=False)
     covariance: tuple[tuple[float, ...], ...]
     factor95: float | None
 
@@ -89,6 +90,7 @@ class JointResult:
         return ToolDifference(vector, tuple(factor * math.sqrt(max(v, 0.0)) for v in variances))
 
 
+@refuses_by_name
 def solve_joint(
     touches: Sequence[JointTouch],
     *,

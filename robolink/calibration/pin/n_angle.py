@@ -36,6 +36,7 @@ from robolink.calibration.core.pose_checks import (
     WARN_ROTATION_DEG,
     check_rotation,
     components,
+    refuses_by_name,
     require_poses,
     some_on_their_head,
     tilted_pose,
@@ -155,6 +156,7 @@ ROBUST_POSES = 6
 _ONE = np.eye(2)
 
 
+@refuses_by_name
 def solve_n_angle(
     poses: Sequence[Pose],
     *,

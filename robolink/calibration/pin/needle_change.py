@@ -10,7 +10,12 @@ import math
 from dataclasses import dataclass, replace
 
 from robolink.calibration.core.dispersion import Dispersion, interval_of, require_positive
-from robolink.calibration.core.pose_checks import check_poses, components, require_finite
+from robolink.calibration.core.pose_checks import (
+    check_poses,
+    components,
+    refuses_by_name,
+    require_finite,
+)
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.rotations import rotation_of
 from robolink.calibration.core.statistics import NORMAL_95
@@ -121,6 +126,7 @@ def _region_mm(variance: float, lengths: int, sigma_mm: float) -> float | None:
     return None if scatter is None else scatter.region_mm(variance, lengths)
 
 
+@refuses_by_name
 def solve_needle_change(
     flange: Pose,
     before_mm: Point,

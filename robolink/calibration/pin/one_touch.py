@@ -13,7 +13,12 @@ import numpy as np
 
 from robolink.calibration.core.accuracy import ErrorSource
 from robolink.calibration.core.dispersion import Dispersion, interval_of
-from robolink.calibration.core.pose_checks import check_poses, components, require_finite
+from robolink.calibration.core.pose_checks import (
+    check_poses,
+    components,
+    refuses_by_name,
+    require_finite,
+)
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.rotations import rotation_of
 from robolink.calibration.flange_plane import require_flange_in_base
@@ -83,6 +88,7 @@ def one_touch_sources(count: int) -> tuple[ErrorSource, ...]:
     )
 
 
+@refuses_by_name
 def solve_one_touch(
     flange: Pose,
     pin: Pin,

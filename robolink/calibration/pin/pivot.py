@@ -36,6 +36,7 @@ from robolink.calibration.core.pose_checks import (
     angle_spread_deg,
     components,
     refuse_radians,
+    refuses_by_name,
     require_poses,
 )
 from robolink.calibration.core.result import CalibrationResult, ResidualVectors
@@ -65,7 +66,7 @@ _RANK_BELOW = 1e-9
 """1 - s below this is a direction that the rotations leave alone."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)  # arrays are no values
 class PivotDesign:
     """What the orientations of the poses allow, before any position is looked at.
 
@@ -86,7 +87,7 @@ class PivotDesign:
     mean: Floats
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)  # arrays are no values
 class PivotFit:
     """Tip and pivot point, mm, with the residual vector of every pose in base axes."""
 
@@ -267,6 +268,7 @@ ROBUST_POSES = 7
 _CLEARLY_ALONG = 0.98
 
 
+@refuses_by_name
 def solve_pivot(
     poses: Sequence[Pose],
     *,

@@ -14,7 +14,7 @@ import numpy as np
 
 from robolink.calibration.core.dispersion import require_positive
 from robolink.calibration.core.least_squares import Floats, sensitivity
-from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured
+from robolink.calibration.core.pose_checks import check_poses, keep_unmeasured, refuses_by_name
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.rotations import pose_arrays, rotation_of, uvw_deg
 from robolink.calibration.pin.pivot import UNKNOWNS, fit_pivot, pivot_design, solve_pivot
@@ -33,6 +33,7 @@ GOOD_WAY_MM: Final = 50.0
 _TURNED_DEG: Final = 0.01
 
 
+@refuses_by_name
 def axis_displacement(start: Pose, end: Pose, *, wanted_mm: float | None = None) -> Floats:
     """Return the way of the flange in its own axes, mm.
 
@@ -141,6 +142,7 @@ class ToolAxis:
         return math.degrees(math.atan2(math.hypot(x, y), z))
 
 
+@refuses_by_name
 def solve_six_point(
     pivot_poses: Sequence[Pose],
     along_x: Pose,
@@ -231,6 +233,7 @@ def solve_six_point(
     return _doubted(result, (x_axis, second_axis))
 
 
+@refuses_by_name
 def solve_tool_axis(first: Pose, second: Pose, *, sigma_mm: float | None = None) -> ToolAxis:
     """Return the direction of a tool axis along which the tip went from ``first`` to ``second``.
 

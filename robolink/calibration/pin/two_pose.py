@@ -27,6 +27,7 @@ from robolink.calibration.core.pose_checks import (
     heading_deg,
     on_its_head,
     planar_sigma_gain,
+    refuses_by_name,
 )
 from robolink.calibration.core.result import CalibrationResult
 from robolink.errors import CalibrationError, ConfigError
@@ -34,6 +35,7 @@ from robolink.messages import tr
 from robolink.model import Pose, ToolOffset, angle_difference_deg, rotate_xy
 
 
+@refuses_by_name
 def solve_two_pose(
     first: Pose,
     second: Pose,

@@ -19,6 +19,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from robolink.calibration.core.pose_checks import refuses_by_name
 from robolink.calibration.core.result import CalibrationResult
 from robolink.errors import CalibrationError
 from robolink.messages import tr
@@ -168,6 +169,7 @@ class ToolFit:
     apart_mm: float = 0.0
 
 
+@refuses_by_name
 def tool_fits(
     result: CalibrationResult,
     *,

@@ -34,6 +34,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Final
 
+from robolink.calibration.core.pose_checks import refuses_by_name
 from robolink.calibration.core.result import CalibrationResult
 from robolink.errors import CalibrationError
 from robolink.messages import tr
@@ -205,7 +206,7 @@ class Impact:
 
     entries: tuple[PointImpact, ...]
     undefined: tuple[int, ...] = ()
-    other_local: Mapping[int, int] = field(default_factory=dict)
+    other_local: Mapping[int, int] = field(default_factory=dict, hash=False)
 
     @property
     def largest(self) -> PointImpact | None:
@@ -229,6 +230,7 @@ class Impact:
         return None if self.alike else self.largest
 
 
+@refuses_by_name
 def impact_on(points: Mapping[int, Pose | None], *, old: ToolOffset, new: ToolOffset) -> Impact:
     """Return what replacing ``old`` by ``new`` does at ``points``.
 

@@ -76,6 +76,9 @@ class StationPart:
     dof: float = math.inf
     origin: str = ""
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "covariance", tuple(map(tuple, self.covariance)))
+
 
 def with_station(result: ResultT, *parts: StationPart) -> ResultT:
     """Return a result whose covariance, intervals, region and budget hold its stations too.

@@ -8,6 +8,7 @@ from robolink.calibration.core.pose_checks import (
     WARN_ROTATION_DEG,
     angle_spread_deg,
     check_poses,
+    refuses_by_name,
     require_poses,
 )
 from robolink.calibration.core.result import Drift, VerifyResult
@@ -22,6 +23,7 @@ PLACING_TOLERANCE_MM = 0.1
 RECOMMENDED_ANGLES = 4
 
 
+@refuses_by_name
 def verify_drift(
     poses: Sequence[Pose],
     offset: ToolOffset,

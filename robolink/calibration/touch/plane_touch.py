@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from robolink.calibration.core.least_squares import Floats, LinearFit, linear_fit
+from robolink.calibration.core.pose_checks import refuses_by_name
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.rotations import pose_arrays
 from robolink.calibration.quality.doubts import Tolerance
@@ -76,6 +77,7 @@ class _State:
     distance: float
 
 
+@refuses_by_name
 def solve_plane_touch(
     poses: Sequence[Pose],
     *,

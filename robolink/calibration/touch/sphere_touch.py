@@ -12,6 +12,7 @@ import numpy as np
 
 from robolink.calibration.core.dispersion import require_positive
 from robolink.calibration.core.least_squares import Floats, LinearFit, linear_fit
+from robolink.calibration.core.pose_checks import refuses_by_name
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.rotations import pose_arrays
 from robolink.calibration.quality.doubts import Tolerance
@@ -57,6 +58,7 @@ class _State:
     radius: float
 
 
+@refuses_by_name
 def solve_sphere_touch(
     poses: Sequence[Pose],
     *,

@@ -25,7 +25,12 @@ import numpy as np
 
 from robolink.calibration.core.accuracy import DIVISORS, BudgetRow, ErrorSource, UncertaintyBudget
 from robolink.calibration.core.least_squares import Floats, LinearFit, linear_fit
-from robolink.calibration.core.pose_checks import components, require_finite, require_poses
+from robolink.calibration.core.pose_checks import (
+    components,
+    refuses_by_name,
+    require_finite,
+    require_poses,
+)
 from robolink.calibration.core.result import CalibrationResult
 from robolink.calibration.core.statistics import NORMAL_95, f_quantile, shifted_half95, student_t95
 from robolink.calibration.flange_plane import FlangePlane, TipHeight, solvable_planes
@@ -237,6 +242,7 @@ class ZTouchResult(CalibrationResult):
     f_limit: float | None = None
 
 
+@refuses_by_name
 def solve_z_touch(
     touches: Sequence[Touch],
     surface_z_mm: float,

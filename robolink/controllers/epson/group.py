@@ -27,6 +27,7 @@ from robolink.model import (
     Path,
     Pose,
     WorkBox,
+    require_target,
 )
 from robolink.protocols import spel
 from robolink.remedy_words import RemedyWord, remedy_word
@@ -75,14 +76,14 @@ class EpsonGroup(MotionGroupCore):
 
     def move_to(self, target: Pose, profile: MotionProfile, *, box: WorkBox) -> EpsonMotion:
         """Start one movement; see :class:`robolink.model.MotionGroup`."""
-        box.check(target)
+        require_target(target, box, profile)
         return self._start(target, profile, self._statement_for(target, profile))
 
     def move_until_input(
         self, target: Pose, edge: InputEdge, *, speed_mm_s: float, box: WorkBox
     ) -> EpsonMotionUntilInput:
         """Start a straight movement until an input switches; see the model."""
-        box.check(target)
+        require_target(target, box)
         link, window = self._link, self._link.window
         statement = self._statement_until(target, edge)
 

@@ -9,7 +9,7 @@ Global Preserve variables, and they are read with GetVariable, which changes not
 
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 from robolink.controllers.epson.link import EpsonLink
@@ -20,7 +20,7 @@ from robolink.controllers.tool_table import ToolTableCore
 from robolink.controllers.tool_writing import Same, ToolWrite
 from robolink.errors import RejectedError, RemoteProtocolError, ToolError
 from robolink.messages import tr
-from robolink.model import Expected, ToolOffset, ToolReceipt
+from robolink.model import Expected, ToolOffset, ToolReceipt, require_offset
 from robolink.protocols import spel
 from robolink.protocols.epson_text import ErrorCode, Request, VariableType
 
@@ -53,6 +53,7 @@ class EpsonToolTable(ToolTableCore):
         """Tell whether this controller prints both alike; undefined equals undefined only."""
         if a is None or b is None:
             return a is b
+        require_offset("a", a)
         return a.matches(b, TOLERANCE)
 
     def read_all(self) -> dict[int, ToolOffset | None]:
@@ -204,7 +205,7 @@ class PublishedTools:
         publication: A count that grows with each publication of something new.
     """
 
-    tools: Mapping[int, ToolOffset | None]
+    tools: Mapping[int, ToolOffset | None] = field(hash=False)
     selected: int
     robot: int
     publication: int

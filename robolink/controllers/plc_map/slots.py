@@ -18,7 +18,7 @@ from robolink.errors import (
     ToolError,
 )
 from robolink.messages import tr
-from robolink.model import ToolOffset, angle_difference_deg
+from robolink.model import ToolOffset, angle_difference_deg, require_offset
 from robolink.register_maps import (
     ANGLES,
     COMPONENTS,
@@ -141,6 +141,8 @@ class OffsetValues:
         """
         if a is None or b is None:
             return a is b
+        require_offset("a", a)
+        require_offset("b", b)
         pairs = zip(COMPONENTS, a.components(), b.components(), strict=True)
         return all(self._alike(name, first, second) for name, first, second in pairs)
 

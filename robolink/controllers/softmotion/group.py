@@ -25,7 +25,15 @@ from robolink.controllers.softmotion.movement import (
 )
 from robolink.errors import ConfigError, ControllerError, ReadBackError, StoppedError
 from robolink.messages import tr
-from robolink.model import InputEdge, MotionProfile, MotionTerms, Path, Pose, WorkBox
+from robolink.model import (
+    InputEdge,
+    MotionProfile,
+    MotionTerms,
+    Path,
+    Pose,
+    WorkBox,
+    require_target,
+)
 from robolink.protocols.mailbox import (
     BufferMode,
     Command,
@@ -104,7 +112,7 @@ class SoftMotionGroup(MotionGroupCore):
         Raises:
             BusyError: The ends of four movements are not taken yet.
         """
-        box.check(target)
+        require_target(target, box, profile)
         return self._start(target, self._move_draft(target, profile))
 
     def requests_for(self, target: Pose, profile: MotionProfile) -> tuple[str, ...]:
@@ -115,7 +123,7 @@ class SoftMotionGroup(MotionGroupCore):
         self, target: Pose, edge: InputEdge, *, speed_mm_s: float, box: WorkBox
     ) -> SoftMotionMotionUntilInput:
         """Start a straight movement until an input switches (opcode 30008); see the model."""
-        box.check(target)
+        require_target(target, box)
         draft = self._until_draft(target, edge, speed_mm_s)
         on = SoftMotionIo(self._mailbox).read_input(edge.number)
         edge.require_ahead(on, controller=self._mailbox.identity, request=describe(draft))

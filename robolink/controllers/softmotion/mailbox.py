@@ -19,7 +19,7 @@ from robolink.controllers.softmotion.snapshots import Snapshots
 from robolink.controllers.softmotion.wire import MailboxWire
 from robolink.errors import RejectedError, RemoteProtocolError
 from robolink.messages import tr
-from robolink.model import Identity, OutcomeLog, Pose, ToolOffset, of_no_tool
+from robolink.model import Identity, OutcomeLog, Pose, ToolOffset, of_no_tool, require_offset
 from robolink.protocols.mailbox import (
     Bits,
     Command,
@@ -171,6 +171,8 @@ class Mailbox(DriverLink):
         """Tell whether this PLC holds both alike; rotations are compared as matrices."""
         if a is None or b is None:
             return a is b
+        require_offset("a", a)
+        require_offset("b", b)
         return a == b or frames_match(self.to_plc(a), self.to_plc(b), tolerance=TOLERANCE)
 
     def to_plc(self, offset: ToolOffset) -> Six:

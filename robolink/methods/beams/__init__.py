@@ -25,7 +25,7 @@ from robolink.methods.method import (
     Site,
 )
 from robolink.methods.shared_parameters import SampledParameters
-from robolink.model import MotionGroup, Pose, ToolOffset, angle_difference_deg
+from robolink.model import MotionGroup, Pose, ToolOffset, angle_difference_deg, checks_arguments
 from robolink.procedures import (
     InputSource,
     MeasurementContext,
@@ -342,6 +342,7 @@ class BeamsSource(InputSource[BeamsParameters]):
         )
 
 
+@checks_arguments
 def measure_beams(
     station: BeamStation,
     plan: BeamsParameters,

@@ -29,7 +29,7 @@ from robolink.calibration import (
 from robolink.methods.beams import BeamsParameters, BeamsSource
 from robolink.methods.beams.crossings import CrossingSampler
 from robolink.methods.beams.drive import BeamDrive, BeamTravel
-from robolink.model import Pose, ToolOffset
+from robolink.model import Pose, ToolOffset, checks_arguments
 from robolink.procedures import NO_OFFSET, PlacedProof, sample_sequentially
 from robolink.runner import Procedure
 from robolink.stations import BeamStation
@@ -56,6 +56,7 @@ def cross_beams(
     return (yield from sample_sequentially(crossings, first, scans, plan.sampling))
 
 
+@checks_arguments
 def trace_beams(
     guess: BeamStation,
     plan: BeamsParameters,
@@ -105,6 +106,7 @@ def trace_beams(
     return find_beams(crossings, (tip.x_mm, tip.y_mm), tip_sigma_mm=tip_sigma_mm)
 
 
+@checks_arguments
 def verify_by_crossing(
     station: BeamStation,
     plan: BeamsParameters,

@@ -23,7 +23,7 @@ from robolink.methods.method import (
 )
 from robolink.methods.one_touch.solvers import Absolute, Difference
 from robolink.methods.shared_parameters import PinParameters
-from robolink.model import Pose, ToolOffset
+from robolink.model import Pose, ToolOffset, checks_arguments
 from robolink.procedures import (
     MeasurementContext,
     PinTouches,
@@ -93,6 +93,7 @@ class OneTouchParameters(PinParameters):
         return tr("cannot be judged: one touch cannot be checked; limit the interval")
 
 
+@checks_arguments
 def measure_one_touch(
     plan: TouchPlan,
     *,

@@ -24,7 +24,7 @@ from robolink.model import (
     Recorded,
     ToolOffset,
     describe_offset,
-    from_json,
+    from_fields,
     read_offset,
 )
 from robolink.remedy_words import RemedyWord, remedy_word
@@ -150,7 +150,7 @@ def _last_touch(entry: Recorded, station: str) -> LastTouch | None:
         u_deg=float(said["u_deg"]),
         value=value,
         # Records of before do not say ``full_sigma_mm``; their chain starts where it had got to.
-        chain=from_json(NeedleChain, said, partial=True),
+        chain=from_fields(NeedleChain, said, partial=True),
         touch_sigma_mm=None if sigma_mm is None else float(sigma_mm),
         nozzle=entry.signature.nozzle,
         at=entry.at,

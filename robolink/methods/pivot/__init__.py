@@ -21,7 +21,7 @@ from robolink.methods.method import (
     Site,
 )
 from robolink.methods.shared_parameters import PinParameters, Retake
-from robolink.model import Controller, Pose, ToolOffset
+from robolink.model import Controller, Pose, ToolOffset, checks_arguments
 from robolink.procedures import (
     TAKE_ALL,
     PinSource,
@@ -168,6 +168,7 @@ class PivotSource(PinSource):
         return result
 
 
+@checks_arguments
 def measure_pivot(
     plan: TouchPlan,
     *,

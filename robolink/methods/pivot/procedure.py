@@ -29,7 +29,7 @@ from robolink.methods.pivot.tilts import (
     tilt_in_air,
     tilts_in_reach,
 )
-from robolink.model import Pose, ToolOffset
+from robolink.model import Pose, ToolOffset, checks_arguments
 from robolink.procedures import (
     MOST_MORE,
     DriftProof,
@@ -102,6 +102,7 @@ def retake_pivot(
     return result
 
 
+@checks_arguments
 def verify_by_tilting(
     plan: TouchPlan,
     *,

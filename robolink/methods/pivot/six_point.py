@@ -15,7 +15,7 @@ from robolink.errors import CalibrationError
 from robolink.messages import declared, joined, tr
 from robolink.methods.method import MM, Help, Method, Needs, Option, PoseHelp, Site
 from robolink.methods.pivot import PivotParameters, PivotSource, require_known_tip
-from robolink.model import Path, Pose, ToolOffset
+from robolink.model import Path, Pose, ToolOffset, checks_arguments
 from robolink.procedures import TAKE_ALL, SamplingPolicy, TouchPlan, approach_path, offset_z
 from robolink.runner import Ask, Confirm, Move, Notify, Procedure, TeachPrompt, TouchedAt
 from robolink.stations import StationKind
@@ -159,6 +159,7 @@ class SixPointSource(PivotSource):
         return result
 
 
+@checks_arguments
 def measure_six_point(
     plan: TouchPlan,
     ways: AxisTeachPlan,

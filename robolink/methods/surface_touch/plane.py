@@ -13,7 +13,7 @@ from robolink.methods.method import MM, Check, Help, Method, Needs, Option, Pose
 from robolink.methods.pivot import TiltedTouches
 from robolink.methods.surface_touch import SurfaceParameters, SurfaceTouchSource, told_at
 from robolink.methods.surface_touch.survey import PlaneSurvey
-from robolink.model import Pose, ToolOffset
+from robolink.model import Pose, ToolOffset, checks_arguments
 from robolink.procedures import (
     TAKE_ALL,
     ProofBasis,
@@ -124,6 +124,7 @@ class PlaneTouchSource(SurfaceTouchSource[PlaneSurvey, "PlaneTouchResult"]):
         return PLANE
 
 
+@checks_arguments
 def measure_plane_touch(
     plan: TouchPlan,
     survey: PlaneSurvey,

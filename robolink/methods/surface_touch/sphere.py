@@ -13,7 +13,7 @@ from robolink.methods.method import MM, Check, Help, Method, Needs, Option, Pose
 from robolink.methods.pivot import TiltedTouches
 from robolink.methods.surface_touch import SurfaceParameters, SurfaceTouchSource, told_at
 from robolink.methods.surface_touch.survey import SphereSurvey
-from robolink.model import Pose, ToolOffset
+from robolink.model import Pose, ToolOffset, checks_arguments
 from robolink.procedures import (
     TAKE_ALL,
     ProofBasis,
@@ -135,6 +135,7 @@ class SphereTouchSource(SurfaceTouchSource[SphereSurvey, "SphereTouchResult"]):
         return SPHERE
 
 
+@checks_arguments
 def measure_sphere_touch(
     plan: TouchPlan,
     survey: SphereSurvey,

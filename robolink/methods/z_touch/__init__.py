@@ -24,7 +24,7 @@ from robolink.methods.method import (
     Site,
 )
 from robolink.methods.shared_parameters import SampledParameters, clearance_below_lift
-from robolink.model import Pose, ToolOffset
+from robolink.model import Pose, ToolOffset, checks_arguments
 from robolink.procedures import (
     InputSource,
     MeasurementContext,
@@ -222,6 +222,7 @@ class ZTouchSource(InputSource[ZTouchParameters]):
         )
 
 
+@checks_arguments
 def measure_z_touch(
     station: TouchStation,
     plan: ZTouchParameters,

@@ -20,7 +20,7 @@ from robolink.calibration import (
 )
 from robolink.messages import tr
 from robolink.methods.z_touch import ZTouchParameters, ZTouchSource
-from robolink.model import Path, Pose, ToolOffset
+from robolink.model import Path, Pose, ToolOffset, checks_arguments
 from robolink.procedures import (
     NO_OFFSET,
     PlacedProof,
@@ -45,6 +45,7 @@ def touch_surface(
     return (yield from sample_sequentially(probing, first, speeds_mm_s, source.plan.sampling))
 
 
+@checks_arguments
 def verify_by_touching(
     station: TouchStation,
     plan: ZTouchParameters,

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from robolink.errors import OutcomeUnknownError
+from robolink.errors import JournalError, OutcomeUnknownError
 from robolink.journal import ChainVerification, open_journal
 from robolink.journal.store.migrations import MIGRATIONS
 from robolink.model import EntryKind, Marker, MarkerKind, NewEntry
@@ -30,25 +30,66 @@ LATER = {
 ADDRESS = "epson+tcp://192.0.2.1:5000"
 
 
-@pytest.fixture(params=[1, 2, 3])
-def made_before(request, tmp_path):
-    """A journal of each form."""
-    path = tmp_path / "journal.db"
+def file_of(form, folder):
+    """Return a journal of this form, with the entries that an earlier robolink wrote."""
+    path = folder / "journal.db"
     with closing(sqlite3.connect(path)) as file:
         file.executescript(FORM_1.read_text(encoding="utf-8"))
-        for form in range(2, request.param + 1):
-            for statement in LATER[form]:
+        for later in range(2, form + 1):
+            for statement in LATER[later]:
                 file.execute(statement)
-        file.execute("UPDATE schema_version SET version = ?", (request.param,))
+        file.execute("UPDATE schema_version SET version = ?", (form,))
         file.commit()
     return path
 
 
+def held(path):
+    """What a file holds, as another program sees it."""
+    with closing(sqlite3.connect(path)) as file:
+        return [*file.iterdump()]
+
+
+@pytest.fixture(params=[1, *LATER])
+def made_before(request, tmp_path):
+    """A journal of each form."""
+    return file_of(request.param, tmp_path)
+
+
+def test_every_form_is_held_against_this_version():
+    assert [1, *LATER] == [*range(1, len(MIGRATIONS) + 1)], "record here what a new form adds"
+
+
 def test_it_is_read_as_it_stands(made_before, open_anew):
+    before = held(made_before)
     reader = open_anew(str(made_before), read_only=True)
     assert reader.verify() == ChainVerification(3, ())
+    third, second, first = reader.entries()
+    assert (first.kind, first.operation, first.tool) == (EntryKind.INTENT, "a1", 3)
+    assert (second.kind, second.change, second.tool) == (EntryKind.DONE, "c1", 3)
+    assert (second.at, second.verdict) == ("2026-11-29T03:26:16.339+00:00", "gleich ä 机")
+    assert third.details == {"request": "TLSet 4, XY(1, 2, 3, 4)", "tool": 4}
+    assert {it.controller for it in (first, second, third)} == {ADDRESS}
+    signed = {(it.signature.operator, it.signature.nozzle) for it in (first, second, third)}
+    assert signed == {("4711", "N7")}
     assert reader.last_value(ADDRESS, 3).details == {"value": {"x_mm": 1.25}}
     assert [known.operation for known in reader.log(ADDRESS).open_markers()] == ["b2"]
+    assert held(made_before) == before
+
+
+def test_one_of_the_future_is_read_as_far_as_it_is_understood_and_never_written(
+    tmp_path, open_anew, monkeypatch
+):
+    newest = len(MIGRATIONS)
+    monkeypatch.setitem(LATER, newest + 1, ("ALTER TABLE entries ADD COLUMN witness TEXT",))
+    path = file_of(newest + 1, tmp_path)
+    before = held(path)
+    known = f"form {newest + 1}; this robolink knows forms up to {newest}"
+    with pytest.raises(JournalError, match=known) as caught:
+        open_anew(str(path))
+    assert "Install the newer robolink" in caught.value.remedy
+    reader = open_anew(str(path), read_only=True)
+    assert [it.number for it in reader.entries()] == [3, 2, 1]
+    assert held(path) == before
 
 
 def test_it_goes_on_where_it_ended(made_before, open_anew):

@@ -341,7 +341,6 @@ def a_fault_plan(stack: ExitStack) -> dict[str, Any]:
 MAKERS = {
     "README.md 1": with_password,
     "simulators/README.md 1": nothing,
-    "records.md 1": nothing,
     "reference/sensors.md 1": above_two_beams,
     "reference/sensors.md 2": nothing,
     "reference/cameras.md 1": lambda stack: {"SpotUnit": SpotUnit, "Spot": Spot, "TIP": TIP},
@@ -371,8 +370,9 @@ MAKERS = {
     "mailbox.md 2": a_connected_plc,
     "spel-programs.md 1": nothing,
     "spel-programs.md 2": nothing,
-    "stopping.md 1": with_password,
-    "stopping.md 2": with_password,
+    "reference/backups.md 1": nothing,
+    "reference/stopping.md 1": with_password,
+    "reference/stopping.md 2": with_password,
     "reference/structured_text.md 1": nothing,
 }
 

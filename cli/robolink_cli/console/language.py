@@ -1,8 +1,8 @@
 """In which language this command speaks, and whether the console can show it.
 
 ``--lang``, ROBOLINK_LANG, ``language`` in the cell file or the user's, what the system is set to;
-what names no language that we have is English (docs/wizard.md). Nothing of it is looked at
-before the first sentence is made, so a stop has sent its frame by then.
+what names no language that we have is English (docs/reference/languages.md 1). Nothing of it is
+looked at before the first sentence is made, so a stop has sent its frame by then.
 """
 
 import os

@@ -23,8 +23,8 @@ made from the catalogue in `tests/faults/catalogue/rows` and the marks of the te
 printed as *not run*, with the reason. All of it is checked against the simulators, not against a
 robot or a PLC, and on Linux: what of it holds on another system, no row shows. *Unproved* means
 exit code 6: it may or may not have happened, and nothing moves on that controller until somebody
-has looked ([records](records.md)). Tests marked *soak* take long; they run with `make faults` and
-`make soak`, not with `make test`.
+has looked ([recovery](reference/recovery.md)). Tests marked *soak* take long; they run with
+`make faults` and `make soak`, not with `make test`.
 """
 _HEAD: Final = (
     "| | fault | what you see | what never happens | how it is brought about | shown by |",

@@ -102,7 +102,7 @@ def ask_yes_no_or(
 class Asking:
     """Questions to one person.
 
-    Whoever asks through it cannot forget the record (docs/journal.md, "What was answered").
+    Whoever asks through it cannot forget the record (docs/reference/journal.md 6).
 
     Attributes:
         operator: Who is asked.

@@ -238,7 +238,8 @@ def test_a_slope_is_told_from_the_level_on_that_was_chosen_on_both_sides():
         assert (trend and set(trend.moved_mm)) == told
 
 
-# How often a steady cell is suspected, and how soon a change is seen; for docs/accuracy.md.
+# How often a steady cell is suspected, and how soon a change is seen; for
+# docs/reference/accuracy.md 5.
 
 RUNS, BEFORE, UNTIL = 300, 25, 55
 

@@ -98,7 +98,7 @@ if TYPE_CHECKING:  # what no command needs before something stands on a controll
 
 
 class RobolinkError(Exception):
-    """Root of the tree.
+    """Base class of all robolink errors.
 
     Args:
         what: What happened, one sentence.
@@ -130,13 +130,13 @@ class RobolinkError(Exception):
         return f"{self.what} {self.remedy}".rstrip()
 
     def concern(self, controller: str, request: str = "") -> None:
-        """Name the controller and the request, where neither was named nearer to the cause."""
+        """Name the controller and the request, unless they were named nearer to the cause."""
         self.controller = self.controller or controller
         self.request = self.request or request
 
     @property
     def controller_state(self) -> "ControllerOutcome":
-        """What stands on the controller now, of what was done to it in the block that this ended.
+        """What the block that this error ended left on the controller.
 
         That is a write, a change, a procedure or a whole connection, whichever was the outermost
         that this error has left.
@@ -153,7 +153,7 @@ class RobolinkError(Exception):
 
 
 class Concerning:
-    """Lets each error that leaves the block name the controller and the request.
+    """Adds the controller and the request to each error that leaves the block.
 
     What a driver raises inside says what happened; this says of whom, once, at its border. No
     generator: every procedure passes here.
@@ -185,11 +185,11 @@ class ConfigError(RobolinkError, ValueError):
 
 
 class LimitError(ConfigError):
-    """A target, a step or a change lies outside the limits in force. Nothing was sent."""
+    """A target, a step or a change exceeds a limit. Nothing was sent."""
 
 
 class AmbiguousPosesError(ConfigError):
-    """A file of poses can be read in more than one way. Nothing was guessed, nothing was sent.
+    """A file of poses can be read in more than one way. Nothing was guessed or sent.
 
     Attributes:
         asks: What the file does not say: ``columns``, ``length``, ``euler``.
@@ -203,7 +203,7 @@ class AmbiguousPosesError(ConfigError):
 
 
 class NotComparedError(ConfigError):
-    """A write would change what nobody has compared with the machine's own screen.
+    """A write would change a value that nobody has compared with the machine's own screen.
 
     Nothing was sent.
 
@@ -231,15 +231,15 @@ class JournalError(ConfigError):
 
 
 class TransportError(RobolinkError):
-    """The wire failed."""
+    """The connection failed."""
 
 
 class ConnectError(TransportError, ConnectionError):
-    """No link could be made."""
+    """No connection could be made."""
 
 
 class LoginUnansweredError(ConnectError):
-    """The port answers, the login does not.
+    """The port answers, but the login does not.
 
     EPSON controllers serve one remote client at a time (docs/reference/epson.md 1.1); what a second
     one sees is not documented, so silence and a closed connection both end here.
@@ -247,7 +247,7 @@ class LoginUnansweredError(ConnectError):
 
 
 class TransportTimeoutError(TransportError, TimeoutError):
-    """Nothing came before the deadline. The link is unusable from here on."""
+    """Nothing came before the deadline. The link cannot be used again."""
 
 
 class TransportClosedError(TransportError):
@@ -259,7 +259,7 @@ class TransportBrokenError(TransportError):
 
 
 class ProtocolError(RobolinkError):
-    """Root of the two protocol errors; never raised as such."""
+    """Base class of the two protocol errors; never raised itself."""
 
 
 class LocalProtocolError(ProtocolError):
@@ -267,7 +267,7 @@ class LocalProtocolError(ProtocolError):
 
 
 class RemoteProtocolError(ProtocolError):
-    """The far side sent something that makes no sense. The session is over."""
+    """The far side sent something invalid. The session is over."""
 
 
 class UnclearAnswerError(ProtocolError):
@@ -280,7 +280,7 @@ class UnclearAnswerError(ProtocolError):
 
 
 class ControllerError(RobolinkError):
-    """The controller, or a check of its state, said no.
+    """The controller refused, or a check of its state did.
 
     Attributes:
         code: The controller's own number, 0 when there is none.
@@ -305,11 +305,11 @@ class RejectedError(ControllerError):
 
 
 class LoginRefusedError(RejectedError):
-    """The password is wrong or missing. One attempt was made, no more will be."""
+    """The password is wrong or missing. One login was attempted, no more will be."""
 
 
 class NotReadyReason(StrEnum):
-    """Why a command was held back before it was sent."""
+    """Why a command was not sent."""
 
     NOT_REMOTE = "not_remote"
     TEACH = "teach"
@@ -334,7 +334,7 @@ class NotReadyReason(StrEnum):
 
 
 class NotReadyError(ControllerError):
-    """The controller's state would not allow the command, so it was not sent.
+    """The controller's state does not allow the command, so it was not sent.
 
     Attributes:
         reason: The named state.
@@ -355,7 +355,7 @@ class NotReadyError(ControllerError):
 
 
 class ControllerFaultError(ControllerError):
-    """The controller went into, or is in, its error state."""
+    """The controller is in its error state, or has just entered it."""
 
 
 class HeartbeatLostError(ControllerFaultError):
@@ -370,7 +370,7 @@ class MotionTimeoutError(ControllerError):
 
 
 class BusyError(ControllerError):
-    """Another operation holds the controller. Nothing was sent."""
+    """Another operation has the controller locked. Nothing was sent."""
 
 
 class LeaseHeldError(BusyError):
@@ -384,18 +384,18 @@ class LeaseHeldError(BusyError):
 
 
 class LeaseLostError(BusyError):
-    """Another took the controller over, or changed it since it was looked at. Nothing was sent."""
+    """Another user took the controller over, or changed it since it was read. Nothing was sent."""
 
 
 class OutcomeUnknownError(RobolinkError):
-    """A command went out and no answer came: it may or may not have run.
+    """A command was sent and no answer came: it may or may not have run.
 
     Motion on that controller is blocked until ``recover``; nothing is sent again.
     """
 
 
 class StoppedError(RobolinkError):
-    """A stop came: from another thread, another terminal or a person.
+    """A stop from another thread, another terminal or a person.
 
     What was under way was ended by it, and nothing that moves or writes leaves this process
     until the stop is released.
@@ -403,15 +403,15 @@ class StoppedError(RobolinkError):
 
 
 class ToolError(RobolinkError):
-    """Something about a tool."""
+    """Base class of errors about a tool."""
 
 
 class ToolIndexError(ToolError, ValueError):
-    """No such tool number."""
+    """There is no tool with this number."""
 
 
 class SelectedToolError(ToolError):
-    """The tool in force was not cleared: nobody said which one takes its place."""
+    """The selected tool was not cleared: no replacement was named."""
 
 
 class ReservedToolError(ToolError):
@@ -447,7 +447,7 @@ class CalibrationError(RobolinkError):
 
 
 class VerifyError(RobolinkError):
-    """The tip was not proved by turning about it; the old value was put back.
+    """The turn test did not confirm the tip; the old value was restored.
 
     Attributes:
         code: The named reason: ``large_drift``, ``drift_undecided``, ``not_touched`` ..; empty
@@ -465,8 +465,8 @@ class VerifyError(RobolinkError):
 
 
 class DeclinedError(RobolinkError):
-    """A person, or the absence of one, said no."""
+    """A person declined, or nobody could be asked."""
 
 
 class NotAllowedError(DeclinedError):
-    """It takes an engineer, by the people or the limits of the cell file. Nothing was sent."""
+    """Only an engineer may do this, by the people or limits of the cell file. Nothing was sent."""

@@ -1,4 +1,4 @@
-"""What a backup holds, taking one, and what differs from the tools of a controller."""
+"""What a backup contains, taking one, and its differences from a controller's tools."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ one."""
 
 
 class ToolHolder(Protocol):
-    """The side of a controller that backups need."""
+    """What backups need of a controller."""
 
     @property
     def identity(self) -> str:
@@ -76,7 +76,7 @@ class Backup:
 
 
 def read_tools(controller: ToolHolder) -> ToolState:
-    """Read all tools and which one is in force.
+    """Read all tools and which one is selected.
 
     Raises:
         NotReadyError: The controller cannot be asked now, for example because a program runs.
@@ -87,7 +87,7 @@ def read_tools(controller: ToolHolder) -> ToolState:
 
 
 def take_backup(controller: ToolHolder) -> Backup:
-    """Read everything that a backup holds; changes nothing.
+    """Read everything that a backup contains; changes nothing.
 
     Raises:
         NotReadyError: As for :func:`read_tools`.
@@ -174,7 +174,7 @@ class ToolComparison:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """All tools, and the one in force.
+    """All tools, and the selected one.
 
     Attributes:
         tools: One each, in order.
@@ -195,12 +195,12 @@ class Comparison:
 
     @property
     def same_selection(self) -> bool:
-        """Whether the same tool is in force."""
+        """Whether the same tool is selected."""
         return self.expected_selected == self.found_selected
 
     @property
     def equal(self) -> bool:
-        """Whether nothing differs that counts."""
+        """Whether there is no difference that counts."""
         return not self.differing and (self.same_selection or not self.selection_counts)
 
 
@@ -211,7 +211,7 @@ def compare(
     *,
     selection_counts: bool = True,
 ) -> Comparison:
-    """Compare what a file holds with what a controller holds.
+    """Compare the tools in a backup with those of a controller.
 
     Args:
         expected: From the file.

@@ -1,4 +1,4 @@
-"""From a URL to a controller, by whatever opens controllers of the kind that it names.
+"""From a URL to a controller, by the opener of the kind that it names.
 
 Kinds that this package brings stand in a table and are imported when they are named; all others
 are found in the entry-point group ``robolink.controllers``, by the full scheme of the URL
@@ -56,7 +56,7 @@ _KINDS: Final = {
 
 
 class OpenLink(Protocol):
-    """What has to be known of a link to keep a record of what it leads to."""
+    """What has to be known of a link to keep a record of its far end."""
 
     @property
     def identity(self) -> str:
@@ -72,7 +72,7 @@ class OpenLink(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class ConnectionTerms:
-    """On what terms a controller is connected to; see :func:`robolink.connect`.
+    """The terms of a connection; see :func:`robolink.connect`.
 
     Attributes:
         signature: Who works here, and with what.
@@ -98,7 +98,7 @@ class ConnectionTerms:
     tell: Callable[[str], None] = lambda _sentence: None
 
     def record_of(self, link: OpenLink) -> OutcomeLog:
-        """Return the record of what a link leads to; the link is closed when that fails."""
+        """Return the record for a link; the link is closed if that fails."""
         try:
             return self.record_at(link.identity, durable=link.durable)
         except BaseException:
@@ -106,7 +106,7 @@ class ConnectionTerms:
             raise
 
     def record_at(self, address: str, *, durable: bool = True) -> OutcomeLog:
-        """Return the record of what is reached at an address.
+        """Return the record for an address.
 
         Args:
             address: How it is reached.
@@ -130,7 +130,7 @@ class ControllerOpener(Protocol):
 
 
 def find_opener(url: LinkUrl) -> ControllerOpener:
-    """Return what opens controllers of the kind that a URL names.
+    """Return the opener for the kind of controller that a URL names.
 
     Raises:
         ConfigError: Nothing knows the kind, or what does cannot be loaded.
@@ -159,7 +159,7 @@ def find_opener(url: LinkUrl) -> ControllerOpener:
 
 
 def capabilities_of_kind(kind: str) -> Capabilities | None:
-    """Return the most that a controller of a kind can be asked for; nothing is connected.
+    """Return the most that a kind of controller supports; nothing is connected.
 
     Args:
         kind: The first word of its URL.
@@ -181,7 +181,7 @@ def _class_of_kind(kind: str) -> Any:  # noqa: ANN401 - a class with OF_KIND
 
 
 def _told_as_its_own(kind: str, opener: ControllerOpener) -> ControllerOpener:
-    """Return an opener of somebody else, whose errors are not told as robolink's."""
+    """Return a third-party opener whose errors are not reported as robolink's."""
 
     def opened(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
         try:
@@ -259,7 +259,7 @@ def connect(
     glance: bool = False,
     tell: Callable[[str], None] = lambda _sentence: None,
 ) -> Controller:
-    """Connect to a controller; log in where there is a login.
+    """Connect to a controller, and log in if it has a login.
 
     Args:
         url: For example ``epson+tcp://192.168.0.1:5000``, ``epson+sim://cell-a?seed=1`` or
@@ -349,7 +349,7 @@ def connect(
 
 
 def _require_kind(found: type, kind: type[Controller] | None, called: str) -> None:
-    """Refuse a controller, or what a URL is known to open, that is not of the kind asked for.
+    """Refuse a controller, or a URL known to open one, of another kind than asked for.
 
     Raises:
         ConfigError: It is of another kind.
@@ -393,7 +393,7 @@ def _waited_for(
 
 
 def opened(url: LinkUrl, terms: ConnectionTerms) -> Controller:
-    """Connect to the controller at a URL, and have its traffic told.
+    """Connect to the controller at a URL, and report its traffic.
 
     A kind whose link tells nothing, such as the library of a maker, tells the requests that its
     stop latch admits.
@@ -424,7 +424,7 @@ _BITS: Final = 32
 def connect_when_reachable(
     connect: Callable[[], Reached], *, within_s: float, clock: Clock | None = None
 ) -> Reached:
-    """Connect to a controller as soon as it is there.
+    """Connect to a controller as soon as it is reachable.
 
     The first attempt is made at once. After each that fails there is a pause, counted from its
     end: drawn between half and the whole of :data:`FIRST_PAUSE_S`, which doubles each time up to

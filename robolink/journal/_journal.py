@@ -188,7 +188,7 @@ class Journal:
             return tables.entries.count()
 
     def names_of(self, controller: str) -> tuple[str, ...]:
-        """Return the names under which a controller is on record, its identity first.
+        """Return the names under which a controller is recorded, its identity first.
 
         Args:
             controller: Its identity, an address at which it was met, or a name of before. Of a
@@ -214,7 +214,7 @@ class Journal:
             return tables.names.robots(tables.names.meant(controller))
 
     def addresses_of(self, controller: str) -> tuple[str, ...]:
-        """Return the URLs, without options, at which a controller was met, the latest first.
+        """Return the URLs, without options, at which a controller was reached, the latest first.
 
         Args:
             controller: Its identity.
@@ -226,7 +226,7 @@ class Journal:
             return tables.names.addresses_of(controller)
 
     def open_markers(self) -> tuple[tuple[str, Marker], ...]:
-        """Return what is unsettled on any controller, with the controller's identity.
+        """Return the unfinished jobs on any controller, with the controller's identity.
 
         Raises:
             JournalError: It cannot be read.

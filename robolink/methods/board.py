@@ -90,13 +90,13 @@ class BoardParameters(LookParameters):
 
     @property
     def drawing(self) -> BoardDrawing | None:
-        """Where the fiducials are on the board, ``None`` while nothing says it."""
+        """Where the fiducials are on the board, ``None`` while nothing states it."""
         if self.spacing_mm is not None:
             return BoardDrawing.of_two(self.spacing_mm)
         return None if self.fiducials_mm is None else BoardDrawing(self.fiducials_mm)
 
     def problems(self, check: Check) -> Iterator[Problem]:
-        """Check that the drawing is said once, and that its fiducials can be told apart."""
+        """Check that the drawing is stated once, and that its fiducials can be told apart."""
         yield from super().problems(check)
         if self.spacing_mm is None and self.fiducials_mm is None:
             yield Problem(
@@ -115,7 +115,7 @@ class BoardParameters(LookParameters):
             yield from _apart(self.fiducials_mm)
 
     def no_residual(self) -> str:
-        """Return why residuals cannot be judged, empty when they can."""
+        """Return why residuals cannot be judged, empty if they can."""
         drawing = self.drawing
         if drawing is None or not drawing.is_pair or len(self.turns_deg) > 1:
             return ""
@@ -253,7 +253,7 @@ def _places(board: BoardDrawing, tool: ToolOffset, angles_deg: Sequence[float]) 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoardTest(LookTest):
-    """A proof by a camera of a board.
+    """A camera's test of a board.
 
     Attributes:
         board: Where the fiducials are on it.
@@ -321,7 +321,7 @@ class BoardSource(RoundSource):
         return _places(self.board, tool, angles_deg)
 
     def expected(self, seen: Sequence[Sighting], stored: ToolOffset | None) -> ToolOffset:
-        """Return where the board is by its first two fiducials."""
+        """Return where the board is, by its first two fiducials."""
         pair = replace(self, board=BoardDrawing(self.board.fiducials_mm[:2]), sigma_mm=None)
         return pair.solved(seen, (1, 2), stored or NO_OFFSET).offset
 
@@ -348,7 +348,7 @@ class BoardSource(RoundSource):
         )
 
     def proof_of(self, basis: ProofBasis) -> BoardTest:
-        """Return the proof at other angles; see :class:`~robolink.procedures.ProvesAgain`."""
+        """Return the test at other angles; see :class:`~robolink.procedures.ProvesAgain`."""
         return BoardTest(
             **basis.common,
             sensor=self.sensor,

@@ -52,7 +52,7 @@ class CameraParameters(LookParameters):
     """How a calibrated camera looks at a tip."""
 
     def no_residual(self) -> str:
-        """Return why residuals cannot be judged, empty when they can."""
+        """Return why residuals cannot be judged, empty if they can."""
         if len(self.turns_deg) > 2:
             return ""
         return tr(
@@ -103,7 +103,7 @@ def measure_camera(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LookTest(PlacedProof):
-    """All that a proof by a camera needs.
+    """All that a turn test by a camera needs.
 
     Attributes:
         sensor: URL or name of the camera, or the camera itself, which cannot be kept.
@@ -127,7 +127,7 @@ class LookTest(PlacedProof):
 
     @property
     def obstacle(self) -> str:
-        """Why it cannot be kept: an open camera is none that another process can open."""
+        """Why it cannot be kept: no other process can open a camera that is open here."""
         if not isinstance(self.sensor, str):
             return "camera_open"
         if sensor_name(self.sensor) != self.sensor:
@@ -143,7 +143,7 @@ class LookTest(PlacedProof):
             return context.run(self.steps(here), tip=self.written, camera=eye)
 
     def prove_after_a_break(self, context: MeasurementContext) -> VerifyResult:
-        """Make it: it goes straight up first, then over the camera."""
+        """Make it: first straight up, then over the camera."""
         return self.prove(context)
 
     def steps(self, here: Pose) -> Procedure[VerifyResult]:
@@ -161,7 +161,7 @@ class LookTest(PlacedProof):
 
 
 class RoundSource(LookSource):
-    """Measures by bringing marks before a calibrated camera at every angle of a plan.
+    """Measures by moving marks before a calibrated camera at every angle of a plan.
 
     Attributes:
         plan: How they are brought before it.
@@ -208,7 +208,7 @@ class RoundSource(LookSource):
 
     @abstractmethod
     def places(self, tool: ToolOffset, angles_deg: Sequence[float]) -> list[Place]:
-        """Return every mark at every angle, as something to be looked at.
+        """Return every mark at every angle, as something to look at.
 
         Args:
             tool: Where they are expected.
@@ -217,7 +217,7 @@ class RoundSource(LookSource):
 
     @abstractmethod
     def expected(self, seen: Sequence[Sighting], stored: ToolOffset | None) -> ToolOffset:
-        """Return where the marks are by looks at the first two places, or at the only one."""
+        """Return where the marks are, by looks at the first two places, or at the only one."""
 
     @abstractmethod
     def solved(
@@ -268,7 +268,7 @@ class CameraSource(RoundSource):
         return [Place(u_deg, tool) for u_deg in angles_deg]
 
     def expected(self, seen: Sequence[Sighting], stored: ToolOffset | None) -> ToolOffset:
-        """Return where the tip is by one look."""
+        """Return where the tip is, by one look."""
         return solve_up_camera(seen[0], stored=stored).offset
 
     def solved(
@@ -285,7 +285,7 @@ class CameraSource(RoundSource):
         )
 
     def proof_of(self, basis: ProofBasis) -> LookTest:
-        """Return the proof at other angles; see :class:`~robolink.procedures.ProvesAgain`."""
+        """Return the test at other angles; see :class:`~robolink.procedures.ProvesAgain`."""
         return LookTest(
             **basis.common,
             sensor=self.sensor,

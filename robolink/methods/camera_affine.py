@@ -153,7 +153,7 @@ class CameraAffineParameters(LookParameters):
 
     @property
     def limits(self) -> CameraLimits:
-        """What is refused, for the solver."""
+        """The solver's limits for a refusal."""
         return CameraLimits(
             most_shear_deg=self.shear_limit_deg,
             most_unequal_scale=self.unequal_limit,
@@ -164,7 +164,7 @@ class CameraAffineParameters(LookParameters):
 
     @property
     def corners_deg(self) -> tuple[float, ...]:
-        """Angles of the corners of the pattern, which are looked at without a turn."""
+        """Angles of the pattern's corners, which are looked at without a turn."""
         return (0.0,)
 
     @property
@@ -241,7 +241,7 @@ def measure_camera_affine(
 
 
 def _require_pattern(plan: CameraAffineParameters) -> None:
-    """Refuse a pattern that cannot tell camera and offset apart, before anything moves."""
+    """Refuse a pattern that cannot separate camera and offset, before anything moves."""
     if plan.span_mm < LEAST_SPAN_MM:
         raise CalibrationError(
             "rank_deficient",
@@ -291,7 +291,7 @@ class CameraAffineSource(LookSource):
         )
 
     def found_station(self, result: CalibrationResult, tool: int) -> Found | None:
-        """Return what a kept measurement says about the camera, ``None`` without a name."""
+        """Return what a kept measurement shows about the camera, ``None`` without a name."""
         from robolink.calibration import CameraCalibration  # numpy, which a look does without
 
         if not self.name or not isinstance(result, CameraCalibration):
@@ -326,7 +326,7 @@ class CameraAffineSource(LookSource):
         )
 
     def proof_of(self, basis: ProofBasis) -> "LookTest":
-        """Return the proof at other angles; see :meth:`~robolink.procedures.ProvesAgain.proof_of`.
+        """Return the test at other angles; see :meth:`~robolink.procedures.ProvesAgain.proof_of`.
 
         Raises:
             TypeError: The result is not that of a camera that was found.

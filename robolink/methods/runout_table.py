@@ -37,7 +37,7 @@ _LEAST_LOOKS = 8
 
 @dataclass(frozen=True, slots=True)
 class AllRoundPlan(LookPlan):
-    """Looks all round, within half a turn to either side of U = 0, as wrists can go.
+    """Looks all round, within half a turn to either side of U = 0, the range of wrists.
 
     They begin at the end that is nearer and go on from neighbour to neighbour, so that every turn
     but the first is small and the first less than half a turn.
@@ -111,7 +111,7 @@ class RunoutTableSource(CameraSource):
         )
 
     def proof_of(self, basis: ProofBasis) -> "LookTest":
-        """Return the proof at other angles, where the tip has to be where the table says."""
+        """Return the test at other angles, where the tip must be where the table says."""
         from robolink.calibration import RunoutTableResult  # numpy
         from robolink.methods.runout_table_procedure import WobbleTest
 

@@ -1,4 +1,4 @@
-"""What a controller is to its user, what only some kinds have, and whether it is simulated."""
+"""What a controller offers its user, what only some kinds have, and whether it is simulated."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -27,7 +27,7 @@ ValueT = TypeVar("ValueT", bound=Value)
 
 @dataclass(frozen=True, slots=True)
 class ValueReceipt(Generic[ValueT]):
-    """What setting a value did.
+    """The result of setting a value.
 
     Attributes:
         request: The request, as it stands on the wire.
@@ -51,7 +51,7 @@ class DigitalIo(Protocol):
         """Read one input."""
 
     def set_output(self, bit: int, on: bool) -> ValueReceipt[bool] | None:
-        """Switch one output, and prove it as far as this controller lets it be proved.
+        """Switch one output, and confirm it as far as this controller allows.
 
         Returns:
             ``None`` where an output cannot be read back: the acknowledgement is the proof.
@@ -63,7 +63,7 @@ class DigitalIo(Protocol):
         """
 
     def preview_output(self, bit: int, on: bool) -> tuple[str, ...]:
-        """Return what :meth:`set_output` would send, as it stands on the wire."""
+        """Return what :meth:`set_output` would send, as sent on the wire."""
 
 
 class PointReader(Protocol):
@@ -121,21 +121,21 @@ class VariableTable(Protocol):
 
 
 class AlarmList(Protocol):
-    """What a controller wants looked after, apart from errors."""
+    """What needs attention on a controller, apart from errors."""
 
     def list(self) -> tuple[int, ...]:
-        """Read the numbers of the alarms that stand.
+        """Read the numbers of the active alarms.
 
         Raises:
             RejectedError: This firmware does not tell them.
         """
 
     def reset(self, number: int) -> None:
-        """Reset one because a person asked for it, and prove that it is gone."""
+        """Reset one alarm at a person's request, and confirm that it is gone."""
 
 
 class Act(StrEnum):
-    """What a person asks of a controller as a whole."""
+    """An action that a person requests of a controller as a whole."""
 
     STOP = "stop"
     RESET = "reset"
@@ -145,7 +145,7 @@ class Act(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Capabilities:
-    """What this kind of controller can be asked for.
+    """What this kind of controller supports.
 
     The last four say that the controller's attribute of that name is there.
 
@@ -172,7 +172,7 @@ class Capabilities:
 
 
 class Controller(Protocol):
-    """A controller that someone is connected to.
+    """A connected controller.
 
     Every call may raise a TransportError or RemoteProtocolError; after one the link is dead
     and a new connection is needed.
@@ -191,7 +191,7 @@ class Controller(Protocol):
 
     @property
     def capabilities(self) -> Capabilities:
-        """What can be asked for."""
+        """What it supports."""
 
     @property
     def tools(self) -> ToolTable:
@@ -223,42 +223,42 @@ class Controller(Protocol):
 
     @property
     def outcomes(self) -> OutcomeLog:
-        """The doubtful outcomes and the unfinished procedures of this controller."""
+        """The outcomes in doubt and the unfinished procedures of this controller."""
 
     @property
     def ledger(self) -> Ledger:
-        """What was done to it since connecting, and how much of that is proved."""
+        """What was done to it since connecting, and how much of that is confirmed."""
 
     @property
     def resolver(self) -> Resolver:
-        """Settles what was begun here and not proved finished."""
+        """Finishes or undoes interrupted jobs."""
 
     def status(self) -> ControllerStatus:
         """Read the state flags."""
 
     def condition(self) -> Mapping[str, object]:
-        """Read more about the state than the flags say, plain JSON.
+        """Read more about the state than the flags show, plain JSON.
 
         What cannot be read now, or not by this kind of controller, is ``None`` or left out.
         """
 
     def preview(self, act: Act) -> tuple[str, ...]:
-        """Return the requests of an act, as they stand on the wire. Reads at most."""
+        """Return the requests of an action, as sent on the wire. Reads at most."""
 
     def facts(self) -> ControllerFacts:
         """Read which controller and robots these are."""
 
     @property
     def change_guard(self) -> ChangeGuard:
-        """What holds back writes that take a tip farther than the cell allows."""
+        """Refuses writes that move a tip farther than the cell allows."""
 
     @property
     def latch(self) -> StopLatch:
-        """What holds everything back from :meth:`stop` until :meth:`release_stop`."""
+        """Refuses everything from :meth:`stop` until :meth:`release_stop`."""
 
     @property
     def patience(self) -> Patience:
-        """How long a call waits that would be refused because somebody else is at work."""
+        """How long a call waits that is refused because another user has the controller locked."""
 
     def stop(self) -> None:
         """Stop everything; from any thread, at any time, more than once.
@@ -273,16 +273,16 @@ class Controller(Protocol):
         """
 
     def release_stop(self) -> None:
-        """Let this process act again after :meth:`stop`, because a person says so."""
+        """Release a stop at a person's request: this process may act again."""
 
     def reset_fault(self) -> None:
-        """Clear an error because a person asked for it."""
+        """Clear an error at a person's request."""
 
     def motors(self, on: bool) -> None:
-        """Switch the motors."""
+        """Switch the motors on or off."""
 
     def take_over(self, reason: str) -> None:
-        """Take the controller over from whoever works on it, because a person insists.
+        """Take the controller over from the user who has it locked, at a person's request.
 
         The record keeps who insisted and why. The next act of whoever had it is refused: its
         lease has another epoch, and so has a PLC's mailbox. What it began stays open here.
@@ -295,7 +295,7 @@ class Controller(Protocol):
         """
 
     def require_settled(self, request: str) -> None:
-        """Refuse ``request`` while something earlier is unsettled.
+        """Refuse ``request`` while an earlier job is unfinished.
 
         Raises:
             OutcomeUnknownError: Names it.
@@ -332,7 +332,7 @@ class Controller(Protocol):
         """
 
     def finish(self, marker: Marker, *entries: NewEntry) -> None:
-        """Forget the marker of a procedure, and journal how it ended."""
+        """Remove the marker of a procedure, and record how it ended."""
 
     def procedure(
         self, request: str, *, wait_s: float | None = None
@@ -363,10 +363,10 @@ class Controller(Protocol):
         """
 
     def uninterrupted(self) -> AbstractContextManager[None]:
-        """Hold Ctrl-C back for a block that must be seen through."""
+        """Delay Ctrl-C for a block that must be completed."""
 
     def signs_of_life(self) -> AbstractContextManager[None]:
-        """Let others see within the block, once a second, that this process is at work.
+        """Show others within the block, once a second, that this process is at work.
 
         The record and the controller are told, for lease and ownership alone: no command is
         sent and no movement kept going. While a movement is unfinished on which nobody waits,
@@ -380,13 +380,13 @@ class Controller(Protocol):
         """
 
     def preserved(self, reason: str) -> AbstractContextManager[None]:
-        """Put back, at the end of the block, the tool, power and speed in force at its start.
+        """Restore, at the end of the block, the tool, power and speed of its start.
 
         A durable marker names the tool until that has been read back.
         """
 
     def close(self) -> None:
-        """Log out where that does no harm and close the link. Idempotent."""
+        """Log out if that is harmless, and close the link. Idempotent."""
 
     def __enter__(self) -> Self: ...
 
@@ -406,7 +406,7 @@ _MEDIUM: Final = "+sim://"
 
 
 def is_simulated_name(name: str) -> bool:
-    """Tell whether the name of a controller, or a serial number, is a simulator's.
+    """Return whether the name of a controller, or a serial number, is a simulator's.
 
     ``False`` says nothing: the name of a PLC does not tell.
 
@@ -423,12 +423,12 @@ def is_simulated_name(name: str) -> bool:
 
 
 def are_simulated_facts(facts: ControllerFacts) -> bool:
-    """Tell whether the serial numbers of a controller or its robots are a simulator's."""
+    """Return whether the serial numbers of a controller or its robots are a simulator's."""
     return any(map(is_simulated_name, (facts.controller_serial or "", *facts.robot_serials)))
 
 
 def says_it_is_simulated(controller: Controller, facts: ControllerFacts | None = None) -> bool:
-    """Tell whether a controller says of itself that nothing real moves; an answer is not guessed.
+    """Return whether a controller says that nothing real moves; without an answer, an error.
 
     A PLC says it of its axes, in the mailbox (docs/mailbox.md); a simulated EPSON controller by
     its serial numbers. One that cannot be asked just now says nothing.

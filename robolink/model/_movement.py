@@ -28,11 +28,11 @@ class InputEdge:
     run_on: bool = False
 
     def awaited(self, on: bool) -> bool:
-        """Tell whether an input that is ``on`` shows what the movement waits for."""
+        """Return whether an input that is ``on`` shows what the movement waits for."""
         return on is not self.falling
 
     def require_ahead(self, on: bool, *, controller: str, request: str) -> None:
-        """Refuse an input that shows already what the movement waits for.
+        """Refuse an input that already shows what the movement waits for.
 
         An EPSON controller would take such a movement for finished at once, and a PLC would drive
         on to the target, the tip perhaps in contact (docs/reference/spel.md 7.1, docs/mailbox.md).
@@ -86,7 +86,7 @@ class MotionUntilInput(Protocol):
 
 
 class Path(StrEnum):
-    """How the robot travels to a target."""
+    """How the robot moves to a target."""
 
     JOINT = "joint"
     STRAIGHT = "straight"
@@ -134,7 +134,7 @@ class WorkBox:
 
     @classmethod
     def reaching(cls, sideways_mm: float, *, down_mm: float, up_mm: float) -> "WorkBox":
-        """Return the box that reaches so far from a place that is not known yet.
+        """Return the box that reaches so far from a place that is not yet known.
 
         Args:
             sideways_mm: In X and Y, to either side.
@@ -174,7 +174,7 @@ class WorkBox:
         return self.z_max_mm - self.z_min_mm
 
     def about(self, pose: Pose) -> "WorkBox":
-        """Return the same box about a place, which so far stood for nothing."""
+        """Return the same box about a place; so far it had none."""
         return WorkBox(
             pose.x_mm + self.x_min_mm,
             pose.x_mm + self.x_max_mm,
@@ -185,7 +185,7 @@ class WorkBox:
         )
 
     def larger(self, *, sideways_mm: float = 0.0, up_mm: float = 0.0) -> "WorkBox":
-        """Return the box that reaches further by so much, to all sides and up."""
+        """Return the box enlarged by so much, to all sides and up."""
         return WorkBox(
             self.x_min_mm - sideways_mm,
             self.x_max_mm + sideways_mm,
@@ -196,7 +196,7 @@ class WorkBox:
         )
 
     def holds(self, target: Pose) -> bool:
-        """Tell whether a target lies inside."""
+        """Return whether a target lies inside."""
         return (
             self.x_min_mm <= target.x_mm <= self.x_max_mm
             and self.y_min_mm <= target.y_mm <= self.y_max_mm
@@ -284,7 +284,7 @@ class MotionGroup(Protocol):
         """What a person calls it."""
 
     def pose(self) -> Pose:
-        """Read where the frame in force is now (measured, not commanded)."""
+        """Read where the frame of the selected tool is now (measured, not commanded)."""
 
     def move_to(self, target: Pose, profile: MotionProfile, *, box: WorkBox) -> Motion:
         """Start one movement of the frame ``target.tool``; sent at most once.
@@ -367,10 +367,10 @@ class MotionGroup(Protocol):
         """
 
     def requests_for(self, target: Pose, profile: MotionProfile) -> tuple[str, ...]:
-        """Return what :meth:`move_to` would send besides its reads, as it stands on the wire."""
+        """Return what :meth:`move_to` would send besides its reads, as sent on the wire."""
 
     def obstacle(self, target: Pose, path: Path, *, start: Pose | None = None) -> str:
-        """Return why the arm could not go there so, a sentence; empty where nothing is known.
+        """Return why the arm could not make this move, a sentence; empty if nothing is known.
 
         Reads only, and is no promise: it is for whoever has other places to choose from, or would
         rather not begin. The places are meant for the tool in force.
@@ -391,13 +391,13 @@ class MotionGroup(Protocol):
         """
 
     def deceleration_mm_s2(self) -> float | None:
-        """Read how it brakes in straight movements, ``None`` where it does not tell.
+        """Read how it brakes in straight movements, ``None`` if it does not report that.
 
         By that it comes to rest beyond the edge of an input that ends a movement.
         """
 
     def run_up_mm(self, speed_mm_s: float) -> float | None:
-        """Read in what way a movement until an input reaches a speed, and comes to rest from it.
+        """Read the distance in which a movement until an input reaches a speed, and stops from it.
 
         Args:
             speed_mm_s: The speed.
@@ -407,7 +407,7 @@ class MotionGroup(Protocol):
         """
 
     def edge_step_mm(self, speed_mm_s: float) -> float | None:
-        """Return in what steps it tells where the edge of an input was, at a speed.
+        """Return the step in which it reports where the edge of an input was, at a speed.
 
         Args:
             speed_mm_s: The speed.
@@ -417,7 +417,7 @@ class MotionGroup(Protocol):
         """
 
     def require_able(self, purpose: str) -> None:
-        """Refuse what no movement could begin in now; reads only.
+        """Refuse if no movement could start now; reads only.
 
         For whoever asks a person first: nobody is asked whether the cell is clear, and then told
         that the motors are off.
@@ -433,7 +433,7 @@ class MotionGroup(Protocol):
         """Read what a person must know before it moves."""
 
     def base(self) -> tuple[float, ...] | None:
-        """Read where the base stands that positions count from.
+        """Read the place of the base, from which positions count.
 
         Returns:
             X, Y, Z in mm and U, V, W in degrees, seen from the robot; ``None`` where this kind of
@@ -441,16 +441,16 @@ class MotionGroup(Protocol):
         """
 
     def axes(self) -> Mapping[str, tuple[float, ...]]:
-        """Read the positions of the axes, by the names of what they count in."""
+        """Read the positions of the axes, by the names of their units."""
 
     def motors_on(self) -> bool | None:
-        """Read whether its motors are on, ``None`` where this kind does not tell it."""
+        """Read whether its motors are on, ``None`` if this kind does not report it."""
 
     def low_power(self) -> bool | None:
-        """Read whether it moves with little power, ``None`` where this kind has no such mode."""
+        """Read whether it moves with low power, ``None`` if this kind has no such mode."""
 
     def stop(self) -> None:
         """Stop it; may be called from any thread, at any time, more than once."""
 
     def abort_unfinished(self) -> None:
-        """End the movements that were begun here and whose end nobody has seen."""
+        """End the movements that were started here and whose end nobody has seen."""

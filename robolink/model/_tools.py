@@ -63,7 +63,7 @@ class ToolOffset:
 
     @property
     def of_no_tool(self) -> bool:
-        """Whether a number in it is one that no tool has, as words in another order make it."""
+        """Whether one of its numbers is one that no tool has, as words in the wrong order give."""
         return of_no_tool(self.components())
 
     def rounded(self, decimals: int) -> "ToolOffset":
@@ -71,7 +71,7 @@ class ToolOffset:
         return ToolOffset(*[round(value, decimals) + 0.0 for value in self.components()])
 
     def matches(self, other: "ToolOffset", tolerance: float) -> bool:
-        """Tell whether every component agrees within ``tolerance`` (mm, degrees).
+        """Return whether every component agrees within ``tolerance`` (mm, degrees).
 
         Angles are compared modulo 360: a controller may store 270 as -90.
         """
@@ -87,7 +87,7 @@ class ToolOffset:
 
 
 def of_no_tool(values: Sequence[float]) -> bool:
-    """Tell whether one of these numbers is none that a tool has, in whatever unit."""
+    """Return whether one of these numbers is one that no tool has, in any unit."""
     return any(value and not _LEAST < abs(value) < _MOST for value in values)
 
 
@@ -102,7 +102,7 @@ def describe_offset(offset: ToolOffset | None) -> str:
 
 
 def put_right(offset: ToolOffset | None) -> str:
-    """Return how a person puts a tool right that holds the values of none, empty for others."""
+    """Return how a person corrects a tool with impossible values; empty for other tools."""
     if offset is None or not offset.of_no_tool:
         return ""
     return tr(
@@ -116,7 +116,7 @@ def plain_offset(offset: ToolOffset | None) -> list[float] | None:
 
 
 def read_offset(value: object) -> ToolOffset | None:
-    """Return what :func:`plain_offset` was given.
+    """Return the offset from the output of :func:`plain_offset`.
 
     Raises:
         ConfigError: It is no such value.
@@ -152,7 +152,7 @@ def tool_changed(
     controller: str = "",
     request: str = "",
 ) -> ToolChangedError:
-    """Return the error for a tool that holds something else than its writer believes.
+    """Return the error for a tool that does not hold the value that its writer expects.
 
     Args:
         tool: Number of the tool.
@@ -186,7 +186,7 @@ def tool_changed(
 
 @dataclass(frozen=True, slots=True)
 class ToolReceipt:
-    """What a write or clear did, as proved by reading back.
+    """The result of a write or clear, as confirmed by reading back.
 
     ``skipped`` means that the value was already there and nothing was written.
     ``None`` stands for an undefined tool.
@@ -207,7 +207,7 @@ class ToolTable(Protocol):
         """Return the tool numbers that can be written."""
 
     def same(self, a: ToolOffset | None, b: ToolOffset | None) -> bool:
-        """Tell whether this controller would store both alike; undefined equals undefined only."""
+        """Return whether the controller would store both alike; undefined equals undefined only."""
 
     def require_writable(self, tool: int) -> None:
         """Refuse a tool number that cannot be written; sends nothing.
@@ -227,7 +227,7 @@ class ToolTable(Protocol):
         """
 
     def doubts(self, tools: Collection[int]) -> tuple[str, ...]:
-        """Return, in sentences, why the values that are read may not be those in force.
+        """Return, in sentences, why the values that are read may not be the active ones.
 
         Args:
             tools: Those that are about to be changed.
@@ -264,7 +264,7 @@ class ToolTable(Protocol):
         """
 
     def preview_write(self, tool: int, offset: ToolOffset) -> tuple[str, ...]:
-        """Return what :meth:`write` would send besides its reads, as it stands on the wire.
+        """Return what :meth:`write` would send besides its reads, as sent on the wire.
 
         Empty when the value is stored already. Reads only; raises what the write would.
         """
@@ -307,13 +307,13 @@ class ToolTable(Protocol):
         """
 
     def selected(self) -> int | None:
-        """Return the number of the tool in force, 0 for the flange.
+        """Return the number of the selected tool, 0 for the flange.
 
         ``None`` where the controller does not tell.
         """
 
     def select(self, tool: int, *, wait_s: float | None = None) -> None:
-        """Put a tool in force and read the selection back.
+        """Select a tool and read the selection back.
 
         Args:
             tool: Its number, 0 for the flange.
@@ -327,7 +327,7 @@ class ToolTable(Protocol):
 def read_for_verdict(
     tools: ToolTable, tool: int, known: Iterable[ToolOffset | None]
 ) -> ToolOffset | None:
-    """Read a tool whose value decides what becomes of a change, ``None`` when it is undefined.
+    """Read a tool whose value decides what happens to a change, ``None`` when it is undefined.
 
     A value that nobody is known to have written counts when it was read twice: the checksum of
     Remote RS232 does not notice two bytes that changed places (docs/reference/epson.md 2.1).
@@ -365,7 +365,7 @@ def read_for_verdict(
 
 @dataclass(frozen=True, slots=True)
 class Jump:
-    """How far a new value takes the tip of a tool from where the stored one has it.
+    """How far a new value moves the tip of a tool from where the stored one has it.
 
     Attributes:
         length_mm: How far apart the tips are.
@@ -387,7 +387,7 @@ class Jump:
         return cls(length_mm, math.degrees(4.0 * math.asin(min(1.0, chord / 2.0))))
 
     def exceeds(self, length_mm: float | None, angle_deg: float | None) -> bool:
-        """Tell whether it is larger than a limit; ``None`` is none."""
+        """Return whether it is larger than a limit; ``None`` is no limit."""
         too_far = length_mm is not None and self.length_mm > length_mm
         return too_far or (angle_deg is not None and self.angle_deg > angle_deg)
 
@@ -411,7 +411,7 @@ class KinematicToolTable(Protocol):
     """A tool table of a machine whose kinematics does not carry every tool."""
 
     def require_measurable(self, components: Sequence[str]) -> None:
-        """Refuse to measure what the machine could not be told afterwards; only reads.
+        """Refuse to measure what the machine could not accept afterwards; only reads.
 
         Args:
             components: ``x_mm``, ``y_mm``, ``z_mm`` and other parts of a tool.

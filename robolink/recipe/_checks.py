@@ -1,4 +1,4 @@
-"""What is wrong in a recipe that only two of its keys together show."""
+"""Errors in a recipe that only two of its keys together show."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, fields
@@ -32,7 +32,7 @@ from robolink.recipe._tables import (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Draft:
-    """What of a recipe is right in itself; ``None`` for the rest, which is told already.
+    """The correct parts of a recipe; ``None`` for the rest, which is already reported.
 
     Attributes:
         given: The keys at the top of the file, right or wrong.
@@ -54,7 +54,7 @@ class Draft:
 
     @classmethod
     def of(cls, sound: Mapping[str, Any], *, given: Collection[str]) -> "Draft":
-        """Return the draft made of the tables that are right in themselves."""
+        """Return the draft of the tables that are right by themselves."""
         names = {field.name for field in fields(cls)}
         return cls(given=given, **{name: sound[name] for name in sound if name in names})
 
@@ -82,7 +82,7 @@ def moments(draft: Draft) -> Iterator[Problem]:
 
 
 def answers(draft: Draft) -> Iterator[Problem]:
-    """Check that a nozzle and its lot are asked once, and before they are put on record."""
+    """Check that a nozzle and its lot are asked for once, and before they are recorded."""
     asked: set[tuple[str, int | None]] = set()
     for number, prompt in enumerate(draft.prompts or (), start=1):
         if prompt.answer not in _FOR_THE_RECORD:
@@ -108,7 +108,7 @@ def _entries(draft: Draft) -> Iterator[tuple[str, Prompt | Output]]:
 
 
 def tool_numbers(draft: Draft) -> Iterator[Problem]:
-    """Check that no tool stands there twice."""
+    """Check that no tool is listed twice."""
     seen: set[int] = set()
     for place, tool in _tools(draft):
         if tool.number in seen:
@@ -117,7 +117,7 @@ def tool_numbers(draft: Draft) -> Iterator[Problem]:
 
 
 def points(draft: Draft) -> Iterator[Problem]:
-    """Check that each tool has the points that the method needs, and nobody else's."""
+    """Check that each tool has the points that the method needs, and no others."""
     source = draft.source
     if source is None:
         return
@@ -153,7 +153,7 @@ def _owned(where: str, tool: Tool, owners: dict[int, int]) -> Iterator[Problem]:
 
 
 def standstill(draft: Draft) -> Iterator[Problem]:
-    """Check that nothing says how to move where nothing moves."""
+    """Check that nothing states how to move if nothing moves."""
     if draft.source is None or draft.source.of_method.needs.motion:
         return
     said = [key for key in ("poses", "speeds", "box") if key in draft.given]
@@ -175,7 +175,7 @@ def standstill(draft: Draft) -> Iterator[Problem]:
 
 
 def upright(draft: Draft) -> Iterator[Problem]:
-    """Check that the flange is tilted only where the measurement can bear it."""
+    """Check that the flange is tilted only if the measurement allows it."""
     source = draft.source
     if source is None:
         return
@@ -266,7 +266,7 @@ def parameters(draft: Draft) -> Iterator[Problem]:
 
 
 def _stated(draft: Draft) -> StatedLimits | None:
-    """Return by what it is judged, ``None`` where that cannot be told."""
+    """Return the stated limits, ``None`` if that cannot be told."""
     table = draft.tolerances
     if table is None:
         return None if "tolerances" in draft.given else NOTHING_STATED
@@ -280,7 +280,7 @@ def _placed(problem: Problem) -> Problem:
 
 
 def place(draft: Draft) -> Iterator[Problem]:
-    """Check that the station says where it is, where the method goes there."""
+    """Check that the station states its place, if the method goes there."""
     station, source = draft.station, draft.source
     if station is None or source is None or source.of_method.needs.place is None:
         return
@@ -306,7 +306,7 @@ def both_coordinates(draft: Draft) -> Iterator[Problem]:
 
 
 def height(draft: Draft) -> Iterator[Problem]:
-    """Check that Z can be measured where it is to be."""
+    """Check that Z can be measured, if it is to be."""
     if draft.source is None or draft.z is None:
         return
     method = draft.source.of_method
@@ -317,7 +317,7 @@ def height(draft: Draft) -> Iterator[Problem]:
 
 
 def orientation(draft: Draft) -> Iterator[Problem]:
-    """Check that a measured orientation is not to be compared with a reference."""
+    """Check that a measured orientation is not compared with a reference."""
     if draft.source is None or draft.basis != "difference":
         return
     if "v_deg" in draft.source.of_method.measures:
@@ -327,7 +327,7 @@ def orientation(draft: Draft) -> Iterator[Problem]:
 
 
 def verification(draft: Draft) -> Iterator[Problem]:
-    """Check that a drift is judged only where one is measured."""
+    """Check that a drift is judged only if one is measured."""
     limits, source = draft.tolerances, draft.source
     if limits is None or source is None or "drift_mm" not in limits.model_fields_set:
         return
@@ -336,7 +336,7 @@ def verification(draft: Draft) -> Iterator[Problem]:
 
 
 def refusals(draft: Draft) -> Iterator[Problem]:
-    """Check that attempts are allowed where it is measured again."""
+    """Check that attempts are allowed if the measurement is repeated."""
     refusal = draft.refusal
     if refusal is not None and refusal.action == "stop" and refusal.attempts is not None:
         yield Problem("refusal.attempts", tr('means nothing without action = "measure_again"'))
@@ -361,5 +361,5 @@ _CHECKS: Final[tuple[Callable[[Draft], Iterator[Problem]], ...]] = (
 
 
 def problems_together(draft: Draft) -> tuple[Problem, ...]:
-    """Return everything that is wrong between tables that are right in themselves."""
+    """Return all errors between tables that are right by themselves."""
     return tuple(problem for check in _CHECKS for problem in check(draft))

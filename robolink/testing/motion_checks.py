@@ -1,4 +1,4 @@
-"""Promises about movement: inside the box, for the tool in force, and ended by a stop."""
+"""Promises about movement: inside the box, for the selected tool, and ended by a stop."""
 
 from dataclasses import replace
 from typing import Final

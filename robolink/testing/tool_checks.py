@@ -222,7 +222,7 @@ def one_procedure_at_a_time(subject: Subject) -> None:
 
 
 def _written_whole(controller: Controller, tool: int) -> tuple[ToolOffset, tuple[str, ...]]:
-    """Write a value with as many components as this kind holds; return it, and their names.
+    """Write a value with as many components as this kind has; return it, and their names.
 
     Raises:
         RobolinkError: It takes none, or a write that it took did not end as it should.

@@ -1,4 +1,4 @@
-"""One tool change: written as a whole, kept as a whole, or taken back as a whole.
+"""One tool change: written as a whole, kept as a whole, or restored as a whole.
 
 The order is that of docs/reference/rules.md 6: look at the lease, read the old values, compare them
 with what is expected, store the intent durably (which takes the lease), write, read back. A change
@@ -48,7 +48,7 @@ from robolink.transaction._put_back import PutBack, Step, left_unverified, put_b
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What one tool is to hold.
+    """The intended value of one tool.
 
     Attributes:
         tool: Its number.
@@ -71,7 +71,7 @@ _OUT_OF_REACH = (OutcomeUnknownError, TransportError, RemoteProtocolError, Lease
 
 
 class ToolChange:
-    """A change under way; a context manager that takes back what was not kept.
+    """A change in progress; a context manager that restores what was not kept.
 
     Attributes:
         kept: Whether the new values stay.
@@ -210,7 +210,7 @@ class ToolChange:
             return self._receipts
 
     def keep(self, verdict: str = "") -> None:
-        """Put on record that the new values stay.
+        """Record that the new values stay.
 
         Args:
             verdict: Why, in words.
@@ -256,7 +256,7 @@ class ToolChange:
 
     @property
     def request(self) -> str:
-        """What is done, as a person may read it."""
+        """What is done, for display."""
         numbers = ", ".join(str(wanted.tool) for wanted in self._wanted)
         return tr("change of tool {numbers}", numbers=numbers)
 
@@ -297,7 +297,7 @@ class ToolChange:
         return steps
 
     def _selected_before(self, steps: list[Step]) -> int | None:
-        """Return the tool in force where this change, or taking it back, may need to know it."""
+        """Return the selected tool if this change, or restoring it, may need to know it."""
         clears = any(wanted.then_select is not None for wanted in self._wanted)
         defines = any(step.before is None and step.requested is not None for step in steps)
         return self._controller.tools.selected() if clears or defines else None
@@ -345,7 +345,7 @@ class ToolChange:
             raise refusal from error
 
     def _proved_begun(self) -> Iterator[Step]:
-        """Return what was begun, with what was read before each write, not what was believed."""
+        """Return what was started, with the values read before each write, not the expected."""
         account = self._account
         assert account is not None  # noqa: S101 - __enter__ opened it
         for step in self._begun:
@@ -355,7 +355,7 @@ class ToolChange:
                 yield step
 
     def _select_again(self) -> None:
-        """Put the tool in force again that gave way to a clear of this change."""
+        """Select the tool again that gave way to a clear of this change."""
         if not any(wanted.then_select is not None for wanted in self._wanted):
             return
         tools, before = self._controller.tools, self._selected
@@ -370,7 +370,7 @@ class ToolChange:
             )
 
     def _settle_account(self, error: BaseException | None) -> None:
-        """Let whoever is told of ``error`` know what stands, and which tool is selected."""
+        """Add to ``error`` what stands, and which tool is selected."""
         ledger, account = self._controller.ledger, self._account
         assert account is not None  # noqa: S101 - __enter__ opened it
         try:
@@ -384,7 +384,7 @@ class ToolChange:
                 note_outcome(error, ledger.outcome(account))
 
     def _leave_open(self, error: RobolinkError) -> None:
-        """Say what stands in the journal for ``recover``; nothing where no write was sent."""
+        """Report what stands in the journal for ``recover``; nothing if no write was sent."""
         tools = self._controller.ledger.outcome(self._account).tools
         stand = [number for number, tool in tools.items() if tool.differs or not tool.known]
         if not stand:
@@ -406,7 +406,7 @@ class ToolChange:
                 self._controller.outcomes.append(*entries)
 
     def _close_writes(self, result: PutBack) -> None:
-        """Forget the markers of writes whose value is known to be gone again.
+        """Remove the markers of writes whose value is known to be gone again.
 
         They stand open where a fault of the controller, or of the journal, came between write
         and record.
@@ -426,7 +426,7 @@ def change_tools(
     describe: Describe = plain_result,
     wait_s: float | None = None,
 ) -> tuple[ToolReceipt, ...]:
-    """Write tools that nothing is to verify: all of them, or none.
+    """Write tools without a turn test: all of them, or none.
 
     Args:
         controller: The controller, connected.

@@ -11,7 +11,7 @@ _WordsT = TypeVar("_WordsT", tuple[int, ...], MailboxHead)
 
 
 class WordTraffic:
-    """Implements :class:`~robolink.transport.MailboxLink` by another, and tells what passes.
+    """Implements :class:`~robolink.transport.MailboxLink` by another, and reports its traffic.
 
     A word is told as two bytes, the high one first, as in the registers of a Modbus server.
 

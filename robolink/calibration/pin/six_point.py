@@ -1,4 +1,4 @@
-"""A whole tool frame: tip by a pivot, orientation by two more points.
+"""A whole tool frame: the tip by a pivot, the orientation by two more points.
 
 After the pivot the tool is moved, without turning, along its own X and then along its own Z
 (or anywhere in its XZ plane). The ways of the flange, seen from the flange, are the axes
@@ -34,7 +34,7 @@ _TURNED_DEG: Final = 0.01
 
 
 def axis_displacement(start: Pose, end: Pose, *, wanted_mm: float | None = None) -> Floats:
-    """Return the way of the flange in its own axes, mm.
+    """Return the movement of the flange in its own axes, mm.
 
     Args:
         start: Flange pose at its start.
@@ -67,7 +67,7 @@ def axis_displacement(start: Pose, end: Pose, *, wanted_mm: float | None = None)
 
 
 def require_unturned(start: Pose, end: Pose) -> None:
-    """Refuse a way on which the tool turned.
+    """Refuse a movement during which the tool turned.
 
     Raises:
         CalibrationError: ``turned_on_the_way``.
@@ -118,7 +118,7 @@ class SixPointResult(CalibrationResult):
     off_square_deg: float | None
 
     def details(self) -> dict[str, object]:
-        """Return what the ways say beside the frame."""
+        """Return what the movements show besides the frame."""
         return {"off_square_deg": self.off_square_deg}
 
 
@@ -299,7 +299,7 @@ def _doubted(result: SixPointResult, ways: tuple[Floats, Floats]) -> SixPointRes
 
 
 def _far_from(stored: ToolOffset | None, frame: Floats) -> Iterator[str]:
-    """Yield the doubt that an axis was taken for another one."""
+    """Yield the doubt that one axis was confused with another."""
     if stored is None:
         return
     before = rotation_of(Pose(0.0, 0.0, 0.0, *stored.components()[3:]))

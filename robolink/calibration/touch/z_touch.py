@@ -52,7 +52,7 @@ _ROUNDING_MM = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class TouchFit:
-    """What touches at several speeds say.
+    """The fit of touches at several speeds.
 
     Attributes:
         fit: Unknowns: z, then the latency unless it was given, then the overshoot if it counts.
@@ -134,7 +134,7 @@ def _braking(columns: list[Floats], v: Floats) -> float:
 def require_plausible(
     found: TouchFit, sigma_mm: float | None, *, step_mm: float | None = None
 ) -> None:
-    """Refuse a latency or braking that no machine has: speeds or touches are wrong then.
+    """Refuse an impossible latency or braking: the speeds or the touches are wrong.
 
     Args:
         found: The fit.
@@ -372,7 +372,7 @@ def _budget(result: ZTouchResult) -> UncertaintyBudget:
 
 
 def _with_braking(result: ZTouchResult, shift_mm: float, origin: str) -> ZTouchResult:
-    """Return the result with what braking may have shifted Z by, in interval and budget.
+    """Return the result with the Z shift that braking may cause, in interval and budget.
 
     A robot that brakes is shifted by the same at every touch, and perhaps by all of it.
     """

@@ -1,4 +1,4 @@
-"""one-touch: a pin whose place is known, touched once."""
+"""one-touch: a pin at a known place, touched once."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -169,7 +169,7 @@ HALF_A_TURN_DEG = 180.0
 
 @dataclass(frozen=True, slots=True)
 class OneTouchSource(ProvesAgain):
-    """Measures X, Y and Z by one touch of a pin whose place is known.
+    """Measures X, Y and Z by one touch of a pin at a known place.
 
     Attributes:
         solver: How the touch is used.

@@ -77,7 +77,7 @@ class PivotParameters(PinParameters):
 
     @property
     def sampling(self) -> SamplingPolicy:
-        """When it ends, and whether a pose is offered to be taken again."""
+        """When it ends, and whether a person is offered to repeat a pose."""
         return SamplingPolicy(self.until_mm, retake=self.retake)
 
 
@@ -132,7 +132,7 @@ class PivotSource(PinSource):
         )
 
     def foreseen(self) -> Self:
-        """Return the source whose steps are only shown."""
+        """Return the source for a preview of its steps."""
         return replace(PinSource.foreseen(self), sampling=TAKE_ALL)
 
     @property
@@ -143,7 +143,7 @@ class PivotSource(PinSource):
     def further_steps(
         self, here: Pose, taken: Sequence[TouchedAt], again: int | None, stored: ToolOffset | None
     ) -> Procedure[CalibrationResult]:
-        """Return the steps that make one touch again."""
+        """Return the steps that repeat one touch."""
         from robolink.methods.pivot.procedure import retake_pivot  # numpy
 
         known = require_known_tip(stored)

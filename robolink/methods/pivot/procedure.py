@@ -73,7 +73,7 @@ def retake_pivot(
     taken: Sequence[TouchedAt],
     again: int | None,
 ) -> Procedure[CalibrationResult]:
-    """Make one touch of a measurement again. Runs in Tool 0, ends as it does.
+    """Repeat one touch of a measurement. Runs in Tool 0, ends as it does.
 
     Args:
         source: What was measured, and how.
@@ -169,7 +169,7 @@ def _shown(swing: "_Swing", proof: DriftProof, tilt: Tilt) -> Procedure[None]:
 
 
 class _Swing:
-    """Tilts a lifted tool over a pin, and has the pin touched.
+    """Tilts a lifted tool over a pin, and lets a person touch the pin.
 
     Args:
         plan: Lift and clearance.

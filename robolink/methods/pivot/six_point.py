@@ -1,4 +1,4 @@
-"""six-point: a pin touched in tilted orientations, and two ways along the tool's axes.
+"""six-point: a pin touched in tilted orientations, and two moves along the tool's axes.
 
 The ways start where the person finds room for them. Along +Z from the pin itself a tool that
 points down would be driven into whatever the pin stands on.
@@ -53,13 +53,13 @@ class SixPointParameters(PivotParameters):
     ] = "z"
 
     def height_mm(self) -> float:
-        """Return how much higher than the box the flange goes: a way up."""
+        """Return how far above the box the flange goes: a move up."""
         return self.way_mm
 
 
 @dataclass(frozen=True, slots=True)
 class AxisTeachPlan:
-    """Which ways a person shows, and how long they are.
+    """Which moves a person shows, and how long they are.
 
     Attributes:
         length_mm: Least length of each.
@@ -76,7 +76,7 @@ LEAST_OF_SIX_POINTS = 5
 
 @dataclass(frozen=True, slots=True)
 class SixPointSource(PivotSource):
-    """Measures as a pivot does, and by ways along the axes of the tool.
+    """Measures as a pivot does, and by moves along the axes of the tool.
 
     Attributes:
         ways: How the person shows the axes.
@@ -132,7 +132,7 @@ class SixPointSource(PivotSource):
     def further_steps(
         self, here: Pose, taken: Sequence[TouchedAt], again: int | None, stored: ToolOffset | None
     ) -> Procedure[CalibrationResult]:
-        """Return the steps that make one touch again.
+        """Return the steps that repeat one touch.
 
         The ways along the axes stay as they were shown: they begin and end away from the pin.
         """
@@ -209,7 +209,7 @@ def measure_six_point(
 
 @dataclass(frozen=True, slots=True)
 class SixPoints:
-    """Touches of one pin, then a way along the tool's X and one along its Z, or in its XZ plane.
+    """Touches of one pin, then a move along the tool's X and one along its Z, or in its XZ plane.
 
     Attributes:
         second_is: What the last pose shows: ``z`` the tool's +Z, ``xz`` its XZ plane.
@@ -270,7 +270,7 @@ class _AxisTeaching:
     stored: ToolOffset
 
     def start(self) -> Procedure[Pose]:
-        """Have the tool brought to where both ways start."""
+        """Let a person move the tool to where both moves start."""
         from robolink.calibration import require_unturned
 
         lowest_mm = min(
@@ -288,7 +288,7 @@ class _AxisTeaching:
         return (yield from _shown(ask, lambda pose: require_unturned(self.lifted, pose)))
 
     def along(self, start: Pose, way: TeachPrompt) -> Procedure[Pose]:
-        """Have one way shown; the flange is back at ``start`` then."""
+        """Let a person show one move; the flange is back at ``start`` afterwards."""
         from robolink.calibration import axis_displacement
 
         dx_mm, dy_mm, dz_mm = self._foreseen_mm(way).tolist()
@@ -306,7 +306,7 @@ class _AxisTeaching:
         return end
 
     def _doubted(self, start: Pose, end: Pose, way: TeachPrompt) -> Procedure[bool]:
-        """Return whether a way leads far from its axis as it is stored, and is to be shown again.
+        """Return whether a move deviates far from its stored axis, and must be shown again.
 
         A way in a plane may lead anywhere on its side.
         """
@@ -328,7 +328,7 @@ class _AxisTeaching:
         return again
 
     def _foreseen_mm(self, way: TeachPrompt) -> "Floats":
-        """Return a way in the base, as the stored orientation has it."""
+        """Return a move in the base, by the stored orientation."""
         from robolink.calibration import rotation_of
 
         own = rotation_of(Pose(0.0, 0.0, 0.0, *self.stored.components()[3:]))
@@ -356,7 +356,7 @@ class _AxisTeaching:
 
 
 def _shown(ask: Ask, check: Callable[[Pose], object]) -> Procedure[Pose]:
-    """Ask for a pose until it passes; the person goes on from where the tool stands.
+    """Ask for a pose until it passes; the person continues from where the tool is.
 
     Raises:
         CalibrationError: That of ``check``, the third time.
@@ -375,7 +375,7 @@ def _shown(ask: Ask, check: Callable[[Pose], object]) -> Procedure[Pose]:
 
 
 def _uncertainty(result: "SixPointResult") -> str:
-    """Return how well the ways agree with each other, in one sentence."""
+    """Return how well the moves agree with each other, in one sentence."""
     half_deg = max(result.half_width95[3:], default=None)
     off_deg = result.off_square_deg
     if off_deg is None:

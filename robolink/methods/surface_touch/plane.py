@@ -97,7 +97,7 @@ class PlaneTouchSource(SurfaceTouchSource[PlaneSurvey, "PlaneTouchResult"]):
         return tr("Check that all touches were on the same flat surface, and that it is fixed.")
 
     def proof_of(self, basis: ProofBasis) -> "PlaneTest":
-        """Return the proof in other tilts; see :meth:`~robolink.procedures.ProvesAgain.proof_of`.
+        """Return the test in other tilts; see :meth:`~robolink.procedures.ProvesAgain.proof_of`.
 
         Raises:
             TypeError: The result is not that of a plane.

@@ -104,7 +104,7 @@ class SphereTouchSource(SurfaceTouchSource[SphereSurvey, "SphereTouchResult"]):
         return tr("Check that all touches were on the same sphere, and that it is fixed.")
 
     def proof_of(self, basis: ProofBasis) -> "SphereTest":
-        """Return the proof in other tilts; see :meth:`~robolink.procedures.ProvesAgain.proof_of`.
+        """Return the test in other tilts; see :meth:`~robolink.procedures.ProvesAgain.proof_of`.
 
         Raises:
             TypeError: The result is not that of a sphere.

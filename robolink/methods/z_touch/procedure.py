@@ -37,7 +37,7 @@ from robolink.stations import TouchStation
 def touch_surface(
     source: ZTouchSource, stored: ToolOffset | None, here: Pose
 ) -> Procedure[ZTouchResult]:
-    """Measure as a source says, see :func:`~robolink.methods.measure_z_touch`."""
+    """Measure as a source says; see :func:`~robolink.methods.measure_z_touch`."""
     solvable_planes([here], height_of(stored))
     probing = _ZTouchSampler(source, here, stored or NO_OFFSET, here, stored, here)
     speeds_mm_s = source.plan.speeds_mm_s
@@ -169,7 +169,7 @@ class _ZTouchSampler(TouchNames):
 
     @property
     def _above(self) -> Pose:
-        """The frame's pose with the tip where it begins to seek."""
+        """The frame's pose with the tip where the search starts."""
         station = self.source.station
         at = (station.x_mm, station.y_mm, station.z_mm + self.source.plan.clearance_mm)
         return carrying(self.frame, self.tip, at)
@@ -182,7 +182,7 @@ class _ZTouchSampler(TouchNames):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProbeTest(PlacedProof):
-    """All that a proof on a surface that switches an input needs.
+    """All that the test on a switching surface needs.
 
     Attributes:
         station: Where the surface is.

@@ -62,7 +62,7 @@ def heartbeat_word(epoch: int, count: int) -> int:
 
 
 def beats_for(word: int, epoch: int) -> bool:
-    """Tell whether a heartbeat word is one of the owner of ``epoch``."""
+    """Return whether a heartbeat word is one of the owner of ``epoch``."""
     return word >> 8 == epoch & 0xFF and word & 0xFF != 0
 
 
@@ -77,7 +77,7 @@ Four = tuple[float, float, float, float]
 
 
 class WordType(Enum):
-    """How a value lies in words; the names are those of IEC 61131-3, but for ``CHARS``."""
+    """How a value is stored in words; the names are those of IEC 61131-3, except ``CHARS``."""
 
     UINT = "H"
     INT = "h"
@@ -196,7 +196,7 @@ class Layout:
         return {name: parts[place] for name, place in self._places.items()}
 
     def intact(self, words: Sequence[int]) -> bool:
-        """Tell whether the checksum in ``words`` is that of the words before it."""
+        """Return whether the checksum in ``words`` is that of the words before it."""
         place = self._by_name["crc"].word
         return words[place] == crc16(words[:place])
 
@@ -226,7 +226,7 @@ class BlockFault(StrEnum):
 
 
 class BlockError(ValueError):
-    """A block cannot be read or made; who talks to a person turns it into a RobolinkError.
+    """A block cannot be read or made; the caller turns this into a RobolinkError.
 
     Attributes:
         fault: The named reason.

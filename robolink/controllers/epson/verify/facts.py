@@ -1,4 +1,4 @@
-"""What the requests and their answers show. Legal at any time, production included.
+"""What the requests and their answers show. Allowed at any time, production included.
 
 What printed statements show. Each only prints; they need Execute.
 
@@ -192,7 +192,7 @@ def where_width(interview: Interview) -> Fact:
 
 
 def base(interview: Interview) -> Fact:
-    """Where the base stands that positions count from (docs/reference/spel.md 5.4)."""
+    """Where the base is, from which positions count (docs/reference/spel.md 5.4)."""
 
     def read(text: str) -> tuple[str, OptionValue] | None:
         place = spel.parse_base(text)

@@ -28,7 +28,7 @@ WATCHED: Final = "robolink.watched"
 
 
 def on_terminal() -> bool:
-    """Tell whether a person can be asked."""
+    """Return whether a person can be asked."""
     return is_terminal(sys.stdin) and is_terminal(sys.stderr)
 
 
@@ -107,7 +107,7 @@ def asked_for_text(question: str) -> str:
 
 
 def _answer() -> str:
-    """Return the next line; the controller's status is read meanwhile, where one is connected."""
+    """Return the next line; read the controller's status meanwhile, if one is connected."""
     from robolink.runner import awaited_line
     from robolink_cli.prompts.operator import terminal
 
@@ -155,7 +155,7 @@ def accepted_jump(
     accepted_mm: float | None,
     accepted_deg: float | None,
 ) -> Iterator[None]:
-    """Have a jump beyond the limits of the cell accepted, for the block, by who may accept it.
+    """Let a permitted person accept a jump beyond the cell's limits, for the block.
 
     ``--yes`` does not answer this question: it was typed before the figure was known.
 

@@ -41,7 +41,7 @@ def backup_payload(backup: Backup, file: Path) -> dict[str, object]:
 
 
 def show_backup(backup: Backup, file: Path) -> None:
-    """Say what was saved, and of which controller."""
+    """Show what was saved, and of which controller."""
     facts, tools = backup.facts, backup.state.tools
     unknown = tr("unknown")
     say(
@@ -271,7 +271,7 @@ class Restoration:
         self._plan = plan
 
     def requests(self) -> list[str]:
-        """Return what would be sent besides reads; finds what the controller cannot hold.
+        """Return what would be sent besides reads; finds what the controller cannot store.
 
         Raises:
             ToolError: A value does not fit this robot.
@@ -328,7 +328,7 @@ class Restoration:
         }
 
     def show_end(self) -> None:
-        """Say how it ended."""
+        """Show how it ended."""
         if self._plan.empty:
             say(tr("The controller has these values already. Nothing was written."))
         elif self._plan.changes:

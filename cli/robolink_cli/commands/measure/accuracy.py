@@ -1,4 +1,4 @@
-"""cell accuracy: what a cell knows of its accuracy, and measuring a row of it."""
+"""cell accuracy: what a cell knows of its accuracy, and measuring one of its rows."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -178,7 +178,7 @@ class Asked:
 
 
 def measure_row(context: CliContext, row: str, asked: Asked, *, yes: bool) -> None:
-    """Calculate a row, show it, ask, and put it on record; no tool is written, nothing moves.
+    """Calculate a row, show it, ask, and record it; writes no tool, moves nothing.
 
     Raises:
         CalibrationError: Too few measurements count.
@@ -221,7 +221,7 @@ def row_payload(found: MeasuredRow) -> dict[str, object]:
 
 
 def _checked(row: str, asked: Asked) -> tuple[float, float] | None:
-    """Return where the gauge tip truly is, ``None`` where none is used.
+    """Return the true place of the gauge tip, ``None`` if none is used.
 
     Raises:
         ConfigError: See :func:`measure_row`.

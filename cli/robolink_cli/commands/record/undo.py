@@ -1,4 +1,4 @@
-"""undo: what tools held before a change is written back."""
+"""undo: writes back what tools held before a change."""
 
 from typing import Annotated
 
@@ -143,7 +143,7 @@ class Undoing:
         }
 
     def show_end(self, cell: str) -> None:
-        """Say how it ended, and how it is undone.
+        """Show how it ended, and how to undo it.
 
         Args:
             cell: How a person names the controller.

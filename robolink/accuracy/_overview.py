@@ -149,7 +149,7 @@ def measuring_step(
     camera = f"robolink calibrate camera-affine --station {at} --tool {number}"
     return {
         "touch_mm": tr(
-            "Measure a gauge tip that is known, five times: {command}",
+            "Measure a gauge tip with a known offset five times: {command}",
             command=f"robolink cell accuracy measure touch_mm --tool {number} --true X,Y",
         ),
         "place_mm": tr("Measure the camera five times: {command}", command=camera)

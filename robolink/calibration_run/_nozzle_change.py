@@ -312,7 +312,7 @@ class NozzleChange:
         if not self._plan.ask_before_write:
             if self._plan.agreed_by is not None:
                 entry = answer_entry(question, True, self._plan.agreed_by, accepted=True)
-                self._controller.outcomes.append(replace(entry, verdict=tr("accepted beforehand")))
+                self._controller.outcomes.append(replace(entry, verdict=tr("accepted in advance")))
             return None
         judged = [(one, plan.criteria.verdicts(one)) for plan, one in proposals]
         shown, verdicts = zip(*judged, strict=True)

@@ -160,7 +160,7 @@ def _sure(step: TurnTestStep, judgement: TurnJudgement, stated_mm: float | None)
 
 def _take_back() -> ChoiceRow:
     return ChoiceRow(
-        tr("Put the old value back."), tr("robolink undoes everything that this change wrote.")
+        tr("Restore the old value."), tr("robolink undoes everything that this change wrote.")
     )
 
 
@@ -195,7 +195,7 @@ def _kept(
             wider=wider_mm,
             stated=stated_mm or 0.0,
         ),
-        tr("It goes on record, and needs an engineer if the cell names people."),
+        tr("It is recorded, and needs an engineer if the cell names people."),
     )
 
 

@@ -101,7 +101,7 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
         with self._link.lock.held(self.request):
             markers, self._unconditional = self._link.markers, expected is ANY
             if self._unconditional:
-                purpose = tr("write tool {tool} blindly", tool=self.tool)
+                purpose = tr("write tool {tool} without comparing its old value", tool=self.tool)
                 require_engineer(markers.outcomes, purpose)
             markers.look()
             self.before = self.read_before(expected)

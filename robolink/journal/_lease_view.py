@@ -218,7 +218,7 @@ class LeaseView:
             alive: Whether he lives, one sentence.
         """
         said = tr(
-            "{holder} has been at work on this controller since {since}: {purpose}.",
+            "{holder} has had this controller locked since {since}: {purpose}.",
             holder=describe(self.who()),
             since=local_label(self.taken_at),
             purpose=self.purpose,
@@ -250,12 +250,12 @@ class LeaseView:
                 had to insist.
         """
         if self.token == FREE:
-            verdict = tr("Nobody worked on this cell; {because}.", because=because)
+            verdict = tr("Nobody had this controller locked; {because}.", because=because)
         else:
             holder = describe(self.who())
             verdict = (
                 tr(
-                    "{holder} was at work on this controller before: {because}.",
+                    "{holder} had this controller locked before: {because}.",
                     holder=holder,
                     because=because,
                 )

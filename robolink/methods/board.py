@@ -69,11 +69,7 @@ class BoardParameters(LookParameters):
         Len(2, 24),
         MM,
         Option(flag="--fiducial", metavar="X,Y", moves=False),
-        Help(
-            declared(
-                "A fiducial in the axes that the tool is to have; in the order of their numbers."
-            )
-        ),
+        Help(declared("A fiducial in the axes of the tool; in the order of their numbers.")),
     ] = None
     spacing_mm: Annotated[
         float | None,
@@ -399,10 +395,10 @@ METHOD = Method(
     name="board",
     summary=declared("See the fiducials of a held board: X, Y and U."),
     description=declared(
-        "See the fiducials of a held board with an up-looking camera: X, Y and U of the board.\n\n"
-        "The tool that is stored says where the board is expected: the fiducials must then lie in "
-        "the image one at a time. Say where they are: how far two are apart, or where each of "
-        "them is."
+        "See the fiducials of a held board with an up-looking camera: X, Y and U of the "
+        "board.\n\nThe stored tool gives the expected place of the board: with it, each "
+        "fiducial must appear in the image by itself. State where they are: the distance "
+        "between two, or the place of each."
     ),
     parameters=BoardParameters,
     measures=("x_mm", "y_mm", "u_deg"),

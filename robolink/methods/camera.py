@@ -308,10 +308,10 @@ METHOD = Method(
     name="camera",
     summary=declared("See the tip with a calibrated, up-looking camera: X and Y."),
     description=declared(
-        "See the tip with an up-looking camera: X and Y; nobody touches anything.\n\n"
-        "What a pixel means is known from 'calibrate camera-affine', or stands in the cell file, "
-        "or the camera answers in millimetres. Looks at several angles tell the tip from what the "
-        "camera itself is off by; a single one believes the camera."
+        "See the tip with an up-looking camera: X and Y; nobody touches anything.\n\nThe scale "
+        "of a pixel comes from 'calibrate camera-affine' or the cell file, or the camera "
+        "answers in millimetres. Looks at several angles separate the tip from the camera's "
+        "own error; a single look trusts the camera."
     ),
     parameters=CameraParameters,
     measures=("x_mm", "y_mm"),

@@ -360,10 +360,10 @@ METHOD = Method(
     summary=declared("Find an up-looking camera and the tip together."),
     description=declared(
         "Find an up-looking camera and the tip together: X and Y, scale, turn and mirror.\n\n"
-        "Say to the command, or in the cell file, where the camera looks to within its field of "
-        "view. The tip goes to four corners of the image and turns in its middle. What was found "
-        "is kept on record under the name of the station; a camera that is not as it was is "
-        "refused."
+        "State where the camera looks, to within its field of view, with the command or in the "
+        "cell file. The tip moves to four corners of the image and turns in its middle. "
+        "robolink records the result under the name of the station, and refuses a camera that "
+        "has changed since."
     ),
     parameters=CameraAffineParameters,
     measures=("x_mm", "y_mm"),

@@ -58,8 +58,8 @@ class PointsParameters(MethodParameters):
         Option(moves=False),
         Help(
             declared(
-                "All axes were held by their motors, none let go (SFREE), when the points were "
-                "taught; without it a person is asked."
+                "All axes were held by their motors, none released (SFREE), when the points "
+                "were taught; without it robolink asks you."
             )
         ),
     ] = False

@@ -130,7 +130,7 @@ class SampledParameters(MethodParameters, ABC):
         """Check that an early end and a retake can have an effect."""
         if "retake" in check.given and self.retake and self.no_residual():
             yield Problem(
-                "retake", tr("means nothing: nothing is repeated, so nothing can fit badly")
+                "retake", tr("has no effect: nothing is repeated, so nothing can fit badly")
             )
         if self.until_mm is None or check.sigma_stated is None:
             return
@@ -188,7 +188,7 @@ Turns = Annotated[
     MaxLen(24),
     DEGREES,
     Option(flag="--angles", metavar="0,60,.."),
-    Help(declared("U of each look, counted toward zero from where the tool stands.")),
+    Help(declared("U of each look, relative to the present U, counted toward zero.")),
 ]
 
 PLACE = (

@@ -55,7 +55,7 @@ class TwoPoseParameters(UprightPinParameters):
         Le(360 - MIN_ROTATION_DEG),
         DEGREES,
         Option(metavar="DEG"),
-        Help(declared("By how much U differs between the two touches.")),
+        Help(declared("Turn of U between the two touches.")),
     ] = 180.0
 
     @property

@@ -219,7 +219,7 @@ class ChangeGuard:
         require_engineer(
             self._outcomes,
             tr(
-                "let tool {tool} jump by {change:.3f} mm and {turn:.3f} degrees",
+                "accept a jump of tool {tool} by {change:.3f} mm and {turn:.3f} degrees",
                 tool=tool,
                 change=jump.length_mm,
                 turn=jump.angle_deg,

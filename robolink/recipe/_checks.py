@@ -72,7 +72,7 @@ def moments(draft: Draft) -> Iterator[Problem]:
             continue
         if entry.at not in _OF_ONE_TOOL:
             yield Problem(
-                where, tr('means nothing here: "{at}" comes once for all tools', at=entry.at)
+                where, tr('has no effect here: "{at}" comes once for all tools', at=entry.at)
             )
         elif known is not None and entry.tool not in known:
             yield Problem(
@@ -91,8 +91,8 @@ def answers(draft: Draft) -> Iterator[Problem]:
             yield Problem(
                 f"prompts#{number}.at",
                 tr(
-                    "is too late for this answer: the measurement is on record by then; write "
-                    '"start" or "before_measure"'
+                    "is too late for this answer: the measurement is already recorded by then; "
+                    'write "start" or "before_measure"'
                 ),
             )
         if asked & {(prompt.answer, prompt.tool), (prompt.answer, None)}:
@@ -126,10 +126,10 @@ def points(draft: Draft) -> Iterator[Problem]:
         where = f"{place}.points"
         if not isinstance(parameters, PointsParameters):
             if tool.points is not None:
-                yield Problem(where, tr('means nothing without kind = "points" in [source]'))
+                yield Problem(where, tr('has no effect without kind = "points" in [source]'))
             if tool.poses is not None:
                 yield Problem(
-                    f"{place}.poses", tr('means nothing without kind = "points" in [source]')
+                    f"{place}.poses", tr('has no effect without kind = "points" in [source]')
                 )
         elif tool.poses is not None:
             if tool.points is not None:
@@ -165,7 +165,8 @@ def standstill(draft: Draft) -> Iterator[Problem]:
         )
     if draft.verify:
         yield Problem(
-            "verify", tr('cannot be true: nothing moves with kind = "points", so nothing is proved')
+            "verify",
+            tr('cannot be true: nothing moves with kind = "points", so there is no turn test'),
         )
     if draft.refusal is not None and draft.refusal.action == "measure_again":
         yield Problem(
@@ -311,7 +312,7 @@ def height(draft: Draft) -> Iterator[Problem]:
         return
     method = draft.source.of_method
     if draft.z != "measured" and method.only_z:
-        yield Problem("z", tr('must be "measured": a touch tells Z and nothing else'))
+        yield Problem("z", tr('must be "measured": a touch measures only Z'))
     if draft.z == "measured" and method.unmeasured_z:
         yield Problem("z", spoken(method.unmeasured_z))
 
@@ -332,14 +333,14 @@ def verification(draft: Draft) -> Iterator[Problem]:
     if limits is None or source is None or "drift_mm" not in limits.model_fields_set:
         return
     if draft.verify is False or not source.of_method.needs.motion:
-        yield Problem("tolerances.drift_mm", tr("means nothing: no drift is measured"))
+        yield Problem("tolerances.drift_mm", tr("has no effect: no drift is measured"))
 
 
 def refusals(draft: Draft) -> Iterator[Problem]:
     """Check that attempts are allowed if the measurement is repeated."""
     refusal = draft.refusal
     if refusal is not None and refusal.action == "stop" and refusal.attempts is not None:
-        yield Problem("refusal.attempts", tr('means nothing without action = "measure_again"'))
+        yield Problem("refusal.attempts", tr('has no effect without action = "measure_again"'))
 
 
 _CHECKS: Final[tuple[Callable[[Draft], Iterator[Problem]], ...]] = (

@@ -186,7 +186,7 @@ def compare_test(
     if value in before and _alike(before[value], typed, digits):
         raise ConfigError(
             tr(
-                "{key} read {shown} before as well, so this proves nothing.",
+                "{key} already read {shown} before, so this confirms nothing.",
                 **_said(value, text),
             ),
             remedy=tr("Enter another value at the machine's own screen."),
@@ -323,7 +323,7 @@ def _require_alike(found: Found, value: MapValue, text: str, typed: float, digit
         raise _differs(found, value, text, typed, digits)
     if not typed:
         raise ConfigError(
-            tr("{key} reads 0: a 0 proves nothing.", key=value),
+            tr("{key} reads 0, and a 0 confirms nothing.", key=value),
             remedy=tr(
                 "Enter a test value for it at the machine's own screen, compare that, and put the "
                 "0 back there."

@@ -251,7 +251,10 @@ def _probe(found: RegisterMap) -> Iterator[Problem]:
     if len(set(words)) < len(words) or not any(words):
         yield Problem(
             "probe.value",
-            tr("does not tell the word order: take a number with no two words alike, as 12.3456"),
+            tr(
+                "does not show the word order: use a number whose words all differ, for example "
+                "12.3456"
+            ),
         )
 
 

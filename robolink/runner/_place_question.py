@@ -175,7 +175,7 @@ class PlaceQuestion:
         if self._typed is None:
             raise ConfigError(
                 tr("A pose is typed only at a touch that a turn test proves afterwards."),
-                remedy=tr("Bring the tip onto it, and take it."),
+                remedy=tr("Jog the tip onto it, then take it."),
             )
         return self._typed(word, here)
 
@@ -320,4 +320,4 @@ def inputs_of(controller: Controller) -> DigitalIo:
 
 def ended_by_operator() -> DeclinedError:
     """Return the end that a person requested; a caller that restores a value reports it itself."""
-    return DeclinedError(tr("You stopped it."), remedy=tr("The robot stands still."))
+    return DeclinedError(tr("You stopped it."), remedy=tr("The robot has stopped."))

@@ -75,14 +75,14 @@ class ProgramChange:
     def end_kept(self, value: ToolOffset | None) -> bool:
         """Close it as kept; return false, and record a conflict, if that is impossible."""
         if self.proved and same_thousandths(value, self.requested):
-            self._close(EntryKind.DONE, tr("proved, and kept by the program"), value)
+            self._close(EntryKind.DONE, tr("tested, and kept by the program"), value)
             return True
         return self._conflict(value)
 
     def end_restored(self, value: ToolOffset | None) -> bool:
         """Close it as restored; return false, and record a conflict, if that is impossible."""
         if same_thousandths(value, self.before):
-            self._close(EntryKind.ROLLED_BACK, tr("put back by the program"), value)
+            self._close(EntryKind.ROLLED_BACK, tr("restored by the program"), value)
             return True
         return self._conflict(value)
 

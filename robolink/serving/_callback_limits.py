@@ -90,8 +90,8 @@ def _require_known(result: "CalibrationResult", limit_mm: float) -> None:
         raise CalibrationError(
             "uncertain",
             tr(
-                "The tip is known within {within:.3f} mm; {limit:g} mm are allowed. The largest "
-                "part is: {row}.",
+                "The tip is accurate to {within:.3f} mm; the limit is {limit:g} mm. Largest "
+                "row: {row}.",
                 within=accuracy.within_mm,
                 limit=limit_mm,
                 row=accuracy.largest.title,

@@ -329,7 +329,7 @@ class CallbackConversation:
         assert run.facts is not None  # noqa: S101 - a value was given
         proof = proved(run.measure, run.result, change.requested, run.facts)
         change.allow_keeping(
-            tr("proved by what the program saw after it wrote"),
+            tr("confirmed by what the program saw after the write"),
             max_drift_mm=proof.max_drift_mm,
             tolerance_mm=self._limits.tolerance_mm,
             warnings=list(proof.warnings),

@@ -200,7 +200,7 @@ class PermitCall:
             for _ in range(plan.proofs):
                 self._take(self._next(), written, proof=True)
             proved(self._touches, result, written, facts)
-            change.keep(tr("proved by what the program touched after the write"))
+            change.keep(tr("confirmed by what the program touched after the write"))
         return written
 
     @property

@@ -297,7 +297,7 @@ def _restore_tool(controller: Controller, kept: _Kept, tool: int) -> None:
             EntryKind.ROLLED_BACK if written else EntryKind.NOT_APPLIED,
             operation=mine.operation,
             tool=tool,
-            verdict=tr("checked against the contract; it holds what it held before"),
+            verdict=tr("checked against the contract; its earlier value is restored"),
             details={**mine.details, "value": plain_offset(kept.before)},
         ),
     )

@@ -173,7 +173,7 @@ def left_unverified(tools: Sequence[int], *, marked: bool) -> str:
             numbers=numbers,
         )
     return tr(
-        "Tool {numbers} may hold the new value, which was never tested; 'robolink "
-        "recover' puts the old one back.",
+        "Tool {numbers} may hold the new value, which was never tested; 'robolink recover' "
+        "restores the old one.",
         numbers=numbers,
     )

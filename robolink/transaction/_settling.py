@@ -118,7 +118,7 @@ class Settler:
         numbers = ", ".join(
             str(step.tool) for step, is_old in zip(steps, old, strict=True) if not is_old
         )
-        action = tr("Put the old value of tool {numbers} back", numbers=numbers)
+        action = tr("Restore the old value of tool {numbers}", numbers=numbers)
         return Finding(marker, Verdict.NOT_FINISHED, text, action)
 
     def settle(self, finding: Finding) -> None:

@@ -386,7 +386,7 @@ def _plan_to(controller: Controller, number: int, tool: int | None) -> UndoPlan:
             remedy=tr("Name that tool, or leave {tool} out.", tool=remedy_word(RemedyWord.TOOL)),
         )
     sentence = tr(
-        "bring tool {tool} back to what entry {number} of {at} proved",
+        "restore tool {tool} to the value confirmed by entry {number} of {at}",
         tool=proved,
         number=number,
         at=local_label(entry.at),

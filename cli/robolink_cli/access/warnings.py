@@ -176,7 +176,7 @@ def _unfinished(marker: "Marker", back: str, now: str) -> str:
         remedy = tr("Next: {command}", command=back)
     else:
         remedy = tr(
-            "This puts tool {tool} back, with the earlier power mode and speed: {commands}",
+            "This restores tool {tool}, with the earlier power mode and speed: {commands}",
             commands=back,
             tool=before,
         )

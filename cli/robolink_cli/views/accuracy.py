@@ -126,7 +126,7 @@ def show_accuracy(known: Sequence[RowsOfRobot]) -> None:
         for step in steps:
             say(step)
     else:
-        say(tr("Every row is stated or on record."))
+        say(tr("Every row is stated or recorded."))
 
 
 def _step(place: RowsAt, row: KnownRow) -> str:

@@ -99,7 +99,7 @@ def not_yet(state: WizardState, at_s: float) -> str:
         return tr("Wait: the robot is still moving.")
     arrived = touch.arrival is not None or state.carried
     if touch.contact is None and arrived and not _brought(state):
-        return tr("Not yet: the tip still stands where the robot put it. Jog it onto the pin.")
+        return tr("Not yet: the tip is still where the robot stopped. Jog it onto the pin.")
     if touch.contact is None and jogging.coarse:
         return tr(
             "Not yet: the last step was {mm} mm. Finish with 0.10 mm or less.",

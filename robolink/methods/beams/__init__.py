@@ -89,7 +89,8 @@ class BeamsParameters(SampledParameters):
         Option(metavar="DEG"),
         Help(
             declared(
-                "Turn of U for a second measurement, so that moved beams do no harm; 0 for none."
+                "Turn of U for a second measurement, so that moved beams cause no error; 0 for "
+                "none."
             )
         ),
     ] = 0.0
@@ -104,7 +105,11 @@ class BeamsParameters(SampledParameters):
         Ge(0.5),
         Le(20),
         MM,
-        Help(declared("How far beside the beam the tip starts; the new tip may be off by less.")),
+        Help(
+            declared(
+                "How far beside the beam the tip starts; the new tip must be off by less than this."
+            )
+        ),
     ] = 2.0
     aside_mm: Annotated[
         float,

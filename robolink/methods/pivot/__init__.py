@@ -47,11 +47,7 @@ class PivotParameters(PinParameters):
         int,
         Ge(4),
         Le(12),
-        Help(
-            declared(
-                "Number of touches, the first one in the orientation in which the tool stands."
-            )
-        ),
+        Help(declared("Number of touches; the first in the tool's present orientation.")),
     ] = 6
     tilt_deg: Annotated[
         float,
@@ -309,11 +305,11 @@ METHOD = Method(
     ),
     description=declared(
         "Touch one pin with the tool tilted and turned: X, Y and Z, on five axes or six.\n\n"
-        "Put the tip some millimetres above a fixed pin first, the tool as it stands in "
-        "production. After the first touch the robot lifts it, tilts and turns it in the air, and "
-        "comes down to a clearance; you do the rest. The tool must be defined already, to a "
-        "millimetre or two. A robot whose tool only turns about Z cannot do this.\n\n"
-        "With poses that exist already nothing moves."
+        "First put the tip some millimetres above a fixed pin, with the tool oriented as in "
+        "production. After the first touch the robot lifts the tool, tilts and turns it in the "
+        "air, and comes down to a clearance; you jog the rest. The tool must be defined "
+        "already, to a millimetre or two. A robot whose tool only turns about Z cannot do "
+        "this.\n\nWith existing poses nothing moves."
     ),
     parameters=PivotParameters,
     measures=("x_mm", "y_mm", "z_mm"),

@@ -40,7 +40,11 @@ class SixPointParameters(PivotParameters):
         Le(200),
         MM,
         Option(metavar="MM"),
-        Help(declared("Least length of each of the two moves; the longer, the surer the axes.")),
+        Help(
+            declared(
+                "Least length of each of the two moves; longer moves make the axes more accurate."
+            )
+        ),
     ] = USUAL_WAY_MM
     second_is: Annotated[
         Literal["z", "xz"],
@@ -319,8 +323,7 @@ class _AxisTeaching:
             return False
         again: bool = yield Confirm(
             tr(
-                "This move leads {angle:.0f} degrees away from {axis} as it is "
-                "stored. Show it again?",
+                "This move is {angle:.0f} degrees off the stored {axis}. Show it again?",
                 angle=far_deg,
                 axis="+X" if way is TeachPrompt.ALONG_X else "+Z",
             )
@@ -413,16 +416,14 @@ METHOD = Method(
     name="six-point",
     summary=declared("A pivot and two moves along the tool's axes: all six components."),
     description=declared(
-        "Find all six components: a pivot, then a move along the tool's X and one "
-        "along its Z.\n\n"
-        "The touches go as in 'calibrate pivot'. Then, in the air and without "
-        "turning, you bring the tip to where it has room, and jog it along the tool's "
-        "own +X; the robot goes straight back; and along its own +Z. A move that is "
-        "too short or has turned is told at once. The work box reaches higher by the "
-        "length of a move.\n\n"
-        "With poses that exist already nothing moves: three or more on one pin, "
-        "tilted and turned; the last two, in this order, after a move along +X and "
-        "one along +Z, both from the last pose on the pin."
+        "Find all six components: a pivot, then a move along the tool's X and one along its "
+        "Z.\n\nThe touches go as in 'calibrate pivot'. Then, in the air and without turning, "
+        "you jog the tip to where it has room, and along the tool's own +X. The robot goes "
+        "straight back, and you jog along the tool's own +Z. robolink refuses at once a move "
+        "that is too short or has turned. The work box is higher by the length of a move.\n\n"
+        "With existing poses nothing moves: three or more on one pin, tilted and turned; the "
+        "last two, in this order, after a move along +X and one along +Z, both from the last "
+        "pose on the pin."
     ),
     parameters=SixPointParameters,
     measures=("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg"),

@@ -83,8 +83,8 @@ class ZTouchParameters(SampledParameters):
         MM,
         Help(
             declared(
-                "How far below the expected touch the search ends; "
-                "a new tip can be shorter by less."
+                "How far below the expected touch the search ends; the new tip must be shorter "
+                "by less than this."
             )
         ),
     ] = 2.0
@@ -106,8 +106,8 @@ class ZTouchParameters(SampledParameters):
         Option(metavar="DEG"),
         Help(
             declared(
-                "By how much U differs at the touch that proves the new value; 0 on a machine that "
-                "cannot turn, such as a gantry."
+                "Turn of U to the touch that tests the new value; 0 on a machine that cannot "
+                "turn, such as a gantry."
             )
         ),
     ] = 180.0
@@ -295,10 +295,10 @@ METHOD = Method(
     name="z-touch",
     summary=declared("Touch a surface that switches an input: Z."),
     description=declared(
-        "Touch a surface that switches an input: Z; nobody touches anything.\n\n"
-        "X and Y are kept. The tip stops at the touch and retreats; two speeds tell the latency. "
-        "After each touch from the third on it says how well they agree and what Z is repeatable "
-        "to; at the end the one that fits worst is named and may be made again."
+        "Touch a surface that switches an input: Z; nobody touches anything.\n\nX and Y stay. "
+        "The tip stops at the touch and retreats; two speeds show the latency. From the third "
+        "touch on, it shows how well they agree and what Z is repeatable to. At the end it "
+        "names the touch that fits worst, and you can repeat it."
     ),
     parameters=ZTouchParameters,
     measures=("z_mm",),

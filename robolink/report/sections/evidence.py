@@ -43,8 +43,8 @@ def interval_sentences(fit: CalibrationResult) -> tuple[str, ...]:
 def change_of_z() -> str:
     """Return what a change of Z does not show."""
     return tr(
-        "Z is a change: only by how much the new tip is longer or shorter was measured. The stored "
-        "Z was never measured, so nothing is stated of how long the tip is."
+        "Z: only the change from the old tip was measured. The stored Z was never measured, so "
+        "the length of the tip is not known."
     )
 
 
@@ -171,8 +171,8 @@ def limits_rule(report: Report) -> str:
     if not report.judgements:
         return ""
     return tr(
-        "Decision rule of the limits: what is found is compared directly with what is "
-        "allowed; the measurement is refused when one of them is exceeded."
+        "Decision rule of the limits: each value is compared directly with its limit; the "
+        "measurement is refused if one limit is exceeded."
     )
 
 

@@ -389,8 +389,8 @@ class MapComparison:
             raise DeclinedError(
                 tr("Not everything was compared."),
                 remedy=tr(
-                    "The comparisons made are on record; robolink does not change the "
-                    "rest. Run the command again to go on."
+                    "The comparisons made are recorded; robolink does not change the rest. Run "
+                    "the command again to continue."
                 ),
             )
         if not answer:

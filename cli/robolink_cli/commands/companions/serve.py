@@ -56,10 +56,9 @@ def serve(
         CliOption(
             "--on-record",
             metavar="NAME",
-            help="Name under which a robot is on record; by default epson: and its serial "
-            "number. For a "
-            "controller with several robots repeat it: each name ends in the robot's serial "
-            "number.",
+            help="Name under which a robot is recorded; default: epson: and its serial number. "
+            "For a controller with several robots repeat it: each name ends in the "
+            "robot's serial number.",
         ),
     ] = (),
     tolerance_mm: Annotated[

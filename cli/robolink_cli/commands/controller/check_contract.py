@@ -94,10 +94,10 @@ def check_contract(
     """Check that a controller behaves as every controller type must; without options it only reads.
 
     With --write it writes one tool several times, selects it and the flange, stops and resets;
-    with --move it moves up and down in small steps. Tool, selection, power and speed are restored,
-    and stay on record until then: if this is killed, 'robolink recover' restores them. Exit code 1
-    when a check fails; if the controller refuses to show something in its present state, that is an
-    error, as elsewhere.
+    with --move it moves up and down in small steps. It restores tool, selection, power and speed.
+    If the command is killed before that, 'robolink recover' restores them. Exit code 1 when a check
+    fails; if the controller refuses to show something in its present state, that is an error, as
+    elsewhere.
     """
     if (writes and tool is None) or (tool is not None and not writes):
         raise click.UsageError(

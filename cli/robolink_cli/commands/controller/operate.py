@@ -246,7 +246,7 @@ def execute_raw(
     statement: Annotated[str, CliArgument()],
     yes: Yes = False,
 ) -> None:
-    """Run one SPEL+ statement as typed; for engineers. It goes on record.
+    """Run one SPEL+ statement as typed; for engineers. It is recorded.
 
     robolink sends it once, unchanged, and needs the answer within --timeout. Do not use it for
     movements: robolink may not be able to confirm how they ended.

@@ -82,9 +82,7 @@ def measure(
     tool: Annotated[
         int | None,
         click.IntRange(1, 15),
-        CliOption(
-            shell_complete=complete_tool, help="The tool whose calibrations on record count."
-        ),
+        CliOption(shell_complete=complete_tool, help="The tool whose recorded calibrations count."),
     ] = None,
     true: Annotated[
         str | None,

@@ -401,7 +401,7 @@ class Recalibration:
             say(tr("The reference was recorded; nothing was written."))
         say(
             tr(
-                "On record as change {change}: robolink journal report {change}",
+                "Recorded as change {change}: robolink journal report {change}",
                 change=report.change[:8],
             )
         )

@@ -103,7 +103,7 @@ def _option(answer: str, *, written: bool, tests: bool) -> str:
     if not written:
         return tr("Everything is as it should be. Work can continue.")
     if answer == OLD:
-        return tr("The old one. Put the old value back.")
+        return tr("The old one. Restore the old value.")
     if tests:
         return tr("The new one. Make the turn test, then keep the new value.")
     return tr("The new one. Keep the new value; nobody has tested it.")
@@ -120,15 +120,15 @@ def recover(
         bool,
         CliOption(
             late=True,
-            help="Keep untested new values; without it robolink writes the old ones back.",
+            help="Keep untested new values; without it robolink restores the old ones.",
         ),
     ] = False,
     choose: Annotated[
         Literal["old", "new", "blocked"] | None,
         CliOption(
             late=True,
-            help="Your answer to every question: old values back; new values kept, on a "
-            "terminal after their turn test; or everything left blocked.",
+            help="Your answer to every question: restore the old values; keep the new ones, on "
+            "a terminal after their turn test; or leave everything blocked.",
         ),
     ] = None,
     yes: Annotated[

@@ -267,7 +267,7 @@ class TurnTests:
             self._controller,
             tr("to test tool {tool}, from where you jog the tip into contact", tool=tools)
             if tests[0].test.by_touch
-            else tr("to test tool {tool}, straight up from where it stands first", tool=tools),
+            else tr("to test tool {tool}, first straight up from where it is", tool=tools),
             moves=sum(one.test.moves(here) for one in tests),
             speed_mm_s=settings.speed_mm_s,
             box_mm=box.x_max_mm - box.x_min_mm,

@@ -224,7 +224,7 @@ def _actions(state: WizardState) -> tuple[tuple[str, str], ...]:
     if touch is None or not touch.number:
         return (("5", tr("It is there")), ("0", tr("STOP")))
     if touch.proof:
-        return (("5", tr("Record")), ("0", tr("Stop: the old value comes back")))
+        return (("5", tr("Record")), ("0", tr("Stop: restore the old value")))
     take, stop = ("5", tr("Record this touch")), ("0", tr("STOP"))
     if touch.number < 2:
         return take, stop

@@ -131,7 +131,7 @@ def _of_the_place(method: AnyMethod) -> list[Decorator]:
             motion_option(
                 "--at",
                 metavar="X,Y,Z",
-                help=declared("Where the station is, in the base; default: its place on record."),
+                help=declared("Where the station is, in the base; default: its recorded place."),
             )
         )
     if method.from_poses is not None and method.pose_help is not None:

@@ -1,4 +1,4 @@
-"""The tool definitions a controller keeps, and what each change costs."""
+"""The tool definitions that a controller stores, and the cost of each change."""
 
 from collections.abc import Mapping
 from typing import Final, Literal, TypeAlias
@@ -26,7 +26,7 @@ class ToolMemory:
 
     @property
     def selected(self) -> int:
-        """Number of the tool in force, 0 for the flange."""
+        """Number of the selected tool, 0 for the flange."""
         return self._selected
 
     def get(self, tool: int) -> ToolOffset | None:
@@ -54,7 +54,7 @@ class ToolMemory:
         self.flash_writes += 1
 
     def clear(self, tool: int, *, in_force: ClearInForce = "error") -> None:
-        """Forget a definition.
+        """Remove a definition.
 
         Args:
             tool: Number of the tool.
@@ -75,7 +75,7 @@ class ToolMemory:
         self.flash_writes += 1
 
     def select(self, tool: int) -> None:
-        """Put a tool in force.
+        """Select a tool.
 
         Raises:
             Refusal: It is not defined (seen in a client: it needs a reset,
@@ -94,7 +94,7 @@ class ToolMemory:
         }
 
     def restore(self, state: Mapping[str, object]) -> None:
-        """Take over what :meth:`to_state` returned.
+        """Restore what :meth:`to_state` returned.
 
         Raises:
             TypeError, ValueError: It is something else.

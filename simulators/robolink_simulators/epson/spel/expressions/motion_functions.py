@@ -122,7 +122,7 @@ def _time_to(session: Session, arguments: Sequence[Value]) -> Value:
 
 
 def _short_enough(session: Session, arguments: Sequence[Value]) -> Value:
-    """Tell whether PTPBoost counts for the motion from here to a point."""
+    """Return whether PTPBoost applies to the motion from here to a point."""
     machine = session.machine
     joints = machine.robot.joints_for(as_point(arguments[0]))
     return is_short(go_leg(machine, machine.arm.joints, joints))

@@ -7,7 +7,7 @@ back until the exchange, which a deadline bounds, has ended.
 
 A process that would rather be ended than killed has SIGTERM and SIGHUP take the same way for the
 time of :func:`one_ending`, as every command does: the movement is aborted, tool, power and speed
-are put back, and only then it ends. Without that they do what they always did: they kill, and
+are restored, and only then it ends. Without that they do what they always did: they kill, and
 ``recover`` finds what was left.
 
 The handler is swapped when the first session opens and not once per exchange, because two calls

@@ -154,7 +154,7 @@ class StopLatch:
         A thread that restores is let through; what it may send is decided by :meth:`admit`.
 
         Raises:
-            StoppedError: A stop is in force.
+            StoppedError: A stop is active.
         """
         if self._closed and not self.restores:
             raise self._stopped(tr("{request}: ended by a stop.", request=request), request)
@@ -177,7 +177,7 @@ class StopLatch:
         """Surround an operation that must not start under a stop, nor end well under one.
 
         Raises:
-            StoppedError: A stop was in force at its beginning, or came meanwhile.
+            StoppedError: A stop was active at its beginning, or came meanwhile.
         """
         self.require_open(request)
         with self.ending(request):
@@ -188,7 +188,7 @@ class StopLatch:
         """Surround what must not end well under a stop.
 
         Raises:
-            StoppedError: A stop is in force at its end, be that a success or a "no" of the
+            StoppedError: A stop is active at its end, be that a success or a "no" of the
                 controller, which the stop explains.
         """
         with Concerning(self._controller, request):
@@ -378,10 +378,10 @@ class Patience:
 
         Args:
             request: What waits.
-            calming: Whether that may begin while a stop is in force, as a reset may.
+            calming: Whether that may begin while a stop is active, as a reset may.
 
         Raises:
-            StoppedError: A stop is in force.
+            StoppedError: A stop is active.
         """
         if not calming:
             self._latch.require_open(request)

@@ -118,4 +118,4 @@ RENAMED: Final = {
     ),
     "where": (f"{CONTROLLER}.operate:where", "robot where"),
 }
-"""Names of before: where they are, and what they are called now."""
+"""Former names: where they are, and what they are called now."""

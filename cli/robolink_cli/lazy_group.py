@@ -30,7 +30,7 @@ class LazyGroup(click.Group):
         lazy: Command name to ``("package.module:object", one-line help)``, in the order in
             which they are listed, after the commands that were added to the group itself.
         unlisted: Names that work and are listed nowhere, to ``"package.module:object"``.
-        renamed: Names of before, to ``("package.module:object", full name of today)``. They are
+        renamed: Former names, to ``("package.module:object", full name of today)``. They are
             listed nowhere; on a terminal a line says how the command is called now.
     """
 

@@ -48,7 +48,7 @@ class ToolState:
 
     Attributes:
         tools: Every tool by number; an undefined one is ``None``.
-        selected: The tool in force, 0 for the flange; ``None`` where the controller does not
+        selected: The selected tool, 0 for the flange; ``None`` where the controller does not
             tell.
     """
 
@@ -178,8 +178,8 @@ class Comparison:
 
     Attributes:
         tools: One each, in order.
-        expected_selected: The tool in force in the file.
-        found_selected: The tool in force on the controller.
+        expected_selected: The selected tool in the file.
+        found_selected: The selected tool on the controller.
         selection_counts: Whether another tool in force is a difference.
     """
 

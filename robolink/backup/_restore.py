@@ -40,7 +40,7 @@ class RestorePlan:
 
     Attributes:
         changes: Writes first, then clears.
-        select: The tool to put in force, ``None`` to leave that as it is.
+        select: The tool to select, ``None`` to leave that as it is.
     """
 
     changes: tuple[RestoreChange, ...]
@@ -115,11 +115,11 @@ def plan_restore(
         backup: What is wanted.
         now: What the controller holds.
         tools: Which tools; none for all.
-        selected: Whether the tool in force is restored too.
+        selected: Whether the selected tool is restored too.
 
     Raises:
         ToolIndexError, ReservedToolError: No such tool to restore.
-        ToolError: The tool in force would lose its definition.
+        ToolError: The selected tool would lose its definition.
         UndefinedToolError: The tool to select would have none.
 
     Example:

@@ -3,7 +3,7 @@
 Methods that touch a pin upright measure X and Y and keep Z. The flange stands the higher on the
 pin, the longer the tip is (docs/reference/evidence.md 2), so a Z that is kept is compared with
 what the touches show. A length that changed is never swallowed: a person decides, or decided
-beforehand, or nothing is written.
+in advance, or nothing is written.
 
 What the first touch shows is told at once and decides nothing: the needle can be looked at before
 the rest is touched.

@@ -3,7 +3,7 @@
 Order (docs/reference/rules.md 4, 6): read the old values; measure, in Tool 0 where the robot moves;
 judge; propose; on a yes write with compare-and-set and read back; turn about the new tips;
 keep, or write the old values back once. Several tools are all measured before the first is
-written. Whatever happens, the tool, power mode and speed of before are put back at the end.
+written. Whatever happens, the tool, power mode and speed as before are restored at the end.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -131,9 +131,9 @@ class NozzleChange:
             ConfigError: A clearance is below the largest change that is believed, or an input is
                 to show contact where there are none.
             DeclinedError: The person said no; nothing was written.
-            StoppedError: A stop came; what was written was put back, unless it was kept already.
+            StoppedError: A stop came; what was written was restored, unless it was kept already.
             VerifyError: A tip drifts too far, or its touches were not made; the old values were
-                put back.
+                restored.
             RobolinkError: Anything else that ended it, with the state it left.
         """
         require_clearance(self._plan)

@@ -177,7 +177,7 @@ def _made_adapter(kind: type) -> "TypeAdapter[Any]":
 
 
 _OUT_OF_REACH: Final = (OutcomeUnknownError, TransportError, RemoteProtocolError, LeaseLostError)
-"""After these nothing can be put back here: the link is gone, or the right to write."""
+"""After these nothing can be restored here: the link is gone, or the right to write."""
 
 
 def finish_by_turn_test(
@@ -208,7 +208,7 @@ def finish_by_turn_test(
 
     Raises:
         VerifyError: It did not pass, or its touches were not made; the old values are back.
-        OutcomeUnknownError: Something else is unsettled, too, or the change has no test, or its
+        OutcomeUnknownError: Another job is unfinished, or the change has no test, or its
             tools hold other values now; nothing moved.
         RobolinkError: Anything else that ended it, with the state it left.
 

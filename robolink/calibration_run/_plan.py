@@ -176,7 +176,7 @@ class ChangePlan:
         safe: Flange pose to which the robot goes first and last.
         attended: Whether a person may be asked what a measurement leaves open; ``None`` for where
             the write is asked too.
-        agreed_by: How the write was agreed to beforehand, for the record, where it is not asked;
+        agreed_by: How the write was agreed to in advance, for the record, where it is not asked;
             ``None`` where the listener asks, and so has the answer on record.
     """
 

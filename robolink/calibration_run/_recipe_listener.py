@@ -28,7 +28,7 @@ class RecipeListener(Listener):
     Args:
         recipe: The recipe.
         controller: The controller, connected.
-        answers: What was answered beforehand.
+        answers: What was answered in advance.
         references: The references of basis "difference", by tool.
         taking_reference: Whether this run only takes them.
         measure_only: Whether nothing follows from what is measured, so that no length is asked for.

@@ -65,7 +65,7 @@ def plan_of(
         controller: The controller; only read, and only where the robot has to tilt.
         folder: Where the recipe lies: files that it names are looked for there.
         ask_before_write: Whether a person accepts the proposals.
-        agreed_by: How the write was agreed to beforehand, where nobody is asked.
+        agreed_by: How the write was agreed to in advance, where nobody is asked.
         accepted_change_mm: A larger jump than the recipe's that an engineer accepts this time.
         sensor: The camera, or its name or URL, in place of the recipe's.
         stated: The station as the cell file has it, ``None`` where it says nothing.

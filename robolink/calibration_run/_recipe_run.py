@@ -47,7 +47,7 @@ class RecipeRun:
         controller: The controller, connected.
         loaded: The recipe.
         operator: Who is asked, and brings the tip onto the pin.
-        answers: What was answered beforehand; nothing by default.
+        answers: What was answered in advance; nothing by default.
         audience: Told of everything that happens; nobody by default.
         take_reference: Whether to take a new reference in any case.
         accepted_change_mm: A larger jump than the recipe's that an engineer accepts this time.
@@ -145,7 +145,7 @@ class RecipeRun:
             LimitError: A foreseen target lies outside the box.
             NotReadyError: The station was learnt in another base.
             NotAllowedError: A jump is accepted by somebody who is no engineer.
-            OutcomeUnknownError: Something earlier is unsettled.
+            OutcomeUnknownError: An earlier job is unfinished.
             BusyError: Somebody else is changing this controller.
             RobolinkError: The controller's state forbids it.
         """

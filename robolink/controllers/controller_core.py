@@ -49,10 +49,10 @@ class ControllerCore(DriverPart, ABC):
         identity: How it is reached: the URL, with those options only that tell far ends apart.
         clock: The clock on which its time passes.
         latch: What holds everything back from :meth:`stop` until :meth:`release_stop`.
-        change_guard: What holds back writes that take a tip farther than the cell allows.
+        change_guard: Refuses writes that move a tip farther than the cell allows.
         patience: How long a call waits that would be refused because somebody else is at work.
         outcomes: The doubtful outcomes and the unfinished procedures of this controller.
-        ledger: What was done to it since connecting, and how much of that is proved.
+        ledger: What was done to it since connecting, and how much of that is confirmed.
         capabilities: What can be asked for.
         tools: The tool offsets.
         groups: What moves.

@@ -158,15 +158,15 @@ class DriverLink:
     Attributes:
         identity: Which controller.
         clock: The clock on which its time passes.
-        latch: What holds requests back while a stop is in force.
+        latch: Refuses requests while a stop is active.
         markers: The durable markers of what was begun.
-        change_guard: What holds back writes that take a tip farther than the cell allows.
+        change_guard: Refuses writes that move a tip farther than the cell allows.
         lock: One procedure at a time.
 
     Args:
         identity: Which controller.
         clock: The clock on which its time passes.
-        latch: What holds requests back while a stop is in force.
+        latch: Refuses requests while a stop is active.
         outcomes: Where the markers are kept.
         gate: Holds Ctrl-C back inside.
 
@@ -240,7 +240,7 @@ class DriverLink:
         return self._gate
 
     def was_not_executed(self, refusal: RejectedError) -> bool:
-        """Whether a refusal proves that nothing was done."""
+        """Whether a refusal confirms that nothing was done."""
         return True
 
     def lacks(self, what: str) -> ConfigError:

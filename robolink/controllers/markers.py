@@ -69,13 +69,13 @@ class ProcedureLock:
 
         Args:
             request: What it is held for.
-            calming: Whether that may go on while a stop is in force, as a reset may.
+            calming: Whether that may go on while a stop is active, as a reset may.
             leased: Whether it needs the lease, as everything that is marked does.
 
         Raises:
             BusyError: Another thread holds it, or another program is at work, and for no longer is
                 it waited.
-            StoppedError: A stop is in force, or came meanwhile.
+            StoppedError: A stop is active, or came meanwhile.
         """
         with Concerning(self._identity, request), self.patience.within():
             if calming:
@@ -252,21 +252,21 @@ class MarkerStore:
         """Store a marker durably: a new one, or an earlier one whose work continues.
 
         Whatever writes, moves or begins a procedure passes here, in a driver of anybody's. So this
-        is where it is refused after a stop, while something earlier is unsettled, and, of a tool,
+        is where it is refused after a stop, while an earlier job is unfinished, and, of a tool,
         while the robot moves (docs/reference/rules.md 1, 2, 5). Only what puts back an earlier
-        state goes on, and the work of a marker of before.
+        state goes on, and the work of an earlier marker.
 
         Args:
             kind: What it stands for.
             request: What is begun, as a person may read it.
-            details: Plain JSON values needed to settle it.
-            operation: Id of the marker of before; empty for a new one.
+            details: Plain JSON values needed to recover it.
+            operation: Id of the earlier marker; empty for a new one.
 
         Raises:
             ConfigError: That is impossible.
             BusyError: Another process has the controller, or a movement is under way here.
-            StoppedError: A stop is in force.
-            OutcomeUnknownError: Something earlier is unsettled; nothing may be sent.
+            StoppedError: A stop is active.
+            OutcomeUnknownError: An earlier job is unfinished; nothing may be sent.
             LeaseLostError: Somebody else was at it and has just ended.
         """
         if not operation and not self._latch.restores:
@@ -362,8 +362,8 @@ class MarkerStore:
         The markers of the procedures that run here do not count.
 
         Raises:
-            OutcomeUnknownError: Names what is unsettled.
-            LeaseHeldError: Somebody else is at it.
+            OutcomeUnknownError: Names the unfinished jobs.
+            LeaseHeldError: Somebody else has it locked.
         """
         self._refuse_unsettled(request, besides=())
 

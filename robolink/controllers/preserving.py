@@ -29,7 +29,7 @@ from robolink.timing import local_label
 class Preserver:
     """Remembers the selected tool at the start of a procedure, and restores it at the end.
 
-    A kind of controller on which more has to be put back adds that.
+    A kind of controller on which more has to be restored adds that.
 
     Args:
         link: The controller.

@@ -49,7 +49,7 @@ class SimpleMachine:
 
     Attributes:
         tools: The tools that are defined, by number.
-        selected: The tool in force, 0 for the flange.
+        selected: The selected tool, 0 for the flange.
         flange: Where the flange is.
     """
 

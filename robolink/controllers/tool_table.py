@@ -4,9 +4,9 @@ What a person is refused, what is compared and proved, and in which order, is th
 holds the tools. A kind says which tools there are, how one is read, and how one write leaves.
 
 Clearing a tool never leaves the machine with another tool selected than somebody named. What a
-controller selects when the tool in force loses its definition is not documented, and a program
-that goes on with Tool 0 drives the flange where a nozzle's tip belongs. So clearing the tool in
-force is refused on every kind of controller, unless the caller names the tool to select in its
+controller selects when the selected tool loses its definition is not documented, and a program
+that goes on with Tool 0 drives the flange where a nozzle's tip belongs. So clearing the selected
+tool is refused on every kind of controller, unless the caller names the tool to select in its
 place; that one is selected, and read back, before anything is cleared.
 """
 

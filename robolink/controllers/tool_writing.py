@@ -95,7 +95,7 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
 
         Raises:
             BusyError: Another thread is at work on this controller.
-            StoppedError: A stop is in force, or came meanwhile.
+            StoppedError: A stop is active, or came meanwhile.
             RobolinkError: As :meth:`robolink.model.ToolTable.write`.
         """
         with self._link.lock.held(self.request):

@@ -57,7 +57,7 @@ class _Meeting:
         names: Of the controller.
         before: Who was met at this address last, empty for nobody.
         elsewhere: Where else this controller was met.
-        unclaimed: Names of before under which something stands that is nobody's yet.
+        unclaimed: Former names under which something stands that is nobody's yet.
         new_robots: Robots that the journal did not know to be this controller's.
         shared: Whether something stands under the controller's name that is no robot's.
     """

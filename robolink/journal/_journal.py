@@ -108,7 +108,7 @@ class Journal:
 
         Args:
             controller: Of this controller only: its identity, or an address at which it was
-                met, or a name of before.
+                met, or a former name.
             tool: About this tool only.
             change: Of this tool change only.
             kinds: Of these kinds only; empty for all.
@@ -191,7 +191,7 @@ class Journal:
         """Return the names under which a controller is recorded, its identity first.
 
         Args:
-            controller: Its identity, an address at which it was met, or a name of before. Of a
+            controller: Its identity, an address at which it was met, or a former name. Of a
                 controller with several robots that is all of them; the name of a robot is that
                 robot alone.
 
@@ -205,7 +205,7 @@ class Journal:
         """Return the names of the robots of a controller that has several, else nothing.
 
         Args:
-            controller: Its identity, an address at which it was met, or a name of before.
+            controller: Its identity, an address at which it was met, or a former name.
 
         Raises:
             JournalError: It cannot be read.

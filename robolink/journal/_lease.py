@@ -36,7 +36,7 @@ class Grip:
 
     Attributes:
         epoch: The epoch under which it is held.
-        entries: What is put on record about it.
+        entries: What is recorded about it.
     """
 
     epoch: int
@@ -195,7 +195,7 @@ class Lease:
         """End the lease, whoever has it, inside the caller's transaction.
 
         Returns:
-            What is put on record; ``None`` when this log holds it itself.
+            What is recorded; ``None`` when this log holds it itself.
         """
         seen = rows.sight(self.controller)
         if seen.token == self._token:

@@ -141,7 +141,7 @@ class JournalOutcomeLog:
     def begin(self, marker: Marker) -> None:
         """Store ``marker`` in one durable transaction that also confirms or takes the lease.
 
-        The first one of a controller is put on record whatever it stands for, so that a record
+        The first one of a controller is recorded whatever it stands for, so that a record
         which was lost later is told from a new one.
 
         Raises:
@@ -381,7 +381,7 @@ class JournalOutcomeLog:
     def take_over(self, reason: str) -> None:
         """End the lease, whoever has it, at a person's request; this is recorded.
 
-        His open markers stay, and block until they are settled.
+        His open markers stay, and block until they are recovered.
 
         Args:
             reason: Why, in the person's words.

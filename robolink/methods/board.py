@@ -207,7 +207,7 @@ def verify_board(
         angles_deg: Its angles U at which each fiducial is looked at.
         tolerance_mm: Largest drift that passes.
         camera_error_mm: What the camera is off by, as the measurement found it.
-        aside: Where the board is expected, seen from the frame in force.
+        aside: Where the board is expected, seen from the selected frame.
 
     Raises:
         CalibrationError: As :func:`measure_board`.

@@ -189,7 +189,7 @@ def measure_camera_affine(
     and turns in the middle, which tells the offset.
 
     Args:
-        station: Where the camera is, to within its field of view; with its model of before,
+        station: Where the camera is, to within its field of view; with its earlier model,
             against which a changed camera is refused.
         plan: The pattern, and whether the look that fits worst is offered again.
         here: Where the flange is; its U is that of the corners.
@@ -263,7 +263,7 @@ class CameraAffineSource(LookSource):
 
     Attributes:
         sensor: URL or name of the camera, or the camera; it answers in pixels.
-        station: Where it is to within its field of view; with its model of before, a camera
+        station: Where it is to within its field of view; with its earlier model, a camera
             that changed is refused.
         plan: The pattern.
         sigma_mm: Standard deviation of one coordinate of one look, where it is known.

@@ -37,13 +37,13 @@ def were_held(context: MeasurementContext, *, stated: bool) -> bool:
 
     Args:
         context: What asks.
-        stated: Whether it was said beforehand, by an option or in the recipe.
+        stated: Whether it was said in advance, by an option or in the recipe.
 
     Returns:
         ``False`` where nobody said it and nobody is to be asked.
 
     Raises:
-        CalibrationError: ``axes_free``: they were let go.
+        CalibrationError: ``axes_free``: they were released.
 
     Example:
         >>> from robolink.methods.given_poses import were_held
@@ -174,7 +174,7 @@ class PointsSource:
 
         Raises:
             CalibrationError: The poses give no trustworthy result; its code says why, ``axes_free``
-                where they were taught with axes let go.
+                where they were taught with axes released.
             ConfigError: Too many poses for the method.
             UndefinedToolError: The tool with which they were taught has no definition.
         """

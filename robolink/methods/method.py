@@ -231,7 +231,7 @@ class Needs:
 
     Attributes:
         station: What it measures at.
-        named: Whether the station has to be named, because it must be known beforehand.
+        named: Whether the station has to be named, because it must be known in advance.
         finds_pin: Whether it finds the pin itself; the place goes on record.
         sensor: Whether a camera takes part.
         tilt: Whether the robot has to tilt its tool, so that it also works on a tilted flange.

@@ -265,7 +265,7 @@ class Controller(Protocol):
 
         It sets the latch before it waits for anything: until :meth:`release_stop` no movement,
         jog, write or program start leaves this process. Only the tool, power and speed of
-        before may be put back, and each tool of an open change once. Whoever was at work gets
+        before may be restored, and each tool of an open change once. Whoever was at work gets
         StoppedError. It returns when the controller has shown that it is at rest.
 
         Raises:
@@ -314,8 +314,8 @@ class Controller(Protocol):
         Args:
             kind: What it stands for.
             request: What is begun, as a person may read it.
-            details: Plain JSON values needed to settle it.
-            operation: Id of a marker of before whose work is taken up; empty for a new one.
+            details: Plain JSON values needed to recover it.
+            operation: Id of an earlier marker whose work is taken up; empty for a new one.
 
         Raises:
             ConfigError: That is impossible; nothing may be sent.

@@ -86,8 +86,8 @@ class ControllerFacts:
         firmware: Version text.
         project: The project loaded in it.
         robot_number: The robot that motors and statements act on.
-        robot_models: One for each robot; without the extended queries, of the robot in
-            force only.
+        robot_models: One for each robot; without the extended queries, of the current
+            robot only.
         robot_serials: Likewise.
     """
 

@@ -2,7 +2,7 @@
 
 A value that is written may rest on an answer as much as on a touch: "is the new tip exactly as
 long as the old one?" decides Z. So whatever asks, asks through a primitive that keeps the answer:
-the runner of procedures, and the prompts of the command line. What was answered beforehand, by an
+the runner of procedures, and the prompts of the command line. What was answered in advance, by an
 option or ``--yes``, is kept with the question that it answered.
 """
 

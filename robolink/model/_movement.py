@@ -296,7 +296,7 @@ class MotionGroup(Protocol):
 
         Raises:
             LimitError: The target lies outside ``box``.
-            NotReadyError: The state, the motors or the tool in force forbid it.
+            NotReadyError: The state, the motors or the selected tool forbid it.
             OutcomeUnknownError: An earlier command on this controller is unresolved.
 
         Example:
@@ -373,7 +373,7 @@ class MotionGroup(Protocol):
         """Return why the arm could not make this move, a sentence; empty if nothing is known.
 
         Reads only, and is no promise: it is for whoever has other places to choose from, or would
-        rather not begin. The places are meant for the tool in force.
+        rather not begin. The places are meant for the selected tool.
 
         Args:
             target: Where to.

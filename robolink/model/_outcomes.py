@@ -40,7 +40,7 @@ class Marker:
             ``HISTORY`` the record of what was done here before is missing.
         request: What was sent or begun, as a person may read it.
         begun_at: Wall-clock label, ISO 8601 UTC.
-        details: Plain JSON values needed to settle it.
+        details: Plain JSON values needed to recover it.
     """
 
     operation: str
@@ -102,7 +102,7 @@ class OutcomeLog(Protocol):
         """Which of several robots this record is about.
 
         Markers and the lease hold for the whole controller; tools, stations and what was done
-        to them are on record of the robot in force. Empty where there is one robot.
+        to them are on record of the current robot. Empty where there is one robot.
         """
 
     @property
@@ -240,7 +240,7 @@ class Finding:
         verdict: What became of it.
         sentence: The same for a person.
         action: What settling it will do beyond forgetting it, empty for nothing.
-        entries: What settling it puts on record.
+        entries: What recovering it records.
     """
 
     marker: Marker

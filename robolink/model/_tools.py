@@ -288,7 +288,7 @@ class ToolTable(Protocol):
         Args:
             tool: Its number.
             expected: What is believed to be stored.
-            then_select: The tool to put in force before, if ``tool`` is in force; 0 is the
+            then_select: The tool to select before, if ``tool`` is in force; 0 is the
                 flange. What is in force is left alone otherwise.
             wait_s: As for :meth:`write`.
 

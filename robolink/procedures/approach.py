@@ -136,12 +136,12 @@ def require_turn_inside(
     """Refuse a turn during which the flange, or a tip, gets too far from where it is.
 
     Args:
-        here: Where the frame in force is.
+        here: Where the selected frame is.
         turn_deg: By how much U changes.
         lift_mm: How far it is lifted first.
         reach_mm: How far from its own place each of them may get, in every direction.
         swings: The tips that are looked at: what each is called, and its offset from the flange.
-        tool: The tool in force, about whose tip it turns; ``None`` for the flange.
+        tool: The selected tool, about whose tip it turns; ``None`` for the flange.
 
     Raises:
         ConfigError: As :func:`turn_in_air`.

@@ -126,7 +126,7 @@ def verify_by_looking(
         angles_deg: Its angles U at which the tip is looked at.
         tolerance_mm: Largest drift that passes.
         camera_error_mm: What the camera is off by, as the measurement found it.
-        aside: Where the tip is expected, seen from the frame in force; not 0 where a difference
+        aside: Where the tip is expected, seen from the selected frame; not 0 where a difference
             to a reference was written.
         radius_px: How wide its spot was in the measurement; ``None`` where nobody told.
 

@@ -48,9 +48,9 @@ def verify_by_turning(
         angles_deg: Tool angles U at which the tip is brought back onto the pin.
         tolerance_mm: Largest drift that passes, with its guard band.
         u_mm: Standard uncertainty of the drift that one touch shows, ``None`` for the usual one.
-        written: The offset in force.
+        written: The active offset.
         tip: Where the tip was found. It differs from ``written`` where a difference was
-            written, and then the frame in force does not turn about the tip.
+            written, and then the selected frame does not turn about the tip.
         in_space: Whether its height counts as drift. Only a contact input tells a height as well as
             a place; what a person sees of it scatters more (docs/reference/evidence.md 1), so their
             heights are compared by a limit of their own.
@@ -116,7 +116,7 @@ class _Turning:
         plan: Lift, clearance, contact input.
         contact: Pose of the new tool's tip on the pin.
         limit_mm: Largest drift that passes.
-        written: The offset in force.
+        written: The active offset.
         tip: Where the tip was found.
     """
 
@@ -277,7 +277,7 @@ def place_on_pin(contact: Pose, angle_deg: float, written: ToolOffset, tip: Tool
     Args:
         contact: Pose of the new tool's tip on the pin.
         angle_deg: Tool angle U.
-        written: The offset in force.
+        written: The active offset.
         tip: Where the tip was found.
     """
     frame = replace(contact, u_deg=angle_deg)

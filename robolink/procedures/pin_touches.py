@@ -86,7 +86,7 @@ class PinTouches(WitnessedTouches):
         The tip starts lifted and over the pin.
 
         Args:
-            expected: Pose of the frame in force with the tip on the pin, as far as it is known.
+            expected: Pose of the selected frame with the tip on the pin, as far as it is known.
             key: By which a later touch takes the place of this one.
             turning: What the way over the pin is for.
             instruction: What the person is to do.

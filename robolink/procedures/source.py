@@ -121,7 +121,7 @@ class MeasurementContext:
 
         Args:
             question: What a yes agrees to.
-            given: How a yes was given beforehand, ``None`` where it was not.
+            given: How a yes was given in advance, ``None`` where it was not.
 
         Returns:
             The answer, which is on record then; ``None`` where nobody is to be asked.

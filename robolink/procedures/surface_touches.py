@@ -78,7 +78,7 @@ class SurfaceTouches(WitnessedTouches):
         The tip starts lifted.
 
         Args:
-            expected: Pose of the frame in force with the tip on the surface, as far as it is known.
+            expected: Pose of the selected frame with the tip on the surface, as far as it is known.
             normal: The surface's unit normal there, away from it.
             key: By which a later touch takes the place of this one.
             columns: What tip and surface could explain; see ``SurfaceStandoffs.next``.

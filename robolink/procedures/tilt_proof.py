@@ -146,7 +146,7 @@ class SurfaceProof:
         """Add a touch.
 
         Args:
-            place: Where the frame in force should have been.
+            place: Where the selected frame should have been.
             found: Where it was.
             normal: The surface's unit normal there.
 

@@ -200,7 +200,7 @@ class LoadedRecipe:
         path: The file.
         sha256: Hash of the bytes that were read, hexadecimal; the journal keeps it, so that a
             change of the recipe shows.
-        notes: What to tell whoever wrote it: names of before, with those of now.
+        notes: What to tell whoever wrote it: former names, with those of now.
     """
 
     recipe: Recipe

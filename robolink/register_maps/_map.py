@@ -366,7 +366,7 @@ class RegisterMap:
         commit: How new values come into force.
         probe: The constant to compare before anything is believed, if there is one.
         permit: On while offsets may be written, if there is such a signal.
-        selected: Number of the tool in force, if the PLC tells it.
+        selected: Number of the selected tool, if the PLC tells it.
         device_id: Where a number stands that tells this machine from every other one, if it
             has one.
         flange: Where the flange is, by component; empty where the PLC does not tell.

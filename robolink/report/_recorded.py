@@ -184,7 +184,7 @@ def _end(entries: Sequence[Recorded], end: Recorded) -> tuple[Outcome, str]:
 def _offsets(tool: int, entries: Sequence[Recorded], *, done: bool) -> dict[str, ToolOffset | None]:
     """Return 'before' and 'after', as far as they are recorded.
 
-    The first that says so counts: when an old value is put back, that is written too.
+    The first that says so counts: when an old value is restored, that is written too.
     """
     found: dict[str, ToolOffset | None] = {}
     for entry in entries:

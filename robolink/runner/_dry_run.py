@@ -171,7 +171,7 @@ class ArmAhead:
 
     Attributes:
         group: The arm.
-        tool: The tool in force now, for which its controller answers.
+        tool: The selected tool now, for which its controller answers.
         selected: Its offset.
     """
 

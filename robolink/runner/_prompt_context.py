@@ -139,7 +139,7 @@ class JogRange:
     """Jogging only: nothing is measured, and it ends where the person leaves it.
 
     Attributes:
-        start: Where the frame in force was when it began.
+        start: Where the selected frame was when it began.
         box: Where it may go.
     """
 

@@ -146,7 +146,7 @@ class Runner:
         tool: Number of the tool that it is about, for the record of what is answered; ``None``
             where it is about none or several.
 
-    Every answer is put on record here, and not by whoever asks; see :class:`Asking`.
+    Every answer is recorded here, and not by whoever asks; see :class:`Asking`.
 
     Example:
         >>> from robolink.model import Path, Pose, WorkBox

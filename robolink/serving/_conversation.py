@@ -72,7 +72,7 @@ _LENGTHS: Final = {
 """Questions, and how many fields each has; of a pose the method decides how many."""
 
 _POSE_FIELDS: Final = 7
-"""The tool in force, and six lengths and angles; what was seen there follows."""
+"""The selected tool, and six lengths and angles; what was seen there follows."""
 
 
 @dataclass(slots=True)
@@ -93,7 +93,7 @@ class CallbackConversation:
     """Answers one program.
 
     Args:
-        journal: Where all is put on record.
+        journal: Where all is recorded.
         limits: What its measurements are held to.
         peer: From where it calls, as a person may read it.
         signature: Who watches over it, and with what software.

@@ -104,7 +104,7 @@ def a_stop_ends_a_movement(subject: Subject) -> None:
 
 
 def what_is_unsettled_holds_movements_back(subject: Subject) -> None:
-    """Nobody knows how long the tool in force is then, nor where the robot was to go."""
+    """Nobody knows how long the selected tool is then, nor where the robot was to go."""
     with left_unsettled(subject) as second:
         if second is not None:
             subject.prepare(second)

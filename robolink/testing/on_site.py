@@ -66,7 +66,7 @@ class _Kept:
         change: Marker of the tool that is written; ``None`` where none is.
         selection: Marker of tool, power and speed in force; ``None`` where the kind tells of none.
         before: What the tool holds.
-        selected: The tool in force.
+        selected: The selected tool.
     """
 
     change: Marker | None
@@ -99,7 +99,7 @@ def kept_on_site(
 
     Raises:
         ConfigError: The tool is the selected one, or is not there.
-        OutcomeUnknownError: Something earlier is unsettled; or it could not be put back, and
+        OutcomeUnknownError: An earlier job is unfinished; or it could not be restored, and
             stays open for ``recover``.
 
     Example:

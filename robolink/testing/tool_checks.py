@@ -169,7 +169,7 @@ def a_cleared_tool_is_undefined(subject: Subject) -> None:
 
 
 def a_selection_is_read_back(subject: Subject) -> None:
-    """A tool in force keeps its definition, and only a defined one comes into force."""
+    """A selected tool keeps its definition, and only a defined one comes into force."""
     with subject.kept() as controller:
         tools = controller.tools
         value = another_offset(tools.read(subject.tool))

@@ -55,7 +55,7 @@ class Wanted:
         offset: The new value; ``None`` clears it.
         expected: What the caller believes it holds now.
         details: More for the journal, plain JSON.
-        then_select: The tool to put in force before this one is cleared, should this one be in
+        then_select: The tool to select before this one is cleared, should this one be in
             force; without it that is refused.
     """
 
@@ -81,7 +81,7 @@ class ToolChange:
         wanted: The tools to change, each once, in the order in which they are written.
         verify: Whether something is to be verified between the writes and :meth:`keep`.
         marked: More for its durable marker, plain JSON.
-        tell: Told, in sentences, what was put back.
+        tell: Told, in sentences, what was restored.
         order: The order that it carries out; with the values it is kept that this is done.
         describe: Makes the result of the order from what was written.
         wait_s: How long the block, and then :meth:`write`, waits for other threads and programs
@@ -167,13 +167,13 @@ class ToolChange:
             ToolChangedError: A tool does not hold what was expected; nothing was written.
             NotAllowedError: A tip would be taken farther than the cell allows, which nobody has
                 accepted; nothing was written.
-            SelectedToolError: A tool in force is to be cleared, and none is named to be selected
+            SelectedToolError: A selected tool is to be cleared, and none is named to be selected
                 in its place; nothing was written.
-            OutcomeUnknownError: Something earlier is unsettled, or a write was not answered.
-            ReadBackError: Another value came back; the old ones are put back.
+            OutcomeUnknownError: An earlier job is unfinished, or a write was not answered.
+            ReadBackError: Another value came back; the old ones are restored.
             ConfigError: The intent cannot be stored; nothing was written.
             BusyError: Another process has the controller.
-            StoppedError: A stop came; what was written is put back.
+            StoppedError: A stop came; what was written is restored.
         """
         with self._controller.patience.within(self._wait_s):
             self._controller.latch.require_open(self.request)
@@ -217,7 +217,7 @@ class ToolChange:
 
         Raises:
             ConfigError: It cannot be recorded; the change stays open for ``recover``.
-            StoppedError: A stop came before; what was written is put back.
+            StoppedError: A stop came before; what was written is restored.
         """
         self._controller.latch.require_open(self.request)
         if self._marker is None:
@@ -431,7 +431,7 @@ def change_tools(
     Args:
         controller: The controller, connected.
         wanted: The tools to change.
-        tell: Told what was put back.
+        tell: Told what was restored.
         order: The order that this carries out (:func:`robolink.transaction.carrying_out`).
         describe: Makes the result of the order from what was written.
         wait_s: As for :class:`ToolChange`.

@@ -151,7 +151,7 @@ def carrying_out(
         ConfigError: The id is none, or the order is not to be carried out again: it was another
             job, or what it did was taken back, or closed on a person's word.
         ToolChangedError: A tool that it wrote holds another value since.
-        OutcomeUnknownError: Something earlier is unsettled, perhaps this very order, or what was
+        OutcomeUnknownError: An earlier job is unfinished, perhaps this very order, or what was
             in force before it and is not put back.
 
     Example:

@@ -321,13 +321,13 @@ def undo(
     Args:
         controller: The controller, connected.
         plan: What to do.
-        then_select: The tool to put in force in place of one that is in force and becomes
+        then_select: The tool to select in place of one that is in force and becomes
             undefined; without it that is refused.
-        tell: Told what was put back when it fails on the way.
+        tell: Told what was restored when it fails on the way.
 
     Raises:
         NotAllowedError: It takes an engineer; nothing was sent.
-        SelectedToolError: The tool in force would become undefined; nothing was sent.
+        SelectedToolError: The selected tool would become undefined; nothing was sent.
         RobolinkError: As :func:`robolink.transaction.change_tools`.
 
     Example:

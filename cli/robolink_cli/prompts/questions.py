@@ -37,7 +37,7 @@ def agree(question: str, *, yes: bool, asks: bool = True) -> None:
 
     Args:
         question: What a yes agrees to.
-        yes: Whether it was answered beforehand.
+        yes: Whether it was answered in advance.
         asks: Whether a person may be asked where there is a terminal.
 
     Raises:
@@ -163,8 +163,8 @@ def accepted_jump(
         controller: The controller, connected.
         tool: Number of the tool.
         jump: How far its tip would be taken.
-        accepted_mm: The length that was accepted beforehand.
-        accepted_deg: The angle that was accepted beforehand.
+        accepted_mm: The length that was accepted in advance.
+        accepted_deg: The angle that was accepted in advance.
 
     Raises:
         NotAllowedError: It takes an engineer; nobody was asked.

@@ -39,7 +39,7 @@ def agree_to_procedure(
         moves: How many movements are foreseen.
         speed_mm_s: How fast at most.
         box_mm: How far at most.
-        yes: Whether the answer was given beforehand.
+        yes: Whether the answer was given in advance.
         at: At what it measures, which has to be clean too; ``None`` where nobody knows.
         tools: Numbers of the tools that are measured: the list says how they were left.
 

@@ -59,14 +59,14 @@ def open_controller(
         usual_change_mm: How far a write may take a tip where the cell file does not say it; by
             default what is usual.
         job: What is to be done, where a person would look, measure or answer for it before
-            anything is sent: refused at once while something earlier is unsettled.
+            anything is sent: refused at once while an earlier job is unfinished.
 
     Raises:
         ConfigError: No controller is named, the URL or password file is wrong, or the robot is
             not the cell's.
         ConnectError: It is not reached.
         LoginRefusedError: Wrong or missing password.
-        OutcomeUnknownError: Something earlier is unsettled, and there is a ``job``.
+        OutcomeUnknownError: An earlier job is unfinished, and there is a ``job``.
         StoppedError: A stop came, at the end or before.
     """
     url = context.require_url()

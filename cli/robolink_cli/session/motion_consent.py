@@ -120,7 +120,7 @@ def agree_to_motion(question: str, *, yes: bool, in_tool: bool = True) -> None:
 
     Args:
         question: What will happen.
-        yes: Whether the answer was given beforehand.
+        yes: Whether the answer was given in advance.
         in_tool: Whether it matters which tool is selected.
 
     Raises:

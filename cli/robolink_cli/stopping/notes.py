@@ -20,7 +20,7 @@ def heed_stop(url: str, controller: "Controller", *, yes: bool) -> None:
     Args:
         url: How it was reached.
         controller: The controller, connected; it is asked who it is.
-        yes: Whether the answer was given beforehand.
+        yes: Whether the answer was given in advance.
 
     Raises:
         StoppedError: There is a note, and nobody is asked: ``--yes`` was given for a cell that

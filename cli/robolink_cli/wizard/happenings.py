@@ -19,7 +19,7 @@ class Reading:
         at_s: When it was read, by the monotonic clock of this computer.
         state: The one word for what it is doing.
         halted: Whether an emergency stop, an open guard or an error shows.
-        pose: Where the frame in force is, ``None`` where it was not read.
+        pose: Where the selected frame is, ``None`` where it was not read.
         axes: Joint angles, in degrees, where they were read.
         follows: Whether the pose is that of now; else it is where a movement began.
         motors: Whether the motors are on, ``None`` where that was not read.

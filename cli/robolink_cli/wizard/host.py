@@ -103,7 +103,7 @@ def _shown(face: Face, desk: Desk, state: WizardState, work: "Work[T]") -> Wizar
     """Show the work until it has ended, also when it cannot be shown any more.
 
     The work is in a thread that would end with the process in the middle of a measurement. So it
-    is told that nobody answers, and awaited: tool, power and speed are put back then, and the
+    is told that nobody answers, and awaited: tool, power and speed are restored then, and the
     controller is logged out.
     """
     try:

@@ -72,7 +72,7 @@ class LengthChange:
     def z_mm(self, decision: LengthDecision | None) -> float | None:
         """Return the Z that a decision writes; ``None`` if it has to be measured or decided.
 
-        A length that did not change is kept, whatever was decided beforehand.
+        A length that did not change is kept, whatever was decided in advance.
         """
         if not self.changed or decision == "keep":
             return self.stored_z_mm

@@ -1,6 +1,6 @@
 """What every part of this driver uses: a session, its command window, and its markers.
 
-What is asked once a connection: the robot in force, and what is set in the controller.
+What is asked once a connection: the current robot, and what is set in the controller.
 
 Neither changes meanwhile: one client at a time is served, and a change of the preferences restarts
 the controller.
@@ -383,5 +383,5 @@ class EpsonLink(DriverLink):
         self.markers.outcomes.ask(self._reader.read)
 
     def was_not_executed(self, refusal: RejectedError) -> bool:
-        """Whether a refusal proves that nothing was done (docs/reference/epson.md 1.6)."""
+        """Whether a refusal confirms that nothing was done (docs/reference/epson.md 1.6)."""
         return refusal.code in NOT_EXECUTED

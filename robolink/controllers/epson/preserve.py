@@ -81,7 +81,7 @@ class EpsonPreserver(Preserver):
         """Read twice what to restore.
 
         Every other value here is proved by what was sent; these have nothing to be compared
-        with. One bent digit would be put back at the end as the cell's own speed or tool, and
+        with. One bent digit would be restored at the end as the cell's own speed or tool, and
         be proved by reading.
 
         Raises:

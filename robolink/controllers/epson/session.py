@@ -11,7 +11,7 @@ Like every conversation it ends for good with a time-out or a broken link; a ses
 answer that nobody asked for, too.
 
 What a request does is judged from the text that leaves, not from who sends it: one that nobody
-thought of counts as acting, and is held back while a stop is in force.
+thought of counts as acting, and is held back while a stop is active.
 """
 
 import re
@@ -119,7 +119,7 @@ class EpsonSession(EpsonConversation):
     Attributes:
         place: Where it was reached, the same for each spelling of the URL.
         exchanges: Requests sent so far.
-        latch: What holds requests back while a stop is in force.
+        latch: Refuses requests while a stop is active.
 
     Args:
         line: An open line; the session owns it from here on.

@@ -116,7 +116,7 @@ class SingularPlaces:
     """Asks a controller what a movement of its arm would meet.
 
     All questions are functions that move nothing and raise no error in the controller. Targets
-    are meant for the tool in force.
+    are meant for the selected tool.
 
     Attributes:
         window: The controller.

@@ -199,7 +199,7 @@ class PublishedTools:
 
     Attributes:
         tools: Every tool by number; an undefined one is ``None``.
-        selected: The tool in force then, 0 for the flange.
+        selected: The selected tool then, 0 for the flange.
         robot: The robot whose tools they are.
         publication: A count that grows with each publication of something new.
     """

@@ -95,7 +95,7 @@ class Registers:
         clock: The clock on which its time passes.
         exchanges: Requests sent so far.
         gate: Holds Ctrl-C back inside an exchange, and inside whatever else enters it.
-        latch: What holds writes back while a stop is in force.
+        latch: Refuses writes while a stop is active.
     """
 
     def __init__(self, client: RegisterClient) -> None:

@@ -326,7 +326,7 @@ class Slots:
 
         Raises:
             RejectedError: The PLC refused; nothing has changed.
-            OutcomeUnknownError: It did not answer, or the registers could not be put back.
+            OutcomeUnknownError: It did not answer, or the registers could not be restored.
         """
         before = self._stored(slot)
         kept = SlotContent({a: before.words[a] for a in content.words}, before.defined)

@@ -237,7 +237,7 @@ class SoftMotionController(ControllerCore):
             NotReadyError: The group moves, or the machine does not permit it.
             RejectedError: The PLC refused it.
             ReadBackError: Another kinematics is in force.
-            OutcomeUnknownError: Something earlier is unsettled, or no answer came.
+            OutcomeUnknownError: An earlier job is unfinished, or no answer came.
         """
         set_kinematics(self._mailbox, position, orientation)
 

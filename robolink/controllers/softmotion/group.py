@@ -140,7 +140,7 @@ class SoftMotionGroup(MotionGroupCore):
 
         Raises:
             LimitError: The tip came out of the box; the jog was ended there.
-            OutcomeUnknownError: Something earlier is unsettled, or no answer came.
+            OutcomeUnknownError: An earlier job is unfinished, or no answer came.
         """
         watch = JogWatch(self._mailbox, jog, box)
         with self._mailbox.lock.held(watch.request):
@@ -170,7 +170,7 @@ class SoftMotionGroup(MotionGroupCore):
         """Continue the interrupted movement; somebody must be waiting on it.
 
         Raises:
-            OutcomeUnknownError: Something earlier is unsettled, or no answer came.
+            OutcomeUnknownError: An earlier job is unfinished, or no answer came.
         """
         draft = Command(0, Opcode.CONTINUE)
         request = describe(draft)
@@ -222,7 +222,7 @@ class SoftMotionGroup(MotionGroupCore):
         Raises:
             ConfigError: The line is too slow for any movement.
             NotReadyError: The group, its drives, the machine or another movement forbid it.
-            OutcomeUnknownError: Something earlier is unsettled.
+            OutcomeUnknownError: An earlier job is unfinished.
             LeaseHeldError, LeaseLostError: Another client owns the mailbox.
         """
         mailbox = self._mailbox

@@ -234,7 +234,7 @@ class MarkedDraft(MarkedCommand[T]):
     Args:
         mailbox: Where it is sent.
         draft: The command.
-        details: Plain JSON values needed to settle it later.
+        details: Plain JSON values needed to recover it later.
         read: Reads what it changes.
     """
 

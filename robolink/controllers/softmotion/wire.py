@@ -148,7 +148,7 @@ class MailboxWire:
         owner: This client's token, never 0.
         epoch: The epoch of our ownership, 0 while we have none.
         motions: The movements of this client.
-        latch: What holds commands back while a stop is in force.
+        latch: Refuses commands while a stop is active.
         timeout_s: Longest wait for the PLC to acknowledge a command.
         exchanges: Requests sent so far.
         look_back: Looks over another link at what ended the session; ``None`` before the

@@ -84,7 +84,7 @@ class EntryRows:
             controller: Identity of the controller.
             signature: Who does it.
             change: Id of the tool change, for the entries that name none.
-            entries: What is put on record.
+            entries: What is recorded.
 
         Raises:
             TypeError: Details are no plain JSON.

@@ -80,7 +80,7 @@ def _names(connection: DatabaseConnection) -> None:
 def _robots(connection: DatabaseConnection) -> None:
     """Give each robot of a controller with several its own record.
 
-    Entries of before tell only the controller. They are chained and stay as they are: listed,
+    Earlier entries tell only the controller. They are chained and stay as they are: listed,
     exported and verified under its name, and taken for none of its robots
     (docs/decisions/0025-each-robot-of-a-controller-has-its-record.md).
     """

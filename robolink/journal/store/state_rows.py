@@ -78,7 +78,7 @@ class _Stored(NamedTuple):
 
 
 _SUM: Final = "_sum"
-"""Where the checksum stands. Markers of before have none, and nothing tells that one is bent; or
+"""Where the checksum stands. Earlier markers have none, and nothing tells that one is bent; or
 one that leaves the name of their controller out."""
 
 

@@ -124,7 +124,7 @@ def verify_by_crossing(
         here: Where the frame of the new tool is.
         angles_deg: Its angles U at which the tip is measured.
         tolerance_mm: Largest drift that passes.
-        aside: Where the tip is expected, seen from the frame in force; not 0 where a difference
+        aside: Where the tip is expected, seen from the selected frame; not 0 where a difference
             to a reference was written.
         lean: By how much the shaft lies beside the tip, X and Y of the frame in mm per mm above
             it: the beams see the shaft.

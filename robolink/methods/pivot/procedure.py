@@ -114,7 +114,7 @@ def verify_by_tilting(
 
     Args:
         plan: Lift, clearance, contact input.
-        over: The pin, and where the tip is in the frame in force.
+        over: The pin, and where the tip is in the selected frame.
         tilts: Orientations in which the tip is brought back onto the pin.
         tolerance_mm: Largest drift that passes with its guard band, in all three directions
             together.

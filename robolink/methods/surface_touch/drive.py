@@ -204,7 +204,7 @@ def verify_on_surface(
 
     Args:
         plan: Lift, clearance, contact input.
-        over: Where the tip is, lifted, in the frame in force.
+        over: Where the tip is, lifted, in the selected frame.
         spots: What is touched.
         tolerance_mm: Largest drift that passes with its guard band, all directions together.
         u_mm: Standard uncertainty of what one touch shows.

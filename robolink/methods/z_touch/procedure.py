@@ -64,7 +64,7 @@ def verify_by_touching(
         here: Where the frame of the new tool is.
         angles_deg: Its angles U at which the surface is touched.
         tolerance_mm: Largest drift that passes.
-        aside: Where the tip is expected, seen from the frame in force; not 0 where a difference
+        aside: Where the tip is expected, seen from the selected frame; not 0 where a difference
             to a reference was written.
         deceleration_mm_s2: As for :func:`~robolink.methods.measure_z_touch`.
         step_mm: Likewise.

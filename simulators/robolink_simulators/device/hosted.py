@@ -32,7 +32,7 @@ class KeptMoment:
 
     Attributes:
         machine: Which kind and model; only such a one can go back to it.
-        held: What is put back, by name.
+        held: What is restored, by name.
     """
 
     machine: str

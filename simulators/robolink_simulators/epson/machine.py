@@ -50,7 +50,7 @@ class _OfTheRobotInForce(Generic[_T]):
 class Machine:
     """A controller's memory and its robots. No wire, no clock of its own.
 
-    What belongs to one robot (arm, tools, points, settings ...) is that of the robot in force:
+    What belongs to one robot (arm, tools, points, settings ...) is that of the current robot:
     ``Robot n`` and SetCurRobot choose it (docs/reference/epson.md 1.5).
 
     Args:

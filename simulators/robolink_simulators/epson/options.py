@@ -111,7 +111,7 @@ class EpsonOptions:
         number_lead_blank: Print shows a blank before a number that begins its text [R, one
             client reads it so].
         accel_max: Highest Accel in percent; AccelMax gives it [D: usually 100, R: 120].
-        clear_selected_tool: What TLClr does to the tool in force: it is an error [D], Tool 0 is
+        clear_selected_tool: What TLClr does to the selected tool: it is an error [D], Tool 0 is
             selected, or the number stays selected without a definition [older firmware: U].
         xylim_counts: What XYLim holds inside its limits: the tip of the selected tool, or the
             flange [U].

@@ -301,8 +301,8 @@ class Restoration:
         """Carry it out and return the document; nothing is sent when nothing differs.
 
         Args:
-            accepted_mm: The length of a jump that was accepted beforehand.
-            accepted_deg: The angle of a jump that was accepted beforehand.
+            accepted_mm: The length of a jump that was accepted in advance.
+            accepted_deg: The angle of a jump that was accepted in advance.
         """
         receipts: tuple[ToolReceipt, ...] = ()
         if not self._plan.empty:

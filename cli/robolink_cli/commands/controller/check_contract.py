@@ -33,7 +33,7 @@ class _Asked:
     Attributes:
         tool: The tool that may be written; ``None`` for none.
         step_mm: How far the robot may go up; ``None`` for nowhere.
-        yes: Whether a person agreed beforehand.
+        yes: Whether a person agreed in advance.
     """
 
     tool: int | None

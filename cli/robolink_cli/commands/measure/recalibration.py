@@ -163,7 +163,7 @@ class RunOptions:
     """The typed options of one run of a recipe.
 
     Attributes:
-        answers: What was answered beforehand.
+        answers: What was answered in advance.
         assist_url: A simulator's stand-in for the person.
         take_reference: Whether only a reference is taken.
         accepted_change_mm: A larger jump that an engineer accepts this time.

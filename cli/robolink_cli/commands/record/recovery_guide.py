@@ -34,7 +34,7 @@ class Guide:
     Args:
         controller: The controller, connected.
         keep: Whether new values that nobody verified stay.
-        word: Whether a person's word is given beforehand for what reading cannot settle.
+        word: Whether a person's word is given in advance for what reading cannot settle.
         by: How that was given, for the record; ``None`` where it is on record already.
         tests: Whether a new value is kept only after its turn test, where one can be made: a
             person is at the robot who chose it.

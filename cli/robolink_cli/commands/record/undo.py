@@ -90,7 +90,7 @@ class Undoing:
     Args:
         controller: The controller, connected.
         plan: What to do.
-        then_select: The tool to put in force in place of one that becomes undefined.
+        then_select: The tool to select in place of one that becomes undefined.
     """
 
     def __init__(
@@ -105,7 +105,7 @@ class Undoing:
         """Return what would be sent besides reads.
 
         Raises:
-            ToolError: A value does not fit this robot, or the tool in force would become
+            ToolError: A value does not fit this robot, or the selected tool would become
                 undefined.
             NotReadyError: The state forbids a write.
         """

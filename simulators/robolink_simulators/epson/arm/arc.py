@@ -76,7 +76,7 @@ def plan_level_way(
         ends: Where the tip is, and where it comes to.
         way: The way and its length in mm.
         pace: How fast it may be.
-        offset: The tool in force.
+        offset: The selected tool.
         near: The joints at the start.
 
     Raises:

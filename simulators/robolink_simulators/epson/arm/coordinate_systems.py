@@ -207,7 +207,7 @@ class AddedArms:
         """Remove an added arm; removing an undefined one is allowed.
 
         Raises:
-            Refusal: Arm 0, the arm in force, or no such number.
+            Refusal: Arm 0, the selected arm, or no such number.
         """
         self._require_added(number)
         if number == self.selected:

@@ -169,7 +169,7 @@ def plan_line(
         model: The robot.
         ends: Where the tip is and where it goes.
         pace: How fast it may be.
-        offset: The tool in force.
+        offset: The selected tool.
         near: The joints at the start.
         avoiding: The surroundings of singular places that are left; ``None`` for staying.
 
@@ -205,7 +205,7 @@ def plan_about_point(
         pace: How fast the point may be on the workpiece.
         point: The external control point, in the base.
         way: Its way as the tip sees it, and the length; ``None`` for a straight one.
-        offset: The tool in force.
+        offset: The selected tool.
         near: The joints at the start.
         avoiding: The surroundings of singular places that are left; ``None`` for staying.
 

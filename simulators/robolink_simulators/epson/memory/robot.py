@@ -124,7 +124,7 @@ class DrivenRobot:
 
     Attributes:
         arm: The arm in simulated time.
-        tools: Tool definitions and the tool in force.
+        tools: Tool definitions and the selected tool.
         points: P0 to P999.
         locals: Local coordinate systems.
         parameters: Speeds, accelerations, LimZ.

@@ -9,7 +9,7 @@ from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 HIGHEST_TOOL: Final = 15
 
 ClearInForce: TypeAlias = Literal["selects_zero", "keeps", "error"]
-"""What TLClr does to the tool in force."""
+"""What TLClr does to the selected tool."""
 
 
 class ToolMemory:
@@ -58,12 +58,12 @@ class ToolMemory:
 
         Args:
             tool: Number of the tool.
-            in_force: What happens when it is the tool in force. That it is an error is documented
+            in_force: What happens when it is the selected tool. That it is an error is documented
                 for RC+ 8 (docs/reference/spel.md 10); what older firmware does is not: Tool 0
                 may be selected, or the number stays selected, and targets are the flange's.
 
         Raises:
-            Refusal: Tool 0, no such tool number, or the tool in force where that is an error.
+            Refusal: Tool 0, no such tool number, or the selected tool where that is an error.
         """
         self._check_writable(tool)
         selected = self._selected == tool

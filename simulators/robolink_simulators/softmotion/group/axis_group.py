@@ -315,7 +315,7 @@ class ToolBlocks(GroupCore):
         """``SMC_GroupSetTool``: applies to movements commanded from now on.
 
         Refused in Disabled and ErrorStop, and when the kinematics cannot honour the shift;
-        the tool in force then stays (documented). The rotation never matters.
+        the selected tool then stays (documented). The rotation never matters.
         """
         self._require_tool_change()
         self._require_fit(tool)

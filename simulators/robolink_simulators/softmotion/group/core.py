@@ -61,7 +61,7 @@ class GroupCore:
         transforms: Where the coordinate systems stand (MC_SetCoordinateTransform).
         inputs: Digital inputs.
         outputs: Digital outputs.
-        tool: The tool in force for movements to come.
+        tool: The selected tool for movements to come.
         motions: Movements and jogs accepted.
         motion: What moves the drives.
         machine: State and time.

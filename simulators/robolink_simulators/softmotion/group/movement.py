@@ -60,7 +60,7 @@ class Movement:
         number: Its id, from 1.
         path: Where it leads.
         pace: How fast; ``None`` when there is no way to go.
-        tool: The tool in force when it was commanded; it stays the movement's own.
+        tool: The selected tool when it was commanded; it stays the movement's own.
         mode: How it joins the movement before.
         base: Where the coordinate system of its command stands in MCS.
         execution: What its block shows.

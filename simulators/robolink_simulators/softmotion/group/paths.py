@@ -91,7 +91,7 @@ class LinePath:
 
     Attributes:
         kinematics: Of the group.
-        tool: Flange to TCP; the tool in force when the movement was commanded.
+        tool: Flange to TCP; the selected tool when the movement was commanded.
         configuration: Kept all along.
         start: Axes at its beginning.
         end: Axes at its end.

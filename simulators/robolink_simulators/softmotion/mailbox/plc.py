@@ -74,7 +74,7 @@ class Plc:
     Attributes:
         group: The axis group.
         memory: The retained variables.
-        tools: Slots and the tool in force.
+        tools: Slots and the selected tool.
         program: The mailbox program since the last start.
         starts: PLC starts so far.
         cuts: How often its cable was pulled; hosts end their connections then.

@@ -124,7 +124,7 @@ def calibrate_live(frame: CalibrationRequest, source: Callable[[Controller], Tip
         CalibrationError: A measurement is not trusted; nothing was written.
         DeclinedError: A person said no, or nobody could be asked.
         LimitError: The foreseen course leads outside the limits; nothing was moved.
-        VerifyError: The tip drifts too far; the old value was put back.
+        VerifyError: The tip drifts too far; the old value was restored.
     """
     # An order comes from a program, also where that has a terminal.
     alone = frame.assist is None and not frame.dry_run and frame.order is None

@@ -47,12 +47,12 @@ class CalibrationRequest:
         tool: Number of the tool.
         criteria: Acceptance limits of a measurement.
         limits: Where and how fast the robot may go.
-        verify: Whether to prove the new tip after the write.
+        verify: Whether to test the new tip after the write.
         assist: A simulator's stand-in for the person.
         impact: Taught points on which the change is judged.
         report: Where a page about it is wanted.
         dry_run: Whether it is only looked at.
-        yes: Whether questions are answered beforehand.
+        yes: Whether questions are answered in advance.
         pin: Name of the pin that is touched; empty where nobody named one.
         finds_pin: Whether the method finds the pin itself, so that it need not be known.
         length: What is done where the touches show that the tip is longer or shorter.
@@ -133,7 +133,7 @@ class CalibrationRequest:
         Args:
             source: Where its measurement comes from.
             controller: The controller, whose record tells of the station.
-            verify: Whether the new tip is proved after the write.
+            verify: Whether the new tip is tested after the write.
         """
         from robolink.calibration_run import ToolPlan
 

@@ -102,7 +102,7 @@ TORQUE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
 def _time_to(session: Session, arguments: Sequence[Value]) -> Value:
     """Return PTPTime(point, arm, tool) in seconds from where the arm stands, 0 out of reach.
 
-    In low power the tool in force counts for the speed of the tip (assumed).
+    In low power the selected tool counts for the speed of the tip (assumed).
     """
     machine, target = session.machine, as_point(arguments[0])
     arm, tool = (as_integer(argument) for argument in arguments[1:])

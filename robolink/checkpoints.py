@@ -44,7 +44,7 @@ class Checkpoint(StrEnum):
 
 
 Observer = Callable[[Checkpoint, str], None]
-"""Called by the thread that passes a point, with its kind and what goes on."""
+"""Called by the thread that passes a point, with its kind and a description."""
 
 _observer: Observer | None = None
 

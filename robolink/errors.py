@@ -6,39 +6,39 @@
     ├── ConfigError (ValueError)           a URL, an option or a file is wrong; nothing was sent
     │   ├── LimitError                     a target or a change lies outside the stated limits
     │   ├── AmbiguousPosesError            a file of poses does not say everything (.asks)
-    │   ├── NotComparedError               nobody compared with the machine what would change
-    │   └── JournalError                   the record cannot be kept or read
-    ├── TransportError                     the wire
-    │   ├── ConnectError (ConnectionError) no link
-    │   │   └── LoginUnansweredError       a link, but nobody answers the login
+    │   ├── NotComparedError               a value not compared with the machine would change
+    │   └── JournalError                   the journal cannot be written or read
+    ├── TransportError                     the connection failed
+    │   ├── ConnectError (ConnectionError) no connection
+    │   │   └── LoginUnansweredError       a connection, but no answer to the login
     │   ├── TransportTimeoutError (TimeoutError)
-    │   ├── TransportClosedError           we closed it
-    │   └── TransportBrokenError           they, or the cable, did
-    ├── ProtocolError                      never raised as such
-    │   ├── LocalProtocolError             we asked for something illegal
-    │   ├── RemoteProtocolError            what they sent makes no sense; the session is dead
+    │   ├── TransportClosedError           this side closed it
+    │   └── TransportBrokenError           the far side, or the cable, ended it
+    ├── ProtocolError                      never raised itself
+    │   ├── LocalProtocolError             this side asked for something illegal
+    │   ├── RemoteProtocolError            the far side sent something invalid; the session is over
     │   └── UnclearAnswerError             neither done nor refused; it may or may not have run
-    ├── ControllerError                    a well-formed "no"
+    ├── ControllerError                    a refusal
     │   ├── RejectedError                  the controller refused the request
-    │   │   └── LoginRefusedError          wrong password, or one is demanded
-    │   ├── NotReadyError                  refused here: the state would not allow it (.reason)
+    │   │   └── LoginRefusedError          the password is wrong or missing
+    │   ├── NotReadyError                  not sent: the state does not allow it (.reason)
     │   ├── ControllerFaultError           the controller is in error
-    │   │   └── HeartbeatLostError         it halted a movement because we fell silent
+    │   │   └── HeartbeatLostError         it halted a movement because this side fell silent
     │   ├── MotionTimeoutError             a movement took too long and was aborted
-    │   └── BusyError                      another operation is under way
+    │   └── BusyError                      another operation is in progress
     │       ├── LeaseHeldError             another program or person is changing the controller
-    │       └── LeaseLostError             another did so meanwhile
-    ├── OutcomeUnknownError                sent, not answered: the machine may or may not have acted
+    │       └── LeaseLostError             another has changed it meanwhile
+    ├── OutcomeUnknownError                sent but not answered: it may or may not have run
     ├── StoppedError                       a stop ended it, from another thread or terminal
     ├── ToolError
     │   ├── ToolIndexError · ReservedToolError · UndefinedToolError
-    │   ├── SelectedToolError              it is in force, so it was not cleared
+    │   ├── SelectedToolError              the selected tool was not cleared
     │   ├── ToolChangedError               not the value that was expected; nothing was written
     │   └── ReadBackError                  written, but another value came back
     ├── CalibrationError                   the data do not give a trustworthy result (.code)
     ├── VerifyError                        the drift about the new tip is too large
-    └── DeclinedError                      a person said no
-        └── NotAllowedError                it takes an engineer
+    └── DeclinedError                      a person declined
+        └── NotAllowedError                only an engineer may do it
 
 Each error says what happened (:attr:`~RobolinkError.what`) and what to do next
 (:attr:`~RobolinkError.remedy`); ``str(error)`` is both. What it left on the controller is
@@ -104,7 +104,7 @@ class RobolinkError(Exception):
         what: What happened, one sentence.
         remedy: What to do next, one sentence; may be empty when ``what`` says it.
         controller: Identity or URL of the controller concerned, without any password.
-        request: The request under way, as it may be shown to a person.
+        request: The present request, for display.
         raw: The bytes that were read and could not be used.
 
     """
@@ -155,7 +155,7 @@ class RobolinkError(Exception):
 class Concerning:
     """Adds the controller and the request to each error that leaves the block.
 
-    What a driver raises inside says what happened; this says of whom, once, at its border. No
+    An error inside a driver says what happened; this adds the controller, once, at its border. No
     generator: every procedure passes here.
 
     Args:
@@ -274,8 +274,8 @@ class UnclearAnswerError(ProtocolError):
     """An answer in its place that says neither that a command ran nor that it was refused.
 
     One garbled character makes it (``#Execute,1``), and so does a controller that gives up a
-    statement half-way without an error state (``!Execute,99``). The session goes on, so what
-    became of the command can be read.
+    statement half-way without an error state (``!Execute,99``). The session continues, so the
+    outcome of the command can be read.
     """
 
 
@@ -397,7 +397,7 @@ class OutcomeUnknownError(RobolinkError):
 class StoppedError(RobolinkError):
     """A stop from another thread, another terminal or a person.
 
-    What was under way was ended by it, and nothing that moves or writes leaves this process
+    The stop ended what was in progress, and nothing that moves or writes leaves this process
     until the stop is released.
     """
 
@@ -434,8 +434,8 @@ class CalibrationError(RobolinkError):
     """The measurements do not support a result.
 
     Attributes:
-        code: The named reason, for example ``insufficient_rotation``; the most telling one.
-        others: Further reasons that hold as well.
+        code: The named reason, for example ``insufficient_rotation``; the most important one.
+        others: Further reasons that apply as well.
     """
 
     def __init__(

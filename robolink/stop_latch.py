@@ -265,7 +265,7 @@ class StopLatch:
 
 
 LONGEST_WAIT_S: Final = 86_400.0
-"""Nobody waits longer than a day for his turn."""
+"""Longest wait for a turn: a day."""
 
 LOOK_S: Final = 0.1
 """From one look to the next, while waiting, whether a stop or Ctrl-C came, or the way is free."""

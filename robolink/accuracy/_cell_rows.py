@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 _NEWEST: Final = 500
-"""So many entries of a kind are looked at, the newest."""
+"""The newest entries of a kind that are read, at most this many."""
 
 
 class Recall(Protocol):

@@ -135,7 +135,7 @@ def _positive(value: object) -> float | None:
 
 
 LEAST_DOF: Final = 6
-"""From so many degrees of freedom on the record tells the scatter of a look."""
+"""Degrees of freedom from which the record shows the scatter of a look."""
 
 _NEWEST: Final = 200
 
@@ -223,10 +223,10 @@ def _by_contact(touches: object) -> bool:
 
 
 LEAST_RECORDS: Final = 5
-"""A row is learnt from so many records, or not at all."""
+"""A row is learnt from at least this many records."""
 
 _OUTSIDE: Final = 0.05
-"""So often the bound is too low."""
+"""Probability that the bound is too low."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 
 LEAST_ANGLE_DEG = 20.0
-"""Beams that cross at less than this leave one direction badly known."""
+"""Beams that cross at less than this determine one direction badly."""
 
 LEAST_LENGTH_MM = 5.0
 

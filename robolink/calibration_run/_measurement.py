@@ -113,12 +113,13 @@ def with_sources(plan: ToolPlan, result: CalibrationResult) -> CalibrationResult
 
 
 MOST_ANEW: Final = 5
-"""So often a person may begin the touches of one tool anew."""
+"""How often a person may restart the touches of one tool."""
 
 
 MOST_FURTHER: Final = 3
-"""So often touches are gone back to from one proposal: who touches until it fits has measured
-nothing."""
+"""How often a person may return to the touches from one proposal: repeating them until they fit
+would prove nothing.
+"""
 
 
 _INSTRUMENT: Final = frozenset({"no_edge", "sensor_failed", "tip_not_seen", "fiducial_not_seen"})

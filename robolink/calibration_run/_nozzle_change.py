@@ -65,7 +65,7 @@ Earlier = Callable[[int], Sequence[float]]
 first."""
 
 DescribeReport = Callable[[ChangeReport], Mapping[str, object]]
-"""Returns the result of an order, plain JSON, that a second delivery of it is given."""
+"""Returns the result of an order, plain JSON, for a second delivery of it."""
 
 
 class NozzleChange:

@@ -93,7 +93,7 @@ _CELL_NAME = re.compile(r"[^\s+:/\\]+")
 
 
 USUAL_CHANGE_MM: Final = 2.0
-"""Where a cell names no limit of its own: more than a change of nozzles explains."""
+"""Default limit of a cell: more than a change of nozzles explains."""
 
 
 class CellGlimpse(NamedTuple):

@@ -185,7 +185,7 @@ def stopped_before_edge(controller: str, request: str) -> StoppedError:
 
 _POLL_S: Final = 0.02
 _REST_S: Final = 5.0
-"""Longest time from a stop to a state that shows rest (docs/reference/rules.md 5)."""
+"""Longest time from a stop to a confirmed stop state (docs/reference/rules.md 5)."""
 
 
 class PolledGroup(MotionGroupCore):

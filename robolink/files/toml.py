@@ -25,7 +25,7 @@ MOST_BYTES: Final = 250_000
 """A recipe of a hundred tools takes 60 kB, as does a cell file of a hundred cells."""
 
 MOST_SHOWN: Final = 40
-"""Problems of one file that are told at once; a file in another form has one in each line."""
+"""Most problems of one file in an error; a file in another form has one in each line."""
 
 _MOST_PARTS: Final = 32
 _PART: Final = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')"""

@@ -151,7 +151,7 @@ def signature_here(version: str) -> Signature:
 
 
 LEASE_S: Final = 10.0
-"""A holder that gave no sign of life for so long may be replaced."""
+"""A holder without a sign of life for this long may be replaced."""
 
 FREE: Final = ""
 """The token of a lease that nobody holds."""

@@ -61,7 +61,7 @@ if TYPE_CHECKING:
 
 
 LEAST_SPAN_MM: Final = 0.2
-"""A smaller pattern does not tell what a pixel is."""
+"""A smaller pattern does not show the scale of a pixel."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -138,7 +138,7 @@ Rows = tuple[Pair, Pair]
 
 
 LengthRule = Literal["ask", "difference", "keep"]
-"""What is done where a tip proves longer or shorter: ask, write Z by difference, keep Z."""
+"""What to do if a tip is longer or shorter: ask, write Z by difference, keep Z."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -30,10 +30,10 @@ class ValueReceipt(Generic[ValueT]):
     """The result of setting a value.
 
     Attributes:
-        request: The request, as it stands on the wire.
-        before: What was there.
-        requested: What was asked for.
-        read_back: What is there now.
+        request: The request, as sent on the wire.
+        before: The earlier value.
+        requested: The requested value.
+        read_back: The present value.
         skipped: It was there already, so nothing was sent.
     """
 
@@ -54,7 +54,7 @@ class DigitalIo(Protocol):
         """Switch one output, and confirm it as far as this controller allows.
 
         Returns:
-            ``None`` where an output cannot be read back: the acknowledgement is the proof.
+            ``None`` if an output cannot be read back: only the acknowledgement confirms it.
 
         Raises:
             NotReadyError: The state forbids it.
@@ -84,7 +84,7 @@ class VariableTable(Protocol):
 
         Args:
             name: Name of the variable, as the project of the controller has it.
-            value: What it is to hold.
+            value: The new value.
             kind: Its type, such as ``Real``.
 
         Example:
@@ -127,7 +127,7 @@ class AlarmList(Protocol):
         """Read the numbers of the active alarms.
 
         Raises:
-            RejectedError: This firmware does not tell them.
+            RejectedError: This firmware does not report them.
         """
 
     def reset(self, number: int) -> None:
@@ -147,13 +147,12 @@ class Act(StrEnum):
 class Capabilities:
     """What this kind of controller supports.
 
-    The last four say that the controller's attribute of that name is there.
+    The last four say whether the controller has the attribute of that name.
 
     Attributes:
-        pose_while_moving: Whether a position can be read while a movement is under way; else the
-            one line to the controller is waited on.
-        low_power: Whether each movement is made in a power mode of the controller's that is
-            gentle.
+        pose_while_moving: Whether a position can be read while a movement is in progress; if not,
+            the only line to the controller is busy until its end.
+        low_power: Whether each movement uses a gentle power mode of the controller.
         looks: Whether it has a vision system of its own (:class:`LookingController`).
         inputs_only: Whether ``io`` reads inputs and switches no output.
     """
@@ -182,7 +181,7 @@ class Controller(Protocol):
     def identity(self) -> str:
         """How it is reached: the URL, without passwords and without options that name nothing.
 
-        Who it is, whatever the URL, is ``outcomes.identity``.
+        The identity that does not depend on the URL is ``outcomes.identity``.
         """
 
     @property
@@ -264,12 +263,13 @@ class Controller(Protocol):
         """Stop everything; from any thread, at any time, more than once.
 
         It sets the latch before it waits for anything: until :meth:`release_stop` no movement,
-        jog, write or program start leaves this process. Only the tool, power and speed of
-        before may be restored, and each tool of an open change once. Whoever was at work gets
-        StoppedError. It returns when the controller has shown that it is at rest.
+        jog, write or program start leaves this process. Only the earlier tool, power and speed
+        may be restored, and each tool of an open change once. Whoever was working gets
+        StoppedError. It returns when the controller has confirmed that it has stopped.
 
         Raises:
-            OutcomeUnknownError: Rest was not seen; the message says to use the emergency stop.
+            OutcomeUnknownError: The stop is not confirmed; the message says to use the emergency
+                stop.
         """
 
     def release_stop(self) -> None:
@@ -284,8 +284,8 @@ class Controller(Protocol):
     def take_over(self, reason: str) -> None:
         """Take the controller over from the user who has it locked, at a person's request.
 
-        The record keeps who insisted and why. The next act of whoever had it is refused: its
-        lease has another epoch, and so has a PLC's mailbox. What it began stays open here.
+        The journal records who took over and why. The next action of the earlier user is refused:
+        its lease has another epoch, and so has a PLC's mailbox. What it began stays open here.
 
         Args:
             reason: Why, in the person's words.
@@ -313,12 +313,12 @@ class Controller(Protocol):
 
         Args:
             kind: What it stands for.
-            request: What is begun, as a person may read it.
+            request: What is started, for display.
             details: Plain JSON values needed to recover it.
             operation: Id of an earlier marker whose work is taken up; empty for a new one.
 
         Raises:
-            ConfigError: That is impossible; nothing may be sent.
+            ConfigError: It cannot be stored; nothing may be sent.
             BusyError: Another process has the controller.
 
         Example:
@@ -339,17 +339,17 @@ class Controller(Protocol):
     ) -> AbstractContextManager[None]:
         """Let only this thread change something on the controller within the block.
 
-        What other threads change meanwhile is refused with BusyError, or waits. Where this call
-        may wait it takes the lease as well, so that no other program comes in between. The block
+        Changes by other threads are refused with BusyError meanwhile, or wait. If this call may
+        wait, it takes the lease as well, so that no other program comes in between. The block
         belongs to the thread that entered it.
 
         Args:
-            request: What the block does, as a person may read it.
+            request: What the block does, for display.
             wait_s: How long to wait for others, in seconds, 0 not at all; ``None`` for
                 ``patience.wait_s``.
 
         Raises:
-            BusyError: Others are at work still.
+            BusyError: Others are still working.
             StoppedError: A stop came while this waited.
 
         Example:
@@ -368,9 +368,9 @@ class Controller(Protocol):
     def signs_of_life(self) -> AbstractContextManager[None]:
         """Show others within the block, once a second, that this process is at work.
 
-        The record and the controller are told, for lease and ownership alone: no command is
-        sent and no movement kept going. While a movement is unfinished on which nobody waits,
-        none is given.
+        They go to the record and the controller, for lease and ownership alone: they send no
+        command and sustain no movement. None is given while a movement is unfinished on which
+        nobody waits.
 
         Example:
             >>> import robolink
@@ -430,12 +430,12 @@ def are_simulated_facts(facts: ControllerFacts) -> bool:
 def says_it_is_simulated(controller: Controller, facts: ControllerFacts | None = None) -> bool:
     """Return whether a controller says that nothing real moves; without an answer, an error.
 
-    A PLC says it of its axes, in the mailbox (docs/mailbox.md); a simulated EPSON controller by
-    its serial numbers. One that cannot be asked just now says nothing.
+    A PLC reports it for its axes, in the mailbox (docs/mailbox.md); a simulated EPSON controller by
+    its serial numbers. One that cannot answer just now reports nothing.
 
     Args:
         controller: The controller; what can be read is read.
-        facts: What it said of itself, where it was asked already.
+        facts: Its earlier answer, if it was asked already.
 
     Example:
         >>> from robolink import connect

@@ -47,7 +47,7 @@ PROOFS: Final = (
     EntryKind.NOT_APPLIED,
     EntryKind.ROLLED_BACK,
 )
-"""Entries whose value was read from the controller: the newest tells what a tool holds."""
+"""Entries with a value read from the controller: the newest one shows a tool's value."""
 
 NO_HISTORY: Final = (
     EntryKind.IDENTITY,
@@ -55,7 +55,7 @@ NO_HISTORY: Final = (
     EntryKind.LEASE,
     EntryKind.CHECK,
 )
-"""What is recorded of a controller without anything being changed on it."""
+"""Kinds of entries about a controller that record no change of it."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -300,7 +300,7 @@ AxisPositions = tuple[float, ...]
 """``AXISPOS_REF``: one value an axis, a0 first; degrees of a rotary axis, mm of a linear one."""
 
 FlangeFrame = tuple[Direction3, RotationMatrix]
-"""Where a flange stands: its place in mm, and how it is turned."""
+"""The place of a flange in mm, and its orientation."""
 
 
 class AxisKind(StrEnum):

@@ -20,7 +20,7 @@ class InputEdge:
         number: The input as its controller counts: from 0 on an EPSON controller, from 1 in a
             PLC's mailbox.
         falling: Whether it is to go off, not on.
-        run_on: Whether the movement goes on to its target after the edge.
+        run_on: Whether the movement continues to its target after the edge.
     """
 
     number: int
@@ -34,13 +34,13 @@ class InputEdge:
     def require_ahead(self, on: bool, *, controller: str, request: str) -> None:
         """Refuse an input that already shows what the movement waits for.
 
-        An EPSON controller would take such a movement for finished at once, and a PLC would drive
+        An EPSON controller would treat such a movement as finished at once, and a PLC would drive
         on to the target, the tip perhaps in contact (docs/reference/spel.md 7.1, docs/mailbox.md).
 
         Args:
             on: Whether the input is on before the movement begins.
-            controller: Who is asked, for the error.
-            request: What is asked, for the error.
+            controller: The controller, for the error.
+            request: The request, for the error.
 
         Raises:
             NotReadyError: Names the input.
@@ -73,9 +73,9 @@ class MotionUntilInput(Protocol):
         """Wait for the end and return where the tip was at the edge.
 
         Returns:
-            ``None`` when the input did not switch on the way; the movement has arrived then.
-            What a controller cannot latch it reads at rest just past the edge: both edges of a
-            beam, and both directions, are late by the same amount then.
+            ``None`` when the input did not switch on the way; the movement has then arrived.
+            A controller that cannot latch the place reads it at rest just past the edge: both
+            edges of a beam, and both directions, are then late by the same amount.
 
         Raises:
             StoppedError: It was stopped before.
@@ -121,8 +121,8 @@ class MotionProfile:
 class WorkBox:
     """The box that no target may leave, in base coordinates of the frame that moves.
 
-    A plan holds it about the place where the frame will be at the start (:meth:`reaching`); there
-    it is put when that place is known (:meth:`about`).
+    A plan defines it around the start place of the frame (:meth:`reaching`), and moves it there
+    once that place is known (:meth:`about`).
     """
 
     x_min_mm: float = -math.inf
@@ -265,10 +265,10 @@ class MotionTerms:
 
     Attributes:
         who: What moves, and in which mode, to be followed by "will move".
-        watch: Who stops it when this computer falls silent, one sentence.
-        able: What was looked at and lets it move, as :meth:`MotionGroup.require_able` does; empty
-            where this kind of controller tells nothing of it. It holds also while the motors are
-            off.
+        watch: What stops it when this computer falls silent, one sentence.
+        able: What was checked and allows it to move, as :meth:`MotionGroup.require_able` does;
+            empty if this kind of controller reports nothing of it. It is valid also while the
+            motors are off.
     """
 
     who: str
@@ -290,14 +290,14 @@ class MotionGroup(Protocol):
         """Start one movement of the frame ``target.tool``; sent at most once.
 
         Args:
-            target: Where the frame ``target.tool`` is brought, base, mm and degrees.
+            target: Where to move the frame ``target.tool``, base, mm and degrees.
             profile: How: path, speed and accelerations.
             box: Where it may go.
 
         Raises:
             LimitError: The target lies outside ``box``.
             NotReadyError: The state, the motors or the selected tool forbid it.
-            OutcomeUnknownError: An earlier command on this controller is unresolved.
+            OutcomeUnknownError: An earlier command on this controller is not recovered.
 
         Example:
             >>> import robolink
@@ -319,7 +319,7 @@ class MotionGroup(Protocol):
     ) -> MotionUntilInput:
         """Start one straight movement during which the controller watches an input.
 
-        Sent at most once, and not at all when the input shows already what is waited for.
+        Sent at most once, and not at all if the input already shows what is waited for.
 
         Args:
             target: Where it ends when the input does not switch.
@@ -372,14 +372,14 @@ class MotionGroup(Protocol):
     def obstacle(self, target: Pose, path: Path, *, start: Pose | None = None) -> str:
         """Return why the arm could not make this move, a sentence; empty if nothing is known.
 
-        Reads only, and is no promise: it is for whoever has other places to choose from, or would
-        rather not begin. The places are meant for the selected tool.
+        Reads only, and is no promise: it is for a caller that can choose another place, or need not
+        begin. The places are those of the selected tool.
 
         Args:
             target: Where to.
             path: How.
-            start: Where from, ``None`` where nobody knows; of a straight way only the end is looked
-                at then.
+            start: Where from, ``None`` if unknown; then only the end of a straight movement is
+                checked.
 
         Example:
             >>> import robolink
@@ -393,7 +393,7 @@ class MotionGroup(Protocol):
     def deceleration_mm_s2(self) -> float | None:
         """Read how it brakes in straight movements, ``None`` if it does not report that.
 
-        By that it comes to rest beyond the edge of an input that ends a movement.
+        With this it stops beyond the edge of an input that ends a movement.
         """
 
     def run_up_mm(self, speed_mm_s: float) -> float | None:
@@ -403,7 +403,7 @@ class MotionGroup(Protocol):
             speed_mm_s: The speed.
 
         Returns:
-            The longer of both ways; ``None`` where it does not tell.
+            The longer of both distances; ``None`` if it does not report them.
         """
 
     def edge_step_mm(self, speed_mm_s: float) -> float | None:
@@ -413,17 +413,17 @@ class MotionGroup(Protocol):
             speed_mm_s: The speed.
 
         Returns:
-            The step; ``None`` where nobody knows it.
+            The step; ``None`` if unknown.
         """
 
     def require_able(self, purpose: str) -> None:
         """Refuse if no movement could start now; reads only.
 
-        For whoever asks a person first: nobody is asked whether the cell is clear, and then told
-        that the motors are off.
+        For a caller that asks a person first: otherwise the person would confirm a clear cell, and
+        then read that the motors are off.
 
         Args:
-            purpose: What it is to move for, in words.
+            purpose: The purpose of the movement, in words.
 
         Raises:
             NotReadyError: The motors are off, or the state forbids every movement.
@@ -436,8 +436,8 @@ class MotionGroup(Protocol):
         """Read the place of the base, from which positions count.
 
         Returns:
-            X, Y, Z in mm and U, V, W in degrees, seen from the robot; ``None`` where this kind of
-            controller tells none.
+            X, Y, Z in mm and U, V, W in degrees, seen from the robot; ``None`` if this kind of
+            controller reports none.
         """
 
     def axes(self) -> Mapping[str, tuple[float, ...]]:

@@ -119,7 +119,7 @@ def read_offset(value: object) -> ToolOffset | None:
     """Return the offset from the output of :func:`plain_offset`.
 
     Raises:
-        ConfigError: It is no such value.
+        ConfigError: It is not such a value.
     """
     if value is None:
         return None
@@ -138,10 +138,10 @@ class Expect(Enum):
 
 
 ANY: Final = Expect.ANY
-"""Pass as ``expected`` to write whatever is stored now. Recorded as unconditional."""
+"""Pass as ``expected`` to write over any stored value. Recorded as unconditional."""
 
 Expected = ToolOffset | None | Literal[Expect.ANY]
-"""What the caller believes is stored: an offset, ``None`` for undefined, or :data:`ANY`."""
+"""The value that the caller expects: an offset, ``None`` for undefined, or :data:`ANY`."""
 
 
 def tool_changed(
@@ -156,8 +156,8 @@ def tool_changed(
 
     Args:
         tool: Number of the tool.
-        found: What it holds, ``None`` for undefined.
-        expected: What its writer believes.
+        found: The value found, ``None`` for undefined.
+        expected: The value that its writer expects.
         controller: The controller's identity, for the error.
         request: What was asked, for the error.
 
@@ -230,7 +230,7 @@ class ToolTable(Protocol):
         """Return, in sentences, why the values that are read may not be the active ones.
 
         Args:
-            tools: Those that are about to be changed.
+            tools: The tools about to be changed.
         """
 
     def write(
@@ -240,18 +240,18 @@ class ToolTable(Protocol):
 
         Args:
             tool: Its number, 1 and more.
-            offset: What it is to hold, mm and degrees; rounded to what the controller keeps.
-            expected: What is believed to be stored, ``None`` for undefined, ``ANY`` for anything.
-            wait_s: How long to wait for other threads and programs that are at work, in seconds,
+            offset: The new value, mm and degrees; rounded to what the controller stores.
+            expected: The value expected to be stored, ``None`` for undefined, ``ANY`` for anything.
+            wait_s: How long to wait for other threads and programs that are working, in seconds,
                 0 not at all; ``None`` for the controller's ``patience.wait_s``.
 
         Raises:
             ReservedToolError: Tool 0.
             ToolIndexError: There is no such tool.
-            ToolChangedError: Something else is stored; nothing was written.
+            ToolChangedError: Another value is stored; nothing was written.
             ReadBackError: Another value came back.
             NotReadyError: The state would not allow a write; nothing was written.
-            BusyError: Another thread or program is at work; nothing was written.
+            BusyError: Another thread or program is working; nothing was written.
             OutcomeUnknownError: No answer came to the write.
 
         Example:
@@ -287,13 +287,13 @@ class ToolTable(Protocol):
 
         Args:
             tool: Its number.
-            expected: What is believed to be stored.
-            then_select: The tool to select before, if ``tool`` is in force; 0 is the
-                flange. What is in force is left alone otherwise.
+            expected: The value expected to be stored.
+            then_select: The tool to select first, if ``tool`` is selected; 0 is the flange.
+                Otherwise the selection stays.
             wait_s: As for :meth:`write`.
 
         Raises:
-            SelectedToolError: The tool is in force and no other one is named; nothing was sent.
+            SelectedToolError: The tool is selected and no other one is named; nothing was sent.
             UndefinedToolError: The tool named has no definition; nothing was cleared.
 
         Example:
@@ -309,7 +309,7 @@ class ToolTable(Protocol):
     def selected(self) -> int | None:
         """Return the number of the selected tool, 0 for the flange.
 
-        ``None`` where the controller does not tell.
+        ``None`` if the controller does not report it.
         """
 
     def select(self, tool: int, *, wait_s: float | None = None) -> None:
@@ -335,10 +335,10 @@ def read_for_verdict(
     Args:
         tools: The table.
         tool: Its number.
-        known: What it may well hold: the old value, the new one.
+        known: The values to expect: the old one, the new one.
 
     Raises:
-        UnclearAnswerError: Each of three looks shows something else.
+        UnclearAnswerError: Each of three reads shows another value.
         ToolIndexError: There is no such tool.
 
     Example:

@@ -19,7 +19,7 @@ all; a whole turn would bring 0.50 sigma in place of 0.55. In steps of less than
 that no controller has two ways to choose from, and all in one direction."""
 
 TWO_ANGLES_DEG: Final = (0.0, 120.0)
-"""Two that tell the camera's own error from what is on the tool."""
+"""Two angles that separate the camera's own error from the tool."""
 
 LEAST_BESIDE_MM: Final = 0.2
 """An approach that begins nearer to its place does not show whether the spot moves with the tip."""

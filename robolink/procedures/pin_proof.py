@@ -26,7 +26,7 @@ from robolink.procedures.witnessed_touches import TouchPlan, heights_agree, plai
 from robolink.runner import AngleShown, Notify, Procedure, TouchedAt, first_clear
 
 MOST_MORE: Final = 2
-"""Touches that a drift may take which is neither surely inside nor surely outside."""
+"""Most further touches for a drift that is neither certainly inside nor certainly outside."""
 
 
 def verify_by_turning(

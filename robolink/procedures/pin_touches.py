@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 LEAST_TURN_DEG: Final = 10.0
-"""Nearer in U two touches of a plan never lie that puts them further apart than twice as much."""
+"""Least turn between two touches of a plan whose angles are more than twice as far apart."""
 
 
 class PinTouches(WitnessedTouches):

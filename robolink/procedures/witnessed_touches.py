@@ -89,7 +89,7 @@ TOUCH_CODES: Final = (
     "camera_changed",
     "spot_changed",
 )
-"""Why touches do not count, in a measurement and in a proof; and why looks of a camera do not."""
+"""Reasons why touches, or looks of a camera, do not count, in a measurement and in a turn test."""
 
 
 def was_jogged(touch: TouchedAt) -> bool:

@@ -117,7 +117,7 @@ def _field(value: float) -> str:
 VERSION: Final = "RL1"
 
 LONGEST_LINE: Final = 255
-"""A SPEL+ string holds no more characters (docs/reference/spel.md 17)."""
+"""Most characters of a SPEL+ string (docs/reference/spel.md 17)."""
 
 _BASE: Final = 251
 _PRIME: Final = 8_388_593

@@ -33,11 +33,12 @@ MOST_NOT_YET: Final = 3
 """So often a place is asked for that is not to be taken yet, before it ends the measurement."""
 
 AGAIN: Final = "taken_again"
-"""The code with which a person wants an earlier touch again."""
+"""The code of a person's request to repeat an earlier touch."""
 
 MOST_REFUSED: Final = 10
-"""So many answers in a row that lead nowhere end a question: whoever answers, a person or what
-stands in for one, would go on like that."""
+"""This many useless answers in a row end a question: a person, or a substitute, would continue in
+the same way.
+"""
 
 _QUESTIONS: Final = {
     TeachPrompt.PIN: Question.PLACE,

@@ -20,12 +20,12 @@ from robolink.runner._prompt_context import FitSubject, JogRange, TouchSubject
 from robolink.timing import NS_PER_S, Clock
 
 FINEST_STEP: Final = 0.1
-"""The last step before a touch is not longer, in mm or degrees: who comes in steps of a millimetre
-stops up to half of one away (docs/decisions/0041)."""
+"""Longest last step before a touch, in mm or degrees: with steps of a millimetre a person stops up
+to half of one away (docs/decisions/0041).
+"""
 
 SETTLING_S: Final = 0.3
-"""So long after a step of its own a hand is not believed: the key was pressed for what came
-before."""
+"""For this long after a step keys are ignored: they were pressed for what came before."""
 
 OLDEST_READING_S: Final = 1.0
 """What took longer to read is not where the tip is now."""
@@ -345,7 +345,7 @@ class Confirm:
 
 
 TakenStep = Move | Ask | Seek | Look | Notify | Confirm
-"""What happens in the cell, or to a person; it is told of and foreseen."""
+"""A step in the cell, or for a person; it is reported and previewed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -371,7 +371,6 @@ Step = TakenStep | Consider
 T = TypeVar("T")
 
 Procedure = Generator[Step, Any, T]
-"""Yields steps, is sent what each step is answered with, returns a result.
-
-The type of an answer follows from the step, which a generator's type cannot say.
+"""Yields steps, receives the answer of each step, returns a result. The type of an answer follows
+from the step, which a generator's type cannot express.
 """

@@ -22,7 +22,7 @@ MORE: Final = "more"
 """The word for one more touch than planned."""
 
 BACK: Final = "back"
-"""The word for going back to the touches."""
+"""The word for returning to the touches."""
 
 _NO: Final = frozenset({"n", "no", "nein", "否"})
 

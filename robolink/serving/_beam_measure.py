@@ -22,8 +22,9 @@ LEAST_OF_A_ROUND: Final = 4
 """Each beam both ways."""
 
 LEAST_TURN_DEG: Final = 60.0
-"""From 60 degrees on, a proof shows beams that were moved by e as a drift of e or more:
-2 e sin(turn / 2)."""
+"""From 60 degrees on, a turn test shows beams that were moved by e as a drift of e or more: 2 e
+sin(turn / 2).
+"""
 
 LEAST_SHAFT_MM: Final = 1.0
 """How much deeper the shaft is crossed, at least, so that its lean shows."""

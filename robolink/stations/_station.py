@@ -12,7 +12,7 @@ from robolink.model import EntryKind, NewEntry, Recorded, finding_named_now, jso
 from robolink.timing import local_label, wall_time
 
 AGREEING_MM: Final = 2.0
-"""So far may the cell file be from what was learnt: a search finds the station still."""
+"""How far the cell file may be from the learnt place: a search still finds the station."""
 
 
 class StationKind(StrEnum):

@@ -36,7 +36,7 @@ from robolink.transport import far_end_of
 KIND: Final = "holders"
 
 MOST_BYTES: Final = 4096
-"""Nothing that is asked here is longer."""
+"""Most bytes of a request."""
 
 _HEARD_S: Final = 1.0
 _LAST_ANSWER_S: Final = 10.0
@@ -46,7 +46,7 @@ _LONGEST_PATH: Final = 100
 """Bytes of a socket's path; Linux takes 107, others 103."""
 
 Answer = Callable[[socket.socket, dict[str, object]], None]
-"""Answers one who has the token."""
+"""Answers a caller with the token."""
 
 
 class Stoppable(Protocol):

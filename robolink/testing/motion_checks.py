@@ -194,4 +194,4 @@ MOVING_CHECKS: Final[tuple[Check, ...]] = (
 """They move the robot, a step up and down again."""
 
 WRITING_WHILE_MOVING_CHECKS: Final[tuple[Check, ...]] = (nothing_is_written_while_it_moves,)
-"""They do both, so a tool has to be named that may be written."""
+"""They do both, so a tool that may be written has to be named."""

@@ -284,4 +284,4 @@ WRITING_CHECKS: Final[tuple[Check, ...]] = (
     one_procedure_at_a_time,
     *GUARD_CHECKS,
 )
-"""They write one tool, and put it back."""
+"""They write one tool, and restore it."""

@@ -34,7 +34,7 @@ LONGEST_ORDER: Final = 64
 """Characters of an order's id."""
 
 Describe = Callable[[Sequence[ToolReceipt]], Mapping[str, object]]
-"""Returns the result of a change, plain JSON, that a second delivery is given."""
+"""Returns the result of a change, plain JSON, for a second delivery."""
 
 
 @dataclass(frozen=True, slots=True)

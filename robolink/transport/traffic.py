@@ -23,7 +23,7 @@ from robolink.timing import Clock
 Direction = Literal["sent", "received"]
 
 TraceSink = Callable[[int, Direction, bytes], None]
-"""Takes the time in ns of the link's clock, the direction and the bytes."""
+"""Receives the time in ns of the link's clock, the direction and the bytes."""
 
 SECRET_PLACEHOLDER: Final = b"<secret>"
 """Stands in a trace for every secret, whatever its content and length."""

@@ -34,16 +34,16 @@ ROBOT_SIGMA_MM: Final = 0.005
 """Standard deviation of how far the robot really moves between two places, each axis."""
 
 RADIUS_WITHIN: Final = 0.03
-"""By which share the radius of a spot may differ from that of the other looks of a run."""
+"""Share by which the radius of a spot may differ from the other looks of a run."""
 
 LEAST_RADIUS_PX: Final = 0.3
 """No closer limit than this is held against a radius: a finder scatters by 0.1 px."""
 
 _FACTOR: Final = 3.0
-"""How many standard uncertainties are taken for chance."""
+"""Number of standard uncertainties that count as chance."""
 
 _PLAY_AGAIN: Final = 1.5
-"""By what play that was found once may differ at another place."""
+"""How much a measured backlash may differ at another place."""
 
 _SAME_DIRECTION_DEG: Final = 5.0
 """Movements whose directions differ by less are of one direction."""

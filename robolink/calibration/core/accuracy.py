@@ -28,7 +28,7 @@ DIVISORS: Final = {
     "arcsine": math.sqrt(2),
     "normal": 1.0,
 }
-"""By what a half width is divided to be a standard uncertainty, by its distribution."""
+"""Divisors from a half width to a standard uncertainty, by distribution."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,7 +181,7 @@ def coverage_factor(nu_eff: float, probability: float = 0.95) -> float:
 
 
 Basis = Literal["stated", "record", "default"]
-"""What tells how large a row is: the cell, its record, or nobody."""
+"""The source of a row's size: the cell file, the record, or the default."""
 
 Turning = Literal["with_tool", "in_base", "as_offset"]
 """What becomes of an error when the tool turns about the tip that was found.

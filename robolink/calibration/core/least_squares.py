@@ -30,10 +30,10 @@ REJECT_BEYOND: Final = 4.0
 """Residual distance, in standard deviations of a coordinate, beyond which a pose is rejected."""
 
 MOST_SAMPLES: Final = 20_000
-"""Up to so many smallest samples are all tried."""
+"""Up to this many smallest samples are all tried."""
 
 REFINED: Final = 30
-"""So many of the best samples are refined."""
+"""Number of best samples that are refined."""
 
 MOST_REFITS: Final = 20
 

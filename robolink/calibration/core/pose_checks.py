@@ -10,7 +10,7 @@ from robolink.messages import tr
 from robolink.model import COMPONENTS, Hand, Pose, ToolOffset
 
 MAX_OFFSET_MM = 1000.0
-"""A tool longer than this is taken for a mistake (docs/reference/calibration.md 3)."""
+"""A longer tool counts as a mistake (docs/reference/calibration.md 3)."""
 
 METRES_BELOW = 2.0
 """No flange stays so near to its own base axis, in mm; in metres most do."""

@@ -154,8 +154,9 @@ class ResidualVectors(Sequence[tuple[float, ...]]):
 
 
 LEAST_HALF_WIDTH: Final = 0.0005
-"""No interval is stated narrower: half of the last digit that a controller prints, and that anybody
-reads, in mm and in degrees (docs/reference/evidence.md 6)."""
+"""Least stated half width: half of the last digit that a controller prints, in mm and in degrees
+(docs/reference/evidence.md 6).
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -324,7 +325,7 @@ GUARD_FACTOR: Final = 1.65
 """A one-sided error of 5 % on either side."""
 
 PERSON_U_DRIFT_MM: Final = 0.03
-"""Of a person who brings a tip onto a pin, whether the eye or an input shows the contact."""
+"""Drift in U of a person who touches a pin, whether the eye or an input shows the contact."""
 
 
 class DriftVerdict(Enum):

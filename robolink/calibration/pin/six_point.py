@@ -28,7 +28,7 @@ LEAST_WAY_MM: Final = 5.0
 """A shorter way shows no direction."""
 
 GOOD_WAY_MM: Final = 50.0
-"""With a scatter of 0.01 mm at both ends it shows one to 0.02 degrees."""
+"""Length of a good move: with 0.01 mm of scatter at both ends it shows an axis to 0.02 degrees."""
 
 _TURNED_DEG: Final = 0.01
 
@@ -92,7 +92,7 @@ MOST_OFF_SQUARE_DEG = 2.0
 """Raw axes that are further from a right angle are refused (docs/reference/calibration.md 2.4)."""
 
 FAR_DEG = 45.0
-"""A way that leads further from where its axis is stored is nearer to another axis."""
+"""A move further than this from its stored axis is nearer to another axis."""
 
 _MOST_ASKEW = 2.0
 """How many halves of its 95 % interval the angle between the ways may be off a right angle."""

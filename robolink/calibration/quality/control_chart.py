@@ -18,7 +18,7 @@ from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
 
 LEAST_BASELINE: Final = 20
-"""Limits from fewer calibrations lie: from ten, 2.4 % of all good points lie outside."""
+"""Limits from fewer calibrations are unreliable: from ten, 2.4 % of all good points lie outside."""
 
 USUAL_LAMBDA: Final = 0.2
 

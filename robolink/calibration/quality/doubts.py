@@ -16,7 +16,7 @@ from robolink.messages import tr
 from robolink.remedy_words import RemedyWord, remedy_word
 
 BEYOND_TOLERANCE: Final = ("large_residual", "large_rms", "large_pixel_residual")
-"""Codes of a result that does not agree with itself, the plainest first: nothing to be written."""
+"""Codes of a result that contradicts itself, the plainest first; it must not be written."""
 
 
 def beyond_tolerance(codes: Sequence[str], *, judged: Sequence[str] = ()) -> tuple[str, ...]:
@@ -65,7 +65,7 @@ TOUCH_TOLERANCE = Tolerance(rms_mm=0.3, max_residual_mm=1.0)
 
 NEAREST_MM: Final = 0.8
 FARTHEST_MM: Final = 1.2
-"""How far beside the pin the tip stops: well above what a person misses it by."""
+"""How far beside the pin the tip stops: well above a person's aiming error."""
 
 LEVELS_MM: Final = (0.0, 0.6, 1.2, 1.8)
 """How much above the clearance it stops: one and the same way down would not end at one height."""

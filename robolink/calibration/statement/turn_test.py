@@ -129,7 +129,7 @@ _ENOUGH_NU: Final = 6
 fewer only where that would let too much pass."""
 
 LEAST_TURN_DEG: Final = 90.0
-"""A tool that is turned by less from where it was measured is not called tested."""
+"""Less turn from where the tool was measured does not count as tested."""
 
 _SHOWN: Final = 0.5
 """A drift that shows less than this share of an error tells no wider statement."""

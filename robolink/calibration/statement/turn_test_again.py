@@ -22,7 +22,7 @@ from robolink.calibration.statement.turn_test import FALSE_ALARMS, held_to_claim
 from robolink.model import angle_difference_deg
 
 MOST_REPEATS: Final = 2
-"""So often may a turn test that contradicts its measurement be made again."""
+"""How often a turn test that contradicts its measurement may be repeated."""
 
 _SAME_ANGLE_DEG: Final = 1.0
 

@@ -26,7 +26,7 @@ from robolink.errors import CalibrationError
 from robolink.messages import tr
 
 LengthDecision = Literal["difference", "keep", "measure"]
-"""What is done about a length that changed: write Z by difference, keep it, measure it."""
+"""What to do about a changed length: write Z by difference, keep it, measure it."""
 
 LEAST_LENGTH_CHANGE_MM: Final = 0.10
 """Less is what touches of a person differ by, and no other length."""

@@ -199,7 +199,7 @@ PROBE_TOLERANCE = Tolerance(rms_mm=0.05, max_residual_mm=0.15)
 RECOMMENDED_TOUCHES = 3
 
 USUAL_DECELERATION_MM_S2 = 300.0
-"""How hard a robot brakes at least where nobody knows it; see docs/reference/evidence.md 13."""
+"""Assumed least deceleration of a robot; see docs/reference/evidence.md 13."""
 
 _SPEEDS_APART = 1.5
 """Speeds that differ by less than this factor do not tell the latency."""

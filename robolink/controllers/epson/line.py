@@ -163,7 +163,7 @@ _PASSWORD_REFUSALS: Final = (13, 98)
 """The password is wrong, or one is demanded (docs/reference/epson.md 1.6)."""
 
 _STRAYS: Final = 16
-"""As many answers to questions that nobody asked are no controller's."""
+"""A controller never sends this many unrequested answers."""
 
 
 class EpsonConversation:

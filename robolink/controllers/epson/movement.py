@@ -32,7 +32,7 @@ from robolink.protocols.epson_text import ErrorCode, Refusal
 from robolink.timing import Deadline
 
 POLL_S = 0.1
-"""How often the status is read while the robot moves."""
+"""Interval between status reads while the robot moves."""
 
 
 class EpsonMotion:

@@ -20,7 +20,7 @@ from robolink.protocols.epson_text import ErrorCode, Reply, StatusFlags, parse_s
 from robolink.timing import Clock, Deadline
 
 REST_S: Final = 5.0
-"""Longest time from the first Abort to a state that shows rest (docs/reference/rules.md 5)."""
+"""Longest time from the first Abort to a confirmed stop (docs/reference/rules.md 5)."""
 
 _POLL_S: Final = 0.02
 _AGAIN_S: Final = 1.0

@@ -91,7 +91,7 @@ def command_class_of(command: Command) -> CommandClass:
 
 
 REST_S: Final = 5.0
-"""Longest time from the stop to a state that shows rest (docs/reference/rules.md 5)."""
+"""Longest time from the stop to a confirmed stop state (docs/reference/rules.md 5)."""
 
 _ALREADY: Final = frozenset({ErrorClass.STOPPING, ErrorClass.DISABLED, ErrorClass.ERRORSTOP})
 _LOOK_S: Final = 0.1

@@ -19,7 +19,7 @@ from robolink.protocols.mailbox import heartbeat_word
 from robolink.timing import NS_PER_S
 
 FROZEN_S: Final = 1.0
-"""A motion task counts every few milliseconds; after this long without a count it is dead."""
+"""A motion task counts every few milliseconds; without a count for this long it is dead."""
 
 BUSY_BEAT_S: Final = 0.05
 """Between beats while something moves: the PLC halts it after 0.5 s without one.

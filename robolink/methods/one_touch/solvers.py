@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 KEPT = (EntryKind.DONE, EntryKind.DECISION)
-"""Entries that say that a value stays, and what it rests on."""
+"""Entries that say that a value stays, and its basis."""
 
 
 @dataclass(frozen=True, slots=True)

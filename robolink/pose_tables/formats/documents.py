@@ -41,7 +41,7 @@ Found = dict[str, object] | list[list[float]]
 """An object that is a pose, its values by their names; or the rows of a matrix."""
 
 COMPONENTS: Final = frozenset({*LENGTHS, *ANGLES, *QUATERNION, *MATRIX})
-"""What columns or keys are called that say where a pose is and how it turns."""
+"""Names of columns or keys for the place of a pose and its orientation."""
 
 _PARTS: Final = ("position", "orientation", "translation", "rotation")
 _LISTED: Final = {"position": "xyz", "translation": "xyz"}

@@ -72,7 +72,7 @@ class Opening:
 
 
 Event = Request | BadRequest | Reply | Refusal | Opening | EndOfStream
-"""Whatever a codec can hand out."""
+"""Any event of a codec."""
 
 
 class ErrorCode(IntEnum):

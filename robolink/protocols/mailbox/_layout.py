@@ -67,7 +67,7 @@ def beats_for(word: int, epoch: int) -> bool:
 
 
 Words = tuple[int, ...]
-"""16-bit words, each 0..65535, as they stand in registers."""
+"""16-bit words, each 0..65535, as in registers."""
 
 Six = tuple[float, float, float, float, float, float]
 """X, Y, Z in the PLC's user units and A, B, C in degrees; or six axes."""
@@ -261,7 +261,7 @@ VERSION: Final = 0x0100
 """Major version in the high byte, minor in the low one."""
 
 PROBE: Final = 12.3456
-"""What the probe holds when words stand in the right order at the right place."""
+"""The value of the probe when words are in the right order at the right place."""
 
 SLOTS: Final = range(1, 16)
 """The tool slots."""
@@ -360,7 +360,7 @@ DEVICE: Final = Layout(
     Field(0, "device_id", UDINT, note="retained, drawn once, never 0; 0 in a program without it"),
     Field(2, "device_id_complement", UDINT, note="its one's complement: every bit the other way"),
 )
-"""PLC to client, behind the last slot: which PLC this is, on whatever link it is reached."""
+"""PLC to client, behind the last slot: which PLC this is, on any link."""
 
 COMMAND_WORDS: Final = COMMAND.words
 RESPONSE_WORDS: Final = RESPONSE.words

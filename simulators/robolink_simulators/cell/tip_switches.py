@@ -10,7 +10,7 @@ from robolink_simulators.cell.frames import cross, dot, subtract
 from robolink_simulators.cell.places import Direction, XyzMm
 
 Lean = tuple[float, float]
-"""By how much a bent nozzle's shaft lies beside its tip, X and Y in mm per mm above the tip."""
+"""How far a bent nozzle's shaft is beside its tip, X and Y in mm per mm above the tip."""
 
 UPRIGHT: Final[Lean] = (0.0, 0.0)
 

@@ -12,7 +12,7 @@ from robolink_simulators.control.answers import Described
 from robolink_simulators.control.cell import ControlledCell
 
 Answer = dict[str, object]
-"""What an act gives, ready for JSON."""
+"""The result of an act, ready for JSON."""
 
 Given = Mapping[str, Any]
 """What an act is given by name, as it came in."""

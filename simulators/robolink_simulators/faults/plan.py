@@ -33,7 +33,7 @@ class HeldBack:
 
 Leaving = bytes | HeldBack | LinkEnd | None
 Departure = tuple[float, Leaving]
-"""Seconds from now, and what leaves then; ``None`` for the end of the link."""
+"""Seconds from now, and what is sent then; ``None`` for the end of the link."""
 
 _SPLIT_S: Final = 0.01
 """Between the halves of a split reply for which no other time is given."""

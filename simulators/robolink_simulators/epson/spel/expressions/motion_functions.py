@@ -160,7 +160,7 @@ def turned_tool(session: Session, arguments: Sequence[Value]) -> Value:
 
 
 LEAST_TURN_DEG: Final = 0.001
-"""Assumed: a tool that turns by less does not turn."""
+"""Assumed: a smaller turn counts as none."""
 
 
 def turn_deg(machine: Machine, start: Pose, end: Pose) -> float:

@@ -1,4 +1,4 @@
-"""robolink: measure, write and prove tool offsets on robot controllers.
+"""robolink: measure, write and test tool offsets on robot controllers.
 
 ::
 

@@ -1,4 +1,4 @@
-"""Where another thread may come in between: locks, exchanges, commits, questions.
+"""Points where another thread may interleave: locks, exchanges, commits, questions.
 
 A program that can be stopped from a second thread is right only if the stop may come at any of
 these points. They are named in the code that passes them, so that a test, or a scheduler that
@@ -19,7 +19,7 @@ __all__ = [
 
 
 class Checkpoint(StrEnum):
-    """What kind of point a thread passes."""
+    """The kind of point that a thread passes."""
 
     LOCK = "lock"
     """Before it takes the lock of an exchange; it may wait there for another thread."""
@@ -44,13 +44,13 @@ class Checkpoint(StrEnum):
 
 
 Observer = Callable[[Checkpoint, str], None]
-"""Called by the thread that passes a point, with its kind and what goes on."""
+"""Called by the thread that passes a point, with its kind and a description."""
 
 _observer: Observer | None = None
 
 
 def checkpoint(point: Checkpoint, what: str = "") -> None:
-    """Pass a point at which another thread may come in between.
+    """Pass a point where another thread may interleave.
 
     Args:
         point: Its kind.

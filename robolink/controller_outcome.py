@@ -1,4 +1,4 @@
-"""What stands on a controller after something was done to it, or was not.
+"""The state of a controller after something was done to it, or was not.
 
 Every error carries one (:attr:`robolink.errors.RobolinkError.controller_state`), and so does
 whatever else ended a block in which a controller was used, Ctrl-C and a full disk included. It
@@ -18,7 +18,7 @@ Components = tuple[float, ...] | None
 
 
 class Effect(StrEnum):
-    """What became of the controller, in one word."""
+    """What happened to the controller, in one word."""
 
     UNCHANGED = "unchanged"
     CHANGED = "changed"
@@ -83,7 +83,7 @@ class ControllerOutcome:
 
     @property
     def effect(self) -> Effect:
-        """What became of the controller, in one word."""
+        """What happened to the controller, in one word."""
         proved = self.selection_known and all(tool.known for tool in self.tools.values())
         if self.doubtful or self.moving or not proved:
             return Effect.UNKNOWN
@@ -109,7 +109,7 @@ class ControllerOutcome:
         return self.selected_before not in (None, self.selected)
 
     def followed_by(self, later: "ControllerOutcome") -> "ControllerOutcome":
-        """Return what stands after the work of two connections, one after the other.
+        """Return the outcome of the work of two connections, one after the other.
 
         Args:
             later: What the second one left. What it did not look at is as the first left it.
@@ -136,7 +136,7 @@ class ControllerOutcome:
         )
 
     def put_back(self) -> "ControllerOutcome":
-        """Return what stands once tools and selection were read and are as before, at rest."""
+        """Return the outcome once tools and selection were read and are as before, at rest."""
         return replace(
             self,
             tools={
@@ -156,11 +156,11 @@ UNTOUCHED = ControllerOutcome()
 
 
 def outcome_after(error: BaseException) -> ControllerOutcome:
-    """Return what ``error``, of whatever kind, left on the controller."""
+    """Return what ``error``, of any kind, left on the controller."""
     found = getattr(error, "controller_state", UNTOUCHED)
     return found if isinstance(found, ControllerOutcome) else UNTOUCHED
 
 
 def note_outcome(error: BaseException, outcome: ControllerOutcome) -> None:
-    """Let ``error``, of whatever kind, say from now on what it left on the controller."""
+    """Attach to ``error``, of any kind, what it left on the controller."""
     error.controller_state = outcome  # type: ignore[attr-defined]

@@ -1,4 +1,4 @@
-"""Public names that were given up for better ones: each works for one more version, and warns.
+"""Public names that were replaced: each works for one more version, and warns.
 
 :data:`OLD_NAMES` is the one list of names that moved; a package with a row in it asks here by
 :func:`~robolink.lazy_exports.old_names`. What is found is the thing itself, so ``isinstance``,
@@ -164,7 +164,7 @@ _F = TypeVar("_F", bound=Callable[..., object])
 
 
 def under_old_name(package: str, name: str) -> object:
-    """Return what a package used to hand out under a name, and warn whoever asked for it.
+    """Return what a package exported under an old name, and warn the caller.
 
     It is called by the ``__getattr__`` of that package.
 
@@ -189,7 +189,7 @@ def under_old_name(package: str, name: str) -> object:
 
 
 def deprecated(instead: str) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
-    """Mark a function or a method that was given up: it does what it did, and warns.
+    """Mark a function or a method as deprecated: it still works, and warns.
 
     Args:
         instead: What to use, as a reader would write it.
@@ -220,7 +220,7 @@ def deprecated(instead: str) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
 
 
 def without_sign(sentence: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Mark a function of sentences that took what stands before a half width: it still does.
+    """Mark a sentence function that took the sign before a half width: it still does.
 
     ``sign``, by name or as the last argument, replaces ``+-`` in what is returned, and warns.
     """
@@ -268,7 +268,7 @@ def read_without_schema(fields: Callable[..., object]) -> Callable[[_F], _F]:
 
 
 def old_hook(kind: type, old: str, new: str, adapted: object) -> None:
-    """Let a class that overrides a hook by its old name be what it was, and warn whoever wrote it.
+    """Keep a class working that overrides a hook by its old name, and warn its author.
 
     A base, which is an ABC, calls it from its ``__init_subclass__``.
 
@@ -298,7 +298,7 @@ def old_hook(kind: type, old: str, new: str, adapted: object) -> None:
 
 
 def warn_of_old_name(old: str, new: str, stacklevel: int) -> None:
-    """Warn of a name that was given up.
+    """Warn of a deprecated name.
 
     Args:
         old: What it was.

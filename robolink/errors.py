@@ -7,39 +7,39 @@
     │   ├── LimitError                     a target or a change lies outside the stated limits
     │   ├── AmbiguousPosesError            a file of poses does not say everything (.asks)
     │   ├── DocumentError                  a JSON document of another class or a newer version
-    │   ├── NotComparedError               nobody compared with the machine what would change
-    │   └── JournalError                   the record cannot be kept or read
-    ├── TransportError                     the wire
-    │   ├── ConnectError (ConnectionError) no link
-    │   │   └── LoginUnansweredError       a link, but nobody answers the login
+    │   ├── NotComparedError               a value not compared with the machine would change
+    │   └── JournalError                   the journal cannot be written or read
+    ├── TransportError                     the connection failed
+    │   ├── ConnectError (ConnectionError) no connection
+    │   │   └── LoginUnansweredError       a connection, but no answer to the login
     │   ├── TransportTimeoutError (TimeoutError)
-    │   ├── TransportClosedError           we closed it
-    │   └── TransportBrokenError           they, or the cable, did
-    ├── ProtocolError                      never raised as such
-    │   ├── LocalProtocolError             we asked for something illegal
-    │   ├── RemoteProtocolError            what they sent makes no sense; the session is dead
+    │   ├── TransportClosedError           this side closed it
+    │   └── TransportBrokenError           the far side, or the cable, ended it
+    ├── ProtocolError                      never raised itself
+    │   ├── LocalProtocolError             this side asked for something illegal
+    │   ├── RemoteProtocolError            the far side sent something invalid; the session is over
     │   └── UnclearAnswerError             neither done nor refused; it may or may not have run
-    ├── ControllerError                    a well-formed "no"
+    ├── ControllerError                    a refusal
     │   ├── RejectedError                  the controller refused the request
-    │   │   └── LoginRefusedError          wrong password, or one is demanded
-    │   ├── NotReadyError                  refused here: the state would not allow it (.reason)
+    │   │   └── LoginRefusedError          the password is wrong or missing
+    │   ├── NotReadyError                  not sent: the state does not allow it (.reason)
     │   ├── ControllerFaultError           the controller is in error
-    │   │   └── HeartbeatLostError         it halted a movement because we fell silent
+    │   │   └── HeartbeatLostError         it halted a movement because this side fell silent
     │   ├── MotionTimeoutError             a movement took too long and was aborted
-    │   └── BusyError                      another operation is under way
+    │   └── BusyError                      another operation is in progress
     │       ├── LeaseHeldError             another program or person is changing the controller
-    │       └── LeaseLostError             another did so meanwhile
-    ├── OutcomeUnknownError                sent, not answered: the machine may or may not have acted
+    │       └── LeaseLostError             another has changed it meanwhile
+    ├── OutcomeUnknownError                sent but not answered: it may or may not have run
     ├── StoppedError                       a stop ended it, from another thread or terminal
     ├── ToolError
     │   ├── ToolIndexError · ReservedToolError · UndefinedToolError
-    │   ├── SelectedToolError              it is in force, so it was not cleared
+    │   ├── SelectedToolError              the selected tool was not cleared
     │   ├── ToolChangedError               not the value that was expected; nothing was written
     │   └── ReadBackError                  written, but another value came back
     ├── CalibrationError                   the data do not give a trustworthy result (.code)
     ├── VerifyError                        the drift about the new tip is too large
-    └── DeclinedError                      a person said no
-        └── NotAllowedError                it takes an engineer
+    └── DeclinedError                      a person declined
+        └── NotAllowedError                only an engineer may do it
 
 Each error says what happened (:attr:`~RobolinkError.what`) and what to do next
 (:attr:`~RobolinkError.remedy`); ``str(error)`` is both. What it left on the controller is
@@ -100,13 +100,13 @@ if TYPE_CHECKING:  # what no command needs before something stands on a controll
 
 
 class RobolinkError(Exception):
-    """Root of the tree.
+    """Base class of all robolink errors.
 
     Args:
         what: What happened, one sentence.
         remedy: What to do next, one sentence; may be empty when ``what`` says it.
         controller: Identity or URL of the controller concerned, without any password.
-        request: The request under way, as it may be shown to a person.
+        request: The present request, for display.
         raw: The bytes that were read and could not be used.
 
     """
@@ -135,13 +135,13 @@ class RobolinkError(Exception):
         return (_restored, (type(self), self.args, vars(self)))
 
     def concern(self, controller: str, request: str = "") -> None:
-        """Name the controller and the request, where neither was named nearer to the cause."""
+        """Name the controller and the request, unless they were named nearer to the cause."""
         self.controller = self.controller or controller
         self.request = self.request or request
 
     @property
     def controller_state(self) -> "ControllerOutcome":
-        """What stands on the controller now, of what was done to it in the block that this ended.
+        """What the block that this error ended left on the controller.
 
         That is a write, a change, a procedure or a whole connection, whichever was the outermost
         that this error has left.
@@ -167,9 +167,9 @@ def _restored(
 
 
 class Concerning:
-    """Lets each error that leaves the block name the controller and the request.
+    """Adds the controller and the request to each error that leaves the block.
 
-    What a driver raises inside says what happened; this says of whom, once, at its border. No
+    An error inside a driver says what happened; this adds the controller, once, at its border. No
     generator: every procedure passes here.
 
     Args:
@@ -199,11 +199,11 @@ class ConfigError(RobolinkError, ValueError):
 
 
 class LimitError(ConfigError):
-    """A target, a step or a change lies outside the limits in force. Nothing was sent."""
+    """A target, a step or a change exceeds a limit. Nothing was sent."""
 
 
 class AmbiguousPosesError(ConfigError):
-    """A file of poses can be read in more than one way. Nothing was guessed, nothing was sent.
+    """A file of poses can be read in more than one way. Nothing was guessed or sent.
 
     Attributes:
         asks: What the file does not say: ``columns``, ``length``, ``euler``.
@@ -221,7 +221,7 @@ class DocumentError(ConfigError):
 
 
 class NotComparedError(ConfigError):
-    """A write would change what nobody has compared with the machine's own screen.
+    """A write would change a value that nobody has compared with the machine's own screen.
 
     Nothing was sent.
 
@@ -249,15 +249,15 @@ class JournalError(ConfigError):
 
 
 class TransportError(RobolinkError):
-    """The wire failed."""
+    """The connection failed."""
 
 
 class ConnectError(TransportError, ConnectionError):
-    """No link could be made."""
+    """No connection could be made."""
 
 
 class LoginUnansweredError(ConnectError):
-    """The port answers, the login does not.
+    """The port answers, but the login does not.
 
     EPSON controllers serve one remote client at a time (docs/reference/epson.md 1.1); what a second
     one sees is not documented, so silence and a closed connection both end here.
@@ -265,7 +265,7 @@ class LoginUnansweredError(ConnectError):
 
 
 class TransportTimeoutError(TransportError, TimeoutError):
-    """Nothing came before the deadline. The link is unusable from here on."""
+    """Nothing came before the deadline. The link cannot be used again."""
 
 
 class TransportClosedError(TransportError):
@@ -277,7 +277,7 @@ class TransportBrokenError(TransportError):
 
 
 class ProtocolError(RobolinkError):
-    """Root of the two protocol errors; never raised as such."""
+    """Base class of the two protocol errors; never raised itself."""
 
 
 class LocalProtocolError(ProtocolError):
@@ -285,20 +285,20 @@ class LocalProtocolError(ProtocolError):
 
 
 class RemoteProtocolError(ProtocolError):
-    """The far side sent something that makes no sense. The session is over."""
+    """The far side sent something invalid. The session is over."""
 
 
 class UnclearAnswerError(ProtocolError):
     """An answer in its place that says neither that a command ran nor that it was refused.
 
     One garbled character makes it (``#Execute,1``), and so does a controller that gives up a
-    statement half-way without an error state (``!Execute,99``). The session goes on, so what
-    became of the command can be read.
+    statement half-way without an error state (``!Execute,99``). The session continues, so the
+    outcome of the command can be read.
     """
 
 
 class ControllerError(RobolinkError):
-    """The controller, or a check of its state, said no.
+    """The controller refused, or a check of its state did.
 
     Attributes:
         code: The controller's own number, 0 when there is none.
@@ -323,11 +323,11 @@ class RejectedError(ControllerError):
 
 
 class LoginRefusedError(RejectedError):
-    """The password is wrong or missing. One attempt was made, no more will be."""
+    """The password is wrong or missing. One login was attempted, no more will be."""
 
 
 class NotReadyReason(StrEnum):
-    """Why a command was held back before it was sent."""
+    """Why a command was not sent."""
 
     NOT_REMOTE = "not_remote"
     TEACH = "teach"
@@ -352,7 +352,7 @@ class NotReadyReason(StrEnum):
 
 
 class NotReadyError(ControllerError):
-    """The controller's state would not allow the command, so it was not sent.
+    """The controller's state does not allow the command, so it was not sent.
 
     Attributes:
         reason: The named state.
@@ -373,7 +373,7 @@ class NotReadyError(ControllerError):
 
 
 class ControllerFaultError(ControllerError):
-    """The controller went into, or is in, its error state."""
+    """The controller is in its error state, or has just entered it."""
 
 
 class HeartbeatLostError(ControllerFaultError):
@@ -388,7 +388,7 @@ class MotionTimeoutError(ControllerError):
 
 
 class BusyError(ControllerError):
-    """Another operation holds the controller. Nothing was sent."""
+    """Another operation has the controller locked. Nothing was sent."""
 
 
 class LeaseHeldError(BusyError):
@@ -402,34 +402,34 @@ class LeaseHeldError(BusyError):
 
 
 class LeaseLostError(BusyError):
-    """Another took the controller over, or changed it since it was looked at. Nothing was sent."""
+    """Another user took the controller over, or changed it since it was read. Nothing was sent."""
 
 
 class OutcomeUnknownError(RobolinkError):
-    """A command went out and no answer came: it may or may not have run.
+    """A command was sent and no answer came: it may or may not have run.
 
     Motion on that controller is blocked until ``recover``; nothing is sent again.
     """
 
 
 class StoppedError(RobolinkError):
-    """A stop came: from another thread, another terminal or a person.
+    """A stop from another thread, another terminal or a person.
 
-    What was under way was ended by it, and nothing that moves or writes leaves this process
+    The stop ended what was in progress, and nothing that moves or writes leaves this process
     until the stop is released.
     """
 
 
 class ToolError(RobolinkError):
-    """Something about a tool."""
+    """Base class of errors about a tool."""
 
 
 class ToolIndexError(ToolError, ValueError):
-    """No such tool number."""
+    """There is no tool with this number."""
 
 
 class SelectedToolError(ToolError):
-    """The tool in force was not cleared: nobody said which one takes its place."""
+    """The selected tool was not cleared: no replacement was named."""
 
 
 class ReservedToolError(ToolError):
@@ -452,8 +452,8 @@ class CalibrationError(RobolinkError):
     """The measurements do not support a result.
 
     Attributes:
-        code: The named reason, for example ``insufficient_rotation``; the most telling one.
-        others: Further reasons that hold as well.
+        code: The named reason, for example ``insufficient_rotation``; the most important one.
+        others: Further reasons that apply as well.
     """
 
     def __init__(
@@ -465,7 +465,7 @@ class CalibrationError(RobolinkError):
 
 
 class VerifyError(RobolinkError):
-    """The tip was not proved by turning about it; the old value was put back.
+    """The turn test did not confirm the tip; the old value was restored.
 
     Attributes:
         code: The named reason: ``large_drift``, ``drift_undecided``, ``not_touched`` ..; empty
@@ -483,8 +483,8 @@ class VerifyError(RobolinkError):
 
 
 class DeclinedError(RobolinkError):
-    """A person, or the absence of one, said no."""
+    """A person declined, or nobody could be asked."""
 
 
 class NotAllowedError(DeclinedError):
-    """It takes an engineer, by the people or the limits of the cell file. Nothing was sent."""
+    """Only an engineer may do this, by the people or limits of the cell file. Nothing was sent."""

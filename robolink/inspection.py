@@ -1,4 +1,4 @@
-"""A look at a whole cell that moves nothing: is it as the last change left it, is anything due.
+"""A check of a whole cell that moves nothing: is it as the last change left it, is anything due.
 
 For a job that runs every night, and for whoever comes to a cell in the morning
 (docs/accuracy.md).
@@ -44,7 +44,7 @@ class InspectionCode(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class InspectionFinding:
-    """One thing that somebody should see to.
+    """One finding that needs attention.
 
     Attributes:
         code: What it is.
@@ -61,7 +61,7 @@ class InspectionFinding:
 
 @dataclass(frozen=True, slots=True)
 class Inspection:
-    """What a look at a cell found.
+    """What a check of a cell found.
 
     Attributes:
         controller: Its identity.
@@ -80,7 +80,7 @@ class Inspection:
     findings: tuple[InspectionFinding, ...]
 
     def with_findings(self, more: Iterable[InspectionFinding]) -> "Inspection":
-        """Return the same with what else was found."""
+        """Return the same with further findings."""
         return replace(self, findings=(*self.findings, *more))
 
     @property
@@ -116,7 +116,7 @@ def inspect(
     cell: Cell | None = None,
     since: str = "",
 ) -> Inspection:
-    """Compare a cell with its record. Nothing is written or moved, and nothing recorded.
+    """Compare a cell with its record. Nothing is written, moved or recorded.
 
     Args:
         controller: The controller, connected.

@@ -7,7 +7,7 @@ back until the exchange, which a deadline bounds, has ended.
 
 A process that would rather be ended than killed has SIGTERM and SIGHUP take the same way for the
 time of :func:`one_ending`, as every command does: the movement is aborted, tool, power and speed
-are put back, and only then it ends. Without that they do what they always did: they kill, and
+are restored, and only then it ends. Without that they do what they always did: they kill, and
 ``recover`` finds what was left.
 
 The handler is swapped when the first session opens and not once per exchange, because two calls
@@ -46,7 +46,7 @@ __all__ = [
 
 
 class EndedBy(StrEnum):
-    """What ended a command before its time."""
+    """What ended a command early."""
 
     CTRL_C = "SIGINT"
     TERMINATED = "SIGTERM"
@@ -74,7 +74,7 @@ _PATIENCE_S: Final = 60.0
 
 
 def _known(*names: str) -> dict[int, EndedBy]:
-    """Return those signals that this system has; Windows ends a console with SIGBREAK."""
+    """Return the signals that this system has; Windows ends a console with SIGBREAK."""
     by = {"SIGBREAK": EndedBy.TERMINATED}
     return {
         int(getattr(signal, name)): by.get(name) or EndedBy(name)
@@ -88,7 +88,7 @@ _OF_A_COMMAND: Final = _known("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK")
 
 
 def _usual(number: int) -> Callable[[int, FrameType | None], object] | signal.Handlers:
-    """Return what Python does with a signal of which nobody has said anything."""
+    """Return Python's default for a signal."""
     return signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL
 
 
@@ -114,7 +114,7 @@ class _Handler:
         self.closed = False
 
     def watch(self, numbers: dict[int, EndedBy]) -> list[int]:
-        """Take over those signals that nobody else has taken; return which."""
+        """Handle the signals that nobody else handles; return which."""
         if threading.current_thread() is not threading.main_thread():
             return []
         taken = []
@@ -129,7 +129,7 @@ class _Handler:
         return taken
 
     def leave(self, numbers: list[int], *, for_good: bool = False) -> None:
-        """Watch them for one less; the last one gives them back.
+        """Release one watcher; the last one restores the signals.
 
         Where the process ends nobody is to hear them, not even a session that was left open.
         """
@@ -154,7 +154,7 @@ class _Handler:
         self.ended_by = outer
 
     def arrived(self, by: EndedBy) -> None:
-        """Raise :class:`Interrupted`, or hold it back inside a gate.
+        """Raise :class:`Interrupted`, or delay it inside a gate.
 
         Of a command only the first ending is heard: a second Ctrl-C, or the hang-up that follows
         a closed output, must not break the cleaning up after the first.
@@ -173,11 +173,11 @@ class _Handler:
         self.arrived(EndedBy.HUNG_UP if self.closed else _OF_A_COMMAND[number])
 
     def heard_here(self) -> bool:
-        """Tell whether this is the thread whose work is ended."""
+        """Return whether this is the thread whose work is to end."""
         return threading.get_ident() == (_MAIN if self.worker is None else self.worker)
 
     def let_out(self) -> None:
-        """Raise what was held back, if anything was and no gate is closed.
+        """Raise what was delayed, if anything was and no gate is closed.
 
         Raises:
             Interrupted: It was.
@@ -192,7 +192,7 @@ _handler = _Handler()
 
 @contextmanager
 def heard_by_this_thread() -> Iterator[None]:
-    """Let what would end the program end the work of this thread, a worker's, for the block.
+    """Let a signal that would end the program end this worker thread's block.
 
     The main thread is then free to show a screen and to wait for keys. A signal, or :func:`end`,
     is raised here as :class:`Interrupted` where a gate opens, which is after the exchange that is
@@ -209,7 +209,7 @@ def heard_by_this_thread() -> Iterator[None]:
 
 
 def heed() -> None:
-    """End the work of this thread where that was asked for; for whoever waits outside a gate.
+    """End the work of this thread if that was asked for; for a wait outside a gate.
 
     Raises:
         Interrupted: It was.
@@ -219,7 +219,7 @@ def heed() -> None:
 
 
 def heed_while_waiting() -> None:
-    """End a wait in which nothing is under way, inside a gate too.
+    """End a wait in which nothing is in progress, inside a gate too.
 
     Raises:
         KeyboardInterrupt: Ctrl-C, or what ends a program like it, came and was held back.
@@ -260,7 +260,7 @@ def one_ending(*, last: bool = False) -> Iterator[None]:
 
 
 def output_closed() -> None:
-    """End the command because nobody reads what it shows.
+    """End the command because nobody reads its output.
 
     Raises:
         Interrupted: At once, or where the gate that the main thread is in ends.
@@ -280,12 +280,12 @@ def window_closed() -> None:
 
 
 def ended_by() -> EndedBy | None:
-    """Return what has ended the command that is under way, ``None`` while nothing has."""
+    """Return what has ended the present command, ``None`` if nothing has."""
     return _handler.ended_by
 
 
 class InterruptGate:
-    """Holds back what would end the program while the main thread is inside; a context manager.
+    """Delays what would end the program while the main thread is inside; a context manager.
 
     It may be entered inside itself, and inside another one, because some operations are several
     exchanges: a write is not done before it has been read back, and a movement is not under way
@@ -338,7 +338,7 @@ class InterruptGate:
 
 @contextmanager
 def seen_through() -> Iterator[None]:
-    """Hold Ctrl-C back for a block that must be seen through, whatever session is open.
+    """Delay Ctrl-C for a block that must be completed, whatever session is open.
 
     For what is stored and then noted in this process: an end in between would leave the two at
     odds. It is raised at the end of the block, or of the gate around it.
@@ -359,11 +359,11 @@ _MAIN = threading.main_thread().ident
 
 
 class ClosedAtExit(ABC):
-    """A context manager that is itself what the block uses, and whose end is its ``close``."""
+    """A context manager that the block uses itself, and whose end is its ``close``."""
 
     @abstractmethod
     def close(self) -> None:
-        """Give back what it holds. Idempotent."""
+        """Release what it holds. Idempotent."""
 
     def __enter__(self) -> Self:
         return self

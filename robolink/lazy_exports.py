@@ -1,4 +1,4 @@
-"""Packages whose names are loaded when they are first used (PEP 562).
+"""Packages whose names are loaded at first use (PEP 562).
 
 A stop, a status and ``--help`` may not pay for what they do not use. A package that one of them
 passes, and whose names need more than they do, lists its names once for readers and the type
@@ -45,7 +45,7 @@ def lazy_exports(
 
 
 def old_names(package: str) -> Callable[[str], object]:
-    """Return the ``__getattr__`` of a package that names have left (:mod:`robolink.deprecation`).
+    """Return the ``__getattr__`` of a package that exports old names (:mod:`robolink.deprecation`).
 
     Args:
         package: Its ``__name__``.

@@ -1,4 +1,4 @@
-"""The one door through which a sentence reaches a person.
+"""Every sentence that a person reads passes through this module.
 
 Every sentence shown to a person is written as ``tr("...")`` where it is used and
 collected into ``robolink/locale/robolink.pot`` by ``make messages``; a test fails when
@@ -30,7 +30,7 @@ _WIDE_STOPS = ("\u3002", "\uff01", "\uff1f")
 
 
 class Translated(str):
-    """A sentence in the language of the process, which knows what it is in English.
+    """A sentence in the language of the process that knows its English original.
 
     Records are read by other people than the one at the screen, and compared with each other:
     they are kept in English (:func:`in_english`).
@@ -68,12 +68,12 @@ def tr(sentence: str, /, **values: object) -> str:
 
 
 def declared(sentence: str, /) -> str:
-    """Return ``sentence`` as it stands, to be collected; :func:`spoken` translates it."""
+    """Return ``sentence`` unchanged, to be collected; :func:`spoken` translates it."""
     return sentence
 
 
 def spoken(sentence: str, /) -> str:
-    """Return a sentence that was declared, in the language of the process.
+    """Return a declared sentence in the language of the process.
 
     What no catalogue knows, such as the declaration of another package, comes back as it is.
     """
@@ -81,7 +81,7 @@ def spoken(sentence: str, /) -> str:
 
 
 def joined(between: str, sentences: Iterable[str]) -> str:
-    """Return whole sentences one after the other, to be kept in English like each of them.
+    """Return whole sentences joined in order; like each of them, the result keeps its English.
 
     No blank stands behind a Chinese full stop, which is wide by itself.
     """
@@ -94,12 +94,12 @@ def joined(between: str, sentences: Iterable[str]) -> str:
 
 
 def in_english(text: str) -> str:
-    """Return what a record keeps of a text that a person was shown."""
+    """Return the English of a text that a person was shown, for a record."""
     return text.english if isinstance(text, Translated) else text
 
 
 def plain(value: object) -> object:
-    """Return plain values, mappings and lists with every sentence in them in English."""
+    """Return plain values, mappings and lists, with every sentence in them in English."""
     kind = type(value)
     if kind in _AS_THEY_ARE:  # most of a record, and far quicker than what follows
         return value

@@ -59,7 +59,7 @@ class PackageLog:
         self._logger: Logger | None = None
 
     def debugs(self) -> bool:
-        """Whether anybody listens to what passes on a link."""
+        """Whether anybody logs what passes on a link."""
         logger = self._logger
         if logger is None:
             logger = self._found()
@@ -70,7 +70,7 @@ class PackageLog:
         self._log(_DEBUG, text, controller, request, direction)
 
     def decided(self, text: str, *, controller: str, request: str = "") -> None:
-        """Log, at INFO, what was decided.
+        """Log a decision, at INFO.
 
         Args:
             text: A sentence, without the controller's name in front.
@@ -108,7 +108,7 @@ class PackageLog:
 
 
 def complain(sentence: str) -> None:
-    """Say something on standard error, once in a process; nothing that fails here matters.
+    """Write a warning to standard error, once a process; failures here are ignored.
 
     Args:
         sentence: What; the same is not said twice.

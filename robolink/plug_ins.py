@@ -1,4 +1,4 @@
-"""What installed packages bring: transports, controllers, methods, sensors, by entry points."""
+"""Plug-ins of installed packages: transports, controllers, methods, sensors, by entry points."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,16 +11,16 @@ _OURS: Final = frozenset({"robolink", "robolink_cli", "robolink_simulators"})
 
 
 class PlugInError(Exception):
-    """A plug-in cannot be used; its text says why. Whoever looks for it says what it is."""
+    """A plug-in cannot be used; the text says why. The caller adds what it is."""
 
     @property
     def origin(self) -> BaseException:
-        """What Python said when it was loaded; else this error itself."""
+        """The error of Python when it was loaded; else this error itself."""
         return self.__cause__ or self
 
 
 def find_plug_in(group: str, name: str) -> object | None:
-    """Return what a package brings under a name, ``None`` where none brings it.
+    """Return what a package provides under a name, ``None`` if none provides it.
 
     Args:
         group: The group of entry points.
@@ -60,7 +60,7 @@ class PlugInModule:
 
 
 def plug_in_module(error: BaseException) -> PlugInModule | None:
-    """Return the plug-in that let ``error`` out, ``None`` where it is robolink's own.
+    """Return the plug-in that raised ``error``, ``None`` if robolink itself did.
 
     That is the one that robolink called last, whatever that called in turn.
     """
@@ -81,7 +81,7 @@ def plug_in_module(error: BaseException) -> PlugInModule | None:
 
 
 def unexpected(error: BaseException) -> str:
-    """Return a sentence for an error that nobody should have let out, with whose it is."""
+    """Return a sentence for an unexpected error, with its origin."""
     kind, module = type(error).__name__, plug_in_module(error)
     if module is None:
         return tr("A defect in robolink: {kind}: {error}", kind=kind, error=error)
@@ -95,7 +95,7 @@ def unexpected(error: BaseException) -> str:
 
 
 def _packages_of_plug_ins() -> Iterator[tuple[str, str]]:
-    """Yield the outermost module of each plug-in, and the package that brings it."""
+    """Yield the outermost module of each plug-in, and the package that provides it."""
     from importlib import metadata
 
     for package in metadata.distributions():

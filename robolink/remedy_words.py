@@ -1,4 +1,4 @@
-"""What a sentence tells a person to give or to use, in the words of whoever shows it.
+"""How a sentence names what a person should give or use, in the words of the front end.
 
 An error of the library says what to do next. Its Python user gives an argument for that, a person
 at a shell an option. So the sentence leaves a place for it, and the program that shows the

@@ -1,4 +1,4 @@
-"""What a program takes from its surroundings: chance, time, and locks that threads wait at.
+"""What a program gets from its surroundings: chance, time, and locks for threads.
 
 Whatever decides how a run goes and is not given to it comes from here, so that a test can give
 it instead: the same chance, the same times and the same order of threads give the same run, byte
@@ -42,7 +42,7 @@ class WaitingLock(Protocol):
         """Take it; False where that takes longer than allowed."""
 
     def release(self) -> None:
-        """Give it back."""
+        """Release it."""
 
     def __enter__(self) -> bool: ...
 
@@ -55,16 +55,16 @@ class WaitingLock(Protocol):
 
 
 class WaitingRoom(Protocol):
-    """A condition variable: a lock, and threads that wait inside it for news."""
+    """A condition variable: a lock, and threads that wait for a notification."""
 
     def wait(self, timeout: float | None = None) -> bool:
-        """Wait for news; False where none came within ``timeout`` seconds."""
+        """Wait for a notification; False if none came within ``timeout`` seconds."""
 
     def wait_for(self, predicate: Callable[[], bool], timeout: float | None = None) -> bool:
-        """Wait until ``predicate`` holds, ``timeout`` seconds at most; return whether it does."""
+        """Wait until ``predicate`` is true, at most ``timeout`` seconds; return whether it is."""
 
     def notify_all(self) -> None:
-        """Let everybody who waits look again."""
+        """Wake everybody who waits."""
 
     def __enter__(self) -> bool: ...
 
@@ -77,7 +77,7 @@ class WaitingRoom(Protocol):
 
 
 def in_a_thread(every_s: float, act: Callable[[], None], name: str) -> Callable[[], None]:
-    """Have ``act`` called every so many seconds by a thread that ends with its process.
+    """Call ``act`` every so many seconds in a thread that ends with its process.
 
     Args:
         every_s: How often; the first time after so long.
@@ -104,7 +104,7 @@ def in_a_thread(every_s: float, act: Callable[[], None], name: str) -> Callable[
 
 
 class SystemRuntime:
-    """The real surroundings; a subclass stands in for them.
+    """The real surroundings; a subclass replaces them.
 
     Attributes:
         steps_time: Whether time passes here only where it is stepped, so that what is done
@@ -114,7 +114,7 @@ class SystemRuntime:
     steps_time = False
 
     def random_bytes(self, count: int) -> bytes:
-        """Return bytes that nobody can know beforehand."""
+        """Return unpredictable bytes."""
         return os.urandom(count)
 
     def wall_s(self) -> float:
@@ -147,7 +147,7 @@ class SystemRuntime:
         return threading.Condition()
 
     def regularly(self, every_s: float, act: Callable[[], None], name: str) -> Callable[[], None]:
-        """Have ``act`` called every so many seconds, beside what this thread does.
+        """Call ``act`` every so many seconds, besides what this thread does.
 
         Args:
             every_s: How often.
@@ -170,7 +170,7 @@ _present = SystemRuntime()
 
 @contextmanager
 def replaced(ambience: SystemRuntime) -> Iterator[None]:
-    """Let ``ambience`` stand in for the real surroundings, in every thread, within the block."""
+    """Replace the real surroundings by ``ambience``, in every thread, within the block."""
     global _present  # noqa: PLW0603 - a process has one world around it
     before, _present = _present, ambience
     try:
@@ -180,12 +180,12 @@ def replaced(ambience: SystemRuntime) -> Iterator[None]:
 
 
 def random_bytes(count: int) -> bytes:
-    """Return bytes that nobody can know beforehand."""
+    """Return unpredictable bytes."""
     return _present.random_bytes(count)
 
 
 def random_number(bits: int) -> int:
-    """Return a number from 1 to 2**bits - 1 that nobody can know beforehand; never 0."""
+    """Return an unpredictable number from 1 to 2**bits - 1; never 0."""
     drawn = int.from_bytes(_present.random_bytes((bits + 7) // 8))
     return drawn % ((1 << bits) - 1) + 1
 
@@ -226,7 +226,7 @@ def waiting_room() -> WaitingRoom:
 
 
 def regularly(every_s: float, act: Callable[[], None], name: str) -> Callable[[], None]:
-    """Have ``act`` called every so many seconds; see :meth:`SystemRuntime.regularly`.
+    """Call ``act`` every so many seconds; see :meth:`SystemRuntime.regularly`.
 
     Args:
         every_s: How often.
@@ -245,5 +245,5 @@ def regularly(every_s: float, act: Callable[[], None], name: str) -> Callable[[]
 
 
 def steps_time() -> bool:
-    """Tell whether time passes only where it is stepped; see :class:`SystemRuntime`."""
+    """Return whether time passes only in steps; see :class:`SystemRuntime`."""
     return _present.steps_time

@@ -100,7 +100,7 @@ def seen_in(sensor: TipSensor, mark: int, *, pictures: int) -> tuple[Spot, ...]:
 
 
 def median_spot(spots: Sequence[Spot]) -> Spot:
-    """Return the median of each number of some spots; of what none of them tells, ``None``."""
+    """Return the median of each number of some spots; ``None`` for a number that none has."""
     radii = [spot.radius_px for spot in spots if spot.radius_px is not None]
     scores = [spot.score for spot in spots if spot.score is not None]
     return Spot(
@@ -112,7 +112,7 @@ def median_spot(spots: Sequence[Spot]) -> Spot:
 
 
 def scatter_of(spots: Sequence[Spot]) -> float | None:
-    """Return the standard deviation of one coordinate of one picture, ``None`` of one picture.
+    """Return the standard deviation of one coordinate of one picture, ``None`` for one picture.
 
     From the lower quartile of the differences between any two, so that one false find among three
     pictures does not make the scatter of the others seem large.
@@ -237,7 +237,7 @@ class VisionGuideCamera:
 
     @property
     def identity(self) -> str:
-        """What it is called, and whose it is."""
+        """Its name, and its controller."""
         whose = f" of {self._controller.identity}" if self._controller else ""
         return f"{VISION_GUIDE}?program={self._program}{whose}"
 
@@ -248,7 +248,7 @@ class VisionGuideCamera:
 
     @property
     def resolution_px(self) -> tuple[int, int] | None:
-        """Of no account: it answers in millimetres."""
+        """Irrelevant: it answers in millimetres."""
         return None
 
     @property
@@ -323,7 +323,7 @@ class SensorOpener(Protocol):
 
 @contextmanager
 def open_sensor(url: str | TipSensor) -> Iterator[TipSensor]:
-    """Open a camera, and let go of it at the end of the block.
+    """Open a camera, and release it at the end of the block.
 
     Args:
         url: For example ``assist+tcp://TOKEN@127.0.0.1:40001`` or the name of a plug-in. A
@@ -345,7 +345,7 @@ def open_sensor(url: str | TipSensor) -> Iterator[TipSensor]:
 
 
 def sensor_name(sensor: str | TipSensor) -> str:
-    """Return what a camera is called in a sentence or a record: its name, or who it says it is.
+    """Return the camera's name in a sentence or a record: its name, or its own identity.
 
     Of a URL that part is left out that stands before ``@``: a user, a password or a token.
     """

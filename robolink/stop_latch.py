@@ -1,4 +1,4 @@
-"""Stopped means stopped: the latch that everything passes on its way out of this process.
+"""Stopped means stopped: the latch that everything sent by this process passes.
 
 ``stop()`` closes the latch before it waits for anything. From then on, until a person opens it
 with ``release_stop()``, no movement, jog, write or program start leaves this process, whenever it
@@ -79,32 +79,32 @@ class StopLatch:
         self._tell: Callable[[str], None] | None = None
 
     def tell(self, told: Callable[[str], None]) -> None:
-        """Tell ``told`` of each request that is admitted, where the link itself tells nothing."""
+        """Report each admitted request to ``told``, if the link itself reports nothing."""
         self._tell = told
 
     @property
     def closed(self) -> bool:
-        """Whether a stop is in force."""
+        """Whether a stop is active."""
         return self._closed
 
     @property
     def closings(self) -> int:
-        """How often it was closed so far: whoever waits sees by it that a stop came meanwhile."""
+        """How often it has closed: a waiter sees from this that a stop came meanwhile."""
         return self._closings
 
     @property
     def restores(self) -> bool:
-        """Whether this thread is putting back what was in force before."""
+        """Whether this thread is restoring earlier settings."""
         return self._permit("restoring")
 
     def close(self) -> None:
-        """Hold everything back from now on; never waits."""
+        """Refuse everything from now on; never waits."""
         self._closings += 1
         self._closed = True
 
     @contextmanager
     def stopping(self) -> Iterator[None]:
-        """Close the latch, and surround the dialogue that brings the machine to rest."""
+        """Close the latch, and surround the dialogue that stops the machine."""
         self.close()
         with self._stops:
             self._under_way += 1
@@ -116,17 +116,17 @@ class StopLatch:
                 self._stops.notify_all()
 
     def await_stops(self, timeout_s: float) -> None:
-        """Let the stops that are under way in other threads end before the link is closed."""
+        """Let stops in progress in other threads end before the link is closed."""
         with self._stops:
             self._stops.wait_for(lambda: not self._under_way, timeout_s)
 
     def release(self) -> None:
-        """Let things pass again, because a person says so."""
+        """Release the latch at a person's request."""
         self._put_back.clear()
         self._closed = False
 
     def admit(self, kind: CommandClass, request: str) -> None:
-        """Hold ``request`` back if a stop forbids it; called under the lock of its exchange.
+        """Refuse ``request`` if a stop forbids it; called under the lock of its exchange.
 
         Raises:
             StoppedError: It was not sent.
@@ -149,12 +149,12 @@ class StopLatch:
         raise self._stopped(said, request)
 
     def require_open(self, request: str) -> None:
-        """Refuse to begin, or to go on with, an operation of several exchanges.
+        """Refuse to start, or to continue, an operation of several exchanges.
 
         A thread that restores is let through; what it may send is decided by :meth:`admit`.
 
         Raises:
-            StoppedError: A stop is in force.
+            StoppedError: A stop is active.
         """
         if self._closed and not self.restores:
             raise self._stopped(tr("{request}: ended by a stop.", request=request), request)
@@ -174,10 +174,10 @@ class StopLatch:
 
     @contextmanager
     def watching(self, request: str) -> Iterator[None]:
-        """Surround an operation that must not begin under a stop, nor end well under one.
+        """Surround an operation that must not start under a stop, nor end well under one.
 
         Raises:
-            StoppedError: A stop was in force at its beginning, or came meanwhile.
+            StoppedError: A stop was active at its beginning, or came meanwhile.
         """
         self.require_open(request)
         with self.ending(request):
@@ -188,7 +188,7 @@ class StopLatch:
         """Surround what must not end well under a stop.
 
         Raises:
-            StoppedError: A stop is in force at its end, be that a success or a "no" of the
+            StoppedError: A stop is active at its end, be that a success or a "no" of the
                 controller, which the stop explains.
         """
         with Concerning(self._controller, request):
@@ -201,7 +201,7 @@ class StopLatch:
 
     @contextmanager
     def calming(self, request: str) -> Iterator[None]:
-        """Surround what may begin under a stop: a reset, or switching off.
+        """Surround what may start under a stop: a reset, or switching off.
 
         A stop that comes meanwhile ends it as it ends everything else, and no reset of before is
         sent after it: it would release what this stop holds. Where a person is asked about it
@@ -226,7 +226,7 @@ class StopLatch:
 
     @contextmanager
     def restoring(self) -> Iterator[None]:
-        """Let this thread select a tool and set power and speed although a stop is in force."""
+        """Let this thread select a tool and set power and speed although a stop is active."""
         before = self.restores
         self._permits.restoring = True
         try:
@@ -236,7 +236,7 @@ class StopLatch:
 
     @contextmanager
     def putting_back(self, tool: int) -> Iterator[None]:
-        """Let this thread write the old value of ``tool`` although a stop is in force; once.
+        """Let this thread write the old value of ``tool`` although a stop is active; once.
 
         Raises:
             StoppedError: That was done since the stop already.
@@ -265,7 +265,7 @@ class StopLatch:
 
 
 LONGEST_WAIT_S: Final = 86_400.0
-"""Nobody waits longer than a day for his turn."""
+"""Longest wait for a turn: a day."""
 
 LOOK_S: Final = 0.1
 """From one look to the next, while waiting, whether a stop or Ctrl-C came, or the way is free."""
@@ -291,7 +291,7 @@ def require_wait(wait_s: float) -> float:
 
 
 class Patience:
-    """How long a call waits that would be refused because somebody else is at work.
+    """How long a call waits that is refused because another user has the controller locked.
 
     One call waits that long in all: for another thread of this program, for another program that
     has the lease, for another owner of a PLC's mailbox. Nothing has been sent by then. A stop ends
@@ -329,18 +329,18 @@ class Patience:
 
     @property
     def waits(self) -> bool:
-        """Whether the call under way in this thread may wait, or might have."""
+        """Whether the present call of this thread may wait, or might have."""
         return self._calls.__dict__.get("until_ns") is not None
 
     @property
     def left_s(self) -> float:
-        """How much longer the call under way in this thread may wait."""
+        """How much longer the present call of this thread may wait."""
         until_ns: int | None = self._calls.__dict__.get("until_ns")
         return 0.0 if until_ns is None else max(0, until_ns - runtime.monotonic_ns()) / 1e9
 
     @contextmanager
     def within(self, wait_s: float | None = None) -> Iterator[None]:
-        """Surround one call; what it calls itself waits within the same seconds.
+        """Surround one call; the calls inside it wait within the same seconds.
 
         Args:
             wait_s: How long it may wait; ``None`` for what is usual here.
@@ -358,7 +358,7 @@ class Patience:
             yield
 
     def between(self) -> AbstractContextManager[None]:
-        """Surround what a user does inside a block: each call there waits for itself."""
+        """Surround a user's code inside a block: each call there waits by itself."""
         return self._calling({})
 
     @contextmanager
@@ -374,14 +374,14 @@ class Patience:
             call.update(before)
 
     def watch(self, request: str, *, calming: bool = False) -> Callable[[], None]:
-        """Begin to wait; what is returned raises once a stop, or Ctrl-C, came.
+        """Start to wait; the returned function raises once a stop, or Ctrl-C, came.
 
         Args:
             request: What waits.
-            calming: Whether that may begin while a stop is in force, as a reset may.
+            calming: Whether that may begin while a stop is active, as a reset may.
 
         Raises:
-            StoppedError: A stop is in force.
+            StoppedError: A stop is active.
         """
         if not calming:
             self._latch.require_open(request)
@@ -394,7 +394,7 @@ class Patience:
         return look
 
     def until_free(self, attempt: Callable[[], T], request: str) -> T:
-        """Repeat what is refused because another program or person is at work, while time is left.
+        """Repeat a call that is refused because another user has the lock, while time is left.
 
         Args:
             attempt: One attempt, which sends nothing when it is refused.
@@ -421,7 +421,7 @@ class Patience:
 
 
 def waiting_for(refusal: RobolinkError, wait_s: float) -> str:
-    """Return what is said when somebody else is waited for.
+    """Return the sentence to show while waiting for another user.
 
     Args:
         refusal: Says who has it.

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 NS_PER_S = 1_000_000_000
 
 FASTEST_ANSWER_S = 0.3
-"""Nobody reads a question and answers it faster (docs/reference/evidence.md 1)."""
+"""Shortest time in which a person reads and answers a question (docs/reference/evidence.md 1)."""
 
 
 class Clock(Protocol):

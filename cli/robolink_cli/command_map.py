@@ -1,4 +1,4 @@
-"""Which commands there are: those of every day, the groups of the rest, and older names.
+"""The commands: those of every day, the groups of the rest, and older names.
 
 The first help page holds at most twelve entries; everything else stands in a group with a name
 of its own (docs/decisions/0043-a-map-of-commands.md). A name that was once in use goes on
@@ -118,4 +118,4 @@ RENAMED: Final = {
     ),
     "where": (f"{CONTROLLER}.operate:where", "robot where"),
 }
-"""Names of before: where they are, and what they are called now."""
+"""Former names: where they are, and what they are called now."""

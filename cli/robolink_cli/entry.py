@@ -1,4 +1,4 @@
-"""Where a process of ``robolink`` begins: a stop goes its own way, all else goes to click.
+"""The start of a process of ``robolink``: a stop goes its own way, all else goes to click.
 
 Nothing is imported here that a stop does not need before its frame (docs/decisions/0017).
 """

@@ -30,7 +30,7 @@ class LazyGroup(click.Group):
         lazy: Command name to ``("package.module:object", one-line help)``, in the order in
             which they are listed, after the commands that were added to the group itself.
         unlisted: Names that work and are listed nowhere, to ``"package.module:object"``.
-        renamed: Names of before, to ``("package.module:object", full name of today)``. They are
+        renamed: Former names, to ``("package.module:object", full name of today)``. They are
             listed nowhere; on a terminal a line says how the command is called now.
     """
 
@@ -70,7 +70,7 @@ class LazyGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return the command that was typed; say it when it has another name today."""
+        """Return the typed command; report a former name."""
         try:
             found = super().resolve_command(ctx, args)
         except click.exceptions.NoSuchCommand as error:
@@ -90,7 +90,7 @@ class LazyGroup(click.Group):
         return found
 
     def _groups_with(self, ctx: click.Context, typed: str) -> list[str]:
-        """Return the commands of that name in groups whose one line of help names it."""
+        """Return the commands of that name in groups whose one-line help names it."""
         found = []
         for group, (_, summary) in self.lazy.items():
             if typed in summary.split():
@@ -111,7 +111,7 @@ class LazyGroup(click.Group):
 
     @contextmanager
     def while_listing(self) -> "Iterator[None]":
-        """Hand out stand-ins inside of the block: names and one-line helps, nothing loaded."""
+        """Return stand-ins within the block: names and one-line helps, nothing loaded."""
         self.listing = True
         try:
             yield

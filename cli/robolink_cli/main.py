@@ -78,7 +78,7 @@ def run(arguments: Sequence[str], *, last: bool = False) -> int:
 
 
 def tell_stop(request: "StopRequest", outcome: "StopOutcome") -> int:
-    """Tell how a stop ended that needed no click so far; return the exit code."""
+    """Report how a stop ended that needed no click so far; return the exit code."""
     return _guarded(lambda: _tell_stop(request, outcome), last=False)
 
 
@@ -138,7 +138,7 @@ def _answer(arguments: Sequence[str]) -> int:
 
 
 def _logs() -> "Any":  # noqa: ANN401 - a module
-    """Return what opens logs; ``None`` where nobody has asked for one."""
+    """Return what opens logs; ``None`` if nobody has asked for one."""
     return sys.modules.get("robolink_cli.options.log_file")
 
 
@@ -161,7 +161,7 @@ def _ended(arguments: Sequence[str]) -> int:
 
 
 def _explained(error: BaseException) -> BaseException:
-    """Return the error; what looks like a defect beside packages that do not fit is none."""
+    """Return the error; name unfit packages if they may be the cause."""
     from robolink_cli.console.exit_codes import BUG, exit_code
 
     if exit_code(error) != BUG:

@@ -1,4 +1,4 @@
-"""What is said when the packages beside robolink are not those that it asks for.
+"""The sentences for packages that do not fit robolink.
 
 Then anything may fail anywhere, ``import click`` included, and no failure is a defect of
 robolink. So nothing is imported here but Python's own library and what of ours needs no more.
@@ -37,14 +37,14 @@ _NOTHING_BEGUN: Final[dict[str, object]] = {
 
 
 def unfit_packages() -> list[Remark]:
-    """Return what is missing or of a version that robolink does not run with; mostly nothing."""
+    """Return missing packages and unfit versions; usually nothing."""
     with suppress(Exception):  # metadata that cannot be read accuse nobody
         return [remark for remark in check_versions() if remark.level is Level.BAD]
     return []
 
 
 def cannot_run(unfit: Sequence[Remark], error: BaseException) -> str:
-    """Return the sentence for a failure beside packages that do not fit.
+    """Return the sentence for a failure with unfit packages.
 
     Args:
         unfit: Those packages, at least one.

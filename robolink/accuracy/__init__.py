@@ -1,4 +1,4 @@
-"""What a cell knows of its own accuracy: stated, on record, shown, measured.
+"""The accuracy of a cell: rows stated in its file, recorded, shown and measured.
 
 Each row of a budget (``robolink.calibration.ACCURACY_ROWS``) is stated by the recipe or the
 cell file, learnt from the journal, or a default. docs/accuracy.md explains all three.

@@ -1,4 +1,4 @@
-"""What a cell knows of its rows in one place: stated, from its record, else the default."""
+"""The rows of a cell in one place: stated, else from its record, else the default."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -21,18 +21,18 @@ if TYPE_CHECKING:
 
 
 _NEWEST: Final = 500
-"""So many entries of a kind are looked at, the newest."""
+"""The newest entries of a kind that are read, at most this many."""
 
 
 class Recall(Protocol):
-    """Yields what is on record about one controller, newest first."""
+    """Yields the records of one controller, newest first."""
 
     def __call__(self, *, kinds: tuple[EntryKind, ...]) -> Iterator[Recorded]:
         """Yield entries of some kinds."""
 
 
 class CellRecord:
-    """What is on record of one controller, or of its robot in force, for the rows of its budgets.
+    """The records of one controller, or of its current robot, for the rows of its budgets.
 
     A journal that is lost or cannot be read tells nothing, and then the defaults count.
 
@@ -94,7 +94,7 @@ def facts_at(
     learnt: bool = True,
     inputs_per_look: int = 1,
 ) -> AccuracyFacts:
-    """Return what is known of the rows of a measurement: stated, else from the record.
+    """Return the rows that apply to a measurement: stated, else from the record.
 
     Args:
         record: What is on record.
@@ -135,7 +135,7 @@ def facts_at(
 
 
 def _on_record(record: CellRecord, station: str, *, learnt: bool = True) -> dict[str, RowFact]:
-    """Return what is on record of the rows of a station, empty for none.
+    """Return the recorded rows of a station, empty for none.
 
     Args:
         record: What is on record.
@@ -147,7 +147,7 @@ def _on_record(record: CellRecord, station: str, *, learnt: bool = True) -> dict
 
 
 def _height_learnt(record: CellRecord, station: str, facts: AccuracyFacts) -> dict[str, RowFact]:
-    """Return the row of a surface whose height was learnt: it has a place row, and grows old.
+    """Return the row of a surface with a learnt height: it has a place row, and ages.
 
     What its learning itself is unsure of is in it.
     """
@@ -167,7 +167,7 @@ def _sigma_of(station: Station) -> float:
 
 @dataclass(frozen=True, slots=True)
 class KnownRow:
-    """One row of a cell, as it counts now.
+    """One row of a cell with its present value.
 
     Attributes:
         key: Its key.
@@ -181,19 +181,19 @@ class KnownRow:
 
     @property
     def half_width(self) -> float:
-        """Half its width, with what has to be added for its age."""
+        """Half its width, enlarged for its age."""
         return self.fact.half_width + self.fact.growth
 
     @property
     def exceeded(self) -> bool:
-        """Whether the record says more than what is stated."""
+        """Whether the record shows more than is stated."""
         return self.on_record is not None and self.on_record.half_width > self.half_width
 
 
 def rows_at(
     record: CellRecord, keys: Iterable[str], *, station: str, stated: Mapping[str, RowFact]
 ) -> tuple[KnownRow, ...]:
-    """Return rows as they count at a station.
+    """Return the rows that apply at a station.
 
     Args:
         record: What is on record.
@@ -229,7 +229,7 @@ def stated_rows(
     recipe: Mapping[str, float] | None = None,
     recipe_name: str = "",
 ) -> dict[str, RowFact]:
-    """Return what is stated of the rows of a measurement.
+    """Return the stated rows of a measurement.
 
     A recipe is for one job at one station, a station stands in one cell: what the recipe states
     goes before what is stated for its station, and that before what is stated for the cell.
@@ -261,7 +261,7 @@ def stated_rows(
 
 
 def rows_of_station(cell: "Cell | None", station: str) -> dict[str, RowFact]:
-    """Return what the cell file states for a station itself."""
+    """Return the rows that the cell file states for a station itself."""
     said = None if cell is None else (cell.settings.stations or {}).get(station)
     if said is None:
         return {}
@@ -269,7 +269,7 @@ def rows_of_station(cell: "Cell | None", station: str) -> dict[str, RowFact]:
 
 
 def _height_of(station: Station) -> dict[str, RowFact]:
-    """Return how sure the height of a surface is whose standard deviation is stated.
+    """Return the uncertainty of a surface's height from its stated standard deviation.
 
     One that was learnt is as sure as its learning, which the record tells.
     """

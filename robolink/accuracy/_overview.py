@@ -1,4 +1,4 @@
-"""Which rows count where in a cell, and what each of them makes of a result by itself."""
+"""Which rows apply where in a cell, and how much each contributes to a result."""
 
 import math
 import shlex
@@ -47,7 +47,7 @@ class RowsAt:
     mm_per_px: float | None = None
 
     def alone_mm(self, row: KnownRow) -> float | None:
-        """Return within what a tip would lie in 95 % if this row were all.
+        """Return the 95 % distance of a tip if this were the only row.
 
         Turn and scale of a camera count for a tip 1 mm from the middle. ``None`` where it depends
         on the measurement.
@@ -69,7 +69,7 @@ _PLANE: Final = chi_square_quantile(0.95, 2)
 
 
 def rows_of_cell(cell: Cell | None, record: CellRecord) -> tuple[RowsAt, ...]:
-    """Return all rows of a cell: first those that need no station, then station by station.
+    """Return all rows of a cell: first those without a station, then station by station.
 
     Args:
         cell: The cell; ``None`` where none is named.
@@ -112,7 +112,7 @@ def _by_touch() -> tuple[str, ...]:
 
 
 def mm_per_px(station: Station) -> float | None:
-    """Return the length of a pixel of a camera, ``None`` where nobody knows it."""
+    """Return the length of a camera's pixel, ``None`` if unknown."""
     if station.kind is not StationKind.CAMERA or "mm_per_px" not in station.details:
         return None
     if None in (station.x_mm, station.y_mm, station.z_mm):
@@ -128,7 +128,7 @@ def mm_per_px(station: Station) -> float | None:
 def measuring_step(
     key: str, *, station: str = "", kind: StationKind | None = None, tool: int | None = None
 ) -> str:
-    """Return how a row is measured in a cell, one sentence with its command.
+    """Return how to measure a row in a cell, one sentence with its command.
 
     Args:
         key: Key of the row.
@@ -149,7 +149,7 @@ def measuring_step(
     camera = f"robolink calibrate camera-affine --station {at} --tool {number}"
     return {
         "touch_mm": tr(
-            "Measure a gauge tip that is known, five times: {command}",
+            "Measure a gauge tip with a known offset five times: {command}",
             command=f"robolink cell accuracy measure touch_mm --tool {number} --true X,Y",
         ),
         "place_mm": tr("Measure the camera five times: {command}", command=camera)
@@ -170,7 +170,7 @@ def measuring_step(
 def learning_commands(
     station: str, kind: StationKind, *, tool: int, known_tool: int | None = None
 ) -> tuple[str, ...]:
-    """Return the commands that learn a station anew, each after ``robolink`` and the cell's name.
+    """Return the commands that relearn a station; each follows ``robolink`` and the cell's name.
 
     A pin and a camera are found together with the tip. Beams and a plate need a tip that is known.
     For beams the tool can be measured by touch first; of its length that tells nothing, so for a

@@ -1,4 +1,4 @@
-"""What repeated learning of a station tells: how its place, and a camera's turn, scatter.
+"""What repeated learning of a station shows: the scatter of its place and of a camera's turn.
 
 Every learning on record counts, by ``cell station learn`` and by calibrations that find their
 station. What was found in another base is another place, and what is no number is passed over.
@@ -32,7 +32,7 @@ _NEWEST: Final = 100
 
 
 def learnt_rows(entries: Iterable[Recorded], station: str) -> dict[str, RowFact]:
-    """Return what repeated learning of a station tells of its rows; empty for too little.
+    """Return the rows that repeated learning of a station shows; empty for too few.
 
     Args:
         entries: Entries about stations, newest first.
@@ -135,7 +135,7 @@ def _finite(*values: object) -> tuple[float, ...] | None:
 
 
 def _camera(station: Station) -> CameraModel | None:
-    """Return a camera as one calibration found it, ``None`` where an entry does not say all of it.
+    """Return a camera as one calibration found it, ``None`` for an incomplete entry.
 
     The place that it knows best is the one to which tips are brought, where nothing else says it.
     """
@@ -190,7 +190,7 @@ def months_at(
     calibrations: Callable[[], Iterable[Recorded]],
     learnt: bool = True,
 ) -> float | None:
-    """Return how long ago a station was learnt, in months; ``None`` where nothing says it.
+    """Return how many months ago a station was learnt; ``None`` if not recorded.
 
     One whose place is only stated is as old as the first calibration there at least: nobody has
     looked since where it stands.

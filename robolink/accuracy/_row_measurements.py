@@ -1,4 +1,4 @@
-"""A row that was measured for its own sake: what goes on record, and how it is read back."""
+"""A row that was measured for its own sake: what is recorded, and how it is read back."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -21,7 +21,7 @@ _HOW: Final = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MeasuredRow:
-    """How large a row was found.
+    """The measured size of a row.
 
     Attributes:
         row: Its key.
@@ -52,7 +52,7 @@ class MeasuredRow:
 
     @property
     def fact(self) -> RowFact:
-        """What it tells."""
+        """This row as a fact for a budget."""
         told = tr(
             "{how}, entry {number}, {at}",
             how=self.how,
@@ -63,7 +63,7 @@ class MeasuredRow:
 
 
 def measured_entry(found: MeasuredRow) -> NewEntry:
-    """Return the entry that makes a measured row count from now on."""
+    """Return the entry that makes a measured row apply from now on."""
     row = ACCURACY_ROWS[found.row]
     return NewEntry(
         EntryKind.ACCURACY,
@@ -85,7 +85,7 @@ def measured_entry(found: MeasuredRow) -> NewEntry:
 
 
 def measured_row(entry: Recorded) -> MeasuredRow | None:
-    """Return the row that an entry tells; ``None`` for one that cannot be read as that."""
+    """Return the row in an entry; ``None`` if the entry cannot be read as one."""
     said = entry.details
     key, half_width = said.get("row"), _positive(said.get("half_width"))
     if entry.kind is not EntryKind.ACCURACY or half_width is None or not isinstance(key, str):
@@ -110,7 +110,7 @@ def measured_row(entry: Recorded) -> MeasuredRow | None:
 
 
 def measured_rows(entries: Iterable[Recorded], station: str) -> dict[str, RowFact]:
-    """Return what entries tell of the rows at a station.
+    """Return the rows at a station that entries record.
 
     The newest counts; one of the station goes before one of the whole cell.
 
@@ -135,7 +135,7 @@ def _positive(value: object) -> float | None:
 
 
 LEAST_DOF: Final = 6
-"""From so many degrees of freedom on the record tells the scatter of a look."""
+"""Degrees of freedom from which the record shows the scatter of a look."""
 
 _NEWEST: Final = 200
 
@@ -145,7 +145,7 @@ _LAST_DIGIT_MM: Final = 0.001 / math.sqrt(12)
 
 @dataclass(frozen=True, slots=True)
 class LooksAlike:
-    """Which calibrations on record were made like one.
+    """Which recorded calibrations were made in the same way.
 
     Attributes:
         station: Name of the station; without one nothing is alike.
@@ -160,7 +160,7 @@ class LooksAlike:
     change: str = ""
 
     def made(self, entry: Recorded) -> bool:
-        """Tell whether an entry was made like it."""
+        """Return whether an entry was made in that way."""
         said = entry.details
         return (
             entry.kind is EntryKind.CALIBRATION
@@ -216,22 +216,22 @@ def _residuals(entry: Recorded) -> tuple[float, int] | None:
 
 
 def _by_contact(touches: object) -> bool:
-    """Tell whether an input showed every touch of an entry."""
+    """Return whether an input confirmed every touch of an entry."""
     if not isinstance(touches, Sequence) or isinstance(touches, str) or not touches:
         return False
     return all(isinstance(one, dict) and one.get("contact") is True for one in touches)
 
 
 LEAST_RECORDS: Final = 5
-"""A row is learnt from so many records, or not at all."""
+"""A row is learnt from at least this many records."""
 
 _OUTSIDE: Final = 0.05
-"""So often the bound is too low."""
+"""Probability that the bound is too low."""
 
 
 @dataclass(frozen=True, slots=True)
 class RowBound:
-    """What records say about a row.
+    """What the records show about a row.
 
     Attributes:
         half_width: Half its width, from the upper 95 % bound, in the unit of the values.
@@ -259,7 +259,7 @@ def upper_half_width(sigma: float, nu: float) -> float:
 def scatter_of_repeats(
     values: Sequence[Sequence[float]], *, anew_from: float, floor: float = 0.0
 ) -> RowBound | None:
-    """Return how much something scatters that was found again and again; ``None`` for too few.
+    """Return the scatter of something that was found repeatedly; ``None`` for too few.
 
     It may have wandered all the while, and may have been placed anew: so the scatter is that of
     successive differences, s^2 = sum d^2 / (2 m) of the m that count, with
@@ -296,7 +296,7 @@ def scatter_of_repeats(
 
 @dataclass(frozen=True, slots=True)
 class ArtefactTest:
-    """What measuring a tip whose offset is known says about who measures.
+    """Result of measuring a tip whose offset is known.
 
     Attributes:
         bias_mm: Mean of measured less known, each coordinate.
@@ -314,7 +314,7 @@ class ArtefactTest:
 def artefact_test(
     measured_mm: Sequence[Sequence[float]], known_mm: Sequence[float], *, known_u_mm: float = 0.0
 ) -> ArtefactTest:
-    """Return how far beside the truth a cell measures a tip that is known.
+    """Return how far from its known place a cell measures a tip.
 
     The bias of each coordinate has an upper 95 % bound, |b| + t_0.95(nu) s / sqrt(n); the row is
     sqrt(3) times the rms of these bounds, so that the region of a result, 2.45 u, holds a bias in
@@ -350,7 +350,7 @@ def artefact_test(
 def paired_half_width(
     first: Sequence[Sequence[float]], turned: Sequence[Sequence[float]]
 ) -> RowBound:
-    """Return what turns with a nozzle, from nozzles measured before and after half a turn of them.
+    """Return what turns with a nozzle, from nozzles measured before and after half a turn.
 
     Half the difference of the two is what turned along: what the camera sees beside the middle of
     the tip, and how much the nozzle itself is out of true. Nothing parts the two, so the row is

@@ -17,7 +17,7 @@ _LEAST_PERSONS = 3
 
 @dataclass(frozen=True, slots=True)
 class MeasuredTip:
-    """One calibration on record, as a study of the cell takes it.
+    """One recorded calibration, as a study of the cell uses it.
 
     Attributes:
         number: Number of its entry.
@@ -43,7 +43,7 @@ class MeasuredTip:
 
 
 def measured_tips(entries: Iterable[Recorded]) -> Iterator[MeasuredTip]:
-    """Yield the calibrations that tell X and Y of a tip which a person touched or a camera saw.
+    """Yield calibrations with X and Y of a tip that a person touched or a camera saw.
 
     Beams have no person, one touch tells only what changed, and a touch that an input showed was
     seen by nobody: these are none.
@@ -81,7 +81,7 @@ def artefact_row(
     known_u_mm: float = 0.0,
     station: str = "",
 ) -> MeasuredRow:
-    """Return judging contact by eye, from a gauge tip whose place is known.
+    """Return the row for judging contact by eye, from a gauge tip at a known place.
 
     Args:
         tips: Its measurements; five or more.
@@ -121,7 +121,7 @@ def artefact_row(
 
 
 def study_row(study: GaugeStudy, *, persons: int, station: str = "") -> MeasuredRow:
-    """Return how differently persons see contact, from a gauge study of the cell.
+    """Return the row for how differently persons see contact, from a gauge study of the cell.
 
     What all of them see alike is not in it: an artefact test shows that.
 
@@ -167,7 +167,7 @@ Pair = tuple[MeasuredTip, MeasuredTip]
 
 
 def turned_pairs(tips: Iterable[MeasuredTip]) -> list[Pair]:
-    """Return the last two measurements of each nozzle that has an id, in the order of time.
+    """Return the last two measurements of each nozzle that has an id, oldest first.
 
     Nothing on record says how a nozzle sits in its mount: whoever asks for the row says that it
     was turned by half a turn between the two.
@@ -183,7 +183,7 @@ def turned_pairs(tips: Iterable[MeasuredTip]) -> list[Pair]:
 
 
 def tip_image_row(pairs: Sequence[Pair], *, mm_per_px: float, station: str) -> MeasuredRow:
-    """Return what a camera sees beside the middle of tips, from nozzles that were turned.
+    """Return the row for how well a camera sees the middle of tips, from nozzles that were turned.
 
     Args:
         pairs: Each nozzle before and after half a turn in its mount; five or more.
@@ -216,7 +216,7 @@ def tip_image_row(pairs: Sequence[Pair], *, mm_per_px: float, station: str) -> M
 
 
 def _measured_xy(said: Mapping[str, object]) -> tuple[float, float] | None:
-    """Return X and Y of the tip, ``None`` where they were not measured or cannot be read."""
+    """Return X and Y of the tip, ``None`` if they were not measured or are unreadable."""
     measured = said.get("measured")
     if not isinstance(measured, list) or not {"x_mm", "y_mm"} <= {*map(str, measured)}:
         return None
@@ -235,7 +235,7 @@ def _method(name: object) -> AnyMethod | None:
 
 
 def _by_eye(method: AnyMethod, touches: object) -> bool:
-    """Tell whether a person saw the touches, of a method that relies on no place."""
+    """Return whether a person judged the touches by eye, with a method that relies on no place."""
     needs = method.needs
     if needs.by_sensor or not (needs.finds_pin or needs.station is StationKind.TOUCH):
         return False

@@ -1,4 +1,4 @@
-"""What a backup holds, taking one, and what differs from the tools of a controller."""
+"""What a backup contains, taking one, and its differences from a controller's tools."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -24,7 +24,7 @@ one."""
 
 
 class ToolHolder(Protocol):
-    """The side of a controller that backups need."""
+    """What backups need of a controller."""
 
     @property
     def identity(self) -> str:
@@ -48,7 +48,7 @@ class ToolState:
 
     Attributes:
         tools: Every tool by number; an undefined one is ``None``.
-        selected: The tool in force, 0 for the flange; ``None`` where the controller does not
+        selected: The selected tool, 0 for the flange; ``None`` where the controller does not
             tell.
     """
 
@@ -76,7 +76,7 @@ class Backup:
 
 
 def read_tools(controller: ToolHolder) -> ToolState:
-    """Read all tools and which one is in force.
+    """Read all tools and which one is selected.
 
     Raises:
         NotReadyError: The controller cannot be asked now, for example because a program runs.
@@ -87,7 +87,7 @@ def read_tools(controller: ToolHolder) -> ToolState:
 
 
 def take_backup(controller: ToolHolder) -> Backup:
-    """Read everything that a backup holds; changes nothing.
+    """Read everything that a backup contains; changes nothing.
 
     Raises:
         NotReadyError: As for :func:`read_tools`.
@@ -174,12 +174,12 @@ class ToolComparison:
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """All tools, and the one in force.
+    """All tools, and the selected one.
 
     Attributes:
         tools: One each, in order.
-        expected_selected: The tool in force in the file.
-        found_selected: The tool in force on the controller.
+        expected_selected: The selected tool in the file.
+        found_selected: The selected tool on the controller.
         selection_counts: Whether another tool in force is a difference.
     """
 
@@ -195,12 +195,12 @@ class Comparison:
 
     @property
     def same_selection(self) -> bool:
-        """Whether the same tool is in force."""
+        """Whether the same tool is selected."""
         return self.expected_selected == self.found_selected
 
     @property
     def equal(self) -> bool:
-        """Whether nothing differs that counts."""
+        """Whether there is no difference that counts."""
         return not self.differing and (self.same_selection or not self.selection_counts)
 
 
@@ -211,7 +211,7 @@ def compare(
     *,
     selection_counts: bool = True,
 ) -> Comparison:
-    """Compare what a file holds with what a controller holds.
+    """Compare the tools in a backup with those of a controller.
 
     Args:
         expected: From the file.

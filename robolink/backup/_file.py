@@ -1,4 +1,4 @@
-"""A backup as a file: plain JSON that can be read by eye.
+"""A backup as a file: plain JSON that a person can read.
 
 One line holds one tool, so that two files can be compared with any text tool. Reading is
 strict: what is missing, unknown or not a number is refused by its place in the file, because
@@ -45,7 +45,7 @@ class JsonReader:
         self.source = source
 
     def document(self, text: str) -> object:
-        """Return the document; a name that stands twice and NaN are refused.
+        """Return the document; duplicate names and NaN are refused.
 
         Raises:
             ConfigError: It is no JSON.
@@ -145,7 +145,7 @@ _FAMILY: Final = "robolink/backup/"
 
 
 def save(backup: Backup, path: Path, *, replace: bool = False) -> None:
-    """Write ``backup``; the file is whole and on the disk when this returns.
+    """Write ``backup``; on return the file is complete and on the disk.
 
     Args:
         backup: What is kept.
@@ -285,7 +285,7 @@ def _block(members: Mapping[str, object]) -> str:
 
 
 def first_backup_path(identity: str) -> Path:
-    """Return where the first backup of a controller stands, in the user's state folder.
+    """Return the path of a controller's first backup, in the user's state folder.
 
     Args:
         identity: Who the controller is, as its record calls it; not its URL.
@@ -348,7 +348,7 @@ def keep_first_backup(
 
 
 def kept_backup(controller: ToolHolder) -> Backup | None:
-    """Return the backup of a controller that was made before the first write, read from its file.
+    """Return the backup of a controller from before the first write, read from its file.
 
     Args:
         controller: The controller, connected; it is not asked for its tools.
@@ -366,7 +366,7 @@ def kept_backup(controller: ToolHolder) -> Backup | None:
 
 
 def _paths(controller: ToolHolder) -> list[Path]:
-    """Return where the backup may be, by every name of the controller, that of now first."""
+    """Return where the backup may be, by every name of the controller, the present one first."""
     outcomes = controller.outcomes
     names = (outcomes.robot,) if outcomes.robot else outcomes.names
     return [first_backup_path(name) for name in names]

@@ -1,4 +1,4 @@
-"""Putting the tools of a backup back, one compare-and-set each."""
+"""Restores the tools of a backup, one compare-and-set each."""
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from robolink.remedy_words import RemedyWord, remedy_word
 
 @dataclass(frozen=True, slots=True)
 class RestoreChange:
-    """One tool that the backup knows otherwise.
+    """One tool whose value in the backup differs.
 
     Attributes:
         tool: Its number.
@@ -40,7 +40,7 @@ class RestorePlan:
 
     Attributes:
         changes: Writes first, then clears.
-        select: The tool to put in force, ``None`` to leave that as it is.
+        select: The tool to select, ``None`` to leave that as it is.
     """
 
     changes: tuple[RestoreChange, ...]
@@ -48,12 +48,12 @@ class RestorePlan:
 
     @property
     def writes(self) -> tuple[RestoreChange, ...]:
-        """The tools that get a value."""
+        """The tools that are written."""
         return tuple(change for change in self.changes if change.wanted is not None)
 
     @property
     def clears(self) -> tuple[RestoreChange, ...]:
-        """The tools that lose theirs."""
+        """The tools that are cleared."""
         return tuple(change for change in self.changes if change.wanted is None)
 
     @property
@@ -63,7 +63,7 @@ class RestorePlan:
 
 
 def require_same_controller(backup: Backup, identity: str, facts: ControllerFacts) -> None:
-    """Refuse a controller that is not the one the backup came from.
+    """Refuse a controller other than the one that the backup came from.
 
     Serial numbers decide where both sides know one; where they do not, the URL does.
 
@@ -109,17 +109,17 @@ def require_same_controller(backup: Backup, identity: str, facts: ControllerFact
 def plan_restore(
     backup: Backup, now: ToolState, *, tools: Collection[int] = (), selected: bool = False
 ) -> RestorePlan:
-    """Return what must be done so that the controller holds what the backup holds.
+    """Return the steps that make the controller match the backup.
 
     Args:
         backup: What is wanted.
         now: What the controller holds.
         tools: Which tools; none for all.
-        selected: Whether the tool in force is restored too.
+        selected: Whether the selected tool is restored too.
 
     Raises:
         ToolIndexError, ReservedToolError: No such tool to restore.
-        ToolError: The tool in force would lose its definition.
+        ToolError: The selected tool would lose its definition.
         UndefinedToolError: The tool to select would have none.
 
     Example:
@@ -148,7 +148,7 @@ def plan_restore(
 def restore(
     tools: ToolTable, plan: RestorePlan, *, tell: Callable[[str], None] = lambda _: None
 ) -> tuple[ToolReceipt, ...]:
-    """Carry ``plan`` out; each tool only if it still holds what the plan saw.
+    """Carry out ``plan``; each tool only if it still has the value that the plan read.
 
     Args:
         tools: The table.

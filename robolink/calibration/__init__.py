@@ -1,4 +1,4 @@
-"""Where the tool tip is: the mathematics of it, pure. No I/O.
+"""Calculates where the tool tip is. No I/O.
 
 Its names are loaded when they are first used, because a command that only looks at the controller
 should not wait for numpy.

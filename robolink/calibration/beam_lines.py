@@ -1,4 +1,4 @@
-"""Two crossed light beams: where they are, from a pin, and what a crossing of one tells.
+"""Two crossed light beams: their places, found with a pin, and what one crossing shows.
 
 A beam is a line in the base. The tip breaks it on entering and frees it on leaving; half way
 between, its middle is on the line, whatever its thickness and the beam's. Latency and
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 
 LEAST_ANGLE_DEG = 20.0
-"""Beams that cross at less than this leave one direction badly known."""
+"""Beams that cross at less than this determine one direction badly."""
 
 LEAST_LENGTH_MM = 5.0
 
@@ -50,7 +50,7 @@ _REFINEMENTS = 5
 
 @dataclass(frozen=True, slots=True)
 class Beam:
-    """A light beam: a point on it, its direction in the base, and how sure both are.
+    """A light beam: a point on it, its direction in the base, and the uncertainty of both.
 
     Attributes:
         x_mm, y_mm: A point on it, base: the one at which its distance is stated.
@@ -140,7 +140,7 @@ def find_beams(
     tip_sigma_mm: float = 0.0,
     sigma_mm: float | None = None,
 ) -> tuple[Beam, Beam]:
-    """Return where both beams are and how sure that is, from a reference pin whose tip is known.
+    """Return both beams and their uncertainty, from a reference pin whose tip is known.
 
     Args:
         crossings: Travels of the pin through both beams at several places along each, four
@@ -220,7 +220,7 @@ def check_crossings(crossings: Sequence[Crossing], *, minimum: int) -> tuple[str
 
 
 def require_crossed(beams: tuple[Beam, Beam]) -> None:
-    """Refuse beams that run nearly side by side.
+    """Refuse beams that are nearly parallel.
 
     Raises:
         CalibrationError: ``parallel_beams``.
@@ -237,7 +237,7 @@ def require_crossed(beams: tuple[Beam, Beam]) -> None:
 
 @dataclass(frozen=True, slots=True)
 class _BeamFit:
-    """A beam, with what the fit of its line leaves over."""
+    """A beam, with the residuals of its fit."""
 
     beam: Beam
     unit_covariance: Floats
@@ -245,7 +245,7 @@ class _BeamFit:
     dof: int
 
     def with_spread(self, sigma_mm: float, dof: int | None, tip_sigma_mm: float) -> Beam:
-        """Return the beam and how sure it is, for crossings of standard deviation ``sigma_mm``."""
+        """Return the beam with its uncertainty for crossings of standard deviation ``sigma_mm``."""
         (turn, both), (_, shift) = (self.unit_covariance * sigma_mm**2).tolist()
         distance = math.sqrt(shift + tip_sigma_mm**2)
         spread = distance * math.sqrt(turn)
@@ -369,7 +369,7 @@ class Lean:
 
 
 def lean_exceeds(x: float, y: float, covariance: Sequence[Sequence[float]]) -> bool:
-    """Tell whether a lean is more than its scatter, given its 2 x 2 covariance, explains in 99 %.
+    """Return whether a lean is more than its scatter, a 2 x 2 covariance, explains in 99 %.
 
     Args:
         x: Along the flange's X, mm per mm.
@@ -390,7 +390,7 @@ def lean_exceeds(x: float, y: float, covariance: Sequence[Sequence[float]]) -> b
 
 
 def with_unknown_length(result: ResultT, lean: Lean, sigma_mm: float | None) -> ResultT:
-    """Return a result that holds how far a needle that leans has its end elsewhere if it is longer.
+    """Return a result with how far the end of a leaning needle moves if it is longer.
 
     Args:
         result: With X and Y as its measured components.

@@ -1,4 +1,4 @@
-"""Tool offset from travels through two crossed beams.
+"""Tool offset from moves through two crossed beams.
 
 Half way through a beam with normal n, ``n (middle + A t + c t_z) = distance``; A and c are those
 of the flange, which may lean or hang upside down (docs/reference/evidence.md 3).
@@ -58,7 +58,7 @@ from robolink.model import ToolOffset
 def beams_part(
     design: Floats, crossings: Sequence[Crossing], beams: tuple[Beam, Beam], offset: ToolOffset
 ) -> StationPart:
-    """Return what two beams add to the uncertainty of X and Y.
+    """Return the uncertainty that two beams add to X and Y.
 
     Args:
         design: The design matrix of the fit, one row a crossing, X and Y its first two columns.
@@ -141,7 +141,7 @@ def solve_crossed_beams(
     step_mm: float | None = None,
     tolerance: Tolerance = PLANAR_TOLERANCE,
 ) -> BeamsResult:
-    """Return the offset of a tip that was driven through two crossed beams.
+    """Return the offset of a tip that moved through two crossed beams.
 
     Args:
         crossings: Travels through both beams, best in both directions.
@@ -245,7 +245,7 @@ def _leaning(
     shaft: ShaftSeen,
     height: TipHeight | None,
 ) -> BeamsResult:
-    """Return a result with how the needle leans, and what an unknown length of it does then."""
+    """Return a result with the needle's lean, and the effect of an unknown length."""
     x, y = fit.x[columns].tolist()
     variance = (result.sigma_mm or 0.0) ** 2
     spread = (fit.unit_covariance[columns, columns] * variance).tolist()

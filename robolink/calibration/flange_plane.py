@@ -1,4 +1,4 @@
-"""X and Y of a tip under a flange that leans, or hangs upside down as six axes usually do.
+"""X and Y of a tip under a flange that leans, or is upside down as is usual on six axes.
 
 With A the upper left 2 x 2 part of R = Rz(U) Ry(V) Rx(W) and c = (R13, R23), a point t of the
 flange's axes lies at ``p + A (t_x, t_y) + c t_z`` in X and Y of the base. A can be inverted
@@ -127,7 +127,7 @@ class FlangePlane:
 
 @refuses_by_name
 def carrying(frame: Pose, tip: ToolOffset, place_mm: tuple[float, float, float]) -> Pose:
-    """Return where a frame is when what lies at ``tip`` in its axes is at a place of the base.
+    """Return where a frame is when the point ``tip`` in its axes is at a place of the base.
 
     Args:
         frame: Its angles, hand, local and tool.
@@ -148,7 +148,7 @@ def carrying(frame: Pose, tip: ToolOffset, place_mm: tuple[float, float, float])
 
 
 def height_of(stored: ToolOffset | None, given: TipHeight | None = None) -> TipHeight | None:
-    """Return what is known of a tip's Z: what was given, else what is stored."""
+    """Return the known Z of a tip: as given, else as stored."""
     if given is not None or stored is None:
         return given
     return TipHeight(stored.z_mm)
@@ -177,7 +177,7 @@ def solvable_planes(poses: Sequence[Pose], height: TipHeight | None) -> list[Fla
 
 
 def known_z_mm(height: TipHeight | None) -> float:
-    """Return the Z to solve with: 0 where nobody knows it, which only upright flanges bear."""
+    """Return the Z to solve with: 0 if unknown, which only upright flanges allow."""
     return 0.0 if height is None else height.z_mm
 
 
@@ -252,7 +252,7 @@ def require_flange_in_base(poses: Sequence[Pose]) -> None:
 def with_height_error(
     result: ResultT, per_mm: tuple[float, float], height: TipHeight | None
 ) -> ResultT:
-    """Return a result whose X and Y carry what the tip's height is unsure by.
+    """Return a result whose X and Y include the uncertainty of the tip's height.
 
     Args:
         result: With X and Y as its first two measured components.

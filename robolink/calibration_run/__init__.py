@@ -1,4 +1,4 @@
-"""A calibration run: measure the new tips, write their offsets, prove them, or undo it.
+"""A calibration run: measure the new tips, write and test their offsets, or undo it.
 
 :class:`NozzleChange` is the run, of one tool or of several on one head. :class:`RecipeRun` is the
 same run with all that a recipe adds to it: questions, outputs, references, stations by name.

@@ -22,7 +22,7 @@ from robolink.stations import StationKind
 
 @dataclass(frozen=True, slots=True)
 class AcceptanceCriteria:
-    """Limits of a measurement; what is ``None`` is not judged.
+    """Limits of a measurement; a limit of ``None`` is not checked.
 
     Attributes:
         max_change_mm: Largest plausible change against the stored value, over the lengths measured.
@@ -55,13 +55,13 @@ class AcceptanceCriteria:
         return max(self.max_change_mm, self.accepted_change_mm or 0.0)
 
     def within(self, limits: ChangeLimits) -> "AcceptanceCriteria":
-        """Return these with no larger change than a cell allows without an engineer."""
+        """Return these limits, with no larger change than a cell allows without an engineer."""
         if limits.length_mm is None or limits.length_mm >= self.max_change_mm:
             return self
         return replace(self, max_change_mm=limits.length_mm)
 
     def judge_fit(self, result: CalibrationResult) -> None:
-        """Refuse a measurement that does not agree with itself.
+        """Refuse a measurement whose parts disagree.
 
         Raises:
             CalibrationError: ``large_rms``, ``large_residual``, ``large_interval``, or
@@ -100,7 +100,7 @@ class AcceptanceCriteria:
                 )
 
     def _require_judged(self, result: CalibrationResult) -> None:
-        """Refuse a limit of which the measurement does not tell whether it is kept.
+        """Refuse a limit that the measurement cannot be checked against.
 
         Raises:
             CalibrationError: ``not_judged``.
@@ -139,7 +139,7 @@ class AcceptanceCriteria:
         kind: StationKind | None = None,
         tool: int | None = None,
     ) -> CalibrationError | None:
-        """Return why a statement is over the limit that only default rows carry there.
+        """Return why a statement exceeds the limit only because of default rows.
 
         The error names the largest of them and what measures it. ``None`` where the statement is
         within the limit, or over it without them.
@@ -199,7 +199,7 @@ class AcceptanceCriteria:
         )
 
     def _refuse_unwatched(self, result: CalibrationResult) -> None:
-        """Refuse poses that nobody saw being taken and that disagree, as 'solve' does.
+        """Refuse poses that nobody watched and that disagree, as 'solve' does.
 
         What a stated limit judges is left to it. Touches that were watched are proved by a turn
         test instead.
@@ -263,7 +263,7 @@ class AcceptanceCriteria:
             )
 
     def verdicts(self, proposal: Proposal) -> tuple[LimitVerdict, ...]:
-        """Return what each limit says; nothing about what is not judged or not known."""
+        """Return what each limit says; nothing about what is not checked or not known."""
         fit = self._of_fit(proposal.result)
         if proposal.change_mm is None:
             return tuple(fit)
@@ -273,7 +273,7 @@ class AcceptanceCriteria:
         return (*fit, change)
 
     def jumps(self, proposal: Proposal) -> bool:
-        """Tell whether the change is larger than a nozzle change explains."""
+        """Return whether the change is larger than a nozzle change explains."""
         change = proposal.change_mm
         return change is not None and change > self.max_change_mm
 
@@ -318,7 +318,7 @@ class AcceptanceCriteria:
 
 
 def _how_measured(key: str, *, station: str, kind: StationKind | None, tool: int | None) -> str:
-    """Return what measures a row that is a default, one sentence."""
+    """Return how to measure a default row, one sentence."""
     if key not in ACCURACY_ROWS:
         return tr("State the scatter of one touch, or make six touches or more.")
     from robolink.accuracy import measuring_step  # what only looks does without
@@ -338,13 +338,13 @@ def _worst_in_words(result: CalibrationResult) -> str:
 
 
 def _out_of_order(result: CalibrationResult) -> str:
-    """Return what moved while the touches were made; empty where nothing did."""
+    """Return what moved while the touches were made; empty if nothing did."""
     order = result.evidence.run_order if result.evidence is not None else None
     return order_in_words(order) if order is not None else ""
 
 
 def require_proved(result: VerifyResult, identity: str) -> None:
-    """Refuse a proof that did not pass.
+    """Refuse a turn test that did not pass.
 
     Args:
         result: What it showed.

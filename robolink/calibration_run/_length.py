@@ -1,9 +1,9 @@
-"""Whether the new tip is as long as the old one: from the heights at which it touched the pin.
+"""Whether the new tip is as long as the old one, from the heights of its touches.
 
 Methods that touch a pin upright measure X and Y and keep Z. The flange stands the higher on the
 pin, the longer the tip is (docs/reference/evidence.md 2), so a Z that is kept is compared with
 what the touches show. A length that changed is never swallowed: a person decides, or decided
-beforehand, or nothing is written.
+in advance, or nothing is written.
 
 What the first touch shows is told at once and decides nothing: the needle can be looked at before
 the rest is touched.
@@ -46,7 +46,7 @@ _UNKNOWN_SIGMA_MM: Final = 0.05
 
 @dataclass(frozen=True, slots=True)
 class KnownHeight:
-    """What the stored Z has to agree with: a pin whose height somebody showed.
+    """What the stored Z has to agree with: a pin of known height.
 
     Attributes:
         place_mm: Where the pin is by it, base; not a number for X and Y that nobody stated.
@@ -68,7 +68,7 @@ class KnownHeight:
 
 @dataclass(frozen=True, slots=True)
 class _Told:
-    """What the heights of one tool tell, and against what; or why they tell nothing."""
+    """What the heights of one tool show, and compared with what; or why they show nothing."""
 
     change: LengthChange | None = None
     known: KnownHeight | None = None
@@ -78,7 +78,7 @@ class _Told:
 def known_height(
     controller: Controller, tool: int, pin: str, stated: Station | None = None
 ) -> KnownHeight | None:
-    """Return what the height of a tool's touches of a pin has to agree with.
+    """Return what the heights of a tool's touches of a pin have to agree with.
 
     That is the last touch of the same tool there, if its value is still stored; else the height of
     the pin, where it was measured or typed and not taken from a Z that was kept itself; else what
@@ -113,7 +113,7 @@ def known_height(
 def settle_lengths(
     context: MeasurementContext, proposals: Proposals, *, attended: bool
 ) -> Proposals:
-    """Return the proposals, each with the Z that its heights and somebody's decision make.
+    """Return the proposals, each with the Z from its heights and a person's decision.
 
     Args:
         context: What asks the person.
@@ -144,7 +144,7 @@ def settle_lengths(
 
 
 def _chained(controller: Controller, plan: ToolPlan, proposal: Proposal) -> Proposal:
-    """Return a proposal that adds a difference, with the origin of the Z that it was added to."""
+    """Return a difference proposal with the origin of the Z that it is added to."""
     last = find_last_touch(controller, plan.tool, plan.pin)
     stated = "z_mm" in proposal.result.measured and proposal.tip.z_mm == proposal.offset.z_mm
     origin = {**proposal.kept_record, "z_from": "measured" if stated else last.z_from}
@@ -160,7 +160,7 @@ def _chained(controller: Controller, plan: ToolPlan, proposal: Proposal) -> Prop
 
 
 def _told(controller: Controller, plan: ToolPlan, proposal: Proposal) -> _Told:
-    """Return what the heights tell, or why they tell nothing; empty where nobody asks them."""
+    """Return what the heights show, or why they show nothing; empty if nobody needs them."""
     if proposal.before is None or proposal.z_from == "typed" or not tells_height(proposal.result):
         return _Told()
     # A Z that was made from a stated height cannot be compared with it.
@@ -187,7 +187,7 @@ def change_against(
     stored: ToolOffset,
     touches: Sequence[Pose],
 ) -> LengthChange:
-    """Compare how high touches put a pin with what is known of it.
+    """Compare the height of a pin by its touches with what is known of it.
 
     Args:
         controller: Whose record tells how well touches repeat.
@@ -214,7 +214,7 @@ def change_against(
 
 
 def _moved(known: KnownHeight, plan: ToolPlan, proposal: Proposal) -> bool:
-    """Tell whether the pin stands elsewhere than where its height was found."""
+    """Return whether the pin has moved since its height was found."""
     if "station_moved" in proposal.result.warnings:
         return True
     now = touch_details(plan.pin, proposal)
@@ -231,7 +231,7 @@ def _moved(known: KnownHeight, plan: ToolPlan, proposal: Proposal) -> bool:
 
 
 def _pins_that_sank(told: Sequence[tuple[str, LengthChange | None]]) -> set[str]:
-    """Return the pins on which several tools stand by as much higher, or lower."""
+    """Return the pins that several tools find higher, or lower, by the same."""
     changes: dict[str, list[LengthChange]] = {}
     for pin, one in told:
         if one is not None:
@@ -246,7 +246,7 @@ def _pins_that_sank(told: Sequence[tuple[str, LengthChange | None]]) -> set[str]
 
 
 def _said(proposal: Proposal, why: str, *, attended: bool) -> Proposal:
-    """Return a proposal whose length nothing tells, with a note of it.
+    """Return a proposal of unknown length, with a note of it.
 
     Raises:
         CalibrationError: ``length_not_observable``: its Z was measured on a pin that moved, and
@@ -274,7 +274,7 @@ def _decided(
     *,
     attended: bool,
 ) -> Proposal:
-    """Return a proposal with the Z that was decided on.
+    """Return a proposal with the Z that a person decided on.
 
     Raises:
         CalibrationError: ``length_changed``: nobody decided.
@@ -313,7 +313,7 @@ def _decided(
 
 
 def _with_length(proposal: Proposal, told: LengthChange, decision: str) -> Proposal:
-    """Return a proposal with a change of length, written by difference or knowingly kept."""
+    """Return a proposal with a change of length, written by difference or kept on purpose."""
     result = proposal.result
     doubted = replace(result, warnings=(*result.warnings, "length_changed"))
     if decision != "difference":
@@ -334,7 +334,7 @@ def _with_length(proposal: Proposal, told: LengthChange, decision: str) -> Propo
 
 
 def in_words(tool: int, told: LengthChange) -> str:
-    """Return what the heights tell about a length, in one sentence."""
+    """Return what the heights show about a length, in one sentence."""
     values = {
         "tool": tool,
         "apart": abs(told.longer_mm),
@@ -377,7 +377,7 @@ def _of_station(controller: Controller, pin: str) -> KnownHeight | None:
 
 
 def _of_cell_file(stated: Station | None) -> KnownHeight | None:
-    """Return the height that a person wrote into the cell file.
+    """Return the height in the cell file.
 
     Without a standard deviation its place aside is taken to be right to within what a search
     finds; what nobody stated of it does not count.
@@ -395,7 +395,7 @@ def _of_cell_file(stated: Station | None) -> KnownHeight | None:
 
 
 def shows_height(station: Station) -> bool:
-    """Tell whether the height of a pin is more than a Z that a calibration had kept."""
+    """Return whether the height of a pin is more than a Z that a calibration kept."""
     return station.details.get("z_from") in ("measured", "typed", "touched")
 
 
@@ -448,7 +448,7 @@ def _first_touch(done: StepDone) -> Pose | None:
 
 
 def _keeps_z(plan: ToolPlan) -> bool:
-    """Tell whether the heights of the touches say something beside what is solved."""
+    """Return whether the heights of the touches show more than what is solved."""
     if not plan.method:
         return False
     method = find_method(plan.method)

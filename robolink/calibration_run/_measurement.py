@@ -1,4 +1,4 @@
-"""The first half of a nozzle change: from a mounted nozzle to a proposal on record.
+"""The first half of a nozzle change: from a mounted nozzle to a recorded proposal.
 
 Of the errors that no measurement shows by itself, what the plan states goes before what the record
 tells, and that before the default (docs/reference/evidence.md 19).
@@ -31,7 +31,7 @@ from robolink.stations import stations_on_record
 def accuracy_facts(
     controller: Controller, plan: ToolPlan, result: CalibrationResult
 ) -> AccuracyFacts:
-    """Return what is known in this cell of the rows of a result's budget.
+    """Return what this cell knows about the rows of a result's budget.
 
     Args:
         controller: Whose record is looked at.
@@ -70,7 +70,7 @@ def accuracy_facts(
 def assessed_in_cell(
     controller: Controller, plan: ToolPlan, result: CalibrationResult
 ) -> tuple[CalibrationResult, AccuracyFacts]:
-    """Return a result with what it is accurate to in this cell, and what that rests on.
+    """Return a result with what it is accurate to in this cell, and the basis of that.
 
     Args:
         controller: Whose record is looked at.
@@ -94,7 +94,7 @@ def assessed_in_cell(
 
 
 def with_sources(plan: ToolPlan, result: CalibrationResult) -> CalibrationResult:
-    """Return a result that says which errors its scatter does not show.
+    """Return a result that names the errors its scatter does not show.
 
     A method that does not say so itself has those of what it declares to need: a person who sees
     contact, a station whose place it relies on.
@@ -113,12 +113,13 @@ def with_sources(plan: ToolPlan, result: CalibrationResult) -> CalibrationResult
 
 
 MOST_ANEW: Final = 5
-"""So often a person may begin the touches of one tool anew."""
+"""How often a person may restart the touches of one tool."""
 
 
 MOST_FURTHER: Final = 3
-"""So often touches are gone back to from one proposal: who touches until it fits has measured
-nothing."""
+"""How often a person may return to the touches from one proposal: repeating them until they fit
+would prove nothing.
+"""
 
 
 _INSTRUMENT: Final = frozenset({"no_edge", "sensor_failed", "tip_not_seen", "fiducial_not_seen"})
@@ -143,7 +144,7 @@ class Measuring:
         self.simulated = says_it_is_simulated(context.controller, self._facts)
 
     def propose(self, plan: ToolPlan) -> Proposal:
-        """Measure one tool, again where the plan allows it, and put it on record.
+        """Measure one tool, again where the plan allows it, and record it.
 
         Raises:
             CalibrationError: The last measurement is not trusted either; it is on record.
@@ -163,7 +164,7 @@ class Measuring:
                 anew, left = (anew - 1, left) if by_hand else (anew, left - 1)
 
     def further(self, plan: ToolPlan, proposal: Proposal, *, again: int | None) -> Proposal:
-        """Go on with the touches of a measurement, and put what they say then on record.
+        """Add touches to a measurement, and record the new result.
 
         Args:
             plan: What is measured.
@@ -184,7 +185,7 @@ class Measuring:
         return self._attempt(plan, measure)
 
     def go_to(self, pose: Pose | None, purpose: str) -> None:
-        """Drive the flange to ``pose``: up, over, down; nowhere when there is none."""
+        """Drive the flange to ``pose``: up, over, down; nowhere without one."""
         if pose is None:
             return
         controller = self._context.controller
@@ -232,7 +233,7 @@ class Measuring:
         return proposal
 
     def _station_record(self, name: str) -> dict[str, object]:
-        """Return which entry of the journal says where the station is, so that results compare.
+        """Return the journal entry with the station's place, so that results compare.
 
         Tools that were measured by one entry share its error, and differ by their touches alone
         (docs/reference/evidence.md 12).
@@ -246,7 +247,7 @@ class Measuring:
 
     @contextmanager
     def _watched(self, plan: ToolPlan, before: ToolOffset | None) -> Iterator[None]:
-        """Tell of each step; when the measurement ends early, keep its poses on record."""
+        """Report each step; if the measurement ends early, record its poses."""
         poses: list[Pose] = []
 
         def on_step(done: StepDone) -> None:
@@ -270,13 +271,13 @@ class Measuring:
 
 
 def _by_difference(proposal: Proposal) -> bool:
-    """Whether X and Y are those of before and a difference, and not as they were measured."""
+    """Whether X and Y are earlier ones plus a difference, and not measured directly."""
     measured, offset = proposal.measured, proposal.offset
     return measured is not None and (measured.x_mm, measured.y_mm) != (offset.x_mm, offset.y_mm)
 
 
 def told_of_typed(result: CalibrationResult) -> tuple[CalibrationResult, tuple[str, ...]]:
-    """Return a result that says which of its touches were only typed, and that in words."""
+    """Return a result that names which of its touches were only typed, in words too."""
     typed = [n for n, touch in enumerate(touches_of(result), start=1) if touch.typed]
     if not typed:
         return result, ()
@@ -289,7 +290,7 @@ def told_of_typed(result: CalibrationResult) -> tuple[CalibrationResult, tuple[s
 
 @dataclass(frozen=True, slots=True)
 class FurtherTouch:
-    """The touch that a person wants before anything is written.
+    """A further touch that a person wants before anything is written.
 
     Attributes:
         again: Index of the one that is made again, ``None`` for one more.
@@ -300,7 +301,7 @@ class FurtherTouch:
 
 @dataclass(frozen=True, slots=True)
 class FurtherOffer:
-    """What can be done with the touches of a measurement that has ended.
+    """What can be done with the touches of a finished measurement.
 
     Attributes:
         worst: Index of the one that fits worst; the last where nothing tells.
@@ -312,16 +313,16 @@ class FurtherOffer:
 
     @property
     def words(self) -> tuple[str, ...]:
-        """The words with which it is taken."""
+        """The words that choose it."""
         return (BACK, MORE) if self.adds else (BACK,)
 
     def meant_by(self, word: str) -> FurtherTouch:
-        """Return what one of the words asks for."""
+        """Return the choice that a word names."""
         return FurtherTouch(None if word == MORE else self.worst)
 
 
 def offer_of(measured: Sequence[tuple[ToolPlan, Proposal]]) -> FurtherOffer | None:
-    """Return what can be done, ``None`` for nothing: several tools, or no touches of a person."""
+    """Return what can be done, ``None`` for several tools or without touches of a person."""
     if len(measured) != 1:
         return None
     ((plan, proposal),) = measured
@@ -338,7 +339,7 @@ def offer_of(measured: Sequence[tuple[ToolPlan, Proposal]]) -> FurtherOffer | No
 
 
 def _name_another_way(error: CalibrationError) -> None:
-    """Say in the remedy how a tool is measured where an instrument has failed for good."""
+    """Add to the remedy how to measure a tool after an instrument has failed for good."""
     if error.code not in _INSTRUMENT:
         return
     another = tr(

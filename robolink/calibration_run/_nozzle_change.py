@@ -1,9 +1,9 @@
-"""The nozzle change: measure the new tips, write their offsets, prove them, or take all back.
+"""The nozzle change: measure the new tips, write and test their offsets, or undo all.
 
 Order (docs/reference/rules.md 4, 6): read the old values; measure, in Tool 0 where the robot moves;
 judge; propose; on a yes write with compare-and-set and read back; turn about the new tips;
 keep, or write the old values back once. Several tools are all measured before the first is
-written. Whatever happens, the tool, power mode and speed of before are put back at the end.
+written. Whatever happens, the tool, power mode and speed as before are restored at the end.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -65,7 +65,7 @@ Earlier = Callable[[int], Sequence[float]]
 first."""
 
 DescribeReport = Callable[[ChangeReport], Mapping[str, object]]
-"""Returns the result of an order, plain JSON, that a second delivery of it is given."""
+"""Returns the result of an order, plain JSON, for a second delivery of it."""
 
 
 class NozzleChange:
@@ -121,7 +121,7 @@ class NozzleChange:
         self._began_ns = 0
 
     def run(self, *, write: bool = True) -> ChangeReport:
-        """Do it all. Ctrl-C before the last verification has passed leaves the old values.
+        """Run it. Ctrl-C before the last turn test has passed restores the old values.
 
         Args:
             write: Whether the proposals are written; a reference for later is not.
@@ -131,9 +131,9 @@ class NozzleChange:
             ConfigError: A clearance is below the largest change that is believed, or an input is
                 to show contact where there are none.
             DeclinedError: The person said no; nothing was written.
-            StoppedError: A stop came; what was written was put back, unless it was kept already.
+            StoppedError: A stop came; what was written was restored, unless it was kept already.
             VerifyError: A tip drifts too far, or its touches were not made; the old values were
-                put back.
+                restored.
             RobolinkError: Anything else that ended it, with the state it left.
         """
         require_clearance(self._plan)
@@ -154,7 +154,7 @@ class NozzleChange:
 
     @contextmanager
     def _begun(self) -> Iterator[None]:
-        """Watch over the change; put tool, power mode and speed back whatever ends it."""
+        """Guard the change; restore tool, power mode and speed whatever ends it."""
         reason, controller = self._request, self._controller
         controller.outcomes.change = new_operation()
         self._began_ns = controller.clock.now_ns()
@@ -184,7 +184,7 @@ class NozzleChange:
         return tr("calibrate tool {tool}", tool=self._numbers)
 
     def _require_possible(self, *, write: bool) -> None:
-        """Say what the write would be refused for before a person has measured anything."""
+        """Refuse an impossible write before a person has measured anything."""
         if write:
             for one in self._plan.tools:
                 self._controller.tools.require_writable(one.tool)
@@ -204,7 +204,7 @@ class NozzleChange:
         *,
         write: bool,
     ) -> Proposals:
-        """Return what is to be written of what was measured; a person may go back to touches."""
+        """Return what to write of the measured values; a person may go back to touches."""
         for left in reversed(range(MOST_FURTHER + 1)):
             proposals = self._checked(context, measured, write=write)
             self._listener.proposed([proposal for _, proposal in proposals])
@@ -241,7 +241,7 @@ class NozzleChange:
     def _checked(
         self, context: MeasurementContext, proposals: Proposals, *, write: bool
     ) -> Proposals:
-        """Return the proposals with what stations and heights say; a refusal goes on record."""
+        """Return the proposals with what stations and heights show; record a refusal."""
         try:
             checked = check_stations(self._controller, proposals)
             if not write:
@@ -270,7 +270,7 @@ class NozzleChange:
     def _require_accurate(
         self, context: MeasurementContext, plan: ToolPlan, proposal: Proposal
     ) -> None:
-        """Have a person decide on a statement that only defaults carry over the limit.
+        """Ask a person about a statement that exceeds the limit only because of defaults.
 
         Raises:
             CalibrationError: ``large_interval``: nobody may be asked.
@@ -306,13 +306,13 @@ class NozzleChange:
     def _ask(
         self, context: MeasurementContext, proposals: Proposals, offer: FurtherOffer | None
     ) -> FurtherTouch | None:
-        """Have the proposals accepted; return the touch that is to be made before that."""
+        """Ask for the proposals to be accepted; return the touch to make before that."""
         numbers = ", ".join(str(plan.tool) for plan in self._plan.tools)
         question = tr("Write these values to tool {tool}? 'robolink undo' undoes it.", tool=numbers)
         if not self._plan.ask_before_write:
             if self._plan.agreed_by is not None:
                 entry = answer_entry(question, True, self._plan.agreed_by, accepted=True)
-                self._controller.outcomes.append(replace(entry, verdict=tr("accepted beforehand")))
+                self._controller.outcomes.append(replace(entry, verdict=tr("accepted in advance")))
             return None
         judged = [(one, plan.criteria.verdicts(one)) for plan, one in proposals]
         shown, verdicts = zip(*judged, strict=True)
@@ -336,7 +336,7 @@ class NozzleChange:
         return None
 
     def _write(self, context: MeasurementContext, proposals: Proposals) -> tuple[ToolReport, ...]:
-        """Write all, verify each, keep all; an error on the way takes all back."""
+        """Write all, test each, keep all; an error on the way restores all."""
         verify = any(plan.verify and plan.moving for plan, _ in proposals)
         known = [dict(plan.details(proposal)) for plan, proposal in proposals]
         wanted = [

@@ -1,4 +1,4 @@
-"""A value whose turn test is open: kept in a durable marker, told, and tested later.
+"""A value with an open turn test: kept in a durable marker, reported, and tested later.
 
 Whoever finds the marker open later takes the change up again: it, and no other, lets the robot
 move, and stays until the verdict, so that a process that is killed in the test leaves what it found
@@ -85,7 +85,7 @@ def marked_turn_tests(
 def _kept(
     context: MeasurementContext, limits: Limits, plan: ToolPlan, proposal: Proposal
 ) -> dict[str, object] | str:
-    """Return the test of one tool, or why there is none."""
+    """Return the test of one tool, or why it has none."""
     source, start = plan.moving, context.start
     if source is None or start is None:
         return "no_motion"
@@ -117,7 +117,7 @@ def _kept(
 
 
 def open_turn_tests(controller: Controller) -> dict[str, tuple[OpenTurnTest, ...]]:
-    """Return the turn tests that open changes still lack, by the operations of their markers.
+    """Return the turn tests missing from open changes, by the operations of their markers.
 
     Only of changes whose tools all hold the new values now. Reads only.
 
@@ -137,7 +137,7 @@ def open_turn_tests(controller: Controller) -> dict[str, tuple[OpenTurnTest, ...
 
 
 def tests_of(marker: Marker) -> tuple[OpenTurnTest, ...]:
-    """Return what a marker keeps; nothing where it is not that of such a change, or unreadable."""
+    """Return what a marker keeps; nothing if it is unreadable or of another kind."""
     kept, tools = marker.details.get(_KEY), marker.details.get("tools")
     if marker.kind is not MarkerKind.CHANGE or not isinstance(kept, list):
         return ()
@@ -150,7 +150,7 @@ def tests_of(marker: Marker) -> tuple[OpenTurnTest, ...]:
 
 
 def _read(kept: Mapping[str, object]) -> OpenTurnTest:
-    """Return a test that was kept.
+    """Return a test that was stored.
 
     Raises:
         ConfigError: No method of that name is installed.
@@ -177,7 +177,7 @@ def _made_adapter(kind: type) -> "TypeAdapter[Any]":
 
 
 _OUT_OF_REACH: Final = (OutcomeUnknownError, TransportError, RemoteProtocolError, LeaseLostError)
-"""After these nothing can be put back here: the link is gone, or the right to write."""
+"""After these nothing can be restored here: the link is gone, or the right to write."""
 
 
 def finish_by_turn_test(
@@ -188,7 +188,7 @@ def finish_by_turn_test(
     attended: bool = False,
     tell: Callable[[int, VerifyResult], None] = lambda _tool, _result: None,
 ) -> Finding:
-    """Make the turn test of an open change, then keep its values or put the old ones back.
+    """Make the turn test of an open change, then keep its values or restore the old ones.
 
     Whatever else ends it puts the old values back too, as it would have in the change itself;
     only where the link or the lease is lost, or this process ends, the change stays open. Call it
@@ -208,7 +208,7 @@ def finish_by_turn_test(
 
     Raises:
         VerifyError: It did not pass, or its touches were not made; the old values are back.
-        OutcomeUnknownError: Something else is unsettled, too, or the change has no test, or its
+        OutcomeUnknownError: Another job is unfinished, or the change has no test, or its
             tools hold other values now; nothing moved.
         RobolinkError: Anything else that ended it, with the state it left.
 
@@ -274,7 +274,7 @@ def finish_by_turn_test(
 
 
 def _open(controller: Controller, operation: str) -> tuple[Marker, Finding]:
-    """Return the open change and what its tools hold now.
+    """Return the open change and the present values of its tools.
 
     Raises:
         OutcomeUnknownError: There is nothing that could be tested.
@@ -292,7 +292,7 @@ def _open(controller: Controller, operation: str) -> tuple[Marker, Finding]:
 
 
 def _with_statements(finding: Finding, proofs: Mapping[int, VerifyResult]) -> Finding:
-    """Return what was found with what each tip is accurate to by its turn test, for the record."""
+    """Return the findings with what each tip is accurate to by its turn test, for the record."""
     entries = []
     for entry in finding.entries:
         proof = None if entry.tool is None else proofs.get(entry.tool)
@@ -309,7 +309,7 @@ def _prove(
     *,
     attended: bool,
 ) -> VerifyResult:
-    """Make one test; what this change has shown before counts too.
+    """Make one test; earlier results of this change count too.
 
     Raises:
         VerifyError: It did not pass.
@@ -345,7 +345,7 @@ def _prove(
 
 @contextmanager
 def _put_back_unless_kept(controller: Controller, marker: Marker) -> Iterator[None]:
-    """Put the old values back where the block ends early and the controller is within reach."""
+    """Restore the old values if the block ends early and the controller is reachable."""
     try:
         yield
     except _OUT_OF_REACH:
@@ -359,7 +359,7 @@ def _put_back_unless_kept(controller: Controller, marker: Marker) -> Iterator[No
 
 
 def _put_back(controller: Controller, marker: Marker) -> str:
-    """Put the old values back with one write a tool; return what became of it, in words."""
+    """Restore the old values with one write a tool; return the outcome, in words."""
     still = [one.operation for one in controller.outcomes.open_markers()]
     if marker.operation not in still:
         return ""  # kept, or put back, already
@@ -382,7 +382,7 @@ def _stays_open() -> str:
 
 
 def untested_sentences(controller: Controller) -> list[str]:
-    """Return of each written change that keeps no turn test why, and what measures and tests anew.
+    """Return why written changes keep no turn test, and how to measure and test them anew.
 
     Args:
         controller: The controller, connected.
@@ -401,7 +401,7 @@ def untested_sentences(controller: Controller) -> list[str]:
 
 
 def _whys(marker: Marker) -> Iterator[str]:
-    """Yield a sentence for each tool of a change whose test cannot be made now."""
+    """Yield a sentence for each tool of a change that cannot be tested now."""
     untested = marker.details.get(UNTESTED)
     if not isinstance(untested, dict):
         yield tr("The record does not say how to test this change.")
@@ -441,7 +441,7 @@ def _why(tool: str, method: str, why: str) -> str:
 
 
 def _anew(method: str, why: str) -> str:
-    """Return which command measures and tests, when this is settled."""
+    """Return which command measures and tests, once this is recovered."""
     by_motion = "two-pose" if why == "no_motion" else method
     return tr(
         "When this job is finished or undone, 'robolink calibrate {method}' measures and "

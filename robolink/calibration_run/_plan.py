@@ -1,4 +1,4 @@
-"""What a nozzle change is to do, and within which limits."""
+"""What a nozzle change will do, and within which limits."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -36,7 +36,7 @@ from robolink.stations import Gauge, Station
 
 
 def usual_box(sideways_mm: float = 150.0) -> WorkBox:
-    """Return how far targets may lie from the start where nobody says how far down and up."""
+    """Return how far targets may lie from the start if no limits down and up are given."""
     return WorkBox.reaching(sideways_mm, down_mm=30.0, up_mm=50.0)
 
 
@@ -68,7 +68,7 @@ class Limits:
 
 @dataclass(frozen=True, slots=True)
 class ToolPlan:
-    """What is to be done about one tool.
+    """The plan for one tool.
 
     Attributes:
         tool: Number of the tool whose nozzle was changed.
@@ -108,7 +108,7 @@ class ToolPlan:
     rows: Mapping[str, RowFact] = field(default_factory=dict, hash=False)
 
     def named(self, result: CalibrationResult) -> CalibrationResult:
-        """Return a result under the name of the method, whichever solver it borrows.
+        """Return a result under the method's name, whichever solver it uses.
 
         Raises:
             CalibrationError: ``local_pose``: the pin that is to be kept was not found in the base.
@@ -117,7 +117,7 @@ class ToolPlan:
         return replace(result, method=self.method) if self.method else result
 
     def details(self, proposal: Proposal) -> dict[str, object]:
-        """Return what the journal keeps about the value beside it, plain JSON."""
+        """Return what the journal stores besides the value, plain JSON."""
         own = {
             "tip": plain_offset(proposal.tip),
             "method": proposal.result.method,
@@ -133,7 +133,7 @@ class ToolPlan:
         return {**own, **touch, **length, **following, **proposal.kept_record}
 
     def as_recorded(self, controller: Controller) -> "ToolPlan":
-        """Return the same with what the record says of the touches, where nobody stated it."""
+        """Return the same with the touches' unstated values taken from the record."""
         source = self.source
         if not isinstance(source, TouchesPin):
             return self
@@ -147,7 +147,7 @@ class ToolPlan:
 
 
 def journey(target: Pose | None, purpose: str, here: Pose) -> Procedure[None]:
-    """Return the way of the flange to a pose of a plan, up, over and down; none where it has none.
+    """Return the flange's path to a planned pose, up, over and down; none without one.
 
     Args:
         target: That pose.
@@ -166,7 +166,7 @@ Proposals = Sequence[tuple[ToolPlan, Proposal]]
 
 @dataclass(frozen=True, slots=True)
 class ChangePlan:
-    """What to do with one tool, or with several on one head: all of them or none.
+    """The plan for one tool, or for several on one head: all of them or none.
 
     Attributes:
         tools: The tools, in the order in which they are measured.
@@ -176,7 +176,7 @@ class ChangePlan:
         safe: Flange pose to which the robot goes first and last.
         attended: Whether a person may be asked what a measurement leaves open; ``None`` for where
             the write is asked too.
-        agreed_by: How the write was agreed to beforehand, for the record, where it is not asked;
+        agreed_by: How the write was agreed to in advance, for the record, where it is not asked;
             ``None`` where the listener asks, and so has the answer on record.
     """
 
@@ -189,7 +189,7 @@ class ChangePlan:
 
     @property
     def asks(self) -> bool:
-        """Whether a person may be asked what a measurement leaves open."""
+        """Whether a person may be asked about what a measurement leaves open."""
         return self.ask_before_write if self.attended is None else self.attended
 
     @property
@@ -199,7 +199,7 @@ class ChangePlan:
 
 
 def _tip_about(flange: Pose, offset: ToolOffset) -> tuple[float, float]:
-    """Return how far above a flange a tip is, and how far beside it at most, whatever its U."""
+    """Return how far above a flange a tip is, and how far beside it at most, at any U."""
     x_mm, y_mm, z_mm = offset.components()[:3]
     v, w = math.radians(flange.v_deg), math.radians(flange.w_deg)
     above_mm = -math.sin(v) * x_mm + math.cos(v) * (math.sin(w) * y_mm + math.cos(w) * z_mm)
@@ -208,7 +208,7 @@ def _tip_about(flange: Pose, offset: ToolOffset) -> tuple[float, float]:
 
 
 def clearance_too_small(clearance_mm: float, limit_mm: float) -> str:
-    """Return why a clearance below the largest change that is believed is refused."""
+    """Return why a clearance below the largest believed change is refused."""
     return tr(
         "The robot would stop {clearance:g} mm from contact, but a new tip may be "
         "{limit:g} mm longer.",
@@ -218,7 +218,7 @@ def clearance_too_small(clearance_mm: float, limit_mm: float) -> str:
 
 
 def require_clearance(plan: ChangePlan) -> None:
-    """Refuse a plan in which a new tip could meet the pin before the person takes over.
+    """Refuse a plan in which a new tip could hit the pin before the person takes over.
 
     A jump that an engineer accepts was seen before, and is the engineer's to answer for.
 
@@ -240,7 +240,7 @@ def require_clearance(plan: ChangePlan) -> None:
 
 
 def require_inputs(controller: Controller, plan: ChangePlan) -> None:
-    """Refuse a plan whose touches an input is to show, where there are no inputs; asks nothing.
+    """Refuse a plan that needs a contact input where there are no inputs; asks nothing.
 
     Raises:
         ConfigError: The controller has no inputs.
@@ -251,7 +251,7 @@ def require_inputs(controller: Controller, plan: ChangePlan) -> None:
 
 
 def require_measurable(controller: Controller, plan: ChangePlan) -> None:
-    """Refuse a plan that measures what the machine's kinematics could not be told; only reads.
+    """Refuse to measure what the machine's kinematics cannot accept; only reads.
 
     Raises:
         RejectedError: Names the components, and why.
@@ -265,7 +265,7 @@ def require_measurable(controller: Controller, plan: ChangePlan) -> None:
 
 
 def require_motion(controller: Controller, plan: ChangePlan) -> None:
-    """Refuse a plan whose measurement the robot moves too fast for; only reads.
+    """Refuse a plan in which the robot moves too fast for the measurement; only reads.
 
     Raises:
         CalibrationError: As :meth:`RequiresMotion.require_able`.
@@ -276,7 +276,7 @@ def require_motion(controller: Controller, plan: ChangePlan) -> None:
 
 
 def require_contact_input(controller: Controller, touch: TouchPlan) -> None:
-    """Read the input that is to show contact, so that one that is not there is known at once.
+    """Read the contact input, so that a missing one is known at once.
 
     Raises:
         ConfigError: The controller has no inputs, or refuses to read this one.
@@ -298,14 +298,14 @@ def require_contact_input(controller: Controller, touch: TouchPlan) -> None:
 
 
 def require_contacts(controller: Controller, plan: ChangePlan) -> None:
-    """Read all inputs of a plan that are to show contact; see :func:`require_contact_input`."""
+    """Read all contact inputs of a plan; see :func:`require_contact_input`."""
     for one in plan.tools:
         if isinstance(one.source, TouchesPin):
             require_contact_input(controller, one.source.touch)
 
 
 def require_ready(controller: Controller, plan: ChangePlan) -> None:
-    """Find out whether cameras and contact inputs of a plan are there, before anything moves.
+    """Check that the cameras and contact inputs of a plan are there, before anything moves.
 
     Raises:
         CalibrationError, ConfigError, ConnectError: As :meth:`RequiresSensor.require_ready` and

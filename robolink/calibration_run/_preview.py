@@ -1,4 +1,4 @@
-"""The nozzle change on paper: every step with its target, before anything moves."""
+"""The preview of a nozzle change: every step with its target, before anything moves."""
 
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -44,7 +44,7 @@ Foreseen = Generator[ForeseenStep, None, tuple[Pose, bool]]
 
 @dataclass(frozen=True, slots=True)
 class PlannedStep:
-    """One step of the measurement as it is foreseen.
+    """One planned step of the measurement.
 
     Attributes:
         text: What is done.
@@ -63,11 +63,11 @@ class PlannedStep:
     shown: TeachPrompt | None = None
 
     def target_is(self, place: Pose) -> bool:
-        """Tell whether it ends at a place."""
+        """Return whether it ends at a place."""
         return self.target is not None and self.target.coordinates() == place.coordinates()
 
     def requests(self, group: MotionGroup) -> tuple[str, ...]:
-        """Return what the step would send besides its reads, as it stands on the wire."""
+        """Return the requests of the step besides its reads, as sent on the wire."""
         if self.target is None or self.profile is None:
             return ()
         if self.edge is None:
@@ -76,7 +76,7 @@ class PlannedStep:
 
 
 def preview(controller: Controller, plan: ChangePlan) -> tuple[PlannedStep, ...]:
-    """Return the steps of the measurements from where the robot stands now.
+    """Return the steps of the measurements from where the robot is now.
 
     Reads only. The person's part is foreseen as no movement at all, but where the step says
     about where it leads. Where the robot stops beside a pin is drawn in the run: the limits are
@@ -101,7 +101,7 @@ def preview(controller: Controller, plan: ChangePlan) -> tuple[PlannedStep, ...]
 def foresee(
     procedure: Procedure[object], *, here: Pose, settings: RunSettings, arm: ArmAhead | None = None
 ) -> tuple[PlannedStep, ...]:
-    """Return the steps of one procedure that begins with the flange at ``here``.
+    """Return the steps of one procedure that starts with the flange at ``here``.
 
     Args:
         procedure: What is foreseen; it is used up.
@@ -126,7 +126,7 @@ def foresee(
 
 
 def flange_now(controller: Controller) -> Pose:
-    """Read where the flange is, whatever tool is in force."""
+    """Read where the flange is, whichever tool is selected."""
     here = controller.groups[0].pose()
     selected = controller.tools.read(here.tool) if here.tool else None
     return flange_of(here, selected or ToolOffset())
@@ -162,7 +162,7 @@ def _foresee(controller: Controller, plan: ChangePlan, start: Pose) -> Iterator[
 def _procedures(
     controller: Controller, plan: ChangePlan
 ) -> Iterator[tuple[Pose | None, Callable[[Pose], Procedure[object]]]]:
-    """Yield what runs before the write, each to be made from where the one before ended.
+    """Yield the procedures before the write, each from where the one before ends.
 
     The pose is where it ends, of one that does so wherever it begins.
     """
@@ -231,7 +231,7 @@ def _planned(step: Move | Seek, settings: RunSettings) -> PlannedStep:
 
 
 def _refusal(target: Pose, settings: RunSettings, *, aside_mm: float = 0.0) -> str:
-    """Return why the limits forbid a target, or one so far beside it; empty when they do not."""
+    """Return why the limits forbid a target, or one so far beside it; empty if they do not."""
     try:
         for dx_mm, dy_mm in ((aside_mm, aside_mm), (-aside_mm, -aside_mm)):
             beside = replace(target, x_mm=target.x_mm + dx_mm, y_mm=target.y_mm + dy_mm)

@@ -1,4 +1,4 @@
-"""What was measured, beside what is stored and what limits say; what came of it, and who hears."""
+"""A measured value beside the stored one and the limits, its outcome, and its listeners."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -74,7 +74,7 @@ class Proposal:
 
     @property
     def offset(self) -> ToolOffset:
-        """What is to be written."""
+        """The offset to write."""
         return self.result.offset
 
     @property
@@ -85,17 +85,17 @@ class Proposal:
 
     @property
     def tip(self) -> ToolOffset:
-        """Where the tip was found, whatever is to be written."""
+        """Where the tip was found, whatever is written."""
         return self.result.offset if self.measured is None else self.measured
 
     @property
     def jump(self) -> Jump | None:
-        """How far the write takes the tip, typed lengths counted; ``None`` as for the change."""
+        """How far the write moves the tip, typed lengths counted; ``None`` as for the change."""
         return None if self.before is None else Jump.between(self.before, self.offset)
 
     @property
     def change_mm(self) -> float | None:
-        """Length of the measured change, ``None`` when the tool was undefined.
+        """Length of the measured change, ``None`` if the tool was undefined.
 
         A Z that a person typed is the person's to answer for, and does not count.
         """
@@ -109,7 +109,7 @@ class Proposal:
 
     @property
     def plane_change_mm(self) -> float | None:
-        """Length of the change in the plane, ``None`` when the tool was undefined."""
+        """Length of the change in the plane, ``None`` if the tool was undefined."""
         if self.before is None:
             return None
         return math.hypot(self.offset.x_mm - self.before.x_mm, self.offset.y_mm - self.before.y_mm)
@@ -117,7 +117,7 @@ class Proposal:
 
 @dataclass(frozen=True, slots=True)
 class WriteSubject:
-    """What a question before a write is about, for a face that draws.
+    """What a question before a write is about, for a screen that draws.
 
     Attributes:
         proposals: What is to be written.
@@ -148,7 +148,7 @@ class WriteSubject:
 
 @dataclass(frozen=True, slots=True)
 class ToolReport:
-    """What a nozzle change did to one tool.
+    """The result of a nozzle change for one tool.
 
     Attributes:
         proposal: What was proposed.
@@ -165,7 +165,7 @@ class ToolReport:
 
 @dataclass(frozen=True, slots=True)
 class ChangeReport:
-    """What a nozzle change did.
+    """The result of a nozzle change.
 
     Attributes:
         change: Its id in the journal.
@@ -181,7 +181,7 @@ class ChangeReport:
 
 
 class Moment(StrEnum):
-    """Between which phases something may be asked or switched."""
+    """Points between phases at which something may be asked or switched."""
 
     START = "start"
     BEFORE_MEASURE = "before_measure"
@@ -191,13 +191,13 @@ class Moment(StrEnum):
 
 
 class Listener:
-    """Told of everything; does nothing with it. Override what is of interest.
+    """Receives every event, and does nothing. Override what is of interest.
 
     Whatever a method raises ends the change, as Ctrl-C would at that place.
     """
 
     def moment(self, moment: Moment, context: MeasurementContext, tool: int | None = None) -> None:
-        """Stand between two phases; ``tool`` where the moment belongs to one.
+        """Act between two phases; ``tool`` if the moment belongs to one.
 
         Args:
             moment: Between which phases.
@@ -215,10 +215,10 @@ class Listener:
         """
 
     def step(self, tool: int, done: StepDone) -> None:
-        """Hear of a step of a measurement or of a verification."""
+        """Receive a step of a measurement or of a turn test."""
 
     def refused(self, tool: int, error: CalibrationError, *, again: bool) -> None:
-        """Hear that a measurement is not believed, and whether it is taken again.
+        """Receive a refusal of a measurement, and whether it is repeated.
 
         Args:
             tool: Number of the tool.
@@ -239,17 +239,17 @@ class Listener:
         """
 
     def adjusted(self, proposal: Proposal, context: MeasurementContext) -> Proposal:  # noqa: ARG002 - for overriding
-        """Return what is to be proposed instead of the bare measurement."""
+        """Return the proposal to use instead of the bare measurement."""
         return proposal
 
     def proposed(self, proposals: Sequence[Proposal]) -> None:
         """Show the proposals, before they are judged and before anything is written."""
 
     def wrote(self, receipt: ToolReceipt) -> None:
-        """Hear of a write that was read back."""
+        """Receive a write that was read back."""
 
     def verified(self, tool: int, result: VerifyResult) -> None:
-        """Hear how a verification ended."""
+        """Receive the result of a turn test."""
 
     def told(self, sentence: str) -> None:
-        """Hear something that a person must know."""
+        """Receive something that a person must know."""

@@ -1,4 +1,4 @@
-"""What a recipe does between the phases of a nozzle change: asks, switches, proposes."""
+"""What a recipe adds between the phases of a nozzle change: questions, outputs, proposals."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -28,7 +28,7 @@ class RecipeListener(Listener):
     Args:
         recipe: The recipe.
         controller: The controller, connected.
-        answers: What was answered beforehand.
+        answers: What was answered in advance.
         references: The references of basis "difference", by tool.
         taking_reference: Whether this run only takes them.
         measure_only: Whether nothing follows from what is measured, so that no length is asked for.
@@ -62,7 +62,7 @@ class RecipeListener(Listener):
         self.switched: dict[int, bool] = {}
 
     def moment(self, moment: Moment, context: MeasurementContext, tool: int | None = None) -> None:
-        """Ask what is to be asked, then switch what is to be switched."""
+        """Ask the questions of this moment, then switch its outputs."""
         self._audience.moment(moment, context, tool)
         if moment is Moment.AFTER_MEASURE:
             # The id belonged to that tool; the value that is kept says it again.
@@ -75,7 +75,7 @@ class RecipeListener(Listener):
                 self._switch(output)
 
     def adjusted(self, proposal: Proposal, context: MeasurementContext) -> Proposal:
-        """Return what the recipe proposes from a measurement."""
+        """Return the recipe's proposal from a measurement."""
         tool = proposal.tool
         typed = None
         if not (self._taking_reference or self._measure_only):
@@ -130,7 +130,7 @@ class RecipeListener(Listener):
         return None
 
     def _told_by_touches(self, tool: int) -> bool:
-        """Tell whether the heights of the touches will show whether the tip is as long as before.
+        """Return whether the heights of the touches will show if the tip is as long as before.
 
         Then that is asked once, with what they show, and only where the length changed.
         """
@@ -156,7 +156,7 @@ class RecipeListener(Listener):
             self._sign(self._signature)
 
     def _record(self, question: str, answer: bool | str, by: AnsweredBy, tool: int | None) -> None:
-        """Put on record what was answered beforehand; what is asked, the runner records."""
+        """Record what was answered in advance; the runner records what it asks."""
         entry = answer_entry(question, answer, by, tool=tool, given_beforehand=True)
         self._controller.outcomes.append(entry)
 
@@ -181,7 +181,7 @@ def _meant(asked: "Prompt | Output", moment: Moment, tool: int | None) -> bool:
 
 
 def ask_prompt(context: MeasurementContext, prompt: "Prompt", tool: int | None = None) -> str:
-    """Put a question of the recipe to the person and return the answer, which is on record then.
+    """Ask a person a question of the recipe and return the answer, which is then recorded.
 
     Args:
         context: What asks.

@@ -1,4 +1,4 @@
-"""What a recipe asks the change to do: the plan before it, and the proposal after it.
+"""The plan that a recipe asks for, and the proposal that it makes afterwards.
 
 The reference of a difference is where the tip was when the stored offset was right. Taught points
 are consistent only with the tool value that they were taught with, even when that value does not
@@ -57,7 +57,7 @@ def plan_of(
     stated: Station | None = None,
     cell: Cell | None = None,
 ) -> ChangePlan:
-    """Return what a recipe asks for, on one controller.
+    """Return a recipe's plan for one controller.
 
     Args:
         recipe: The recipe.
@@ -65,7 +65,7 @@ def plan_of(
         controller: The controller; only read, and only where the robot has to tilt.
         folder: Where the recipe lies: files that it names are looked for there.
         ask_before_write: Whether a person accepts the proposals.
-        agreed_by: How the write was agreed to beforehand, where nobody is asked.
+        agreed_by: How the write was agreed to in advance, where nobody is asked.
         accepted_change_mm: A larger jump than the recipe's that an engineer accepts this time.
         sensor: The camera, or its name or URL, in place of the recipe's.
         stated: The station as the cell file has it, ``None`` where it says nothing.
@@ -158,13 +158,13 @@ def _pose_file(tool: "Tool", folder: Path) -> tuple[Path, ReadingChoices] | None
 
 
 def _pin(recipe: "Recipe") -> str:
-    """Return the name of the pin whose place is kept, empty where none is touched."""
+    """Return the name of the pin whose place is kept, empty if none is touched."""
     needs = recipe.source.of_method.needs
     return recipe.station.id if needs.motion and needs.station is StationKind.PIN else ""
 
 
 def _limits(recipe: "Recipe", parameters: MethodParameters) -> Limits:
-    """Return where the robot may go; higher where the method has to and nobody said how high."""
+    """Return where the robot may go; higher if the method needs it and nobody said how high."""
     box, speeds = recipe.box, recipe.speeds
     higher_mm = 0.0 if "up_mm" in box.model_fields_set else parameters.height_mm()
     return Limits(
@@ -175,7 +175,7 @@ def _limits(recipe: "Recipe", parameters: MethodParameters) -> Limits:
 
 
 def located(recipe: "Recipe", stations: Mapping[str, Station]) -> tuple["Recipe", Station]:
-    """Return the recipe with the place of its station, and the station as the method is told it.
+    """Return the recipe with its station's place, and the station as the method sees it.
 
     What the recipe says goes before the record.
 
@@ -258,7 +258,7 @@ _KINDS = (EntryKind.CALIBRATION, EntryKind.DONE, EntryKind.DECISION)
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """A tip that was measured, and the offset that stood for it.
+    """A measured tip, and the offset that was stored for it.
 
     Attributes:
         tip: Where the tip was found.
@@ -278,7 +278,7 @@ class Reference:
 def reference_details(
     station: str, tip: ToolOffset, value: ToolOffset, contact_z_mm: float | None
 ) -> dict[str, object]:
-    """Return what an entry has to say to serve as a reference later."""
+    """Return what an entry must contain to serve as a reference later."""
     return {
         "reference": station,
         "tip": plain_offset(tip),
@@ -288,7 +288,7 @@ def reference_details(
 
 
 def find_reference(controller: Controller, tool: int, station: str) -> Reference | None:
-    """Return the newest reference of a tool at a station, if it stands for what is stored.
+    """Return the newest reference of a tool at a station, if it matches the stored value.
 
     Returns:
         ``None`` when there never was one.
@@ -356,7 +356,7 @@ def proposed(
     typed_z_mm: float | None = None,
     taking_reference: bool = False,
 ) -> Proposal:
-    """Return the proposal that the recipe makes of a bare measurement.
+    """Return the recipe's proposal from a bare measurement.
 
     Args:
         recipe: The recipe.
@@ -399,7 +399,7 @@ def proposed(
 
 
 def _moved(reference: Reference, tip: ToolOffset, shown: Collection[str]) -> ToolOffset:
-    """Return the value of the reference, carried along by the tip as if it were fixed to it.
+    """Return the value of the reference, moved with the tip as if fixed to it.
 
     Args:
         reference: Where the tip was, and the value that stood for it.
@@ -450,7 +450,7 @@ def _as_moved(reference: Reference, offset: ToolOffset, shown: Collection[str]) 
 def _height(
     recipe: "Recipe", offset: ToolOffset, height: float, reference: Reference | None
 ) -> float:
-    """Return Z of the tip: the flange stands the higher at the contact, the longer the tip."""
+    """Return Z of the tip: the longer the tip, the higher the flange at the contact."""
     if recipe.basis == "absolute":
         assert recipe.station.z_mm is not None  # noqa: S101 - the recipe was checked
         return recipe.station.z_mm - height

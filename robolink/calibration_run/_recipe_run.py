@@ -1,4 +1,4 @@
-"""One run of a recipe: preflight, then the nozzle change with all that the recipe adds."""
+"""One run of a recipe: preflight, then the nozzle change with what the recipe adds."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -47,7 +47,7 @@ class RecipeRun:
         controller: The controller, connected.
         loaded: The recipe.
         operator: Who is asked, and brings the tip onto the pin.
-        answers: What was answered beforehand; nothing by default.
+        answers: What was answered in advance; nothing by default.
         audience: Told of everything that happens; nobody by default.
         take_reference: Whether to take a new reference in any case.
         accepted_change_mm: A larger jump than the recipe's that an engineer accepts this time.
@@ -136,7 +136,7 @@ class RecipeRun:
         self._looked_ahead = False
 
     def preflight(self) -> None:
-        """Find out, reading only, whatever would end the run later.
+        """Check, by reading only, everything that would end the run later.
 
         Raises:
             CalibrationError: ``reference_outdated``, ``no_last_touch`` or ``sensor_not_found``.
@@ -145,7 +145,7 @@ class RecipeRun:
             LimitError: A foreseen target lies outside the box.
             NotReadyError: The station was learnt in another base.
             NotAllowedError: A jump is accepted by somebody who is no engineer.
-            OutcomeUnknownError: Something earlier is unsettled.
+            OutcomeUnknownError: An earlier job is unfinished.
             BusyError: Somebody else is changing this controller.
             RobolinkError: The controller's state forbids it.
         """
@@ -183,7 +183,7 @@ class RecipeRun:
         self._looked_ahead = True
 
     def ask_ids(self, ask: Callable[[str], str]) -> Iterator[str]:
-        """Have the ids of nozzles and lots asked before anything moves; yield each.
+        """Ask for the ids of nozzles and lots before anything moves; yield each.
 
         Args:
             ask: Puts a question to the person and returns what was typed.
@@ -198,7 +198,7 @@ class RecipeRun:
                 yield answer
 
     def run(self) -> ChangeReport:
-        """Carry it out; :meth:`preflight` comes first where it has not passed yet.
+        """Carry it out; :meth:`preflight` comes first unless it has passed.
 
         Raises:
             RobolinkError: As :meth:`preflight`, and as
@@ -215,7 +215,7 @@ class RecipeRun:
                 )
 
     def _listener(self) -> RecipeListener:
-        """Return what carries out the recipe's own part; it signs as the run does now."""
+        """Return the listener for the recipe's part; it signs as the run does now."""
         return RecipeListener(
             self._loaded.recipe,
             self._controller,
@@ -240,7 +240,7 @@ class RecipeRun:
 
     @contextmanager
     def _signed(self) -> Iterator[None]:
-        """Have every entry name the recipe, the station, the nozzle and its lot."""
+        """Let every entry name the recipe, the station, the nozzle and its lot."""
         outcomes, loaded = self._controller.outcomes, self._loaded
         before = outcomes.signature
         outcomes.signature = replace(
@@ -258,7 +258,7 @@ class RecipeRun:
 
     @contextmanager
     def _outputs_told(self, listener: RecipeListener) -> Iterator[None]:
-        """Say how the outputs were left, whatever ends the run early."""
+        """Report how the outputs were left, whatever ends the run early."""
         try:
             yield
         except RobolinkError as error:
@@ -271,7 +271,7 @@ class RecipeRun:
             raise
 
     def _outputs_left(self, listener: RecipeListener) -> str:
-        """Say how the outputs were left.
+        """Report how the outputs were left.
 
         An emergency stop may switch them off by itself (docs/reference/spel.md 8): what the recipe
         had switched is not how they are then. Where the controller cannot be asked any more, only
@@ -340,7 +340,7 @@ def _require_sensor(loaded: "LoadedRecipe") -> None:
 
 
 def _switched(listener: RecipeListener, *, stopped: bool) -> str:
-    """Say which outputs the recipe left switched, and what an emergency stop did to them."""
+    """Report which outputs the recipe left switched, and what an emergency stop did to them."""
     if not listener.switched:
         return tr("The emergency stop may have switched outputs off.") if stopped else ""
     states = ", ".join(
@@ -357,14 +357,14 @@ def _switched(listener: RecipeListener, *, stopped: bool) -> str:
 def _located(
     loaded: "LoadedRecipe", controller: Controller, cell: Cell | None
 ) -> tuple["LoadedRecipe", Station, Station | None]:
-    """Return the recipe with the place of its station, the station, and what is known of that."""
+    """Return the recipe with its station's place, the station, and what is known of that."""
     stations = stations_on_record(controller, cell)
     recipe, station = located(loaded.recipe, stations)
     return replace(loaded, recipe=recipe), station, stations.get(loaded.recipe.station.id)
 
 
 def _rests_on(loaded: "LoadedRecipe", station: Station, known: Station | None) -> Station:
-    """Return the station whose place the run goes by: the known one unless the recipe says it.
+    """Return the station that the run relies on: the known one unless the recipe states it.
 
     A full calibration finds the pin anew, and is judged by where it was.
     """
@@ -375,7 +375,7 @@ def _rests_on(loaded: "LoadedRecipe", station: Station, known: Station | None) -
 def _require_able(
     controller: Controller, recipe: "Recipe", *, other_sensor: bool, writes: bool
 ) -> None:
-    """Refuse a recipe that asks for what a controller cannot do; asks it nothing.
+    """Refuse a recipe that a controller cannot carry out; asks it nothing.
 
     Args:
         controller: The controller, connected.
@@ -399,7 +399,7 @@ def _require_able(
 
 
 def _require_own_numbers(controller: Controller, loaded: "LoadedRecipe") -> None:
-    """Refuse a copy that nobody has put the numbers of the cell in, where something moves; reads.
+    """Refuse a copy without the cell's own numbers, if something moves; reads.
 
     Args:
         controller: The controller, connected.

@@ -1,4 +1,4 @@
-"""What a nozzle change puts on record: poses, verdicts, decisions, the place of the pin."""
+"""What a nozzle change records: poses, verdicts, decisions, the place of the pin."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -47,7 +47,7 @@ def calibration_entry(
     simulated: bool = False,
     gauge: Gauge | None = None,
 ) -> NewEntry:
-    """Return the record of a measurement that was believed, with all that it rests on.
+    """Return the record of an accepted measurement, with all that it rests on.
 
     Args:
         proposal: What was measured.
@@ -107,7 +107,7 @@ def _measured(proposal: Proposal) -> str:
 def refusal_entry(
     tool: int, criteria: AcceptanceCriteria, error: BaseException, *, poses: Sequence[Pose] = ()
 ) -> NewEntry:
-    """Return the record of a measurement that was not believed, or not finished.
+    """Return the record of a refused or unfinished measurement.
 
     Args:
         tool: Number of the tool.
@@ -134,7 +134,7 @@ def refusal_entry(
 def verification_entry(
     tool: int, result: VerifyResult, *, tests: Sequence[VerifyResult] = ()
 ) -> NewEntry:
-    """Return the record of a test about the new tip.
+    """Return the record of a turn test.
 
     Args:
         tool: Number of the tool.
@@ -159,7 +159,7 @@ def verification_entry(
 
 
 def tests_on_record(outcomes: OutcomeLog, tool: int, proof: VerifyResult) -> list[VerifyResult]:
-    """Return the turn tests of the change under way that contradicted its measurement.
+    """Return the recorded turn tests of this change that contradicted its measurement.
 
     Whoever ends the process and begins anew does not get rid of what was seen.
 
@@ -183,7 +183,7 @@ def tests_on_record(outcomes: OutcomeLog, tool: int, proof: VerifyResult) -> lis
 
 
 def decision_entry(verdict: str, **details: object) -> NewEntry:
-    """Return the record of what a person decided."""
+    """Return the record of a person's decision."""
     return NewEntry(EntryKind.DECISION, verdict=verdict, details=details)
 
 
@@ -211,7 +211,7 @@ def _pose(pose: Pose) -> dict[str, object]:
 
 
 def touches_made(poses: Sequence[Pose]) -> dict[str, object]:
-    """Return how a person made each touch, plain JSON; nothing where nobody touched anything.
+    """Return how a person made each touch, plain JSON; nothing if nobody touched anything.
 
     ``touches`` has one entry a pose: where the robot had stopped, the standoff from there to the
     expected contact, how far was jogged, after how many seconds it was answered, whether an input
@@ -246,17 +246,17 @@ def _seen(poses: Sequence[Pose]) -> dict[str, object]:
 
 
 def finds_pin(result: CalibrationResult) -> bool:
-    """Tell whether a measurement found the pin itself, with the offset."""
+    """Return whether a measurement found the pin itself, with the offset."""
     return any(method.needs.finds_pin for method in _methods_of(result))
 
 
 def tells_height(result: CalibrationResult) -> bool:
-    """Tell whether the heights of the touches say how long the tip is, beside what was solved."""
+    """Return whether the heights of the touches show the tip's length, besides what was solved."""
     return "z_mm" not in result.found and any(method.tells_height for method in _methods_of(result))
 
 
 def next_steps(result: CalibrationResult, tool: int) -> tuple[NextStep, ...]:
-    """Return what a person does next with a tool that was written; nothing for most methods.
+    """Return what a person does next with a written tool; nothing for most methods.
 
     Args:
         result: The measurement.
@@ -271,7 +271,7 @@ def _methods_of(result: CalibrationResult) -> Iterator[AnyMethod]:
 
 
 def require_pin_in_base(station: str, result: CalibrationResult) -> None:
-    """Refuse to keep the place of a pin that was found from poses of a local coordinate system.
+    """Refuse to keep a pin's place that was found from poses of a local coordinate system.
 
     The tip comes out the same in every local, the pin does not (docs/reference/evidence.md 4).
 
@@ -298,7 +298,7 @@ def require_pin_in_base(station: str, result: CalibrationResult) -> None:
 
 
 def touch_heights_mm(proposal: Proposal) -> list[float]:
-    """Return how high each touch puts the pin, if the tip is as long as the value says; base."""
+    """Return the pin's height by each touch, if the tip is as long as the value says; base."""
     value = proposal.offset
     return [contact_of(pose, value)[2] for pose in _kept_inputs(proposal.result)]
 
@@ -324,7 +324,7 @@ def _turned(pose: Pose, offset: ToolOffset) -> tuple[float, float, float]:
 
 
 def pin_mm(proposal: Proposal) -> tuple[float, float, float]:
-    """Return where the offset that was measured puts the pin, base."""
+    """Return where the measured offset puts the pin, base."""
     result, tip = proposal.result, proposal.tip
     x_mm, y_mm = result.reference_point_mm[:2]
     if len(result.reference_point_mm) == 3:
@@ -405,7 +405,7 @@ def _spread(result: CalibrationResult) -> dict[str, object]:
 
 
 def touch_details(station: str, proposal: Proposal) -> dict[str, object]:
-    """Return what the journal keeps of the pin beside a value that was kept."""
+    """Return what the journal keeps of the pin besides an accepted value."""
     result = proposal.result
     chain = chain_of(result) or NeedleChain(offset_sigma_mm(result) or 0.0)
     x_mm, y_mm, z_mm = pin_mm(proposal)
@@ -430,7 +430,7 @@ def touch_details(station: str, proposal: Proposal) -> dict[str, object]:
 
 
 def _scatter(heights_mm: Sequence[float], by: TouchWitness) -> dict[str, object]:
-    """Return how much the heights of one run differ, for those who pool it with others."""
+    """Return how much the heights of one run differ, for pooling with others."""
     mean = fmean(heights_mm)
     return {
         "heights_mm2": sum((height - mean) ** 2 for height in heights_mm),

@@ -1,4 +1,4 @@
-"""How nozzles sit, how well touches repeat and a tool is known: from what a cell has on record."""
+"""Seating of nozzles, repeatability of touches, uncertainty of a tool: from a cell's records."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -33,7 +33,7 @@ MOST_CHANGES: Final = 50
 
 @dataclass(frozen=True, slots=True)
 class Seating:
-    """How differently new nozzles sit.
+    """How much the places of newly mounted nozzles differ.
 
     Attributes:
         sigma_mm: Standard deviation of X, Y and Z.
@@ -45,7 +45,7 @@ class Seating:
 
     @property
     def within_mm(self) -> float | None:
-        """In which distance, in the plane, the tip lies after the next mounting, in 95 %.
+        """Distance in the plane within which the tip lies after the next mounting, in 95 %.
 
         ``None`` while too few changes are on record. Two coordinates that were pooled from n
         changes have 2 n degrees of freedom.
@@ -60,12 +60,12 @@ class Seating:
         return seating_sentence(self.within_mm, self.changes)
 
     def as_json(self) -> dict[str, object]:
-        """Return it as plain values; nothing but ``None`` where the record does not tell it."""
+        """Return it as plain values; only ``None`` where the record does not show it."""
         return {"within_mm": self.within_mm, "changes": self.changes}
 
 
 def seating_of(controller: Controller) -> Seating:
-    """Return what the changes of all tools of a controller tell (docs/reference/evidence.md 11).
+    """Return the seating by all tools' changes of a controller (docs/reference/evidence.md 11).
 
     X and Y are pooled: a nozzle has no side on which it sits better. Z counts where it was
     measured; a Z that was kept would look like a nozzle that always sits alike.
@@ -87,7 +87,7 @@ def seating_of(controller: Controller) -> Seating:
 
 
 def touched_by(poses: Sequence[Pose]) -> TouchWitness:
-    """Return what witnessed touches: an input, the person who made them, or nobody."""
+    """Return what confirmed touches: an input, the person who made them, or nobody."""
     touches = [pose for pose in poses if isinstance(pose, TouchedAt)]
     if len(touches) < len(poses) or any(touch.typed for touch in touches):
         return "poses"
@@ -124,7 +124,7 @@ def touch_sigma_z_mm(controller: Controller, pin: str, by: TouchWitness = "perso
 
 
 def touching_as_recorded(controller: Controller, plan: TouchPlan, pin: str) -> TouchPlan:
-    """Return a plan of touches with how well this cell touches the pin, where nobody stated it.
+    """Return a plan of touches with this cell's recorded repeatability, where none is stated.
 
     Args:
         controller: Whose record is looked at.
@@ -148,7 +148,7 @@ def touching_as_recorded(controller: Controller, plan: TouchPlan, pin: str) -> T
 
 
 def height_is_known(controller: Controller, tool: int) -> bool:
-    """Tell whether Z of a tool is more than a value that calibrations kept.
+    """Return whether Z of a tool is more than a value that calibrations kept.
 
     Whoever wrote it by hand stands for it; a calibration of X and Y alone does not.
     """
@@ -158,7 +158,7 @@ def height_is_known(controller: Controller, tool: int) -> bool:
 
 
 def tip_sigma_mm(controller: Controller, tool: int) -> float:
-    """Return how uncertain the stored tip of a tool is by its last calibration, 0 for unknown."""
+    """Return the uncertainty of a tool's stored tip by its last calibration, 0 for unknown."""
     kept = controller.outcomes.recorded(tool=tool, kinds=(EntryKind.DONE, EntryKind.DECISION))
     newest = next((entry for entry in kept if "question" not in entry.details), None)
     touch = newest.details.get("touch") if newest else None
@@ -184,11 +184,11 @@ def _changes(entries: Iterable[Recorded]) -> Iterator[tuple[float, float, float 
 
 
 def nozzle_of(entry: Recorded) -> str:
-    """Return the id of the nozzle that an entry speaks of, empty when nobody gave one."""
+    """Return the nozzle id of an entry, empty if nobody gave one."""
     return nozzle_in(entry.details, entry.signature.nozzle)
 
 
 def nozzle_in(details: Mapping[str, object], of_the_run: str) -> str:
-    """Return the id of a nozzle from a record; one of its own goes before that of the run."""
+    """Return the nozzle id of a record; its own precedes that of the run."""
     own = details.get("nozzle")
     return own if isinstance(own, str) and own else of_the_run

@@ -1,4 +1,4 @@
-"""Whether the pin is where it was: a pin that was bumped is told from new nozzles."""
+"""Whether the pin is where it was: tells a bumped pin from new nozzles."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -19,7 +19,7 @@ from robolink.stations import Station, base_now, find_stations, station_entry, s
 
 
 def check_stations(controller: Controller, proposals: Proposals) -> Proposals:
-    """Return the proposals, doubted where the pin moved since it was found.
+    """Return the proposals, with a doubt if the pin has moved since it was found.
 
     A full calibration finds the pin anew, so its tip is right wherever the pin is now. One touch
     relies on the pin: where several tips say together that it moved, nothing is proposed. A single
@@ -51,7 +51,7 @@ def check_stations(controller: Controller, proposals: Proposals) -> Proposals:
 
 
 def stations_found(controller: Controller, proposals: Proposals) -> Iterator[NewEntry]:
-    """Yield what calibrations that were kept say about where pins are, and how cameras see."""
+    """Yield what accepted calibrations show about places of pins and views of cameras."""
     known = stations_on_record(controller)
     base: tuple[float, ...] | None = None
     asked = False
@@ -86,7 +86,7 @@ def _shifts(
 
 
 def _measured_shift(station: Station | None, proposal: Proposal) -> TipShift | None:
-    """Return by how much a full calibration found the pin elsewhere; the tip plays no part."""
+    """Return how far a full calibration found the pin from before; the tip plays no part."""
     found = found_pin(station.id, proposal) if station else None
     if found is None or station is None or station.x_mm is None or station.y_mm is None:
         return None
@@ -112,7 +112,7 @@ def _supposed_shift(proposal: Proposal, seat_mm: tuple[float, ...]) -> TipShift 
 
 
 def _same_nozzle(controller: Controller, proposal: Proposal) -> bool:
-    """Tell whether the nozzle is known to be the one that was measured last."""
+    """Return whether the nozzle is known to be the one measured last."""
     outcomes = controller.outcomes
     kept = outcomes.recorded(tool=proposal.tool, kinds=KEPT)
     # An answer to a question is a decision too, and stands for no value.
@@ -124,7 +124,7 @@ def _same_nozzle(controller: Controller, proposal: Proposal) -> bool:
 
 
 def _judged(plan: ToolPlan, proposal: Proposal, shift: StationShift) -> Proposal:
-    """Return a proposal with what the shift makes doubtful about it."""
+    """Return a proposal with the doubts that the shift causes."""
     if shift.moved:
         record = {**proposal.record, "station_shift_mm": list(shift.vector_mm)}
         doubted = _with(proposal, _sentence(plan.pin, shift), doubt="station_moved")
@@ -189,7 +189,7 @@ def _sentence(station: str, shift: StationShift) -> str:
 
 
 def found_with(controller: Controller, tools: Sequence[int]) -> dict[int, tuple[str, ...]]:
-    """Return the names of the stations on record that were found with each of some tools."""
+    """Return the recorded stations that were found with each of some tools."""
     entries = list(controller.outcomes.recorded(kinds=(EntryKind.STATION,)))
     found = find_stations(None, entries).values()
     finders = {entry.number: entry.tool for entry in entries}

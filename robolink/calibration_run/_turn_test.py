@@ -1,4 +1,4 @@
-"""The turn test: how it is asked for, and how it ends.
+"""The turn test: how it is requested, and how it ends.
 
 It is held to the limit of the process and to what the measurement said. A drift inside the limit of
 the process that contradicts the statement of the measurement is no pass: what was measured, or what
@@ -43,7 +43,7 @@ _USES_PLACE: Final = frozenset({"place_mm", "plate_mm", "camera_turn_deg", "came
 
 
 class TurnTestStep(StrEnum):
-    """What may follow; the values are those of the record."""
+    """Possible next steps; the values are those of the record."""
 
     TAKE_BACK = "take_back"
     AGAIN = "again"
@@ -58,7 +58,7 @@ KEEPING: Final = frozenset({TurnTestStep.KEEP, TurnTestStep.WIDER})
 
 @dataclass(frozen=True, slots=True)
 class Attended:
-    """That a person may be asked, and what can be done on their word.
+    """Whether a person can be asked, and what can be done with their consent.
 
     Attributes:
         choose: Asks which row.
@@ -77,7 +77,7 @@ class Attended:
 def relearning_commands(
     controller: Controller, plan: ToolPlan, result: CalibrationResult
 ) -> tuple[str, ...]:
-    """Return the commands that learn anew the station on whose place a measurement rests.
+    """Return the commands that relearn the station on which a measurement relies.
 
     Empty where it rests on none, or on one without a name.
 
@@ -112,7 +112,7 @@ def asked_what_follows(
     stated_mm: float | None,
     widest_mm: float | None,
 ) -> TurnTestStep:
-    """Ask what is to follow, and return it.
+    """Ask for the next step, and return it.
 
     Args:
         question: What was found, in sentences.
@@ -148,7 +148,7 @@ def asked_what_follows(
 
 
 def _sure(step: TurnTestStep, judgement: TurnJudgement, stated_mm: float | None) -> str:
-    """Return what a person says yes to before a value is kept: rows change their numbers."""
+    """Return what a person confirms before a value is kept: rows change their numbers."""
     if step is TurnTestStep.KEEP:
         return tr("The tip is still within {mm:.3f} mm, as stated. Keep the value?", mm=stated_mm)
     return tr(
@@ -160,7 +160,7 @@ def _sure(step: TurnTestStep, judgement: TurnJudgement, stated_mm: float | None)
 
 def _take_back() -> ChoiceRow:
     return ChoiceRow(
-        tr("Put the old value back."), tr("robolink undoes everything that this change wrote.")
+        tr("Restore the old value."), tr("robolink undoes everything that this change wrote.")
     )
 
 
@@ -178,7 +178,7 @@ def _again(left: int, *, by_touch: bool) -> ChoiceRow:
 def _kept(
     judgement: TurnJudgement, stated_mm: float | None, widest_mm: float | None
 ) -> tuple[TurnTestStep, ChoiceRow] | None:
-    """Return how the value may be kept; ``None`` where it may not."""
+    """Return how the value may be kept; ``None`` if it may not."""
     if not judgement.fails:
         return TurnTestStep.KEEP, ChoiceRow(
             tr("Keep the value: it is accurate to +-{mm:.3f} mm, as stated.", mm=stated_mm),
@@ -195,12 +195,12 @@ def _kept(
             wider=wider_mm,
             stated=stated_mm or 0.0,
         ),
-        tr("It goes on record, and needs an engineer if the cell names people."),
+        tr("It is recorded, and needs an engineer if the cell names people."),
     )
 
 
 def with_step(error: VerifyError, step: TurnTestStep, relearning: tuple[str, ...]) -> VerifyError:
-    """Return a refusal that says how the step is done that a person chose.
+    """Return an error that says how to do the step that a person chose.
 
     Args:
         error: The refusal.
@@ -233,7 +233,7 @@ def conclude_turn_test(
     earlier: Sequence[VerifyResult] = (),
     tell: Callable[[VerifyResult], None] = lambda _proof: None,
 ) -> VerifyResult:
-    """Put a turn test on record, and refuse one that did not pass or that nobody may let pass.
+    """Record a turn test; refuse one that did not pass or that nobody may let pass.
 
     Args:
         controller: The controller, connected.
@@ -331,7 +331,7 @@ def _record(
     step: TurnTestStep,
     accurate_mm: float | None,
 ) -> None:
-    """Put on record what a person chose.
+    """Record what a person chose.
 
     Raises:
         NotAllowedError: A wider statement takes an engineer.
@@ -361,7 +361,7 @@ def _record(
 def touches_counting(
     controller: Controller, tell: Callable[[CalibrationError], None] = lambda _error: None
 ) -> Iterator[None]:
-    """Let touches of a turn test that were not made end it as a failed one.
+    """Let touches of a turn test that were not made count as a failed test.
 
     Args:
         controller: The controller.
@@ -385,7 +385,7 @@ def touches_counting(
 
 
 def told_of_contradiction(proof: VerifyResult, judgement: TurnJudgement) -> str:
-    """Return what was found and what it contradicts, in sentences for a person.
+    """Return the finding and what it contradicts, in sentences for a person.
 
     Args:
         proof: The turn test.

@@ -1,4 +1,4 @@
-"""From the cell files to one cell, and where each of its values came from."""
+"""From the cell files to one cell, with the source of each of its values."""
 
 import json
 import re
@@ -43,7 +43,7 @@ def problems_of(
     known: Mapping[int, Sequence[str]],
     kinds: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> list[Problem]:
-    """Return everything that pydantic objects to.
+    """Return everything that pydantic reports.
 
     Args:
         error: What it raised.
@@ -93,11 +93,11 @@ _CELL_NAME = re.compile(r"[^\s+:/\\]+")
 
 
 USUAL_CHANGE_MM: Final = 2.0
-"""Where a cell names no limit of its own: more than a change of nozzles explains."""
+"""Default limit of a cell: more than a change of nozzles explains."""
 
 
 class CellGlimpse(NamedTuple):
-    """What is said of a cell, as it is written and unchecked.
+    """What the files say about a cell, unchecked.
 
     Attributes:
         url: The controller's URL; empty where none is said.
@@ -126,7 +126,7 @@ class Cell:
 
     @property
     def expected(self) -> Expected:
-        """What even a look has to heed."""
+        """What even a read-only look has to obey."""
         return Expected(
             self.name,
             tool=self.settings.tool,
@@ -136,7 +136,7 @@ class Cell:
         )
 
     def limits(self, *, usual_mm: float = USUAL_CHANGE_MM) -> ChangeLimits:
-        """Return how far a write may take a tip; more takes an engineer.
+        """Return how far a write may move a tip; more takes an engineer.
 
         Args:
             usual_mm: What holds where the cell names no limit of its own.
@@ -147,7 +147,7 @@ class Cell:
 
 
 def find_cell(name: str) -> Cell:
-    """Return the cell that a person calls ``name``.
+    """Return the cell called ``name``.
 
     Raises:
         ConfigError: There is none, or a file is wrong.
@@ -166,7 +166,7 @@ def find_cell(name: str) -> Cell:
 
 
 def load_cells() -> dict[str, Cell]:
-    """Return all cells of all files, those of the file that wins first.
+    """Return all cells of all files, those of the file with precedence first.
 
     A file adds to what farther ones say about a cell, and wins where both say something. One
     that gives a URL starts the cell anew: limits and confirmations were given for the robot
@@ -188,7 +188,7 @@ def load_cells() -> dict[str, Cell]:
 
 
 def check_file(path: Path) -> tuple[Problem, ...]:
-    """Return everything that is wrong in one cell file; nothing when it is right.
+    """Return all errors in one cell file; none if it is right.
 
     Raises:
         ConfigError: It cannot be read, or is no TOML.
@@ -197,7 +197,7 @@ def check_file(path: Path) -> tuple[Problem, ...]:
 
 
 def problems_in(document: dict[str, object]) -> tuple[Problem, ...]:
-    """Return everything that is wrong in what a cell file says.
+    """Return all errors in the content of a cell file.
 
     Args:
         document: All of the file.
@@ -228,7 +228,7 @@ def problems_in(document: dict[str, object]) -> tuple[Problem, ...]:
 
 
 def settings_of_file(path: Path) -> "Mapping[str, CellSettings]":
-    """Return the cells of one file as it says them alone; none where it is wrong.
+    """Return the cells of one file by itself; none if it is wrong.
 
     Raises:
         ConfigError: It cannot be read, or is no TOML.
@@ -241,7 +241,7 @@ def settings_of_file(path: Path) -> "Mapping[str, CellSettings]":
 
 
 def cell_names() -> list[str]:
-    """Return the names of all cells; for TAB, so files that are wrong are passed over."""
+    """Return the names of all cells, for TAB; files with errors are skipped."""
     names: dict[str, None] = {}
     for cells in _unchecked():
         names |= dict.fromkeys(cells)
@@ -249,7 +249,7 @@ def cell_names() -> list[str]:
 
 
 def glimpse_of_cell(name: str) -> CellGlimpse:
-    """Return what files say of a cell, unchecked; for TAB, so what is wrong is passed over."""
+    """Return what files say about a cell, unchecked, for TAB; errors are skipped."""
     url, stations = "", dict[str, None]()
     for cells in _unchecked():
         said = cells.get(name)
@@ -261,7 +261,7 @@ def glimpse_of_cell(name: str) -> CellGlimpse:
 
 
 def _unchecked() -> Iterator[dict[str, object]]:
-    """Yield the cells of each file that can be read, the one that wins first."""
+    """Yield the cells of each readable file, the one with precedence first."""
     for file in config_files():
         if file.present:
             try:
@@ -273,7 +273,7 @@ def _unchecked() -> Iterator[dict[str, object]]:
 
 
 def _together(farther: _Said, nearer: _Said) -> _Said:
-    """Return what two files say together: the nearer one wins, station by station, row by row."""
+    """Return two files merged: the nearer one wins, station by station, row by row."""
     both = farther | nearer
     for table in ("stations", "accuracy"):
         if table in farther and table in nearer:
@@ -284,7 +284,7 @@ def _together(farther: _Said, nearer: _Said) -> _Said:
 
 
 def _checked(path: Path) -> dict[str, dict[str, object]]:
-    """Return what each cell of a file that is right says, paths made absolute."""
+    """Return each cell of a correct file, with absolute paths."""
     from robolink.config._settings import CellFile
 
     problems = check_file(path)
@@ -323,7 +323,7 @@ def _cell(name: str, said: Mapping[str, tuple[Path, object]]) -> Cell:
 
 
 def add_cell(path: Path, name: str, said: Mapping[str, str | float]) -> None:
-    """Write a cell into a cell file; the rest of the file stays as it is, to the byte.
+    """Add a cell to a cell file; the rest of the file stays as it is, to the byte.
 
     Args:
         path: The file; it is made where there is none.
@@ -351,7 +351,7 @@ def add_cell(path: Path, name: str, said: Mapping[str, str | float]) -> None:
 
 
 def content_with_cell(path: Path, name: str, said: Mapping[str, str | float]) -> bytes:
-    r"""Return what a cell file says with one more cell, so far as its keys are known by now.
+    r"""Return a cell file's content with one more cell, as far as its keys are known by now.
 
     Args:
         path: The file; it is read where there is one.

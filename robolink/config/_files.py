@@ -1,4 +1,4 @@
-"""Which files say what the cells are, and how one is read."""
+"""Which cell files there are, and how one is read."""
 
 import os
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ _NAME = "robolink.toml"
 
 
 class Source(StrEnum):
-    """Why a file is looked at; in the order of precedence."""
+    """Why a file is read; in the order of precedence."""
 
     NAMED = "named"
     FOLDER = "folder"
@@ -30,12 +30,12 @@ class ConfigFile:
 
     @property
     def present(self) -> bool:
-        """Whether it has to be read: it exists, or a person named it."""
+        """Whether to read it: it exists, or a person named it."""
         return self.source is Source.NAMED or self.path.is_file()
 
 
 def config_files() -> tuple[ConfigFile, ...]:
-    """Return the places looked at, the one that wins first.
+    """Return the places searched, the one with precedence first.
 
     The file that ROBOLINK_CONFIG names, ``robolink.toml`` in the working folder, the user's,
     the site's (docs/cell-files.md, "Where they are").
@@ -61,7 +61,7 @@ CELL_FILE: Final = FileKind(
 
 
 def read_document(path: Path) -> dict[str, object]:
-    """Return what a cell file says.
+    """Return the content of a cell file.
 
     Raises:
         ConfigError: It cannot be read, or is no TOML.

@@ -1,4 +1,4 @@
-"""How a cell is reached, when nothing but that matters.
+"""How to reach a cell, whatever the rest of its settings is.
 
 A stop may not be kept from the robot by a wrong key beside the URL. So of the cell files only the
 address and the place of the password are read here, and where a file cannot be read at all, the
@@ -24,7 +24,7 @@ _KIND = "cells"
 
 @dataclass(frozen=True, slots=True)
 class Expected:
-    """What the cell files say that even a look has to heed.
+    """What the cell files require even of a read-only look.
 
     Attributes:
         cell: The cell's name.
@@ -43,7 +43,7 @@ class Expected:
 
 @dataclass(frozen=True, slots=True)
 class Reach:
-    """How a cell is reached.
+    """How to reach a cell.
 
     Attributes:
         url: The controller's URL.
@@ -65,7 +65,7 @@ class Reach:
 
 
 def reach_cell(name: str) -> Reach:
-    """Return how the cell ``name`` is reached, read from no more than has to be right for it.
+    """Return how to reach the cell ``name``, from no more settings than that needs.
 
     Raises:
         ConfigError: No file says it, and no connection has left a copy.
@@ -105,7 +105,7 @@ def reach_cell(name: str) -> Reach:
 
 
 def glance_at_cell(name: str) -> Reach | None:
-    """Return how a cell is reached if its files were right before and are the same now.
+    """Return how to reach a cell if its files were right before and have not changed.
 
     A look need not wait for pydantic to check them anew.
     """
@@ -118,7 +118,7 @@ def glance_at_cell(name: str) -> Reach | None:
 
 
 def proof_of_files() -> str:
-    """Return what changes with any byte of any cell file; empty where one cannot be read."""
+    """Return a value that changes with any byte of any cell file; empty if one is unreadable."""
     digest = sha256()
     try:
         for file in config_files():
@@ -131,7 +131,7 @@ def proof_of_files() -> str:
 
 
 def remember_reach(name: str, origin: Path, reach: Reach) -> None:
-    """Keep how a cell was reached, for the day when its file cannot be read.
+    """Keep how a cell was reached, for when its file cannot be read.
 
     Args:
         name: The cell.
@@ -169,7 +169,7 @@ def _recall(name: str, origin: Path) -> Reach | None:
 
 
 def _recalled_expected(kept: object) -> Expected | None:
-    """Return what was kept of the cell file; ``None`` where an earlier version kept nothing."""
+    """Return what was kept of the cell file; ``None`` if an earlier version kept nothing."""
     try:
         found = Expected(**kept)  # type: ignore[arg-type]
         people = found.people

@@ -1,4 +1,4 @@
-"""What one ``[cells.NAME]`` table may say. Imported when a file is loaded, for pydantic."""
+"""The keys of one ``[cells.NAME]`` table. Imported when a file is loaded, for pydantic."""
 
 from datetime import date
 from typing import Annotated, Literal
@@ -21,7 +21,7 @@ STRICT = ConfigDict(
 
 
 class _Station(BaseModel):
-    """What all kinds of stations have in common.
+    """The keys that all kinds of stations share.
 
     Attributes:
         x_mm, y_mm, z_mm: Where it is, base; once it is learnt, the journal knows better.
@@ -45,7 +45,7 @@ class _Station(BaseModel):
 
 
 class PinSettings(_Station):
-    """A pin that a person brings a tip onto.
+    """A pin that a person touches with a tip.
 
     Attributes:
         place_mm, touch_mm: What is stated of these rows for this pin, half widths.
@@ -112,7 +112,7 @@ Pair = Annotated[tuple[float, ...], Field(strict=False, min_length=2, max_length
 
 
 class CameraSettings(_Station):
-    """An up-looking camera; X, Y and Z are where tips are brought before it, in focus.
+    """An up-looking camera; X, Y and Z are where it sees tips in focus.
 
     Attributes:
         sensor: Name or URL of the camera.
@@ -166,7 +166,7 @@ def station_keys() -> dict[str, list[str]]:
 
 
 class AccuracySettings(BaseModel):
-    """Half widths of rows that are stated for a cell; what is not said is not known.
+    """Half widths of rows that a cell file states; one that is missing is unknown.
 
     The keys are those of ``robolink.calibration.ACCURACY_ROWS``; what is stated for a station
     goes before.
@@ -197,7 +197,7 @@ Text = Annotated[str, Field(min_length=1)]
 
 
 class CellSettings(BaseModel):
-    """One cell: how to reach it, and the limits of work there. What is not said is ``None``.
+    """One cell: how to reach it, and its limits. A missing key is ``None``.
 
     The limits are those of the options of the same name; an option on the command line wins.
 

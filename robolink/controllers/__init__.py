@@ -1,4 +1,4 @@
-"""Codec + transport + semantics = a machine that can be used.
+"""Controllers: codec, transport and semantics as a machine that can be used.
 
 What another kind of controller is made of is offered here too (docs/extending.md).
 """

@@ -1,4 +1,4 @@
-"""A controller, but for what its kind says: the same for whatever is driven.
+"""What all kinds of controllers share, whatever they drive.
 
 A kind brings a :class:`~.driver_link.DriverLink`, a tool table, what moves, and how its state is
 read. Markers, latch, ledger, recovery, and what happens at the end of a connection are here.
@@ -43,16 +43,16 @@ _STOPS_S: Final = 5.0
 
 
 class ControllerCore(DriverPart, ABC):
-    """Implements :class:`robolink.model.Controller` with what a kind of controller says.
+    """Implements :class:`robolink.model.Controller`; each kind of controller adds its own part.
 
     Attributes:
         identity: How it is reached: the URL, with those options only that tell far ends apart.
         clock: The clock on which its time passes.
         latch: What holds everything back from :meth:`stop` until :meth:`release_stop`.
-        change_guard: What holds back writes that take a tip farther than the cell allows.
+        change_guard: Refuses writes that move a tip farther than the cell allows.
         patience: How long a call waits that would be refused because somebody else is at work.
         outcomes: The doubtful outcomes and the unfinished procedures of this controller.
-        ledger: What was done to it since connecting, and how much of that is proved.
+        ledger: What was done to it since connecting, and how much of that is confirmed.
         capabilities: What can be asked for.
         tools: The tool offsets.
         groups: What moves.
@@ -104,7 +104,7 @@ class ControllerCore(DriverPart, ABC):
         self.tools = tools
 
     def __repr__(self) -> str:
-        """Say which controller, and its state as it was read last; nothing is asked for it."""
+        """Show which controller, and its state as last read; asks nothing."""
         seen = self.ledger.seen
         if self._closed:
             state = "closed"
@@ -132,7 +132,7 @@ class ControllerCore(DriverPart, ABC):
         """Close the link. Idempotent."""
 
     def _take_leave(self) -> None:
-        """Do what is proper before the link is closed; whatever it raises is passed over."""
+        """Do what is proper before the link is closed; errors are ignored."""
 
     # What a kind may have; a command that needs none of it does without making it.
 
@@ -158,16 +158,16 @@ class ControllerCore(DriverPart, ABC):
 
     @cached_property
     def resolver(self) -> Resolver:
-        """Settles what was begun here and not proved finished."""
+        """Finishes or undoes interrupted jobs."""
         return MarkerResolver(self._driver, self.tools, self._preserver)
 
     @cached_property
     def _preserver(self) -> Preserver:
-        """Puts back what procedures change."""
+        """Restores what procedures change."""
         return Preserver(self._driver, self.tools, self.groups)
 
     def condition(self) -> Mapping[str, object]:
-        """Read more about the state than the flags say, plain JSON."""
+        """Read more about the state than the flags show, plain JSON."""
         return {}
 
     def facts(self) -> ControllerFacts:
@@ -175,7 +175,7 @@ class ControllerCore(DriverPart, ABC):
         return ControllerFacts()
 
     def preview(self, act: Act) -> tuple[str, ...]:
-        """Return the requests of an act, as they stand on the wire. Reads at most."""
+        """Return the requests of an action, as sent on the wire. Reads at most."""
         raise self._driver.lacks(str(act))
 
     def reset_fault(self) -> None:
@@ -183,20 +183,20 @@ class ControllerCore(DriverPart, ABC):
         raise self._driver.lacks(str(Act.RESET))
 
     def motors(self, on: bool) -> None:
-        """Switch the motors."""
+        """Switch the motors on or off."""
         raise self._driver.lacks(str(Act.MOTORS_ON if on else Act.MOTORS_OFF))
 
     # What is the same for all.
 
     def status(self) -> ControllerStatus:
-        """Read the state flags; others see by it that this process is alive."""
+        """Read the state flags; others see by this that the process is alive."""
         self._driver.markers.beat()
         status = self._read_status()
         self.ledger.saw_status(status, self.clock.now_ns())
         return status
 
     def stop(self) -> None:
-        """Bring everything to rest; from any thread, at any time, more than once.
+        """Stop everything; from any thread, at any time, more than once.
 
         From its first instant on no movement, jog, write or program start leaves this process until
         :meth:`release_stop`; whoever is at work gets StoppedError.
@@ -217,15 +217,15 @@ class ControllerCore(DriverPart, ABC):
         self._driver.decided("stop acknowledged: it rests", str(Act.STOP))
 
     def release_stop(self) -> None:
-        """Let this process act again after :meth:`stop`, because a person says so."""
+        """Release a stop at a person's request: this process may act again."""
         self.latch.release()
 
     def take_over(self, reason: str) -> None:
-        """Take the controller over from whoever works on it; see the model."""
+        """Take the controller over from the user who has it locked; see the model."""
         self.outcomes.take_over(reason)
 
     def require_settled(self, request: str) -> None:
-        """Refuse ``request`` while something earlier is unsettled.
+        """Refuse ``request`` while an earlier job is unfinished.
 
         Raises:
             OutcomeUnknownError: Names it.
@@ -246,12 +246,12 @@ class ControllerCore(DriverPart, ABC):
             return self._driver.markers.begin(kind, request, details, operation=operation)
 
     def finish(self, marker: Marker, *entries: NewEntry) -> None:
-        """Forget the marker of a procedure, and journal how it ended."""
+        """Remove the marker of a procedure, and record how it ended."""
         self._driver.markers.clear(marker, *entries)
 
     @contextmanager
     def procedure(self, request: str, *, wait_s: float | None = None) -> Iterator[None]:
-        """Let only this thread change something within the block; see the model."""
+        """Let only this thread change something in the block; see the model."""
         with (
             self._driver.lock.procedure(request, wait_s=wait_s) as leased,
             self._driver.signs_of_life.shown() if leased else nullcontext(),
@@ -259,19 +259,19 @@ class ControllerCore(DriverPart, ABC):
             yield
 
     def uninterrupted(self) -> AbstractContextManager[None]:
-        """Hold Ctrl-C back for a block that must be seen through."""
+        """Delay Ctrl-C for a block that must be completed."""
         return self._driver.uninterrupted()
 
     def signs_of_life(self) -> AbstractContextManager[None]:
-        """Let others see within the block that this process is at work; see the model."""
+        """Show others within the block that this process is at work; see the model."""
         return self._driver.signs_of_life.shown()
 
     def preserved(self, reason: str) -> AbstractContextManager[None]:
-        """Put back, at the end of the block, the tool and what goes with it; see the model."""
+        """Restore, at the end of the block, the tool and what goes with it; see the model."""
         return self._preserver.preserved(reason)
 
     def close(self) -> None:
-        """End what nobody waited on, take leave, close. Idempotent."""
+        """End what nobody waited on, leave in order, close. Idempotent."""
         self.latch.await_stops(_STOPS_S)
         try:
             self._take_leave()

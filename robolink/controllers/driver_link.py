@@ -1,4 +1,4 @@
-"""What every part of a driver works with, and the one way in which it changes something.
+"""What every part of a driver uses, and the one way in which it changes something.
 
 The command classes of docs/reference/rules.md 1:
 
@@ -55,7 +55,7 @@ EVERY_S: Final = 1.0
 
 
 class SignsOfLife:
-    """Gives signs of life for as long as a block of this process is open on a controller.
+    """Shows others that this process is alive while a block is open on a controller.
 
     Args:
         sign: Gives one, to the record and to the controller. It may fail: what is the matter
@@ -70,7 +70,7 @@ class SignsOfLife:
 
     @contextmanager
     def shown(self) -> Iterator[None]:
-        """Give them within the block; blocks inside of it give no more."""
+        """Show it within the block; inner blocks add nothing."""
         here = threading.current_thread()
         with self._lock:
             first = not self._inside
@@ -102,7 +102,7 @@ T = TypeVar("T")
 
 
 class MarkedCommand(ABC, Generic[T]):
-    """Something that is sent once, is marked meanwhile, and is proved by what is read then.
+    """A command that is sent once, marked meanwhile, and confirmed by reading.
 
     Attributes:
         request: What is sent, as a person may read it.
@@ -119,7 +119,7 @@ class MarkedCommand(ABC, Generic[T]):
     @property
     @abstractmethod
     def details(self) -> Mapping[str, object]:
-        """Plain JSON values needed to settle it later."""
+        """Plain JSON values needed to recover it later."""
 
     @abstractmethod
     def send(self) -> None:
@@ -130,18 +130,18 @@ class MarkedCommand(ABC, Generic[T]):
         """Read what it changes."""
 
     def told_by(self, found: T) -> str:
-        """Return what the value that was read says about an answer that told nothing.
+        """Return what the value read shows about an unclear answer.
 
         Empty where only a person can tell.
         """
         return ""
 
     def entries(self, marker: Marker, found: T) -> Iterable[NewEntry]:
-        """Return what is put on record together with the end of the marker."""
+        """Return what is recorded together with the end of the marker."""
         return ()
 
     def refusal(self, marker: Marker, error: RejectedError) -> Iterable[NewEntry]:
-        """Return what is put on record when the controller did not do it."""
+        """Return what is recorded when the controller did not do it."""
         tool = marker.details.get("tool")
         yield NewEntry(
             EntryKind.REFUSED,
@@ -153,20 +153,20 @@ class MarkedCommand(ABC, Generic[T]):
 
 
 class DriverLink:
-    """A controller that is connected, as the parts of its driver see it.
+    """A connected controller, as the parts of its driver see it.
 
     Attributes:
         identity: Which controller.
         clock: The clock on which its time passes.
-        latch: What holds requests back while a stop is in force.
+        latch: Refuses requests while a stop is active.
         markers: The durable markers of what was begun.
-        change_guard: What holds back writes that take a tip farther than the cell allows.
+        change_guard: Refuses writes that move a tip farther than the cell allows.
         lock: One procedure at a time.
 
     Args:
         identity: Which controller.
         clock: The clock on which its time passes.
-        latch: What holds requests back while a stop is in force.
+        latch: Refuses requests while a stop is active.
         outcomes: Where the markers are kept.
         gate: Holds Ctrl-C back inside.
 
@@ -203,7 +203,7 @@ class DriverLink:
 
     @property
     def simulated(self) -> bool:
-        """Whether the controller has said by now that nothing real moves; it is not asked."""
+        """Whether the controller has said by now that nothing real moves; asks nothing."""
         return False
 
     @cached_property
@@ -226,21 +226,21 @@ class DriverLink:
         return bool(self._waiting)
 
     def show_life(self) -> None:
-        """Tell the controller that this process is there, if it listens to that; no command."""
+        """Show the controller that this process is there, if it supports that; not a command."""
 
     def _sign_of_life(self) -> None:
-        """Give a sign of life, unless a movement was begun here that nobody waits on."""
+        """Give a sign of life, unless a movement was started here that nobody waits on."""
         if self.markers.moving and not self.waited_on:
             return
         self.markers.beat()
         self.show_life()
 
     def uninterrupted(self) -> AbstractContextManager[None]:
-        """Hold Ctrl-C back over exchanges that belong together; it is raised at their end."""
+        """Delay Ctrl-C over exchanges that belong together, then raise it."""
         return self._gate
 
     def was_not_executed(self, refusal: RejectedError) -> bool:
-        """Whether a refusal proves that nothing was done."""
+        """Whether a refusal confirms that nothing was done."""
         return True
 
     def lacks(self, what: str) -> ConfigError:
@@ -256,7 +256,7 @@ class DriverLink:
         )
 
     def decided(self, text: str, request: str) -> None:
-        """Log what was decided about this controller; see ``robolink.package_log``.
+        """Log a decision about this controller; see ``robolink.package_log``.
 
         Args:
             text: A sentence.
@@ -269,7 +269,7 @@ class DriverLink:
         return Concerning(self.identity, request)
 
     def carry_out(self, command: MarkedCommand[T]) -> T:
-        """Send something that is marked, and return what is read then.
+        """Send a marked command, and return what is read afterwards.
 
         Ctrl-C waits for that. A plain refusal settles the marker; a fault does not, because a
         controller in error may refuse to show the value that would prove what happened. After
@@ -312,7 +312,7 @@ class DriverLink:
 
 
 def tell_requests(latch: StopLatch, identity: str, clock: Clock) -> None:
-    """Have each request that a latch admits told to the trace and the log, where no bytes are.
+    """Report each request that a latch admits to the trace and the log, where no bytes are.
 
     Args:
         latch: It; a request is told as text.
@@ -349,7 +349,7 @@ class DriverPart:
                 setattr(cls, name, _naming_controller(member))
 
     def __repr__(self) -> str:
-        """Say whose it is."""
+        """Show whose it is."""
         return f"<{type(self).__name__} of {self._driver.identity}>"
 
 
@@ -366,7 +366,7 @@ def _naming_controller(method: Callable[..., T]) -> Callable[..., T]:
 
 
 def advise_emergency_stop(error: RobolinkError) -> RobolinkError:
-    """Put in front of an error of a stop what a person has to do first."""
+    """Put what a person must do first in front of the error of a stop."""
     first = tr("The stop is not confirmed: press the emergency stop.")
     error.remedy = joined(" ", filter(None, (first, error.remedy)))
     return error

@@ -1,4 +1,4 @@
-"""The durable markers of one controller: stored before a command leaves, cleared when it is proved.
+"""Durable markers of one controller: stored before a command is sent, cleared when confirmed.
 
 What keeps two procedures of this process apart stands here too.
 """
@@ -39,7 +39,7 @@ _OF_A_TOOL: Final = frozenset({"tool", "select"})
 
 
 class ProcedureLock:
-    """Lets one thread at a time run a procedure on a controller; another is told at once, or waits.
+    """Lets one thread at a time run a procedure on a controller; others are refused, or wait.
 
     Those that wait get their turn in the order in which they came. Whoever may not wait is refused
     while others do.
@@ -69,13 +69,13 @@ class ProcedureLock:
 
         Args:
             request: What it is held for.
-            calming: Whether that may go on while a stop is in force, as a reset may.
+            calming: Whether that may go on while a stop is active, as a reset may.
             leased: Whether it needs the lease, as everything that is marked does.
 
         Raises:
             BusyError: Another thread holds it, or another program is at work, and for no longer is
                 it waited.
-            StoppedError: A stop is in force, or came meanwhile.
+            StoppedError: A stop is active, or came meanwhile.
         """
         with Concerning(self._identity, request), self.patience.within():
             if calming:
@@ -91,7 +91,7 @@ class ProcedureLock:
 
     @contextmanager
     def procedure(self, request: str, *, wait_s: float | None = None) -> Iterator[bool]:
-        """Hold it for a block of a user's; see :meth:`robolink.model.Controller.procedure`.
+        """Hold it for a user's block; see :meth:`robolink.model.Controller.procedure`.
 
         Returns:
             Whether the lease is kept as well.
@@ -128,12 +128,12 @@ class ProcedureLock:
             self._owner, self._depth = me, 1
 
     def _is_free_for(self, thread: int) -> bool:
-        """Whether it is free, and nobody else's turn; whoever waits under a stop is leaving."""
+        """Whether it is free and nobody else is next; who waits under a stop is leaving."""
         first = not self._waiting or self._waiting[0] == thread or self._latch.closed
         return self._owner is None and first
 
     def _await_turn(self, me: int, request: str, *, calming: bool) -> None:
-        """Wait in the room until it is this thread's turn.
+        """Wait until it is this thread's turn.
 
         Raises:
             BusyError: That took too long.
@@ -165,7 +165,7 @@ class ProcedureLock:
 
     @contextmanager
     def _leased(self, request: str, *, wanted: bool = True) -> Iterator[bool]:
-        """Wait for the lease where this call may wait, and keep it for the block.
+        """Wait for the lease if this call may wait, and keep it for the block.
 
         So nobody comes in between what is read and what is written. A record that cannot be kept
         is told by what needs it.
@@ -225,7 +225,7 @@ class MarkerStore:
         self._under_way: dict[str, MarkerKind] = {}
 
     def look(self) -> None:
-        """Note the state of the lease before a value is read that a write will rely on.
+        """Note the state of the lease before reading a value that a write will rely on.
 
         Raises:
             LeaseHeldError: Somebody else is changing this controller.
@@ -233,12 +233,12 @@ class MarkerStore:
         self._recorded(self.outcomes.look)
 
     def beat(self) -> None:
-        """Let others see that this process is alive."""
+        """Show others that this process is alive."""
         self.outcomes.beat()
 
     @property
     def moving(self) -> bool:
-        """Whether a movement was begun here whose end is not proved."""
+        """Whether a movement was started here whose end is not confirmed."""
         return MarkerKind.MOVE in self._under_way.values()
 
     def begin(
@@ -249,24 +249,24 @@ class MarkerStore:
         *,
         operation: str = "",
     ) -> Marker:
-        """Store a marker durably: a new one, or one of before whose work is taken up again.
+        """Store a marker durably: a new one, or an earlier one whose work continues.
 
         Whatever writes, moves or begins a procedure passes here, in a driver of anybody's. So this
-        is where it is refused after a stop, while something earlier is unsettled, and, of a tool,
+        is where it is refused after a stop, while an earlier job is unfinished, and, of a tool,
         while the robot moves (docs/reference/rules.md 1, 2, 5). Only what puts back an earlier
-        state goes on, and the work of a marker of before.
+        state goes on, and the work of an earlier marker.
 
         Args:
             kind: What it stands for.
             request: What is begun, as a person may read it.
-            details: Plain JSON values needed to settle it.
-            operation: Id of the marker of before; empty for a new one.
+            details: Plain JSON values needed to recover it.
+            operation: Id of the earlier marker; empty for a new one.
 
         Raises:
             ConfigError: That is impossible.
             BusyError: Another process has the controller, or a movement is under way here.
-            StoppedError: A stop is in force.
-            OutcomeUnknownError: Something earlier is unsettled; nothing may be sent.
+            StoppedError: A stop is active.
+            OutcomeUnknownError: An earlier job is unfinished; nothing may be sent.
             LeaseLostError: Somebody else was at it and has just ended.
         """
         if not operation and not self._latch.restores:
@@ -290,7 +290,7 @@ class MarkerStore:
         return marker
 
     def clear(self, marker: Marker, *entries: NewEntry) -> None:
-        """Forget a marker whose outcome is known, and journal how it ended.
+        """Remove a marker whose outcome is known, and record how it ended.
 
         Raises:
             LeaseLostError: Somebody else took over meanwhile, and what becomes of a procedure is
@@ -321,7 +321,7 @@ class MarkerStore:
             del self._procedures[marker.kind]
 
     def leave_open(self, marker: Marker) -> None:
-        """Count a marker as unsettled whose command has ended without a proof; no-op once cleared.
+        """Count a marker as unfinished whose command ended unconfirmed; no-op once cleared.
 
         Args:
             marker: It.
@@ -330,7 +330,7 @@ class MarkerStore:
 
     @contextmanager
     def unless_stopped(self, marker: Marker) -> Iterator[None]:
-        """Surround the sending of what ``marker`` stands for; a stop that forbids it settles it."""
+        """Surround the sending of a marked command; a stop that forbids it closes the marker."""
         try:
             yield
         except StoppedError:
@@ -339,13 +339,13 @@ class MarkerStore:
 
     @property
     def changing(self) -> bool:
-        """Whether a tool change of several steps is under way here."""
+        """Whether a tool change of several steps is in progress here."""
         marker = self._procedures.get(MarkerKind.CHANGE)
         # One that could not be taken back stays open when its change is over.
         return marker is not None and marker.details.get("change") == self.outcomes.change
 
     def note_selection(self, tool: int) -> None:
-        """Record, in the marker of the procedure under way, which tool is in force now.
+        """Record, in the marker of the present procedure, which tool is selected now.
 
         Called when the controller has accepted the selection: until then the open marker of
         the selection itself says which other tool it may be.
@@ -357,13 +357,13 @@ class MarkerStore:
             self._recorded(lambda: self.outcomes.begin(noted))
 
     def require_settled(self, request: str) -> None:
-        """Refuse to go on while something earlier is unsettled.
+        """Refuse to go on while an earlier job is unfinished.
 
         The markers of the procedures that run here do not count.
 
         Raises:
-            OutcomeUnknownError: Names what is unsettled.
-            LeaseHeldError: Somebody else is at it.
+            OutcomeUnknownError: Names the unfinished jobs.
+            LeaseHeldError: Somebody else has it locked.
         """
         self._refuse_unsettled(request, besides=())
 
@@ -396,7 +396,7 @@ class MarkerStore:
             )
 
     def _overtaken(self, request: str) -> LeaseLostError:
-        """Return the error where somebody else ended just now what was unsettled.
+        """Return the error if somebody else has just finished the unfinished job.
 
         What was read before that may be old, and the look at the lease that would tell has just
         been made anew.
@@ -410,7 +410,7 @@ class MarkerStore:
         )
 
     def _recorded(self, keep: Callable[[], object]) -> bool:
-        """Keep something on record; return whether that was possible.
+        """Record something; return whether that was possible.
 
         Raises:
             JournalError: It was not, and nothing is being put back for which that is no matter.
@@ -443,7 +443,7 @@ class MarkerStore:
             raise self.unproved(request, error) from error
 
     def unproved(self, request: str, error: RobolinkError) -> OutcomeUnknownError:
-        """Return the error for a request after which ``error`` tells nothing of what it did."""
+        """Return the error for a request whose effect ``error`` leaves unknown."""
         # The link is gone with the answer, and with it what was under way on it.
         self._under_way.clear()
         doubt = OutcomeUnknownError(

@@ -1,4 +1,4 @@
-"""How many axes a robot has, by the model that somebody wrote down."""
+"""How many axes a robot has, by its model name."""
 
 import re
 from collections.abc import Mapping

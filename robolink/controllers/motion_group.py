@@ -1,4 +1,4 @@
-"""Axes that move together, as far as every kind of controller treats them alike.
+"""Axes that move together: what all kinds of controllers share.
 
 Movements of a controller that takes one request for each, and then is asked about its end.
 
@@ -39,7 +39,7 @@ from robolink.timing import Deadline
 
 
 class MotionGroupCore(DriverPart, ABC):
-    """Implements :class:`robolink.model.MotionGroup`, but for what a kind of controller says.
+    """Implements :class:`robolink.model.MotionGroup`; each kind of controller adds its own part.
 
     What only some kinds can do, a movement until an input switches, is refused here by name.
 
@@ -54,7 +54,7 @@ class MotionGroupCore(DriverPart, ABC):
 
     @abstractmethod
     def pose(self) -> Pose:
-        """Read where the frame in force is now (measured, not commanded)."""
+        """Read where the frame of the selected tool is now (measured, not commanded)."""
 
     @abstractmethod
     def move_to(self, target: Pose, profile: MotionProfile, *, box: WorkBox) -> Motion:
@@ -62,11 +62,11 @@ class MotionGroupCore(DriverPart, ABC):
 
     @abstractmethod
     def requests_for(self, target: Pose, profile: MotionProfile) -> tuple[str, ...]:
-        """Return what :meth:`move_to` would send besides its reads, as it stands on the wire."""
+        """Return what :meth:`move_to` would send besides its reads, as sent on the wire."""
 
     @abstractmethod
     def stop(self) -> None:
-        """Bring everything to rest; from here on nothing acts before ``release_stop``."""
+        """Stop everything; from here on nothing acts before ``release_stop``."""
 
     def terms(self) -> MotionTerms:
         """Return what a person must know before it moves."""
@@ -76,38 +76,38 @@ class MotionGroupCore(DriverPart, ABC):
         )
 
     def obstacle(self, target: Pose, path: Path, *, start: Pose | None = None) -> str:
-        """Return why the arm could not go there so; nothing where this kind cannot tell."""
+        """Return why the arm could not make this move; nothing if this kind cannot tell."""
         return ""
 
     def deceleration_mm_s2(self) -> float | None:
-        """Return how it brakes in straight movements; nothing where this kind does not tell."""
+        """Return how it brakes in straight movements; nothing if unknown."""
         return None
 
     def run_up_mm(self, speed_mm_s: float) -> float | None:
-        """Return in what way it reaches a speed; nothing where this kind does not tell."""
+        """Return the distance in which it reaches a speed; nothing if unknown."""
         return None
 
     def edge_step_mm(self, speed_mm_s: float) -> float | None:
-        """Return in what steps it tells where an edge was; nothing where nobody knows."""
+        """Return the step of the edge positions that it reports; nothing if unknown."""
         return None
 
     def require_able(self, purpose: str) -> None:
-        """Refuse what no movement could begin in now; see the model."""
+        """Refuse if no movement could start now; see the model."""
 
     def base(self) -> tuple[float, ...] | None:
-        """Return where the base stands that positions count from; none where this kind has none."""
+        """Return the place of the base, from which positions count; none if this kind has none."""
         return None
 
     def axes(self) -> Mapping[str, tuple[float, ...]]:
-        """Read the positions of the axes; none where this kind does not tell them."""
+        """Read the positions of the axes; none if this kind does not report them."""
         return {}
 
     def motors_on(self) -> bool | None:
-        """Read whether its motors are on; none where this kind does not tell it."""
+        """Read whether its motors are on; none if this kind does not report it."""
         return None
 
     def low_power(self) -> bool | None:
-        """Read whether it moves with little power; none where this kind has no such mode."""
+        """Read whether it moves with low power; none if this kind has no such mode."""
         return None
 
     def move_until_input(
@@ -127,7 +127,7 @@ class MotionGroupCore(DriverPart, ABC):
         raise self._driver.lacks(tr("movement until an input switches"))
 
     def abort_unfinished(self) -> None:
-        """End the movements that were begun here and not seen to their end."""
+        """End the movements that were started here and whose end was not seen."""
 
     def _marked(self, target: Pose, request: str, *, selected: int | None) -> Marker:
         """Store the marker of a movement that is about to be sent to where its own tool stands.
@@ -145,7 +145,7 @@ class MotionGroupCore(DriverPart, ABC):
         return self._driver.markers.begin(MarkerKind.MOVE, request, details)
 
     def _require_tool(self, target: Pose, found: int | None) -> None:
-        """Refuse a target that is meant for another tool than the one in force.
+        """Refuse a target for another tool than the selected one.
 
         Raises:
             NotReadyError: Names both.
@@ -186,11 +186,11 @@ def stopped_before_edge(controller: str, request: str) -> StoppedError:
 
 _POLL_S: Final = 0.02
 _REST_S: Final = 5.0
-"""Longest time from a stop to a state that shows rest (docs/reference/rules.md 5)."""
+"""Longest time from a stop to a confirmed stop state (docs/reference/rules.md 5)."""
 
 
 class PolledGroup(MotionGroupCore):
-    """One group of axes that is told where to go, and says whether it moves.
+    """One group of axes that takes a target, and reports whether it moves.
 
     Args:
         link: The controller.
@@ -212,7 +212,7 @@ class PolledGroup(MotionGroupCore):
 
     @abstractmethod
     def _send_stop(self) -> None:
-        """Tell it to come to rest; legal at any time, and more than once."""
+        """Send a stop; allowed at any time, and more than once."""
 
     def move_to(self, target: Pose, profile: MotionProfile, *, box: WorkBox) -> "PolledMotion":
         """Start one movement; see :class:`robolink.model.MotionGroup`."""
@@ -239,7 +239,7 @@ class PolledGroup(MotionGroupCore):
         return self._current
 
     def stop(self) -> None:
-        """Bring it to rest; from here on nothing acts before ``release_stop``.
+        """Stop it; from here on nothing acts before ``release_stop``.
 
         Raises:
             OutcomeUnknownError: It did not come to rest in time.
@@ -248,7 +248,7 @@ class PolledGroup(MotionGroupCore):
             self.halt()
 
     def halt(self) -> None:
-        """Bring it to rest; it may be moved again at once.
+        """Stop it; it may be moved again at once.
 
         Raises:
             OutcomeUnknownError: It did not come to rest in time.
@@ -270,7 +270,7 @@ class PolledGroup(MotionGroupCore):
             self._driver.clock.sleep(_POLL_S)
 
     def abort_unfinished(self) -> None:
-        """Halt the last movement if nobody has seen its end."""
+        """Halt the last movement unless its end was seen."""
         if self._current is not None and not self._current.settled:
             self._current.abort()
 
@@ -311,7 +311,7 @@ class PolledMotion:
         return MotionOutcome.STOPPED if self._aborted else MotionOutcome.ARRIVED
 
     def abort(self) -> None:
-        """Halt it and see it at rest.
+        """Halt it and confirm that it has stopped.
 
         Raises:
             OutcomeUnknownError: No end was seen; the marker stays.

@@ -1,4 +1,4 @@
-"""What was in force before a procedure is put back at its end, whatever that end is.
+"""Restores at the end of a procedure what was set before, whatever that end is.
 
 A calibration works in Tool 0, and the selection of an EPSON controller survives power-off
 (docs/reference/epson.md 3.1): left there, the next program would drive the flange where the nozzle
@@ -27,9 +27,9 @@ from robolink.timing import local_label
 
 
 class Preserver:
-    """Remembers at the start of a procedure, restores at its end: the selected tool.
+    """Remembers the selected tool at the start of a procedure, and restores it at the end.
 
-    A kind of controller on which more has to be put back adds that.
+    A kind of controller on which more has to be restored adds that.
 
     Args:
         link: The controller.
@@ -85,7 +85,7 @@ class Preserver:
             self.restore(marker)
 
     def restore(self, marker: Marker) -> None:
-        """Put back what ``marker`` names, and forget it; Ctrl-C waits for the end.
+        """Restore what ``marker`` names, and remove it; Ctrl-C waits for the end.
 
         Raises:
             ConfigError: The marker was written by something else.
@@ -100,7 +100,7 @@ class Preserver:
             self._link.markers.clear(marker)
 
     def examine(self, marker: Marker) -> Finding:
-        """Return whether a procedure that ended early has put everything back; only reads."""
+        """Return whether a procedure that ended early has restored everything; only reads."""
         before, now = tool_before(marker), self._tools.selected()
         return _judged(
             marker,
@@ -111,16 +111,16 @@ class Preserver:
         )
 
     def _in_force(self, reason: str) -> Mapping[str, object] | None:
-        """Read what is to be put back, as plain JSON; ``None`` where nothing is ever changed."""
+        """Read what to restore, as plain JSON; ``None`` if nothing is ever changed."""
         tool = self._tools.selected()
         # Who does not tell which tool is in force lets none be selected either.
         return None if tool is None else {"tool": tool, "now": tool}
 
     def _restore_more(self, marker: Marker) -> None:
-        """Put back what this kind of controller has besides the tool."""
+        """Restore what this kind of controller has besides the tool."""
 
     def _restored_more(self, marker: Marker) -> bool:
-        """Whether that is back."""
+        """Whether that is restored."""
         return True
 
     def _action(self, marker: Marker, now: int | None) -> str:
@@ -128,7 +128,7 @@ class Preserver:
         return tr("Select tool {tool} again", tool=tool_before(marker))
 
     def _restore_after(self, error: BaseException, marker: Marker) -> None:
-        """Restore while ``error`` is on its way; if impossible, let it say what is left."""
+        """Restore while ``error`` is raised; if impossible, add to it what is left."""
         try:
             self.restore(marker)
         except RobolinkError as second:
@@ -138,7 +138,7 @@ class Preserver:
 
 
 def tool_before(marker: Marker) -> int:
-    """Return the tool that was in force when a procedure began.
+    """Return the tool that was selected when a procedure began.
 
     Raises:
         ConfigError: The marker was written by something else.
@@ -150,7 +150,7 @@ def tool_before(marker: Marker) -> int:
 
 
 def not_understood(marker: Marker) -> ConfigError:
-    """Return the error for the marker of a procedure that something else has written."""
+    """Return the error for a procedure's marker that something else has written."""
     return ConfigError(
         tr(
             "The record of an unfinished job of {when} cannot be read.",
@@ -164,7 +164,7 @@ def not_understood(marker: Marker) -> ConfigError:
 
 
 def _unrestored(failure: RobolinkError, tool: int) -> str:
-    """Return the sentence about a tool of before that a procedure meant to leave selected.
+    """Return the sentence about an earlier tool that a procedure meant to leave selected.
 
     Args:
         failure: What kept the end of the procedure from being recorded, or from happening.
@@ -188,7 +188,7 @@ def _unrestored(failure: RobolinkError, tool: int) -> str:
 def _judged(
     marker: Marker, *, now: int | None, before: int, restored: bool, action: str
 ) -> Finding:
-    """Return whether a procedure that ended early has put the cell's own tool back.
+    """Return whether a procedure that ended early has restored the cell's own tool.
 
     Args:
         marker: Of the procedure.

@@ -1,4 +1,4 @@
-"""From a URL to a controller, by whatever opens controllers of the kind that it names.
+"""From a URL to a controller, by the opener of the kind that it names.
 
 Kinds that this package brings stand in a table and are imported when they are named; all others
 are found in the entry-point group ``robolink.controllers``, by the full scheme of the URL
@@ -7,10 +7,10 @@ knows the kind: a stop and a look are timed (docs/decisions/0017).
 
 Reaching a controller that is not there yet, without a storm when many come back at once.
 
-No link is renewed by itself (docs/reference/rules.md 11), so whoever wants to wait for a
-controller, a monitor after a power cut say, says so. A switch that restarts loses every cell
-behind it at the same instant; if all of them tried again at fixed times they would knock together
-for ever (docs/reference/faults.md F77).
+No link is renewed by itself (docs/reference/rules.md 11), so a caller that wants to wait for a
+controller, such as a monitor after a power cut, asks for it. A switch that restarts loses every
+cell behind it at the same instant; if all of them tried again at fixed times they would try
+together for ever (docs/reference/faults.md F77).
 
 How many axes a robot has by its model alone, before anything is connected.
 """
@@ -56,7 +56,7 @@ _KINDS: Final = {
 
 
 class OpenLink(Protocol):
-    """What has to be known of a link to keep a record of what it leads to."""
+    """What has to be known of a link to keep a record of its far end."""
 
     @property
     def identity(self) -> str:
@@ -72,19 +72,19 @@ class OpenLink(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class ConnectionTerms:
-    """On what terms a controller is connected to; see :func:`robolink.connect`.
+    """The terms of a connection; see :func:`robolink.connect`.
 
     Attributes:
         signature: Who works here, and with what.
-        password: For a login, where there is one.
+        password: For a login, if there is one.
         timeout_s: Longest wait for one answer.
         remote_timeout_s: The remote time-out set on an EPSON controller.
         clock: Replaces the machine's clock.
-        trace: Told of all traffic. The links of robolink tell it by themselves; a kind that has
-            one of its own makes a :class:`robolink.transport.Traffic` and tells that.
+        trace: Receives all traffic. The links of robolink report it themselves; a kind with a link
+            of its own makes a :class:`robolink.transport.Traffic` and reports to that.
         outcomes: The record to keep; ``None`` for the journal of this user.
-        glance: Whether this is for a look only.
-        tell: Told, in sentences, what is waited for.
+        glance: Whether this is for reading only.
+        tell: Receives sentences that say what is waited for.
     """
 
     signature: Signature
@@ -98,7 +98,7 @@ class ConnectionTerms:
     tell: Callable[[str], None] = lambda _sentence: None
 
     def record_of(self, link: OpenLink) -> OutcomeLog:
-        """Return the record of what a link leads to; the link is closed when that fails."""
+        """Return the record for a link; the link is closed if that fails."""
         try:
             return self.record_at(link.identity, durable=link.durable)
         except BaseException:
@@ -106,7 +106,7 @@ class ConnectionTerms:
             raise
 
     def record_at(self, address: str, *, durable: bool = True) -> OutcomeLog:
-        """Return the record of what is reached at an address.
+        """Return the record for an address.
 
         Args:
             address: How it is reached.
@@ -130,10 +130,10 @@ class ControllerOpener(Protocol):
 
 
 def find_opener(url: LinkUrl) -> ControllerOpener:
-    """Return what opens controllers of the kind that a URL names.
+    """Return the opener for the kind of controller that a URL names.
 
     Raises:
-        ConfigError: Nothing knows the kind, or what does cannot be loaded.
+        ConfigError: No opener knows the kind, or the one that does cannot be loaded.
     """
     if url.kind in _KINDS:
         module, name, _ = _KINDS[url.kind]
@@ -159,13 +159,13 @@ def find_opener(url: LinkUrl) -> ControllerOpener:
 
 
 def capabilities_of_kind(kind: str) -> Capabilities | None:
-    """Return the most that a controller of a kind can be asked for; nothing is connected.
+    """Return the most that a kind of controller supports; nothing is connected.
 
     Args:
         kind: The first word of its URL.
 
     Returns:
-        ``None`` where only a connected one tells it.
+        ``None`` if only a connected one shows it.
 
     Example:
         >>> from robolink.controllers import capabilities_of_kind
@@ -181,7 +181,7 @@ def _class_of_kind(kind: str) -> Any:  # noqa: ANN401 - a class with OF_KIND
 
 
 def _told_as_its_own(kind: str, opener: ControllerOpener) -> ControllerOpener:
-    """Return an opener of somebody else, whose errors are not told as robolink's."""
+    """Return a third-party opener whose errors are not reported as robolink's."""
 
     def opened(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
         try:
@@ -259,21 +259,21 @@ def connect(
     glance: bool = False,
     tell: Callable[[str], None] = lambda _sentence: None,
 ) -> Controller:
-    """Connect to a controller; log in where there is a login.
+    """Connect to a controller, and log in if it has a login.
 
     Args:
         url: For example ``epson+tcp://192.168.0.1:5000``, ``epson+sim://cell-a?seed=1`` or
             ``softmotion+modbus-tcp://192.168.0.2:502`` or
             ``plc+modbus-tcp://192.168.0.2?map=machine.toml``. A controller that is open
             already is returned as it is, whatever else is given.
-        kind: The class of controller that the URL leads to, :class:`~.EpsonController` say, where
-            more is needed than all kinds have: the result is then typed as one of those.
+        kind: The class of controller behind the URL, :class:`~.EpsonController` for example, if
+            you need more than all kinds have: the result then has that type.
         password: An EPSON controller's remote password, if one is set; a PLC has none.
         timeout_s: Longest wait for one answer.
         remote_timeout_s: The remote time-out set on an EPSON controller. It cannot be read
             over the wire; 0 forbids motion. A PLC's watchdog is part of its mailbox program.
         wait_s: How long connecting, and later each call of this controller, waits for another
-            program or thread that is at work, in seconds; ``None`` or 0 refuses at once. The
+            working program or thread, in seconds; ``None`` or 0 refuses at once. The
             controller has it as ``patience.wait_s``.
         clock: Replaces the machine's clock; a simulator brings its own.
         trace: Called with (time in ns, "sent" or "received", bytes) for all traffic; a password is
@@ -281,26 +281,26 @@ def connect(
             bytes and its data, a word of a mailbox in this process two bytes. A kind of another
             package that has a link of its own tells its requests as text.
         outcomes: Where outcomes are recorded; by default the journal of this user, or memory
-            for a simulator that dies with this process. A journal that cannot be used keeps
-            nobody from looking and stopping: ``outcomes.trouble`` says what is wrong with it,
-            and what would change something raises it.
+            for a simulator that ends with this process. Without a usable journal you can still
+            read and stop: ``outcomes.trouble`` says what is wrong with it, and every change
+            raises that error.
         signature: Who works here, and with what; by default the user of this computer.
-        limits: How far a write may take a tip, as the cell file says (``Cell.limits()``). A URL
-            alone says nothing, so without them there is no limit.
-        glance: Whether this is for a look, so that a journal in which nothing is unfinished is
-            not opened before something has to be recorded. The controller is not asked for its
-            identity then.
-        tell: Told, in sentences, what is waited for: others who are at work, and ten seconds at
-            most until a PLC gives away the mailbox of a run that has ended.
+        limits: How far a write may move a tip, by the cell file (``Cell.limits()``). Without
+            them there is no limit.
+        glance: Whether this is for reading only: a journal without unfinished jobs is then
+            opened only when something has to be recorded, and the controller is not asked
+            for its identity.
+        tell: Receives sentences that say what is waited for: other users, and at most ten
+            seconds until a PLC releases the mailbox of a run that has ended.
 
     Raises:
         ConfigError: The URL or an option is wrong, or leads to another kind of controller.
-        ConnectError: Nobody is reached, nobody answers the login, or the PLC's mailbox program
-            does not run.
-        RemoteProtocolError: What answers is no mailbox of this version, or the probe of a
+        ConnectError: No connection, no answer to the login, or the PLC's mailbox program does
+            not run.
+        RemoteProtocolError: The far end is not a mailbox of this version, or the probe of a
             map differs.
         LoginRefusedError: Wrong or missing password.
-        LeaseHeldError: Nobody answers the login, and somebody else has the controller.
+        LeaseHeldError: No answer to the login, because somebody else has the controller.
 
     Example:
         >>> import robolink
@@ -349,7 +349,7 @@ def connect(
 
 
 def _require_kind(found: type, kind: type[Controller] | None, called: str) -> None:
-    """Refuse a controller, or what a URL is known to open, that is not of the kind asked for.
+    """Refuse a controller, or a URL known to open one, of another kind than asked for.
 
     Raises:
         ConfigError: It is of another kind.
@@ -367,7 +367,7 @@ def _require_kind(found: type, kind: type[Controller] | None, called: str) -> No
 
 
 _AGAIN_S: Final = 0.25
-"""Between two attempts to log in where somebody else is."""
+"""Pause between two login attempts while somebody else is logged in."""
 
 
 def _waited_for(
@@ -393,14 +393,14 @@ def _waited_for(
 
 
 def opened(url: LinkUrl, terms: ConnectionTerms) -> Controller:
-    """Connect to the controller at a URL, and have its traffic told.
+    """Connect to the controller at a URL, and report its traffic.
 
-    A kind whose link tells nothing, such as the library of a maker, tells the requests that its
+    A kind whose link reports nothing, such as the library of a maker, reports the requests that its
     stop latch admits.
 
     Args:
-        url: It.
-        terms: On which terms.
+        url: The URL.
+        terms: The terms.
 
     Raises:
         RobolinkError: As the opener of its kind.
@@ -424,27 +424,27 @@ _BITS: Final = 32
 def connect_when_reachable(
     connect: Callable[[], Reached], *, within_s: float, clock: Clock | None = None
 ) -> Reached:
-    """Connect to a controller as soon as it is there.
+    """Connect to a controller as soon as it is reachable.
 
     The first attempt is made at once. After each that fails there is a pause, counted from its
     end: drawn between half and the whole of :data:`FIRST_PAUSE_S`, which doubles each time up to
-    :data:`LONGEST_PAUSE_S`. What waiting does not mend, as a wrong password or a mistake in the
-    URL, ends it at once. ::
+    :data:`LONGEST_PAUSE_S`. An error that waiting cannot cure, such as a wrong password or URL,
+    ends it at once. ::
 
         robot = connect_when_reachable(lambda: robolink.connect(url), within_s=600)
 
     Args:
         connect: One attempt; nothing but connecting should happen in it, since it is repeated.
-        within_s: How long it is tried; an attempt that has begun is awaited.
+        within_s: How long to try; an attempt that has begun is awaited.
         clock: Replaces the machine's clock.
 
     Returns:
         What ``connect`` returned.
 
     Raises:
-        ConfigError: ``within_s`` is negative or no number.
-        ConnectError, TransportBrokenError, TransportTimeoutError: The last attempt failed so.
-        RobolinkError: As ``connect`` raised it, where waiting is no remedy.
+        ConfigError: ``within_s`` is negative or not a number.
+        ConnectError, TransportBrokenError, TransportTimeoutError: The last attempt failed with it.
+        RobolinkError: As ``connect`` raised it, if waiting is no remedy.
 
     Example:
         >>> import robolink

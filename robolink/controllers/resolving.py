@@ -1,4 +1,4 @@
-"""Settling what was begun and not proved finished: tools, written or selected, and movements."""
+"""Finishes or undoes interrupted jobs: tools written or selected, and movements."""
 
 from robolink.controllers.driver_link import DriverLink, DriverPart
 from robolink.controllers.preserving import Preserver
@@ -30,7 +30,7 @@ _KINDS = {
 
 
 def examine_write(tools: ToolTable, marker: Marker) -> Finding:
-    """Return what became of a write.
+    """Return what happened to a write.
 
     Raises:
         ConfigError: The marker cannot be understood.
@@ -63,14 +63,14 @@ def examine_write(tools: ToolTable, marker: Marker) -> Finding:
 
 
 def examine_select(tools: ToolTable, marker: Marker) -> Finding:
-    """Return what became of one selection."""
+    """Return what happened to one selection."""
     now, wanted = tools.selected(), int(str(marker.details["select"]))
     verdict = Verdict.DONE if now == wanted else Verdict.NOT_APPLIED
     return Finding(marker, verdict, tr("Tool {tool} is selected now.", tool=now))
 
 
 def examine_move(marker: Marker) -> Finding:
-    """Return what can be told of a movement; whether it is as it should be, a person sees.
+    """Return what is known of a movement; whether it is as it should be, a person checks.
 
     How far it is from its target is not told: the tool in which that was meant may hold another
     value by now, or not be the selected one.
@@ -89,7 +89,7 @@ def _entry(marker: Marker, tool: int, verdict: Verdict, now: ToolOffset | None) 
 
 
 class MarkerResolver(DriverPart):
-    """Settles what an earlier process left open: by reading, and with a person's word.
+    """Recovers what an earlier process left open: by reading, and by asking a person.
 
     Nothing is sent again. A value that was being written is read; a robot that was told to move is
     looked at; the cell's own tool is selected again when a person says so. A kind of controller
@@ -154,7 +154,7 @@ class MarkerResolver(DriverPart):
         )
 
     def settle(self, finding: Finding) -> None:
-        """Do what ``finding.action`` says and forget the marker."""
+        """Do what ``finding.action`` says and remove the marker."""
         if finding.verdict is Verdict.NOT_RESTORED:
             self.fence()  # what is selected is read anew behind it
             self._preserver.restore(finding.marker)

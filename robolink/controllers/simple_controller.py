@@ -1,4 +1,4 @@
-"""A controller in memory: the least that a kind brings, and something to write tests against.
+"""A controller in memory: the minimum of a kind, and something to write tests against.
 
 It is no simulator: a movement has ended when it has begun, nothing fails, and there is no wire.
 What it shares with a controller is what :mod:`robolink.controllers` promises of every kind.
@@ -42,7 +42,7 @@ _TOLERANCE: Final = 1e-6
 
 @dataclass(slots=True)
 class SimpleMachine:
-    """A machine of four axes: what is left of it when nobody is connected.
+    """A machine of four axes: what remains when nobody is connected.
 
     All that :class:`SimpleController` asks of it are ``read``, ``store``, ``in_force``, ``select``,
     ``pose``, ``go``, ``moving`` and ``halt``. A machine that overrides them is a kind of its own,
@@ -50,7 +50,7 @@ class SimpleMachine:
 
     Attributes:
         tools: The tools that are defined, by number.
-        selected: The tool in force, 0 for the flange.
+        selected: The selected tool, 0 for the flange.
         flange: Where the flange is.
     """
 
@@ -63,38 +63,38 @@ class SimpleMachine:
         return self.tools.get(tool)
 
     def store(self, tool: int, offset: ToolOffset | None) -> None:
-        """Give a tool an offset, or take its definition away."""
+        """Give a tool an offset, or clear it."""
         if offset is None:
             self.tools.pop(tool, None)
         else:
             self.tools[tool] = offset
 
     def in_force(self) -> int:
-        """Return the number of the tool in force, 0 for the flange."""
+        """Return the number of the selected tool, 0 for the flange."""
         return self.selected
 
     def select(self, tool: int) -> None:
-        """Put a tool in force."""
+        """Select a tool."""
         self.selected = tool
 
     def pose(self) -> Pose:
-        """Return where the tip of the tool in force is, mm and degrees in the base."""
+        """Return where the tip of the selected tool is, mm and degrees in the base."""
         return self.tip(self.tool)
 
     def moving(self) -> bool:
-        """Tell whether the last movement goes on; here it ended when it began."""
+        """Return whether the last movement goes on; here it ended when it began."""
         return False
 
     def halt(self) -> None:
-        """Bring everything to rest."""
+        """Stop everything."""
 
     @property
     def tool(self) -> ToolOffset:
-        """The offset in force."""
+        """The offset of the selected tool."""
         return self.tools.get(self.selected, ToolOffset())
 
     def tip(self, offset: ToolOffset) -> Pose:
-        """Return where a tip is that sits at an offset from the flange."""
+        """Return where a tip at an offset from the flange is."""
         dx_mm, dy_mm = rotate_xy(offset.x_mm, offset.y_mm, self.flange.u_deg)
         return replace(
             self.flange,
@@ -105,7 +105,7 @@ class SimpleMachine:
         )
 
     def go(self, target: Pose) -> None:
-        """Bring the tip of the tool in force to a pose."""
+        """Move the tip of the selected tool to a pose."""
         offset, u_deg = self.tool, target.u_deg - self.tool.u_deg
         dx_mm, dy_mm = rotate_xy(offset.x_mm, offset.y_mm, u_deg)
         self.flange = replace(

@@ -1,4 +1,4 @@
-"""A stop from outside: reach the controller, stop it, see it rest, leave.
+"""A stop from outside: reach the controller, stop it, confirm that, leave.
 
 Nothing stands before the Abort, Stop or 2003 frame: no journal, no lease, no question, and no
 import that the frame does not need (docs/decisions/0017-a-stop-has-its-own-way-to-the-wire.md).
@@ -47,7 +47,7 @@ def stop_now(
     trace: "TraceSink | None" = None,
     met: "Callable[[str], None] | None" = None,
 ) -> "ControllerStatus":
-    """Bring a controller to rest, whoever moves it, and return the state that shows it.
+    """Stop a controller, whatever moves it, and return the state that confirms it.
 
     On an EPSON controller Abort, then Stop; on a mailbox 2003, which holds the group until a
     reset. Nothing is recorded.
@@ -96,7 +96,7 @@ def stop_now(
 
 
 def stop_requests(url: str) -> tuple[str, ...]:
-    """Return what a stop sends, as a person may read it; nothing is opened.
+    """Return what a stop sends, for display; nothing is opened.
 
     Raises:
         ConfigError: The URL is wrong.
@@ -116,7 +116,7 @@ def stop_requests(url: str) -> tuple[str, ...]:
 
 
 class _Means(NamedTuple):
-    """With what a controller is reached; see :func:`stop_now`."""
+    """The means to reach a controller; see :func:`stop_now`."""
 
     password: str
     timeout_s: float
@@ -151,7 +151,7 @@ def _stop_epson(link: LinkUrl, means: _Means) -> "ControllerStatus":
 
 
 def _tell_who(talk: "EpsonConversation", met: "Callable[[str], None]") -> None:
-    """Say which controller stands now, where this firmware tells it without an Execute."""
+    """Say which controller has stopped, if this firmware reports it without an Execute."""
     from robolink.controllers.epson.link import name_from
 
     def asked() -> str:
@@ -183,7 +183,7 @@ def _stop_group(link: LinkUrl, means: _Means) -> "ControllerStatus":
 
 
 def _tell_which(wire: "MailboxWire", met: "Callable[[str], None]") -> None:
-    """Say which PLC stands now, where its program has a number."""
+    """Say which PLC has stopped, if its program has a number."""
     from robolink.controllers.softmotion.mailbox import identity_of, read_device_id
 
     def asked() -> str:
@@ -194,7 +194,7 @@ def _tell_which(wire: "MailboxWire", met: "Callable[[str], None]") -> None:
 
 
 def _tell_what_is_said_twice(asked: "Callable[[], str]", met: "Callable[[str], None]") -> None:
-    """Ask which controller stands, and once more: an answer that came bent names another one.
+    """Ask twice which controller has stopped: an answer that was damaged names another one.
 
     The note of a stop that names another one holds nothing back here; one without a name does.
     """
@@ -204,7 +204,7 @@ def _tell_what_is_said_twice(asked: "Callable[[], str]", met: "Callable[[str], N
 
 
 def _stop_other(link: LinkUrl, means: _Means) -> "ControllerStatus":
-    """Stop a controller of a kind that another package brings, by what it offers for that."""
+    """Stop a controller of a kind that another package brings, by the means that it offers."""
     from robolink.controllers.registry import ConnectionTerms, opened
     from robolink.journal import open_log, signature_here
     from robolink.model import Secret

@@ -1,12 +1,12 @@
-"""A tool table, but for how its kind of controller is asked and told.
+"""A tool table; its kind of controller adds how it is read and written.
 
 What a person is refused, what is compared and proved, and in which order, is the same whatever
 holds the tools. A kind says which tools there are, how one is read, and how one write leaves.
 
 Clearing a tool never leaves the machine with another tool selected than somebody named. What a
-controller selects when the tool in force loses its definition is not documented, and a program
-that goes on with Tool 0 drives the flange where a nozzle's tip belongs. So clearing the tool in
-force is refused on every kind of controller, unless the caller names the tool to select in its
+controller selects when the selected tool loses its definition is not documented, and a program
+that goes on with Tool 0 drives the flange where a nozzle's tip belongs. So clearing the selected
+tool is refused on every kind of controller, unless the caller names the tool to select in its
 place; that one is selected, and read back, before anything is cleared.
 """
 
@@ -43,7 +43,7 @@ from robolink.remedy_words import RemedyWord, remedy_word
 
 
 class ToolTableCore(DriverPart, ABC):
-    """Implements :class:`robolink.model.ToolTable` with what a kind of controller says.
+    """Implements :class:`robolink.model.ToolTable`; each kind of controller adds its own part.
 
     Attributes:
         machine_selects: Whether the machine alone selects tools, so that to name the tool itself
@@ -63,7 +63,7 @@ class ToolTableCore(DriverPart, ABC):
 
     @abstractmethod
     def same(self, a: ToolOffset | None, b: ToolOffset | None) -> bool:
-        """Tell whether this controller would store both alike; undefined equals undefined only."""
+        """Return whether the controller would store both alike; undefined equals undefined only."""
 
     @abstractmethod
     def _stored(self, tool: int) -> ToolOffset | None:
@@ -79,24 +79,24 @@ class ToolTableCore(DriverPart, ABC):
 
     @abstractmethod
     def _selected(self) -> int | None:
-        """Read which tool is in force."""
+        """Read which tool is selected."""
 
     @abstractmethod
     def _select_request(self, tool: int) -> str:
-        """Return what selecting a tool sends, as a person may read it."""
+        """Return what selecting a tool sends, for display."""
 
     @abstractmethod
     def _send_selection(self, tool: int) -> None:
-        """Put a tool in force; raises unless the controller accepted it."""
+        """Select a tool; raises unless the controller accepted it."""
 
     # What a kind may say.
 
     def _as_sent(self, request: str) -> str:
-        """Return a request as it stands on the wire."""
+        """Return a request as sent on the wire."""
         return request
 
     def _requests(self, tool: int, requested: ToolOffset | None) -> tuple[str, ...]:
-        """Return all that :meth:`_set` sends besides its reads, as it stands on the wire."""
+        """Return all that :meth:`_set` sends besides its reads, as sent on the wire."""
         return (self._as_sent(self._request(tool, requested)),)
 
     def _clear_request(self, tool: int) -> str:
@@ -108,7 +108,7 @@ class ToolTableCore(DriverPart, ABC):
         return offset
 
     def doubts(self, tools: Collection[int]) -> tuple[str, ...]:
-        """Return nothing: what is stored is what the machine works with."""
+        """Return nothing: the machine works with what is stored."""
         return ()
 
     def _require_possible(self, tool: int, offset: ToolOffset) -> None:
@@ -121,17 +121,17 @@ class ToolTableCore(DriverPart, ABC):
         """Refuse a clear that the state would not allow."""
 
     def _is_in_force(self, tool: int) -> bool:
-        """Whether the tool that reads as selected is what the machine works with."""
+        """Whether the machine works with the tool that reads as selected."""
         return True
 
     def _require_selectable(self, request: str) -> None:
-        """Refuse a selection that the state would not allow; before anything is read for it."""
+        """Refuse a selection that the state would not allow, before anything is read for it."""
 
     def _prepare_selection(self, tool: int, request: str) -> None:
         """Make sure that a selection may be sent; just before it is."""
 
     def _prove_selected(self, offset: ToolOffset, request: str) -> None:
-        """Prove more of a selection than the number that is read back."""
+        """Confirm more of a selection than the number that is read back."""
 
     def _choices(self) -> str:
         """Return which tools may be written, as the remedy for tool 0."""
@@ -139,7 +139,7 @@ class ToolTableCore(DriverPart, ABC):
         return tr("Choose a tool from {lowest} to {highest}.", lowest=lowest, highest=highest)
 
     def _known(self, lowest: int) -> str:
-        """Return which tools there are, from 0 or 1 on, as the remedy for one that is not."""
+        """Return which tools there are, from 0 or 1 on, as the remedy for a missing one."""
         return tr(
             "There are tools {lowest} to {highest}.", lowest=lowest, highest=self.indices()[-1]
         )
@@ -204,7 +204,7 @@ class ToolTableCore(DriverPart, ABC):
             return self._clear_after_selecting(tool, expected, then_select)
 
     def preview_write(self, tool: int, offset: ToolOffset) -> tuple[str, ...]:
-        """Return what :meth:`write` would send besides its reads, as it stands on the wire.
+        """Return what :meth:`write` would send besides its reads, as sent on the wire.
 
         Empty when the value is stored already. Reads only; raises what the write would.
         """
@@ -239,13 +239,13 @@ class ToolTableCore(DriverPart, ABC):
         return (self._as_sent(self._select_request(tool)),)
 
     def selected(self) -> int | None:
-        """Read which tool is in force, 0 for the flange; ``None`` where nothing tells it."""
+        """Read which tool is selected, 0 for the flange; ``None`` if unknown."""
         found = self._selected()
         self._driver.markers.ledger.saw_selected(found)
         return found
 
     def select(self, tool: int, *, wait_s: float | None = None) -> None:
-        """Put a tool in force and read the selection back; see the model."""
+        """Select a tool and read the selection back; see the model."""
         self._require_known(tool)
         request, lock = self._select_request(tool), self._driver.lock
         with lock.patience.within(wait_s), lock.held(request):
@@ -288,12 +288,12 @@ class ToolTableCore(DriverPart, ABC):
             self._driver.decided(f"selected: tool {tool}, after tool {before}", request)
 
     def _refuse_operator(self, tool: int) -> None:
-        """Refuse a clear to an operator before another tool is selected for it."""
+        """Refuse an operator's clear before another tool is selected for it."""
         if not self._driver.latch.restores:
             refuse_operator(self._driver.markers.outcomes, tr("clear tool {tool}", tool=tool))
 
     def _would_lose_selection(self, tool: int, expected: Expected, then_select: int | None) -> bool:
-        """Whether a clear, if it is not to be skipped or refused, takes the tool in force away."""
+        """Whether a clear, unless it is skipped or refused, removes the selected tool."""
         if self.selected() != tool:
             return False
         stored = self.read(tool)
@@ -304,7 +304,7 @@ class ToolTableCore(DriverPart, ABC):
     def _clear_after_selecting(
         self, tool: int, expected: Expected, then_select: int | None
     ) -> ToolReceipt:
-        """Select the tool of the caller's choice, then clear; a refused clear selects it again."""
+        """Select the caller's replacement, then clear; after a refusal select the old one again."""
         replacement = require_replacement(tool, then_select)
         with self._driver.uninterrupted():
             self.select(replacement)
@@ -328,7 +328,7 @@ class ToolTableCore(DriverPart, ABC):
         return offset
 
     def _require_values_of_a_tool(self, tool: int, offset: ToolOffset) -> None:
-        """Refuse values of no tool, unless they are put back.
+        """Refuse values of no tool, unless they are restored.
 
         They may be read and replaced, never worked with or written: an EPSON controller goes into
         error over such a statement, which leaves its outcome in doubt.
@@ -414,7 +414,7 @@ class _Selection(MarkedCommand[int | None]):
 
 
 def require_replacement(tool: int, then_select: int | None) -> int:
-    """Return the tool that is to be in force in the place of one that is cleared.
+    """Return the tool to select in the place of one that is cleared.
 
     Raises:
         SelectedToolError: None is named, or the same.

@@ -32,7 +32,7 @@ Same = Callable[[ToolOffset | None, ToolOffset | None], bool]
 
 
 class ToolWrite(MarkedCommand[ToolOffset | None]):
-    """One write of a tool; each kind of controller says how it is read and sent.
+    """One write of a tool; each kind of controller says how to read and send it.
 
     Attributes:
         tool: Number of the tool.
@@ -87,7 +87,7 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
         """Read what is stored after the controller has accepted the write."""
 
     def read_doubted(self) -> ToolOffset | None:
-        """Read what is stored when the answer told nothing."""
+        """Read what is stored after an unclear answer."""
         return self.read_back()
 
     def change(self, expected: Expected) -> ToolReceipt:
@@ -95,13 +95,13 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
 
         Raises:
             BusyError: Another thread is at work on this controller.
-            StoppedError: A stop is in force, or came meanwhile.
+            StoppedError: A stop is active, or came meanwhile.
             RobolinkError: As :meth:`robolink.model.ToolTable.write`.
         """
         with self._link.lock.held(self.request):
             markers, self._unconditional = self._link.markers, expected is ANY
             if self._unconditional:
-                purpose = tr("write tool {tool} blindly", tool=self.tool)
+                purpose = tr("write tool {tool} without comparing its old value", tool=self.tool)
                 require_engineer(markers.outcomes, purpose)
             markers.look()
             self.before = self.read_before(expected)
@@ -120,13 +120,13 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
             return self._receipt(found)
 
     def _require_clearer(self) -> None:
-        """Let nobody but an engineer clear a tool, unless that puts it back."""
+        """Let only an engineer clear a tool, unless that restores it."""
         if self.requested is None and not self._link.latch.restores:
             require_engineer(self._link.markers.outcomes, tr("clear tool {tool}", tool=self.tool))
 
     @property
     def details(self) -> Mapping[str, object]:
-        """Plain JSON values needed to settle it later."""
+        """Plain JSON values needed to recover it later."""
         markers = self._link.markers
         details: dict[str, object] = {
             "tool": self.tool,
@@ -146,14 +146,14 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
         return self.read_back() if self.acknowledged else self.read_doubted()
 
     def entries(self, marker: Marker, found: ToolOffset | None) -> Iterator[NewEntry]:
-        """Return what is put on record together with the end of the marker."""
+        """Return what is recorded together with the end of the marker."""
         now = {**marker.details, "value": plain_offset(found)}
         for kind in self._ends(found):
             said = {"request": self.request} if kind is EntryKind.WRITE else now
             yield NewEntry(kind, operation=marker.operation, tool=self.tool, details=said)
 
     def told_by(self, found: ToolOffset | None) -> str:
-        """Return what the value that was read says about an answer that told nothing."""
+        """Return what the value read shows about an unclear answer."""
         if self._same(found, self.requested):
             return tr("Reading tool {tool} back confirms that it ran.", tool=self.tool)
         if self._same(found, self.before):

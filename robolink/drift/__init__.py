@@ -1,4 +1,4 @@
-"""How the offset of each tool went over its changes, and what that says about the cell.
+"""How the offset of each tool changed over time, and what that says about the cell.
 
 Reads the record alone; nothing is asked of a controller.
 """

@@ -1,4 +1,4 @@
-"""Control charts of what a cell's changes measured: tips by tool, pins by station, turn tests.
+"""Control charts of a cell's changes: tips by tool, pins by station, turn tests.
 
 Single values against three standard deviations of the moving range, and an exponentially weighted
 mean (docs/reference/evidence.md 14). A value outside counts in the mean as if it lay at the limit:
@@ -50,7 +50,7 @@ class ChartPoint:
 
 @dataclass(frozen=True, slots=True)
 class Chart:
-    """The course of one coordinate.
+    """One coordinate over time.
 
     Attributes:
         quantity: ``tip`` of a tool, flange axes; ``pin``, base axes; ``turn test`` of a tool.
@@ -92,7 +92,7 @@ class Chart:
 
     @property
     def shifted(self) -> tuple[ChartPoint, ...]:
-        """The values since it shifted; none while the weighted mean is inside its limits.
+        """The values since a shift; none while the weighted mean is inside its limits.
 
         When that was is told by the split that leaves the least scatter on both sides (the most
         likely one for normal values), among those since the mean went to the side where it is
@@ -110,7 +110,7 @@ class Chart:
 
     @property
     def shift_mm(self) -> float:
-        """By how much the shifted values differ from the centre on average, mm; 0 for none."""
+        """The average difference of the shifted values from the centre, mm; 0 for none."""
         values = [point.value_mm for point in self.shifted]
         return fmean(values) - self.centre_mm if values else 0.0
 
@@ -187,7 +187,7 @@ def _chart(key: _Key, points: Sequence[ChartPoint], baseline: int) -> Chart:
 
 
 def _possible(key: _Key, limits: tuple[float, float] | None) -> tuple[float, float] | None:
-    """Return limits that a value can reach: a turn test ends no nearer than on the spot."""
+    """Return limits that a value can reach: a turn test cannot end below zero."""
     if limits is None or key[0] != "turn test":
         return limits
     return max(limits[0], 0.0), limits[1]

@@ -1,4 +1,4 @@
-"""What the charts of a controller say, in words: a worn nozzle, a slipping mount, a moved pin."""
+"""What a controller's charts show, in words: a worn nozzle, a slipping mount, a moved pin."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -43,7 +43,7 @@ class MountedTrend:
 
 
 def mounted_trend(changes: Sequence[MeasuredChange]) -> MountedTrend | None:
-    """Return how the nozzle that is mounted changes, ``None`` if it does not.
+    """Return how the mounted nozzle changes, ``None`` if it does not.
 
     Args:
         changes: The measured changes of one tool, oldest first. A nozzle without an id is not
@@ -130,7 +130,7 @@ def findings_in(
 
 
 def _unusual(charts: Sequence[Chart], changes: Sequence[MeasuredChange]) -> Iterator[DriftFinding]:
-    """Yield tools whose last change lies outside, and does not go on with a shift."""
+    """Yield tools whose last change is outside the limits and does not continue a shift."""
     newest = {change.tool: change for change in changes}
     for tool, change in newest.items():
         of_tool = [c for c in charts if c.quantity == "tip" and c.subject == tool]
@@ -201,7 +201,7 @@ def _sideways(charts: Sequence[Chart]) -> Iterator[DriftFinding]:
 
 
 def _alike(charts: Sequence[Chart], shifted: Mapping[int | str, object]) -> list[int | str]:
-    """Return the tools, two or more, that moved by the same within their scatter."""
+    """Return the tools, two or more, that moved alike within their scatter."""
     plane = {
         (chart.subject, chart.axis): chart
         for chart in charts
@@ -351,7 +351,7 @@ def _facts(charts: Sequence[Chart]) -> dict[str, object]:
 
 
 def _off(charts: Sequence[Chart]) -> dict[str, float]:
-    """Return the shift by axis; of several tools their mean."""
+    """Return the shift by axis; for several tools their mean."""
     axes = dict.fromkeys(chart.axis for chart in charts)
     return {axis: fmean(c.shift_mm for c in charts if c.axis == axis) for axis in axes}
 
@@ -366,7 +366,7 @@ def _said(off: Mapping[str, float]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class CellDrift:
-    """How the tools of one controller went.
+    """How the tools of one controller changed.
 
     Attributes:
         controller: Its identity, as in the journal.
@@ -396,7 +396,7 @@ def drift_of(
     since: str = "",
     baseline: int = LEAST_BASELINE,
 ) -> CellDrift:
-    """Return how the tools of one controller went.
+    """Return how the tools of one controller changed.
 
     Args:
         controller: Its identity, for the reader.
@@ -427,7 +427,7 @@ def drift_of(
 
 @without_sign
 def last_statements(changes: Sequence[MeasuredChange]) -> Iterator[str]:
-    """Yield a sentence for each tool whose last change has a statement on record.
+    """Yield a sentence for each tool whose last change has a recorded statement.
 
     Args:
         changes: The changes of one controller, oldest first.

@@ -1,4 +1,4 @@
-"""From the journal's entries to what was measured at each tool change."""
+"""From the journal's entries to what each tool change measured."""
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -17,7 +17,7 @@ _AXES = {"x_mm": "x", "y_mm": "y", "z_mm": "z"}
 
 @dataclass(frozen=True, slots=True)
 class MeasuredChange:
-    """A tool change that was measured, and whose value was kept.
+    """A tool change with a measured value that was kept.
 
     Attributes:
         number: Number of the entry that kept it.
@@ -55,7 +55,7 @@ class MeasuredChange:
 def measured_changes(
     entries: Iterable[Recorded], finds_pin: Callable[[str], bool]
 ) -> list[MeasuredChange]:
-    """Return the changes of one controller whose value was measured and kept, oldest first.
+    """Return one controller's changes with a measured and kept value, oldest first.
 
     What was taken back, refused or only typed is none: it says nothing about the nozzle.
 
@@ -118,7 +118,7 @@ def _number(said: Mapping[str, object], name: str) -> float | None:
 
 
 def _tip(said: Mapping[str, object], end: Mapping[str, object]) -> dict[str, float]:
-    """Return the tip as it was measured, not as it was written: a recipe may write a difference."""
+    """Return the tip as measured, not as written: a recipe may write a difference."""
     tip = read_offset(said.get("tip") or said.get("proposed"))
     measured = said.get("measured")
     if tip is None or not isinstance(measured, (list, tuple)):
@@ -143,7 +143,7 @@ _RESOLUTION_MM: Final = 0.001 / math.sqrt(12)
 
 
 def shift_is_sure(before: Sequence[float], since: Sequence[float]) -> bool:
-    """Tell whether the later values have another mean.
+    """Return whether the later values have another mean.
 
     Student's t of two samples with one variance, at a split that was chosen because it looked
     best: the level is divided by the number of splits there were.
@@ -185,7 +185,7 @@ def likeliest_split(values: Sequence[float], earliest: int) -> int:
 
 
 def value_is_unusual(before: Sequence[float], value: float) -> bool:
-    """Tell whether one more value lies outside the prediction interval of those before.
+    """Return whether one more value lies outside the prediction interval of those before.
 
     Args:
         before: Two values or more.

@@ -1,1 +1,1 @@
-"""Files that people name, files that people write, and files of robolink's own."""
+"""Files that people name, files that people write, and robolink's own files."""

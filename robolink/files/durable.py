@@ -22,7 +22,7 @@ def state_folder(kind: str) -> Path:
 
 
 def file_name(identity: str) -> str:
-    """Return a name that is readable, legal anywhere, and of this identity only."""
+    """Return a readable file name that is legal everywhere, and of this identity only."""
     from hashlib import sha256
 
     readable = re.sub(r"[^A-Za-z0-9.]+", "-", identity).strip("-.")[:60]
@@ -45,7 +45,7 @@ def make_folder(folder: Path) -> None:
 def write_whole(
     path: Path, data: bytes | Iterable[bytes], *, replace: bool = True, mode: int = 0o600
 ) -> None:
-    """Put ``data`` at ``path``, whole and on the disk, or leave everything as it was.
+    """Write ``data`` to ``path``, whole and on the disk, or leave everything as it was.
 
     The rename is durable after :func:`sync_folder`.
 
@@ -87,7 +87,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def _put_beside(draft: Path, path: Path) -> None:
-    """Give ``draft`` its name without ever taking the place of another file."""
+    """Rename ``draft`` without ever replacing another file."""
     try:
         os.link(draft, path)
     except FileExistsError:

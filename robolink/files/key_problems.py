@@ -1,4 +1,4 @@
-"""The words for what is wrong with one key of a file. They never repeat the value.
+"""The sentences for a wrong key of a file. They never repeat the value.
 
 A value may be a password in the wrong place. So every sentence is made from what pydantic found
 out about it, never from the value itself.
@@ -12,7 +12,7 @@ from robolink.messages import tr
 
 
 def is_not_known(key: str, table: Iterable[str]) -> str:
-    """Return what to say about a key that does not exist where it stands.
+    """Return the sentence for a key that does not exist in its place.
 
     Args:
         key: The key.
@@ -26,37 +26,37 @@ def is_not_known(key: str, table: Iterable[str]) -> str:
 
 
 def one_of(values: Iterable[str]) -> str:
-    """Return what to say about a value that is none of those that exist."""
+    """Return the sentence for a value that is none of the possible ones."""
     return tr("must be one of {values}", values=", ".join(f'"{value}"' for value in values))
 
 
 def more_than(limit: object) -> str:
-    """Return what to say about a number that is not large enough."""
+    """Return the sentence for a number that is not large enough."""
     return tr("must be more than {limit:g}", limit=limit)
 
 
 def at_least(limit: object) -> str:
-    """Return what to say about a number that is too small."""
+    """Return the sentence for a number that is too small."""
     return tr("must be at least {limit:g}", limit=limit)
 
 
 def at_most(limit: object) -> str:
-    """Return what to say about a number that is too large."""
+    """Return the sentence for a number that is too large."""
     return tr("must be at most {limit:g}", limit=limit)
 
 
 def holds_at_least(count: object) -> str:
-    """Return what to say about a list that is too short."""
+    """Return the sentence for a list that is too short."""
     return tr("must hold at least {count}", count=count)
 
 
 def holds_at_most(count: object) -> str:
-    """Return what to say about a list that is too long."""
+    """Return the sentence for a list that is too long."""
     return tr("must hold at most {count}", count=count)
 
 
 def sentence(detail: Any) -> str:  # noqa: ANN401 - pydantic's own form
-    """Return what to say about a value that pydantic objects to.
+    """Return the sentence for a value that pydantic rejects.
 
     Args:
         detail: One of the errors of a ``ValidationError``, without the value.

@@ -1,4 +1,4 @@
-"""Files that a person named: read only when they are files, never written over unasked."""
+"""Files that a person named: read only if regular, never overwritten unasked."""
 
 import errno
 import os
@@ -56,7 +56,7 @@ def read_named(path: Path, *, most_bytes: int = MOST_BYTES, secret: bool = False
 
 
 def holds(path: Path, data: bytes) -> bool:
-    """Tell whether a regular file holds exactly ``data``."""
+    """Return whether a regular file holds exactly ``data``."""
     try:
         return read_named(path, most_bytes=len(data)) == data
     except OSError:
@@ -64,7 +64,7 @@ def holds(path: Path, data: bytes) -> bool:
 
 
 def append_to_named(path: Path, *, encoding: str = "ascii") -> TextIO:
-    """Open a regular file for text at its end; it is made if it is not there.
+    """Open a regular file to append text; it is created if it is missing.
 
     Args:
         path: The file; a link is followed.
@@ -98,7 +98,7 @@ def require_free(path: Path, *, replace: bool = False) -> None:
 
 
 def save_named(path: Path, data: bytes | Iterable[bytes], *, replace: bool = False) -> None:
-    """Write ``data``; the file is whole and on the disk when this returns.
+    """Write ``data``; on return the file is complete and on the disk.
 
     The data may come in one piece or in several.
 

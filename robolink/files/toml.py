@@ -1,4 +1,4 @@
-"""The TOML files that people write: read, and refused with all that is wrong in them at once.
+"""TOML files that people write: read, or refused with all their errors at once.
 
 Cell files, recipes and PLC maps differ in their keys. How one is read, how a problem names its
 key and how all problems of a file are told is the same for them.
@@ -25,7 +25,7 @@ MOST_BYTES: Final = 250_000
 """A recipe of a hundred tools takes 60 kB, as does a cell file of a hundred cells."""
 
 MOST_SHOWN: Final = 40
-"""Problems of one file that are told at once; a file in another form has one in each line."""
+"""Most problems of one file in an error; a file in another form has one in each line."""
 
 _MOST_PARTS: Final = 32
 _PART: Final = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')"""
@@ -39,7 +39,7 @@ of 60000 parts, 120 kB, took minutes. The keys that we know have four."""
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One thing that is wrong in a file.
+    """One error in a file.
 
     Attributes:
         where: Path of the key inside the file; empty for the file as a whole.
@@ -55,7 +55,7 @@ class Problem:
 
 @dataclass(frozen=True, slots=True)
 class FileKind:
-    """What a kind of file is called, and what to do about one that is of no use.
+    """The name of a kind of file, and what to do about one that is unusable.
 
     The sentences are asked for when they are shown, in the language of that moment.
 
@@ -70,7 +70,7 @@ class FileKind:
     wrong_remedy: Callable[[], str]
 
     def read(self, path: Path) -> bytes:
-        """Return what is in a file.
+        """Return the content of a file.
 
         Raises:
             ConfigError: It cannot be read, or is longer than :data:`MOST_BYTES`.
@@ -81,7 +81,7 @@ class FileKind:
             raise self._unreadable(path, error.strerror or str(error)) from error
 
     def parse(self, path: Path, content: bytes) -> dict[str, object]:
-        """Return what a file says whose content was read.
+        """Return what a file says, from its content.
 
         Raises:
             ConfigError: It is no TOML.
@@ -104,7 +104,7 @@ class FileKind:
             raise self._unreadable(path, str(error)) from error
 
     def refusal(self, path: Path, problems: Sequence[Problem]) -> ConfigError:
-        """Return the error that tells the problems of one file at once, the first forty of them."""
+        """Return the error that lists the problems of one file, the first forty of them."""
         shown = [f"    {problem}" for problem in problems[:MOST_SHOWN]]
         if len(problems) > MOST_SHOWN:
             shown.append("    " + tr("and {more} more", more=len(problems) - MOST_SHOWN))

@@ -1,4 +1,4 @@
-"""The journal: what was done to each tool, by whom, and what is not settled yet.
+"""The journal: what was done to each tool, by whom, and what is unfinished.
 
 Append-only: an SQLite file by default, PostgreSQL by URL (docs/decisions/0011,
 docs/reference/rules.md 6).

@@ -27,7 +27,7 @@ _in_memory: Final[dict[str, "Journal"]] = {}
 
 
 def open_journal(location: str | None = None, *, read_only: bool = False) -> "Journal":
-    """Open a journal, or return the one that this process has open already.
+    """Open a journal, or return the one that this process has open.
 
     A new file is for its owner only, and so is a new folder.
 
@@ -60,7 +60,7 @@ def memory_journal(identity: str) -> "Journal":
 
 
 def forget_memory(identity: str) -> None:
-    """Let go of :func:`memory_journal`; whoever still has it goes on with an empty one.
+    """Forget :func:`memory_journal`; whoever still has it continues with an empty one.
 
     For whoever ends a simulator of this process before the process ends.
 
@@ -122,12 +122,12 @@ def open_log(
 
 @deprecated("open_log(address, durable=True, signature=signature, glance=True)")
 def GlancingLog(address: str, *, signature: Signature) -> OutcomeLog:  # noqa: N802 - a class once
-    """Return the record of a controller for a look; see :func:`open_log`."""
+    """Return the record of a controller for a read-only look; see :func:`open_log`."""
     return open_log(address, durable=True, signature=signature, glance=True)
 
 
 def nothing_is_open(address: str) -> bool:
-    """Tell whether the journal is a readable file that has nothing to say about a look.
+    """Return whether the journal is a readable file with nothing to report about a look.
 
     Args:
         address: How the controller is reached. One that was not met there before is asked who
@@ -153,7 +153,7 @@ class NamesOnRecord(NamedTuple):
 
 
 def names_on_record(address: str) -> NamesOnRecord:
-    """Return the tools and stations on record, for TAB.
+    """Return the recorded tools and stations, for TAB.
 
     Args:
         address: How the controller is reached; empty for all controllers.
@@ -173,7 +173,7 @@ def names_on_record(address: str) -> NamesOnRecord:
 
 
 def _asked(question: "Callable[[Tables, str], T]", *, unknown: T) -> T:
-    """Ask this user's journal where it is a file; one that is not well, or not there, says nothing.
+    """Ask this user's journal if it is a file; a damaged or missing one returns nothing.
 
     The file is opened for the question alone: the next one may be about another file.
     """

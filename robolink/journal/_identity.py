@@ -1,4 +1,4 @@
-"""Which controller a log is about: what it says of itself, and what is on record of that."""
+"""Which controller a log is about: its own answer, and the record of that."""
 
 import re
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ _ANSWERS: Final = 3
 
 @dataclass(frozen=True, slots=True)
 class Names:
-    """Under which names a controller is on record.
+    """The names under which a controller is recorded.
 
     Attributes:
         identity: What goes on record from now on.
@@ -45,7 +45,7 @@ class Names:
 
     @property
     def record(self) -> str:
-        """Under which name entries go on record."""
+        """The name under which entries are recorded."""
         return self.robot or self.identity
 
 
@@ -57,7 +57,7 @@ class _Meeting:
         names: Of the controller.
         before: Who was met at this address last, empty for nobody.
         elsewhere: Where else this controller was met.
-        unclaimed: Names of before under which something stands that is nobody's yet.
+        unclaimed: Former names under which something stands that is nobody's yet.
         new_robots: Robots that the journal did not know to be this controller's.
         shared: Whether something stands under the controller's name that is no robot's.
     """
@@ -74,7 +74,7 @@ _LOG: Final = PackageLog(__package__)
 
 
 class Naming:
-    """Finds out who the controller of one log is, and keeps that on record.
+    """Finds out who the controller of one log is, and records that.
 
     The controller is asked at the first use of the log, not before: whoever only stops it
     waits for no question. It is asked again as long as it could not tell.
@@ -159,7 +159,7 @@ class Naming:
 
 
 def _told_twice(who: Who, first: Identity) -> Identity:
-    """Return what a controller tells twice when it is asked up to three times."""
+    """Return an answer that a controller gives twice in up to three requests."""
     told = [first]
     while len(told) < _ANSWERS:
         told.append(who())
@@ -179,7 +179,7 @@ def _told_twice(who: Who, first: Identity) -> Identity:
 
 
 def _listed(rows: "NameRows", name: str) -> Names:
-    """Return the names of a controller that does not tell which of its robots is in force."""
+    """Return the names of a controller that does not say which of its robots is current."""
     return Names(name, rows.former(name), robots=rows.robots(name))
 
 
@@ -207,7 +207,7 @@ def _meeting(rows: "NameRows", found: Identity, before: str) -> _Meeting:
 
 
 def _is_lent(text: str) -> bool:
-    """Tell whether a name is that of a port which the system gave to whoever asked.
+    """Return whether a name is that of a port which the system assigned.
 
     Simulators are served there; what one left open is not for the next one on its port.
     """

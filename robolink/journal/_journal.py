@@ -108,7 +108,7 @@ class Journal:
 
         Args:
             controller: Of this controller only: its identity, or an address at which it was
-                met, or a name of before.
+                met, or a former name.
             tool: About this tool only.
             change: Of this tool change only.
             kinds: Of these kinds only; empty for all.
@@ -188,10 +188,10 @@ class Journal:
             return tables.entries.count()
 
     def names_of(self, controller: str) -> tuple[str, ...]:
-        """Return the names under which a controller is on record, its identity first.
+        """Return the names under which a controller is recorded, its identity first.
 
         Args:
-            controller: Its identity, an address at which it was met, or a name of before. Of a
+            controller: Its identity, an address at which it was met, or a former name. Of a
                 controller with several robots that is all of them; the name of a robot is that
                 robot alone.
 
@@ -205,7 +205,7 @@ class Journal:
         """Return the names of the robots of a controller that has several, else nothing.
 
         Args:
-            controller: Its identity, an address at which it was met, or a name of before.
+            controller: Its identity, an address at which it was met, or a former name.
 
         Raises:
             JournalError: It cannot be read.
@@ -214,7 +214,7 @@ class Journal:
             return tables.names.robots(tables.names.meant(controller))
 
     def addresses_of(self, controller: str) -> tuple[str, ...]:
-        """Return the URLs, without options, at which a controller was met, the latest first.
+        """Return the URLs, without options, at which a controller was reached, the latest first.
 
         Args:
             controller: Its identity.
@@ -226,7 +226,7 @@ class Journal:
             return tables.names.addresses_of(controller)
 
     def open_markers(self) -> tuple[tuple[str, Marker], ...]:
-        """Return what is unsettled on any controller, with the controller's identity.
+        """Return the unfinished jobs on any controller, with the controller's identity.
 
         Raises:
             JournalError: It cannot be read.

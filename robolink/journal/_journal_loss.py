@@ -1,4 +1,4 @@
-"""What outlives a journal: signs that a controller was changed from here before.
+"""Signs outside a journal that a controller was changed from here before.
 
 A journal that was emptied, deleted or replaced knows nothing of what is unfinished, and looks
 as a new one does; so does an older one that is named again. So the first change of each controller
@@ -41,7 +41,7 @@ class Traces:
     backup: Path | None
 
     def marker(self, journal: str) -> Marker:
-        """Return what a person must settle who has another journal now, or an emptied one.
+        """Return what a person must recover who has another journal now, or an emptied one.
 
         Args:
             journal: Where the record is looked for now.
@@ -54,7 +54,7 @@ class Traces:
 
 
 def leave_trace(identity: str, journal: str, newest: tuple[int, str] | None) -> None:
-    """Note that a controller is changed from here, and where that is on record.
+    """Note that a controller is changed from here, and where that is recorded.
 
     Args:
         identity: Which controller.
@@ -90,7 +90,7 @@ def traces_of(names: tuple[str, ...]) -> Traces | None:
 
 
 def _noted(name: str) -> Traces | None:
-    """Return what was noted of a controller under one name; what cannot be read says nothing."""
+    """Return what was noted of a controller under one name; what is unreadable is ignored."""
     try:
         known = json.loads(_path(name).read_bytes())
         newest = known.get("newest")
@@ -101,7 +101,7 @@ def _noted(name: str) -> Traces | None:
 
 
 def _is_there(path: Path) -> bool:
-    """Tell whether a file is there; in a folder that may not be looked into nothing is."""
+    """Return whether a file is there; in a folder without access nothing is."""
     try:
         return path.exists()
     except OSError:

@@ -1,4 +1,4 @@
-"""One at a time on a controller: a lease with an epoch.
+"""One user at a time on a controller: a lease with an epoch.
 
 Source: docs/reference/rules.md 6; docs/reference/faults.md F46, F47.
 
@@ -32,11 +32,11 @@ BEAT_S: Final = 1.0
 
 @dataclass(frozen=True, slots=True)
 class Grip:
-    """What came of asking for the lease inside a transaction.
+    """Result of asking for the lease inside a transaction.
 
     Attributes:
         epoch: The epoch under which it is held.
-        entries: What is put on record about it.
+        entries: What is recorded about it.
     """
 
     epoch: int
@@ -74,7 +74,7 @@ class Lease:
         return self._epoch != 0
 
     def look(self, *, afresh: bool = True) -> None:
-        """Remember the lease as it is now; one that is held is proved by the next intent.
+        """Remember the lease as it is now; the next intent confirms one that is held.
 
         Args:
             afresh: Whether one that was lost may be forgotten.
@@ -90,7 +90,7 @@ class Lease:
             self._seen, self._lost = self._judged(self._sight()), False
 
     def at_work(self) -> str:
-        """Return who else holds it and lives, in sentences; empty for nobody.
+        """Return who else has it locked and is alive, in sentences; empty for nobody.
 
         A holder on another computer is not watched for that, so whether he lives stays open.
 
@@ -119,7 +119,7 @@ class Lease:
             self.look()
 
     def secure(self, rows: "LeaseRows", purpose: str, operator: str) -> Grip:
-        """Prove inside the caller's transaction that the lease is held, or take it.
+        """Confirm or take the lease, inside the caller's transaction.
 
         Raises:
             LeaseHeldError: Somebody else took it since it was looked at.
@@ -163,7 +163,7 @@ class Lease:
                 self._lose(tables.leases)
 
     def release(self, rows: "LeaseRows") -> bool:
-        """Free it inside the caller's transaction; one that was lost is left alone.
+        """Free it inside the caller's transaction; a lost one is left alone.
 
         Returns:
             Whether it was not lost.
@@ -173,7 +173,7 @@ class Lease:
         return not self._lost
 
     def prove(self, rows: "LeaseRows", *, last: bool) -> None:
-        """Prove inside the caller's transaction that it was not lost, before an end is recorded.
+        """Confirm inside the caller's transaction that it was not lost, before an end is recorded.
 
         Args:
             rows: Of the transaction.
@@ -188,14 +188,14 @@ class Lease:
             raise self._lost_error(sent=True)
 
     def forget(self) -> None:
-        """Note, after the commit, that it was freed; what was seen before is of no use now."""
+        """Note, after the commit, that it was freed, and forget what was read before."""
         self._epoch, self._seen = 0, None
 
     def end(self, rows: "LeaseRows", reason: str, operator: str) -> NewEntry | None:
-        """End the lease of whoever has it, inside the caller's transaction.
+        """End the lease, whoever has it, inside the caller's transaction.
 
         Returns:
-            What is put on record; ``None`` when this log holds it itself.
+            What is recorded; ``None`` when this log holds it itself.
         """
         seen = rows.sight(self.controller)
         if seen.token == self._token:

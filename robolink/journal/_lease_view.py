@@ -1,4 +1,4 @@
-"""Who holds a lease, whether that process still lives, and a lease as somebody sees it.
+"""Who holds a lease, whether that process is alive, and a lease as it was read.
 
 A PLC knows the owner of its mailbox by a token and nothing else. So each run that takes one
 leaves a small file in the state folder, before it asks, and removes it when it has given the
@@ -52,7 +52,7 @@ class LeaseHolder:
         return self.boot != "" and self.boot == other.boot
 
     def proves_gone(self, other: "LeaseHolder") -> bool:
-        """Whether this process can tell for certain that ``other`` has ended.
+        """Whether this process knows for certain that ``other`` has ended.
 
         A container has process numbers of its own, so only the same PID namespace counts.
         """
@@ -60,7 +60,7 @@ class LeaseHolder:
         return self.can_tell(other) and _has_ended(other.pid, start)
 
     def can_tell(self, other: "LeaseHolder") -> bool:
-        """Whether this process can see at all whether ``other`` still runs."""
+        """Whether this process can find out if ``other`` still runs."""
         namespace, _, start = other.process_start.partition(" ")
         if not self.shares_clock_with(other) or not start:
             return False
@@ -103,7 +103,7 @@ def this_process(operator: str = "") -> LeaseHolder:
 
 @lru_cache(maxsize=1)
 def _start_and_boot(pid: int) -> tuple[str, str]:
-    """Return what tells this process from others, which stays as it is; a fork has another pid."""
+    """Return what identifies this process and stays the same; a fork has another pid."""
     found, namespace = _state_and_start(pid), _pid_namespace()
     return f"{namespace} {found[1]}" if found and namespace else "", _boot_id()
 
@@ -151,7 +151,7 @@ def signature_here(version: str) -> Signature:
 
 
 LEASE_S: Final = 10.0
-"""A holder that gave no sign of life for so long may be replaced."""
+"""A holder without a sign of life for this long may be replaced."""
 
 FREE: Final = ""
 """The token of a lease that nobody holds."""
@@ -159,7 +159,7 @@ FREE: Final = ""
 
 @dataclass(frozen=True, slots=True)
 class LeaseView:
-    """A lease as it was seen.
+    """A lease as it was read.
 
     Attributes:
         epoch: How many holders there were; 0 for a lease that never was held.
@@ -180,7 +180,7 @@ class LeaseView:
     purpose: str = ""
 
     def who(self) -> LeaseHolder:
-        """Return the holder, nobody known when the record of him is damaged."""
+        """Return the holder, an unknown one if its record is damaged."""
         try:
             return LeaseHolder(**json.loads(self.holder))
         except (ValueError, TypeError, RecursionError):
@@ -212,13 +212,13 @@ class LeaseView:
         )
 
     def at_work(self, alive: str) -> str:
-        """Return the sentences about a holder who is at it.
+        """Return the sentences about a holder who is working.
 
         Args:
             alive: Whether he lives, one sentence.
         """
         said = tr(
-            "{holder} has been at work on this controller since {since}: {purpose}.",
+            "{holder} has had this controller locked since {since}: {purpose}.",
             holder=describe(self.who()),
             since=local_label(self.taken_at),
             purpose=self.purpose,
@@ -226,7 +226,7 @@ class LeaseView:
         return f"{said} {alive}"
 
     def took_over(self, controller: str) -> str:
-        """Return the sentence about the holder who has it now, or had it last.
+        """Return the sentence about the present holder, or the last one.
 
         Args:
             controller: Whose lease it is.
@@ -242,7 +242,7 @@ class LeaseView:
         )
 
     def taken_entry(self, because: str, insisting: LeaseHolder | None = None) -> NewEntry:
-        """Return what is put on record when this lease was ended by another.
+        """Return the record of a lease that another ended.
 
         Args:
             because: Why that could be done, in words.
@@ -250,12 +250,12 @@ class LeaseView:
                 had to insist.
         """
         if self.token == FREE:
-            verdict = tr("Nobody worked on this cell; {because}.", because=because)
+            verdict = tr("Nobody had this controller locked; {because}.", because=because)
         else:
             holder = describe(self.who())
             verdict = (
                 tr(
-                    "{holder} was at work on this controller before: {because}.",
+                    "{holder} had this controller locked before: {because}.",
                     holder=holder,
                     because=because,
                 )
@@ -278,12 +278,12 @@ class LeaseView:
         return NewEntry(EntryKind.LEASE, verdict=verdict, details=details)
 
     def is_like(self, other: "LeaseView") -> bool:
-        """Whether nothing happened between two sightings."""
+        """Whether nothing happened between two reads."""
         return (self.epoch, self.token, self.beat) == (other.epoch, other.token, other.beat)
 
 
 def describe(holder: LeaseHolder) -> str:
-    """Return who it is, as a person is told."""
+    """Return who it is, for display."""
     if holder == LeaseHolder():
         return tr("Somebody unknown")
     process = tr("process {pid} on {host}", pid=holder.pid, host=holder.host)
@@ -303,7 +303,7 @@ _KEPT_S: Final = 86_400.0
 
 
 def note_client(client: str, holder: LeaseHolder) -> None:
-    """Note, before it asks for a mailbox, whose a token is; a full state folder is no matter."""
+    """Note whose a token is before it takes a mailbox; a full state folder does not matter."""
     known = {"schema": _SCHEMA, "client": client, "holder": asdict(holder), "since": wall_label()}
     with suppress(OSError):
         path = _path(client)
@@ -318,7 +318,7 @@ def note_client(client: str, holder: LeaseHolder) -> None:
 
 
 def forget_client(client: str) -> None:
-    """Forget a token: the mailbox was given back, or was never got."""
+    """Forget a token: the mailbox was released, or never taken."""
     with suppress(OSError):
         _path(client).unlink(missing_ok=True)
 

@@ -102,7 +102,7 @@ class JournalOutcomeLog:
 
     @property
     def identity(self) -> str:
-        """Who the controller is; it is asked if it was not asked yet.
+        """The controller's identity; it is asked at first use.
 
         Raises:
             JournalError: The journal cannot be read.
@@ -112,7 +112,7 @@ class JournalOutcomeLog:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Every name under which the controller is on record, its identity first.
+        """Every name under which the controller is recorded, its identity first.
 
         Raises:
             JournalError, TransportError, RemoteProtocolError: As for :attr:`identity`.
@@ -121,7 +121,7 @@ class JournalOutcomeLog:
 
     @property
     def robot(self) -> str:
-        """Of a controller with several robots the one whose record this is; empty for one.
+        """Which of several robots this record is about; empty for one.
 
         Raises:
             JournalError, TransportError, RemoteProtocolError: As for :attr:`identity`.
@@ -130,7 +130,7 @@ class JournalOutcomeLog:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What a person should know about who the controller is, once, in sentences."""
+        """What a person should know once about the controller's identity, in sentences."""
         return self._naming.remarks
 
     def ask(self, who: Who) -> None:
@@ -139,9 +139,9 @@ class JournalOutcomeLog:
             self._naming.ask(who)
 
     def begin(self, marker: Marker) -> None:
-        """Store ``marker`` in one durable transaction that also proves or takes the lease.
+        """Store ``marker`` in one durable transaction that also confirms or takes the lease.
 
-        The first one of a controller is put on record whatever it stands for, so that a record
+        The first one of a controller is recorded whatever it stands for, so that a record
         which was lost later is told from a new one.
 
         Raises:
@@ -176,7 +176,7 @@ class JournalOutcomeLog:
                 self._traced = self._whole = True
 
     def clear(self, operation: str, *entries: NewEntry) -> None:
-        """Forget a marker and record how it ended, in one durable transaction.
+        """Remove a marker and record how it ended, in one durable transaction.
 
         Raises:
             JournalError: It is not stored; the marker stays.
@@ -215,7 +215,7 @@ class JournalOutcomeLog:
                 self._begin_anew(names.identity, newest)
 
     def append(self, *entries: NewEntry) -> None:
-        """Put something on record, in one durable transaction.
+        """Record something, in one durable transaction.
 
         The first entry of a record that was lost would make it look whole, so that nothing of what
         was unfinished blocks any more. It is refused until a person has looked.
@@ -237,7 +237,7 @@ class JournalOutcomeLog:
             self._answers.append(entry)
 
     def open_markers(self) -> tuple[Marker, ...]:
-        """Return what is unsettled on this controller, oldest first, whoever began it.
+        """Return the unfinished jobs on this controller, oldest first, whoever began them.
 
         A journal that knows nothing of a controller which was changed from here before, or not
         what was noted of it last, has lost what was unfinished: that is unsettled too.
@@ -255,13 +255,13 @@ class JournalOutcomeLog:
         return () if self._whole else (traces.marker(self._journal.location),)
 
     def _goes_on(self, traces: Traces, tables: "Tables") -> bool:
-        """Whether the record of a controller is this one, wherever it was moved to meanwhile."""
+        """Whether this still is the record of the controller, wherever it was moved."""
         if traces.newest is None or traces.journal == self._journal.location:
             return True
         return tables.entries.holds(*traces.newest)
 
     def _begin_anew(self, name: str, newest: tuple[int, str] | None) -> None:
-        """Note that the record of a controller is kept here, because a person said so.
+        """Note that the record of a controller is kept here, at a person's request.
 
         Raises:
             JournalError: That cannot be noted, so the record counts as missing still.
@@ -297,7 +297,7 @@ class JournalOutcomeLog:
     def recorded(
         self, *, tool: int | None = None, change: str = "", kinds: Collection[EntryKind] = ()
     ) -> Iterator[Recorded]:
-        """Yield what is on record about this controller, or its robot in force, newest first.
+        """Yield the records of this controller, or of its current robot, newest first.
 
         Args:
             tool: Only entries about this tool.
@@ -368,7 +368,7 @@ class JournalOutcomeLog:
                 self.close()
 
     def beat(self) -> None:
-        """Let others see that this process is alive.
+        """Show others that this process is alive.
 
         Cheap, and raises nothing: whether the lease was lost, or the journal with it, the next
         :meth:`begin` says.
@@ -379,9 +379,9 @@ class JournalOutcomeLog:
                     self._lease.beat()
 
     def take_over(self, reason: str) -> None:
-        """End the lease of whoever has it, because a person insists; this is put on record.
+        """End the lease, whoever has it, at a person's request; this is recorded.
 
-        His open markers stay, and block until they are settled.
+        His open markers stay, and block until they are recovered.
 
         Args:
             reason: Why, in the person's words.
@@ -415,7 +415,7 @@ class JournalOutcomeLog:
 
     @contextmanager
     def _writing(self, consequence: str = "") -> Iterator["Tables"]:
-        """Write in one transaction; answers that went on record in it are kept no longer."""
+        """Write in one transaction; answers that it recorded are kept no longer."""
         self._told = 0
         with self._store.write(consequence) as tables:
             yield tables
@@ -442,7 +442,7 @@ class JournalOutcomeLog:
             return names
 
     def _require_sound(self) -> None:
-        """Look for damage, once, before the first change: a bent record is no record."""
+        """Check for damage, once, before the first change: a damaged record is no record."""
         if not self._sound:
             self._store.require_sound(self._names.all)
             self._sound = True
@@ -457,7 +457,7 @@ class JournalOutcomeLog:
         )
 
     def close(self) -> None:
-        """Give the lease up; open markers stay, and block until they are settled.
+        """Release the lease; open markers stay, and block until they are recovered.
 
         A lease that cannot be given up ends by its holder's silence.
         """
@@ -474,7 +474,7 @@ def _of_robot(marker: Marker, robot: str) -> Marker:
 
 
 def _beginning(marker: Marker, *, first: bool) -> tuple[NewEntry, ...]:
-    """Return what is put on record when a marker is stored.
+    """Return what is recorded when a marker is stored.
 
     A write may be tried twice under one operation, and each try counts; the other markers are
     stored again to keep what has become of them.
@@ -487,7 +487,7 @@ def _beginning(marker: Marker, *, first: bool) -> tuple[NewEntry, ...]:
 
 
 def _act(kind: EntryKind, marker: Marker) -> NewEntry:
-    """Return what is put on record about what ``marker`` stands for."""
+    """Return what is recorded about the action that ``marker`` stands for."""
     tool, details = marker.details.get("tool"), {**marker.details, "request": marker.request}
     known = tool if isinstance(tool, int) else None
     return NewEntry(kind, operation=marker.operation, tool=known, details=details)

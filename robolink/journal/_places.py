@@ -1,4 +1,4 @@
-"""Where a journal is, and where none can be: on a network share, as far as it can be told.
+"""Where a journal is, and where none can be: on a network share, as far as can be detected.
 
 A database in WAL mode keeps an index in memory that all its users have to share, so they have to
 be on one computer (https://www.sqlite.org/wal.html); and locks and fsync of a share are not those
@@ -69,13 +69,13 @@ def default_location() -> str:
 
 
 def may_exist(location: str) -> bool:
-    """Tell whether there may be a journal at a place: a file is looked for, a server is not."""
+    """Return whether a journal may exist at a place: files are looked for, servers are not."""
     path = place_of(location).path
     return path is None or path.exists()
 
 
 def place_of(location: str) -> JournalPlace:
-    """Understand a URL or a path.
+    """Parse a URL or a path.
 
     A PostgreSQL URL without a driver means psycopg. Nothing is opened.
 

@@ -1,4 +1,4 @@
-"""The record of a controller for somebody who looks: opened when there is a reason to.
+"""The record of a controller for read-only use: opened when there is a reason to.
 
 Nearly always nothing is unfinished and a look has nothing to record: then the journal is only
 read, and the controller not asked who it is. And while the journal cannot be written, looking goes
@@ -26,7 +26,7 @@ T = TypeVar("T")
 
 
 class ReadOnlyLog:
-    """Stands in for a log until something is unfinished or has to be recorded.
+    """Stands in for a log until something is unfinished or must be recorded.
 
     It goes on standing in where the journal is full, damaged, newer, locked or out of reach. What
     is on record shows as far as it can be read then; whatever would have to be recorded raises
@@ -71,7 +71,7 @@ class ReadOnlyLog:
 
     @property
     def change(self) -> str:
-        """Id of the tool change under way; see the model."""
+        """Id of the present tool change; see the model."""
         return self._change if self._opened is None else self._opened.change
 
     @change.setter
@@ -83,7 +83,7 @@ class ReadOnlyLog:
 
     @property
     def order(self) -> str:
-        """Id of the order that is carried out; see the model."""
+        """Id of the present order; see the model."""
         return self._order if self._opened is None else self._opened.order
 
     @order.setter
@@ -95,7 +95,7 @@ class ReadOnlyLog:
 
     @property
     def trouble(self) -> JournalError | None:
-        """What is wrong with the journal, as far as anybody had to know."""
+        """What is wrong with the journal, as far as it has mattered."""
         if not self._says_nothing():
             self._recorder()
         return self._trouble
@@ -107,19 +107,19 @@ class ReadOnlyLog:
 
     @property
     def identity(self) -> str:
-        """Who the controller is, as far as the journal is needed to tell."""
+        """The controller's identity, as far as the journal is needed for it."""
         log = self._recorder() or self._reader
         return self._address if log is None else log.identity
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Every name under which the controller is on record."""
+        """Every name under which the controller is recorded."""
         log = self._recorder() or self._reader
         return (self._address,) if log is None else log.names
 
     @property
     def robot(self) -> str:
-        """Of several robots the one whose record this is, as far as the journal can be read."""
+        """Which of several robots the record is about, as far as the journal can be read."""
         log = self._recorder() or self._reader
         return "" if log is None else log.robot
 
@@ -136,7 +136,7 @@ class ReadOnlyLog:
                 log.ask(who)
 
     def open_markers(self) -> tuple[Marker, ...]:
-        """Return what is unsettled, as far as the journal can be read."""
+        """Return the unfinished jobs, as far as the journal can be read."""
         return self._told(lambda log: log.open_markers(), ())
 
     def at_work(self) -> str:
@@ -146,7 +146,7 @@ class ReadOnlyLog:
     def recorded(
         self, *, tool: int | None = None, change: str = "", kinds: Collection[EntryKind] = ()
     ) -> Iterator[Recorded]:
-        """Yield what is on record, newest first.
+        """Yield the records, newest first.
 
         Raises:
             JournalError: It cannot be read.
@@ -171,7 +171,7 @@ class ReadOnlyLog:
         self._log().append(*entries)
 
     def answered(self, entry: NewEntry) -> None:
-        """See the model; where nothing can be recorded, nothing can follow from it."""
+        """See the model; without a record, nothing can follow from it."""
         log = self._recorder()
         if log is not None:
             log.answered(entry)
@@ -189,7 +189,7 @@ class ReadOnlyLog:
         self._log().take_over(reason)
 
     def note_client(self, client: str) -> None:
-        """See the model; what needs no journal is noted all the same."""
+        """See the model; what needs no journal is noted anyway."""
         note_client(client, this_process(self.signature.operator))
 
     def forget_client(self, client: str) -> None:
@@ -225,14 +225,14 @@ class ReadOnlyLog:
             return nothing
 
     def _recorder(self) -> OutcomeLog | None:
-        """Return the log that is stood in for; ``None`` where that cannot be opened."""
+        """Return the log that it stands in for; ``None`` if that cannot be opened."""
         try:
             return self._log()
         except JournalError:
             return None
 
     def _log(self) -> OutcomeLog:
-        """Return the log that is stood in for, opened by now.
+        """Return the log that it stands in for, open by now.
 
         Raises:
             JournalError: That is impossible, as it was the first time.

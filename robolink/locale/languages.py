@@ -35,7 +35,7 @@ _TRADITIONAL: Final = ("hant", "tw", "hk", "mo", "taiwan", "hong kong", "macao",
 
 
 def language_named(text: str) -> str | None:
-    """Return the language that a name in any of the usual forms means, ``None`` if we lack it.
+    """Return the language meant by a name in any usual form, ``None`` if robolink lacks it.
 
     Args:
         text: A tag (``zh-Hans``), a POSIX locale (``zh_CN.GBK``) or a Windows name
@@ -53,7 +53,7 @@ def language_named(text: str) -> str | None:
 
 
 def speak(language: str) -> bool:
-    """Show every sentence in ``language`` from now on; return whether it can be.
+    """Show every sentence in ``language`` from now on; return whether that is possible.
 
     Where its catalogue is not there, English stays.
 
@@ -66,7 +66,7 @@ def speak(language: str) -> bool:
 
 
 def translator(language: str) -> Callable[[str], str] | None:
-    """Return what translates our sentences, ``None`` for English or without a catalogue."""
+    """Return the translation function, ``None`` for English or without a catalogue."""
     if language not in TERRITORY:
         return None
     ours = catalogue(language, OURS)
@@ -80,7 +80,7 @@ def translator(language: str) -> Callable[[str], str] | None:
 
 
 def catalogue(language: str, name: str) -> "GNUTranslations | None":
-    """Return a catalogue, compiled anew where its source is newer; ``None`` if there is none.
+    """Return a catalogue, compiled anew if its source is newer; ``None`` if there is none.
 
     One that is damaged, as after a full disk, counts as none: a command then speaks English.
 

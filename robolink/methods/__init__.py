@@ -1,4 +1,4 @@
-"""The calibration methods: how each measures, solves and proves."""
+"""The calibration methods: how each measures, solves and tests."""
 
 from typing import TYPE_CHECKING
 

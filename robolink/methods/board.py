@@ -69,11 +69,7 @@ class BoardParameters(LookParameters):
         Len(2, 24),
         MM,
         Option(flag="--fiducial", metavar="X,Y", moves=False),
-        Help(
-            declared(
-                "A fiducial in the axes that the tool is to have; in the order of their numbers."
-            )
-        ),
+        Help(declared("A fiducial in the axes of the tool; in the order of their numbers.")),
     ] = None
     spacing_mm: Annotated[
         float | None,
@@ -90,13 +86,13 @@ class BoardParameters(LookParameters):
 
     @property
     def drawing(self) -> BoardDrawing | None:
-        """Where the fiducials are on the board, ``None`` while nothing says it."""
+        """Where the fiducials are on the board, ``None`` while nothing states it."""
         if self.spacing_mm is not None:
             return BoardDrawing.of_two(self.spacing_mm)
         return None if self.fiducials_mm is None else BoardDrawing(self.fiducials_mm)
 
     def problems(self, check: Check) -> Iterator[Problem]:
-        """Check that the drawing is said once, and that its fiducials can be told apart."""
+        """Check that the drawing is stated once, and that its fiducials can be told apart."""
         yield from super().problems(check)
         if self.spacing_mm is None and self.fiducials_mm is None:
             yield Problem(
@@ -115,7 +111,7 @@ class BoardParameters(LookParameters):
             yield from _apart(self.fiducials_mm)
 
     def no_residual(self) -> str:
-        """Return why residuals cannot be judged, empty when they can."""
+        """Return why residuals cannot be judged, empty if they can."""
         drawing = self.drawing
         if drawing is None or not drawing.is_pair or len(self.turns_deg) > 1:
             return ""
@@ -213,7 +209,7 @@ def verify_board(
         angles_deg: Its angles U at which each fiducial is looked at.
         tolerance_mm: Largest drift that passes.
         camera_error_mm: What the camera is off by, as the measurement found it.
-        aside: Where the board is expected, seen from the frame in force.
+        aside: Where the board is expected, seen from the selected frame.
 
     Raises:
         CalibrationError: As :func:`measure_board`.
@@ -255,7 +251,7 @@ def _places(board: BoardDrawing, tool: ToolOffset, angles_deg: Sequence[float]) 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class BoardTest(LookTest):
-    """A proof by a camera of a board.
+    """A camera's test of a board.
 
     Attributes:
         board: Where the fiducials are on it.
@@ -323,7 +319,7 @@ class BoardSource(RoundSource):
         return _places(self.board, tool, angles_deg)
 
     def expected(self, seen: Sequence[Sighting], stored: ToolOffset | None) -> ToolOffset:
-        """Return where the board is by its first two fiducials."""
+        """Return where the board is, by its first two fiducials."""
         pair = replace(self, board=BoardDrawing(self.board.fiducials_mm[:2]), sigma_mm=None)
         return pair.solved(seen, (1, 2), stored or NO_OFFSET).offset
 
@@ -350,7 +346,7 @@ class BoardSource(RoundSource):
         )
 
     def proof_of(self, basis: ProofBasis) -> BoardTest:
-        """Return the proof at other angles; see :class:`~robolink.procedures.ProvesAgain`."""
+        """Return the test at other angles; see :class:`~robolink.procedures.ProvesAgain`."""
         return BoardTest(
             **basis.common,
             sensor=self.sensor,
@@ -401,10 +397,10 @@ METHOD = Method(
     name="board",
     summary=declared("See the fiducials of a held board: X, Y and U."),
     description=declared(
-        "See the fiducials of a held board with an up-looking camera: X, Y and U of the board.\n\n"
-        "The tool that is stored says where the board is expected: the fiducials must then lie in "
-        "the image one at a time. Say where they are: how far two are apart, or where each of "
-        "them is."
+        "See the fiducials of a held board with an up-looking camera: X, Y and U of the "
+        "board.\n\nThe stored tool gives the expected place of the board: with it, each "
+        "fiducial must appear in the image by itself. State where they are: the distance "
+        "between two, or the place of each."
     ),
     parameters=BoardParameters,
     measures=("x_mm", "y_mm", "u_deg"),

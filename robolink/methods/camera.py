@@ -52,7 +52,7 @@ class CameraParameters(LookParameters):
     """How a calibrated camera looks at a tip."""
 
     def no_residual(self) -> str:
-        """Return why residuals cannot be judged, empty when they can."""
+        """Return why residuals cannot be judged, empty if they can."""
         if len(self.turns_deg) > 2:
             return ""
         return tr(
@@ -104,7 +104,7 @@ def measure_camera(
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class LookTest(PlacedProof):
-    """All that a proof by a camera needs.
+    """All that a turn test by a camera needs.
 
     Attributes:
         sensor: URL or name of the camera, or the camera itself, which cannot be kept.
@@ -128,7 +128,7 @@ class LookTest(PlacedProof):
 
     @property
     def obstacle(self) -> str:
-        """Why it cannot be kept: an open camera is none that another process can open."""
+        """Why it cannot be kept: no other process can open a camera that is open here."""
         if not isinstance(self.sensor, str):
             return "camera_open"
         if sensor_name(self.sensor) != self.sensor:
@@ -144,7 +144,7 @@ class LookTest(PlacedProof):
             return context.run(self.steps(here), tip=self.written, camera=eye)
 
     def prove_after_a_break(self, context: MeasurementContext) -> VerifyResult:
-        """Make it: it goes straight up first, then over the camera."""
+        """Make it: first straight up, then over the camera."""
         return self.prove(context)
 
     def steps(self, here: Pose) -> Procedure[VerifyResult]:
@@ -162,7 +162,7 @@ class LookTest(PlacedProof):
 
 
 class RoundSource(LookSource):
-    """Measures by bringing marks before a calibrated camera at every angle of a plan.
+    """Measures by moving marks before a calibrated camera at every angle of a plan.
 
     Attributes:
         plan: How they are brought before it.
@@ -209,7 +209,7 @@ class RoundSource(LookSource):
 
     @abstractmethod
     def places(self, tool: ToolOffset, angles_deg: Sequence[float]) -> list[Place]:
-        """Return every mark at every angle, as something to be looked at.
+        """Return every mark at every angle, as something to look at.
 
         Args:
             tool: Where they are expected.
@@ -218,7 +218,7 @@ class RoundSource(LookSource):
 
     @abstractmethod
     def expected(self, seen: Sequence[Sighting], stored: ToolOffset | None) -> ToolOffset:
-        """Return where the marks are by looks at the first two places, or at the only one."""
+        """Return where the marks are, by looks at the first two places, or at the only one."""
 
     @abstractmethod
     def solved(
@@ -269,7 +269,7 @@ class CameraSource(RoundSource):
         return [Place(u_deg, tool) for u_deg in angles_deg]
 
     def expected(self, seen: Sequence[Sighting], stored: ToolOffset | None) -> ToolOffset:
-        """Return where the tip is by one look."""
+        """Return where the tip is, by one look."""
         return solve_up_camera(seen[0], stored=stored).offset
 
     def solved(
@@ -286,7 +286,7 @@ class CameraSource(RoundSource):
         )
 
     def proof_of(self, basis: ProofBasis) -> LookTest:
-        """Return the proof at other angles; see :class:`~robolink.procedures.ProvesAgain`."""
+        """Return the test at other angles; see :class:`~robolink.procedures.ProvesAgain`."""
         return LookTest(
             **basis.common,
             sensor=self.sensor,
@@ -309,10 +309,10 @@ METHOD = Method(
     name="camera",
     summary=declared("See the tip with a calibrated, up-looking camera: X and Y."),
     description=declared(
-        "See the tip with an up-looking camera: X and Y; nobody touches anything.\n\n"
-        "What a pixel means is known from 'calibrate camera-affine', or stands in the cell file, "
-        "or the camera answers in millimetres. Looks at several angles tell the tip from what the "
-        "camera itself is off by; a single one believes the camera."
+        "See the tip with an up-looking camera: X and Y; nobody touches anything.\n\nThe scale "
+        "of a pixel comes from 'calibrate camera-affine' or the cell file, or the camera "
+        "answers in millimetres. Looks at several angles separate the tip from the camera's "
+        "own error; a single look trusts the camera."
     ),
     parameters=CameraParameters,
     measures=("x_mm", "y_mm"),

@@ -61,7 +61,7 @@ if TYPE_CHECKING:
 
 
 LEAST_SPAN_MM: Final = 0.2
-"""A smaller pattern does not tell what a pixel is."""
+"""A smaller pattern does not show the scale of a pixel."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -153,7 +153,7 @@ class CameraAffineParameters(LookParameters):
 
     @property
     def limits(self) -> CameraLimits:
-        """What is refused, for the solver."""
+        """The solver's limits for a refusal."""
         return CameraLimits(
             most_shear_deg=self.shear_limit_deg,
             most_unequal_scale=self.unequal_limit,
@@ -164,7 +164,7 @@ class CameraAffineParameters(LookParameters):
 
     @property
     def corners_deg(self) -> tuple[float, ...]:
-        """Angles of the corners of the pattern, which are looked at without a turn."""
+        """Angles of the pattern's corners, which are looked at without a turn."""
         return (0.0,)
 
     @property
@@ -190,7 +190,7 @@ def measure_camera_affine(
     and turns in the middle, which tells the offset.
 
     Args:
-        station: Where the camera is, to within its field of view; with its model of before,
+        station: Where the camera is, to within its field of view; with its earlier model,
             against which a changed camera is refused.
         plan: The pattern, and whether the look that fits worst is offered again.
         here: Where the flange is; its U is that of the corners.
@@ -242,7 +242,7 @@ def measure_camera_affine(
 
 
 def _require_pattern(plan: CameraAffineParameters) -> None:
-    """Refuse a pattern that cannot tell camera and offset apart, before anything moves."""
+    """Refuse a pattern that cannot separate camera and offset, before anything moves."""
     if plan.span_mm < LEAST_SPAN_MM:
         raise CalibrationError(
             "rank_deficient",
@@ -264,7 +264,7 @@ class CameraAffineSource(LookSource):
 
     Attributes:
         sensor: URL or name of the camera, or the camera; it answers in pixels.
-        station: Where it is to within its field of view; with its model of before, a camera
+        station: Where it is to within its field of view; with its earlier model, a camera
             that changed is refused.
         plan: The pattern.
         sigma_mm: Standard deviation of one coordinate of one look, where it is known.
@@ -292,7 +292,7 @@ class CameraAffineSource(LookSource):
         )
 
     def found_station(self, result: CalibrationResult, tool: int) -> Found | None:
-        """Return what a kept measurement says about the camera, ``None`` without a name."""
+        """Return what a kept measurement shows about the camera, ``None`` without a name."""
         from robolink.calibration import CameraCalibration  # numpy, which a look does without
 
         if not self.name or not isinstance(result, CameraCalibration):
@@ -327,7 +327,7 @@ class CameraAffineSource(LookSource):
         )
 
     def proof_of(self, basis: ProofBasis) -> "LookTest":
-        """Return the proof at other angles; see :meth:`~robolink.procedures.ProvesAgain.proof_of`.
+        """Return the test at other angles; see :meth:`~robolink.procedures.ProvesAgain.proof_of`.
 
         Raises:
             TypeError: The result is not that of a camera that was found.
@@ -361,10 +361,10 @@ METHOD = Method(
     summary=declared("Find an up-looking camera and the tip together."),
     description=declared(
         "Find an up-looking camera and the tip together: X and Y, scale, turn and mirror.\n\n"
-        "Say to the command, or in the cell file, where the camera looks to within its field of "
-        "view. The tip goes to four corners of the image and turns in its middle. What was found "
-        "is kept on record under the name of the station; a camera that is not as it was is "
-        "refused."
+        "State where the camera looks, to within its field of view, with the command or in the "
+        "cell file. The tip moves to four corners of the image and turns in its middle. "
+        "robolink records the result under the name of the station, and refuses a camera that "
+        "has changed since."
     ),
     parameters=CameraAffineParameters,
     measures=("x_mm", "y_mm"),

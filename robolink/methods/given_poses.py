@@ -33,17 +33,17 @@ from robolink.remedy_words import RemedyWord, remedy_word
 
 
 def were_held(context: MeasurementContext, *, stated: bool) -> bool:
-    """Return whether somebody says that all axes were held; the answer goes on record.
+    """Return whether a person says that all axes were held; the answer is recorded.
 
     Args:
         context: What asks.
-        stated: Whether it was said beforehand, by an option or in the recipe.
+        stated: Whether it was said in advance, by an option or in the recipe.
 
     Returns:
         ``False`` where nobody said it and nobody is to be asked.
 
     Raises:
-        CalibrationError: ``axes_free``: they were let go.
+        CalibrationError: ``axes_free``: they were released.
 
     Example:
         >>> from robolink.methods.given_poses import were_held
@@ -80,7 +80,7 @@ def held_question() -> str:
 
 
 def taught_poses(points: PointReader, numbers: Sequence[int]) -> tuple[Pose, ...]:
-    """Read points that were taught on the pendant.
+    """Read points that a person taught on the pendant.
 
     Raises:
         CalibrationError: ``undefined_point``.
@@ -98,7 +98,7 @@ def taught_poses(points: PointReader, numbers: Sequence[int]) -> tuple[Pose, ...
 
 @dataclass(frozen=True, slots=True)
 class PosesFound:
-    """What given poses say.
+    """What given poses show.
 
     Attributes:
         result: The offset.
@@ -112,7 +112,7 @@ class PosesFound:
 
 
 class PointsSource:
-    """Takes a measurement from poses that exist.
+    """Measures from poses that exist already.
 
     Attributes:
         found: What the poses said, after :meth:`measure`.
@@ -174,7 +174,7 @@ class PointsSource:
 
         Raises:
             CalibrationError: The poses give no trustworthy result; its code says why, ``axes_free``
-                where they were taught with axes let go.
+                where they were taught with axes released.
             ConfigError: Too many poses for the method.
             UndefinedToolError: The tool with which they were taught has no definition.
         """
@@ -253,7 +253,7 @@ class PointsSource:
         poses: Sequence[Pose],
         named: set[int],
     ) -> PosesFound:
-        """Compare the result with what it would be if the poses were those of other tools.
+        """Compare the result with those that other tools would give.
 
         Raises:
             CalibrationError: ``taught_tool_unknown``.
@@ -306,7 +306,7 @@ class PointsSource:
 
 
 class _UnknownTool(CalibrationError):
-    """Two tools fit the poses alike, and nobody said which one was selected."""
+    """Two tools fit the poses equally well, and nobody said which one was selected."""
 
     def __init__(self, taught: int, alike: Sequence[ToolFit]) -> None:
         self.tools = (*sorted(fit.tool for fit in alike), taught)
@@ -328,7 +328,7 @@ class _UnknownTool(CalibrationError):
 
 
 def _asked(context: MeasurementContext, unknown: _UnknownTool) -> int:
-    """Ask a person which tool was selected; what they answer goes on record.
+    """Ask a person which tool was selected; the answer is recorded.
 
     Raises:
         CalibrationError: ``taught_tool_unknown``: nobody knows it, or nobody can be asked.
@@ -347,7 +347,7 @@ def _asked(context: MeasurementContext, unknown: _UnknownTool) -> int:
 
 
 def _live_pose(controller: Controller) -> Pose | None:
-    """Return where the robot is; ``None`` where it cannot be asked, which refuses nothing."""
+    """Return where the robot is; ``None`` if that cannot be read, which refuses nothing."""
     try:
         return controller.groups[0].pose() if controller.groups else None
     except RobolinkError:
@@ -355,7 +355,7 @@ def _live_pose(controller: Controller) -> Pose | None:
 
 
 def _require_taught_with(tool: int, poses: Sequence[Pose]) -> None:
-    """Refuse poses that say themselves that they are those of another tool.
+    """Refuse poses that state another tool than the one named.
 
     Raises:
         CalibrationError: ``tool_pose``.

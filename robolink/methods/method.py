@@ -1,4 +1,4 @@
-"""What a calibration method declares: its parameters once, for commands, recipes, schema and docs.
+"""What a calibration method declares: its parameters, for commands, recipes, schema and docs.
 
 A method is one module, or a folder of two or three. Its parameters are one frozen dataclass; the
 annotation of each field says its limits (``annotated_types``), its unit and the sentence that help,
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Site:
-    """Where and for what a method measures.
+    """Where a method measures, and for what.
 
     Attributes:
         controller: The controller, connected.
@@ -52,14 +52,14 @@ class Site:
     sensor: "str | TipSensor | None" = None
 
     def stating(self, **details: object) -> "Station":
-        """Return the station with what the parameters say of it; ``None`` says nothing."""
+        """Return the station with what the parameters state; ``None`` states nothing."""
         said = {name: value for name, value in details.items() if value is not None}
         return replace(self.station, details={**self.station.details, **said})
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ToolHistory:
-    """What is on record of a tool at a station: what is known before anything is connected.
+    """The records of a tool at a station: what is known before anything is connected.
 
     Attributes:
         station: Name of the station.
@@ -85,7 +85,7 @@ class Unit:
 
 @dataclass(frozen=True, slots=True)
 class Help:
-    """What a parameter means; the sentence of help, recipe schema and docs."""
+    """The meaning of a parameter; the sentence of help, recipe schema and docs."""
 
     sentence: str
 
@@ -95,7 +95,7 @@ _UNSET: Final = object()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Option:
-    """How a command offers a parameter, where that does not follow from its name.
+    """How a command offers a parameter, if that does not follow from its name.
 
     Attributes:
         flag: Its name on the command line; else the field's without its unit.
@@ -115,7 +115,7 @@ class Option:
     from_recipe: str = ""
 
     def default_or(self, usual: object) -> object:
-        """Return what a command takes when nobody typed it."""
+        """Return the value that a command uses when nobody typed one."""
         return usual if self.default is _UNSET else self.default
 
     @property
@@ -138,12 +138,12 @@ Rows = tuple[Pair, Pair]
 
 
 LengthRule = Literal["ask", "difference", "keep"]
-"""What is done where a tip proves longer or shorter: ask, write Z by difference, keep Z."""
+"""What to do if a tip is longer or shorter: ask, write Z by difference, keep Z."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class StatedLimits:
-    """What somebody stated for this one measurement; ``None`` for what nobody did.
+    """Limits that a person stated for this one measurement; ``None`` for the others.
 
     What a cell allows every method is not stated: a method that cannot be judged by it is not.
 
@@ -165,7 +165,7 @@ NOTHING_STATED: Final = StatedLimits()
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Check:
-    """What is known when parameters are checked for going together.
+    """What is known when the parameters are checked together.
 
     Attributes:
         given: The parameters that somebody wrote.
@@ -185,7 +185,7 @@ class Check:
 
     @property
     def sigma_stated(self) -> bool | None:
-        """Whether the standard deviation was stated; ``None`` where that cannot be told."""
+        """Whether the standard deviation was stated; ``None`` if that is unknown."""
         return None if self.limits is None else self.limits.sigma_mm is not None
 
 
@@ -194,30 +194,30 @@ class MethodParameters:
     """What the parameters of all methods have in common."""
 
     def problems(self, check: Check) -> Iterator[Problem]:  # noqa: ARG002 - for overriding
-        """Yield what is wrong between parameters that are right in themselves.
+        """Yield what is wrong between parameters that are right by themselves.
 
         The place of a problem is the name of a field, with ``#2`` for the second of a list.
         """
         yield from ()
 
     def no_residual(self) -> str:
-        """Return why residuals cannot be judged, empty when they can."""
+        """Return why residuals cannot be judged, empty if they can."""
         return ""
 
     def sigma_gain(self) -> float | None:
-        """Return the tip's standard deviation as a multiple of a measurement's, where known."""
+        """Return the tip's standard deviation as a multiple of a measurement's, if known."""
         return None
 
     def length_rule(self) -> LengthRule:
-        """Return what is done where the touches show that the tip is longer or shorter."""
+        """Return what to do if the touches show that the tip is longer or shorter."""
         return "ask"
 
     def states_station(self) -> bool:
-        """Tell whether they say all about the station, so that it need not be known."""
+        """Return whether they state all about the station, so that it need not be known."""
         return False
 
     def height_mm(self) -> float:
-        """Return how much higher than the box the flange goes."""
+        """Return how far above the box the flange goes."""
         return 0.0
 
     def room_mm(self) -> float:
@@ -231,7 +231,7 @@ class Needs:
 
     Attributes:
         station: What it measures at.
-        named: Whether the station has to be named, because it must be known beforehand.
+        named: Whether the station has to be named, because it must be known in advance.
         finds_pin: Whether it finds the pin itself; the place goes on record.
         sensor: Whether a camera takes part.
         tilt: Whether the robot has to tilt its tool, so that it also works on a tilted flange.
@@ -250,13 +250,13 @@ class Needs:
 
     @property
     def by_sensor(self) -> bool:
-        """Whether beams, a switch or a camera measure and no person touches anything."""
+        """Whether beams, a switch or a camera measure, and no person touches anything."""
         return self.motion and self.named and self.station is not StationKind.PIN
 
 
 @dataclass(frozen=True, slots=True)
 class PoseHelp:
-    """What the help says about poses that exist already: taught, typed, in a file."""
+    """The help's sentences on poses that exist already: taught, typed, in a file."""
 
     points: str
     typed: str
@@ -265,7 +265,7 @@ class PoseHelp:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Former:
-    """A kind of source by which recipes named the method before.
+    """A kind of source by which recipes used to name the method.
 
     Attributes:
         kind: The old ``source.kind``.
@@ -346,7 +346,7 @@ class Method(Generic[P]):
 
     @property
     def only_z(self) -> bool:
-        """Whether it tells Z and nothing else."""
+        """Whether it measures Z and nothing else."""
         return self.measures == ("z_mm",)
 
 

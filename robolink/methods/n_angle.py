@@ -105,11 +105,11 @@ class NAngleParameters(UprightPinParameters):
 
     @property
     def sampling(self) -> SamplingPolicy:
-        """When it ends, and whether a pose is offered to be taken again."""
+        """When it ends, and whether a person is offered to repeat a pose."""
         return SamplingPolicy(self.until_mm, retake=self.retake)
 
     def problems(self, check: Check) -> Iterator[Problem]:
-        """Check that the angles tell the tip."""
+        """Check that the angles determine the tip."""
         if self.angles_deg is not None:
             if "count" in check.given:
                 others = check.spell("angles_deg")
@@ -123,7 +123,7 @@ class NAngleParameters(UprightPinParameters):
 
 
 def most_informative_order(turns_deg: Sequence[float]) -> tuple[float, ...]:
-    """Return the same angles, those first that tell the most together with the ones before.
+    """Return the same angles, most informative first together with the ones before.
 
     The first touch is at 0. Whoever ends early then ends with angles that are spread well.
     """
@@ -228,7 +228,7 @@ class _NAngleSampler(TouchNames):
 
 
 def _came_from_mm(touch: Pose) -> tuple[float, float] | None:
-    """Return on which side of the pin the tip stopped; ``None`` where a person brought it.
+    """Return on which side of the pin the tip stopped; ``None`` if a person moved it there.
 
     Not as it was drawn: where the tip is another than the stored one, it stops elsewhere.
     """
@@ -262,7 +262,7 @@ class NAngleSource(ManualPinSource):
         )
 
     def foreseen(self) -> Self:
-        """Return the source whose steps are only shown."""
+        """Return the source for a preview of its steps."""
         return replace(ManualPinSource.foreseen(self), sampling=TAKE_ALL)
 
     def steps(self, stored: ToolOffset | None) -> Procedure[CalibrationResult]:
@@ -303,7 +303,7 @@ class NAngleSource(ManualPinSource):
     def further_steps(
         self, here: Pose, taken: Sequence[TouchedAt], again: int | None, stored: ToolOffset | None
     ) -> Procedure[CalibrationResult]:
-        """Return the steps that make one touch again, or one more in the largest gap of U.
+        """Return the steps that repeat one touch, or add one in the largest gap of U.
 
         Raises:
             LimitError: There is no room for one more.

@@ -1,4 +1,4 @@
-"""The page of all calibration methods, made from what they declare: docs/methods.md.
+"""The page of all calibration methods, made from their declarations: docs/methods.md.
 
 ``python -m robolink.methods.page`` prints it.
 """

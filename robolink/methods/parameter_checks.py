@@ -1,4 +1,4 @@
-"""The fields of a method's parameters, and whether one can measure with them and judge the result.
+"""The fields of a method's parameters, and whether its results can be judged.
 
 Commands, recipes and docs read the same fields; what is wrong is told in the same words to all.
 """
@@ -79,7 +79,7 @@ _read: dict[type[Any], tuple[ParameterField, ...]] = {}
 
 
 def fields_of(parameters: type[Any]) -> tuple[ParameterField, ...]:
-    """Return the parameters of a method, its own before those that it shares with others.
+    """Return the parameters of a method: its own before the shared ones.
 
     Args:
         parameters: A :class:`MethodParameters`, or a dataclass that is part of one.
@@ -167,7 +167,7 @@ def source_of(
     limits: StatedLimits = NOTHING_STATED,
     box: "WorkBox | None" = None,
 ) -> "TipSource":
-    """Return what measures by a method; refuse beforehand what a recipe would be refused.
+    """Return the source of a method; first refuse what a recipe would be refused.
 
     Args:
         method: The method.
@@ -209,7 +209,7 @@ def source_of(
 def parameter_problems(
     method: AnyMethod, parameters: MethodParameters, check: Check
 ) -> Iterator[Problem]:
-    """Yield all that is wrong with parameters, and with judging what they lead to.
+    """Yield all that is wrong with parameters, and with judging their results.
 
     The place of a problem is the name of a parameter, or of one of :class:`StatedLimits`. What
     goes together is asked only of parameters that are right in themselves.
@@ -271,7 +271,7 @@ def order_of_residuals(limits: StatedLimits) -> Iterator[Problem]:
 
 
 def _of_residuals(parameters: MethodParameters, limits: StatedLimits) -> Iterator[Problem]:
-    """Check that residuals are judged only where there are some."""
+    """Check that residuals are judged only if there are any."""
     why = parameters.no_residual()
     for name in ("rms_mm", "max_mm"):
         if why and getattr(limits, name) is not None:
@@ -281,7 +281,7 @@ def _of_residuals(parameters: MethodParameters, limits: StatedLimits) -> Iterato
 def _of_interval(
     method: AnyMethod, parameters: MethodParameters, limits: StatedLimits, check: Check
 ) -> Iterator[Problem]:
-    """Check that the interval can be known, and can be as narrow as it has to be."""
+    """Check that the interval can be known, and can be as narrow as required."""
     from robolink.calibration import NORMAL_95  # what --help does without
 
     if limits.interval_mm is None:

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class PointsParameters(MethodParameters):
-    """With which tool points were taught, and how they are solved."""
+    """Which tool was selected when the points were taught, and how to solve them."""
 
     method: Annotated[
         Literal["two-pose", "n-angle"],
@@ -58,19 +58,19 @@ class PointsParameters(MethodParameters):
         Option(moves=False),
         Help(
             declared(
-                "All axes were held by their motors, none let go (SFREE), when the points were "
-                "taught; without it a person is asked."
+                "All axes were held by their motors, none released (SFREE), when the points "
+                "were taught; without it robolink asks you."
             )
         ),
     ] = False
 
     def problems(self, check: Check) -> Iterator[Problem]:
-        """Check that there are as many points as the solver takes."""
+        """Check that there are as many points as the solver needs."""
         if check.points is not None and (why := self.wrong_count(check.points)):
             yield Problem("points", why)
 
     def wrong_count(self, points: int) -> str:
-        """Return why so many points cannot be solved, empty when they can."""
+        """Return why that number of points cannot be solved, empty if it can."""
         if self.method == "two-pose" and points != 2:
             return tr('must hold two points; more are for "n-angle"')
         if self.method == "n-angle" and points < 3:
@@ -78,7 +78,7 @@ class PointsParameters(MethodParameters):
         return ""
 
     def no_residual(self) -> str:
-        """Return why residuals cannot be judged, empty when they can."""
+        """Return why residuals cannot be judged, empty if they can."""
         return two_poses_agree() if self.method == "two-pose" else ""
 
 
@@ -91,7 +91,7 @@ def _solver(parameters: PointsParameters, site: Site) -> "PoseMethod":
 
 
 def _source(parameters: PointsParameters, site: Site) -> "TipSource":
-    """Return what reads the points.
+    """Return the source that reads the points.
 
     Raises:
         ConfigError: This kind of controller has none.
@@ -128,7 +128,7 @@ def _source(parameters: PointsParameters, site: Site) -> "TipSource":
 def _from_file(
     parameters: PointsParameters, site: Site, path: "Path", choices: "ReadingChoices"
 ) -> "TipSource":
-    """Return what reads the poses of a file."""
+    """Return the source that reads the poses of a file."""
     from robolink.methods.given_poses import PointsSource
     from robolink.pose_tables import read_poses
 

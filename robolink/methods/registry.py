@@ -1,4 +1,4 @@
-"""Which calibration methods there are: those of robolink, and those that others bring.
+"""The calibration methods: those of robolink, and those of plug-ins.
 
 A package brings one by an entry point of the group ``robolink.methods``, whose name is the
 method's and which leads to its :class:`~robolink.methods.Method`; :func:`register` takes the
@@ -42,7 +42,7 @@ _registered: dict[str, AnyMethod] = {}
 
 @cache
 def _brought(_path: tuple[str, ...]) -> metadata.EntryPoints:
-    """Return what installed packages bring; looking through all of them takes long."""
+    """Return the plug-ins of installed packages; searching all packages takes long."""
     return metadata.entry_points(group=METHODS_GROUP)
 
 
@@ -86,7 +86,7 @@ def all_methods() -> tuple[AnyMethod, ...]:
 
 @contextmanager
 def register(method: AnyMethod) -> Iterator[None]:
-    """Have a method inside the block: as a command, and as a kind of a recipe's source."""
+    """Add a method within the block: as a command, and as a kind of a recipe's source."""
     if method.name in method_names():
         raise ValueError(f"there is a method {method.name!r} already")
     _registered[method.name] = method

@@ -37,7 +37,7 @@ _LEAST_LOOKS = 8
 
 @dataclass(frozen=True, slots=True)
 class AllRoundPlan(LookPlan):
-    """Looks all round, within half a turn to either side of U = 0, as wrists can go.
+    """Looks all round, within half a turn to either side of U = 0, the range of wrists.
 
     They begin at the end that is nearer and go on from neighbour to neighbour, so that every turn
     but the first is small and the first less than half a turn.
@@ -64,8 +64,8 @@ class RunoutTableParameters(LookParameters):
         Option(flag="--angles", metavar="0,30,.."),
         Help(
             declared(
-                "U of each look, counted from where the tool stands: all round, in steps of 60 or "
-                "less. Each becomes a row of the table."
+                "U of each look, relative to the present U: all round, in steps of 60 or less. "
+                "Each becomes a row of the table."
             )
         ),
     ] = tuple(30.0 * step for step in range(12))
@@ -111,7 +111,7 @@ class RunoutTableSource(CameraSource):
         )
 
     def proof_of(self, basis: ProofBasis) -> "LookTest":
-        """Return the proof at other angles, where the tip has to be where the table says."""
+        """Return the test at other angles, where the tip must be where the table says."""
         from robolink.calibration import RunoutTableResult  # numpy
         from robolink.methods.runout_table_procedure import WobbleTest
 
@@ -180,11 +180,11 @@ METHOD = Method(
     name="runout-table",
     summary=declared("Measure pick-nozzle runout: X and Y, and a table by angle."),
     description=declared(
-        "See the tip with a calibrated, up-looking camera all round: X and Y, and a table of how "
-        "far beside them it is at each angle of U; nobody touches anything.\n\n"
-        "The table is for nozzles that wobble when they turn. It goes on record and into the JSON "
-        "document; the controller has no place for it, so the program that places parts takes it "
-        "back itself. Only X and Y are offered to be written."
+        "See the tip with a calibrated, up-looking camera all round: X and Y, and a table of "
+        "how far off the tip is at each angle of U; nobody touches anything.\n\nThe table is "
+        "for nozzles with runout. The journal and the JSON document contain it. The controller "
+        "has no place for it, so the program that places parts must apply it. robolink "
+        "proposes only X and Y for writing."
     ),
     parameters=RunoutTableParameters,
     measures=("x_mm", "y_mm"),

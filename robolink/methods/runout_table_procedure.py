@@ -1,4 +1,4 @@
-"""The proof of a tip that wobbles, for runout-table."""
+"""The turn test of a tip that wobbles, for runout-table."""
 
 from dataclasses import dataclass, replace
 from typing import ClassVar
@@ -10,7 +10,7 @@ from robolink.procedures import MeasurementContext
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WobbleTest(LookTest):
-    """A proof by a camera of a tip that wobbles.
+    """A camera's test of a tip that wobbles.
 
     Attributes:
         table: How far the tip is beside its place, by U of the flange.

@@ -44,7 +44,7 @@ Retake = Annotated[
 
 @dataclass(frozen=True, kw_only=True)
 class PinParameters(MethodParameters):
-    """How a tip is taken off a pin and brought back."""
+    """How a tip is lifted off a pin and returned."""
 
     lift_mm: Annotated[
         float, Ge(1), Le(100), MM, Help(declared("How far to lift the tip before the turn."))
@@ -93,7 +93,7 @@ class PinParameters(MethodParameters):
 
 @dataclass(frozen=True, kw_only=True)
 class UprightPinParameters(PinParameters):
-    """How an upright tip is touched that keeps its Z: heights tell whether it may."""
+    """How an upright tip that keeps its Z touches a pin: heights show whether it may."""
 
     if_length_changed: Annotated[
         LengthRule,
@@ -108,12 +108,12 @@ class UprightPinParameters(PinParameters):
     ] = "ask"
 
     def length_rule(self) -> LengthRule:
-        """Return what is done where the length changed."""
+        """Return what to do if the length changed."""
         return self.if_length_changed
 
 
 class SampledParameters(MethodParameters, ABC):
-    """How an input is switched again and again, until that is enough.
+    """How often an input is switched, until that is enough.
 
     What derives from it has the fields ``until_mm`` and ``retake``, each with a help of its own.
     """
@@ -123,14 +123,14 @@ class SampledParameters(MethodParameters, ABC):
 
     @property
     def sampling(self) -> SamplingPolicy:
-        """When it ends, and whether a sample is offered to be taken again."""
+        """When it ends, and whether a person is offered to repeat a sample."""
         return SamplingPolicy(self.until_mm, retake=self.retake)
 
     def problems(self, check: Check) -> Iterator[Problem]:
-        """Check that an early end and a retake can do something."""
+        """Check that an early end and a retake can have an effect."""
         if "retake" in check.given and self.retake and self.no_residual():
             yield Problem(
-                "retake", tr("means nothing: nothing is repeated, so nothing can fit badly")
+                "retake", tr("has no effect: nothing is repeated, so nothing can fit badly")
             )
         if self.until_mm is None or check.sigma_stated is None:
             return
@@ -139,15 +139,15 @@ class SampledParameters(MethodParameters, ABC):
 
     @abstractmethod
     def may_end_early(self, *, sigma_stated: bool) -> bool:
-        """Tell whether the tip can be known well enough before the last sample."""
+        """Return whether the tip can be known well enough before the last sample."""
 
     @abstractmethod
     def nothing_to_leave_out(self, check: Check) -> str:
-        """Return why it cannot end early, and what to give."""
+        """Return why it cannot end early, and which values to give."""
 
 
 def clearance_below_lift(clearance_mm: float, lift_mm: float, check: Check) -> Iterator[Problem]:
-    """Check that something is left to come down."""
+    """Check that a distance is left to come down."""
     if clearance_mm >= lift_mm:
         yield Problem(
             "clearance_mm",
@@ -160,7 +160,7 @@ def clearance_below_lift(clearance_mm: float, lift_mm: float, check: Check) -> I
 
 
 def standoff_below_lift(clearance_mm: float, lift_mm: float, check: Check) -> Iterator[Problem]:
-    """Check that something is left to come down from the lift to the highest standoff."""
+    """Check that a distance is left between the lift and the highest standoff."""
     if clearance_mm + HIGHEST_MM >= lift_mm:
         yield Problem(
             "clearance_mm",
@@ -188,7 +188,7 @@ Turns = Annotated[
     MaxLen(24),
     DEGREES,
     Option(flag="--angles", metavar="0,60,.."),
-    Help(declared("U of each look, counted toward zero from where the tool stands.")),
+    Help(declared("U of each look, relative to the present U, counted toward zero.")),
 ]
 
 PLACE = (
@@ -202,7 +202,7 @@ UNMEASURED_Z = declared('cannot be "measured" by a camera; write "typed" or "kep
 
 @dataclass(frozen=True, kw_only=True)
 class LookParameters(MethodParameters):
-    """How marks are brought before a camera and looked at."""
+    """How marks are moved before a camera and looked at."""
 
     plan_kind: ClassVar[type[LookPlan]] = LookPlan
 
@@ -269,7 +269,7 @@ class LookParameters(MethodParameters):
 
     @property
     def model(self) -> CameraModel | None:
-        """What its pixels mean, ``None`` where that is not said."""
+        """What its pixels mean, ``None`` if that is not stated."""
         if self.mm_per_px is None or self.origin_mm is None:
             return None
         return CameraModel(self.mm_per_px, self.origin_mm)
@@ -280,7 +280,7 @@ class LookParameters(MethodParameters):
         return ()
 
     def problems(self, check: Check) -> Iterator[Problem]:
-        """Check that pixels are explained whole, and that the tool turns."""
+        """Check that pixels are fully explained, and that the tool turns."""
         yield from self._of_pixels(check)
         angles_deg = (*self.corners_deg, *self.turns_deg)
         if len(angles_deg) > 1 and angle_spread_deg(angles_deg) < MIN_ROTATION_DEG:

@@ -1,4 +1,4 @@
-"""Finding a station with a tip that is known: the reverse of finding a tip at a known station."""
+"""Finds a station with a known tip: the reverse of finding a tip at a known station."""
 
 import math
 from collections.abc import Callable
@@ -86,14 +86,14 @@ def learn_station(
 
 
 def _with_tip(sigma_mm: float | None, tip_sigma_mm: float) -> float | None:
-    """Return how uncertain a touched place is; unknown where the touch is."""
+    """Return the uncertainty of a touched place; unknown if the touch's is."""
     return None if sigma_mm is None else math.hypot(sigma_mm, tip_sigma_mm)
 
 
 def _pin(
     station: Station, tool: int, tip: ToolOffset, sigma_mm: float | None, plan: TouchPlan
 ) -> Procedure[Found]:
-    """Touch the pin twice in one orientation; nothing would witness one touch alone."""
+    """Touch the pin twice in one orientation; nothing would confirm one touch alone."""
     from robolink.calibration import pin_touched  # numpy, which a look does without
 
     touches = PinTouches(plan)

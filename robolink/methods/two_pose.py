@@ -55,7 +55,7 @@ class TwoPoseParameters(UprightPinParameters):
         Le(360 - MIN_ROTATION_DEG),
         DEGREES,
         Option(metavar="DEG"),
-        Help(declared("By how much U differs between the two touches.")),
+        Help(declared("Turn of U between the two touches.")),
     ] = 180.0
 
     @property
@@ -75,7 +75,7 @@ class TwoPoseParameters(UprightPinParameters):
 def _second(
     touches: PinTouches, first: TouchedAt, u_deg: float, guess: ToolOffset
 ) -> Procedure[tuple[TouchedAt, TouchedAt]]:
-    """Return both touches, the first one as it was made last."""
+    """Return both touches, the first one as last made."""
     first_deg = first.u_deg
     while True:
         try:
@@ -131,7 +131,7 @@ class TwoPoseSource(ManualPinSource):
     def further_steps(
         self, here: Pose, taken: Sequence[TouchedAt], again: int | None, stored: ToolOffset | None
     ) -> Procedure[CalibrationResult]:
-        """Return the steps that make one touch again."""
+        """Return the steps that repeat one touch."""
         again = 1 if again is None else again
         touches = PinTouches(self.touch, comes_down=stored is not None, total=2)
         touches.adopt({touch.u_deg: touch for touch in taken})

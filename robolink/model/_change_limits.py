@@ -1,4 +1,4 @@
-"""How far a write may take the tip of a tool at one cell, what is accepted beyond, and by whom."""
+"""How far a write may move a tool's tip at one cell, what is accepted beyond, and by whom."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,7 +16,7 @@ from robolink.stop_latch import StopLatch
 
 
 class PersonRole(StrEnum):
-    """What a person is, by the cell file.
+    """The role of a person, by the cell file.
 
     An operator changes nozzles. Passing the jump limit, clearing a tool, undo, restore, writes
     without an expected value and raw statements take an engineer.
@@ -27,7 +27,7 @@ class PersonRole(StrEnum):
 
 
 def require_engineer(outcomes: OutcomeLog, act: str, **details: object) -> None:
-    """Refuse ``act`` to an operator, and put on record who else did it.
+    """Refuse ``act`` to an operator, and record who else did it.
 
     Where the cell names no people, everybody may; it is recorded all the same.
 
@@ -52,7 +52,7 @@ def require_engineer(outcomes: OutcomeLog, act: str, **details: object) -> None:
 
 
 def refuse_operator(outcomes: OutcomeLog, act: str) -> None:
-    """Refuse ``act`` to an operator; nothing is put on record.
+    """Refuse ``act`` to an operator; nothing is recorded.
 
     Args:
         outcomes: Knows who works here.
@@ -86,7 +86,7 @@ _ROUNDING: Final = 0.002
 
 @dataclass(frozen=True, slots=True)
 class ChangeLimits:
-    """How far one write may take the tip of a tool.
+    """How far one write may move the tip of a tool.
 
     Attributes:
         length_mm: Largest change of its place, ``None`` where nothing is said.
@@ -97,7 +97,7 @@ class ChangeLimits:
     angle_deg: float | None = None
 
     def exceeded_by(self, jump: Jump) -> bool:
-        """Tell whether a jump is larger."""
+        """Return whether a jump is larger."""
         return jump.exceeds(self.length_mm, self.angle_deg)
 
     def figure(self, tool: int, jump: Jump) -> str:
@@ -127,7 +127,7 @@ class ChangeLimits:
 
 
 class ChangeGuard:
-    """Refuses every write that takes a tip farther than the cell allows.
+    """Refuses every write that moves a tip farther than the cell allows.
 
     Whoever writes a tool passes it, typed or measured, from Python or by a command; what is put
     back does not (docs/reference/rules.md 2). A tool that is undefined has no place from which its
@@ -164,14 +164,14 @@ class ChangeGuard:
         self._accepted: dict[int, Jump] = {}
 
     def beyond(self, before: ToolOffset | None, after: ToolOffset | None) -> Jump | None:
-        """Return how far a tip would be taken, if that is farther than the cell allows."""
+        """Return how far a tip would be moved, if that is farther than the cell allows."""
         if before is None or after is None:
             return None
         jump = Jump.between(before, after)
         return jump if self.limits.exceeded_by(jump) else None
 
     def require(self, tool: int, before: ToolOffset | None, after: ToolOffset | None) -> None:
-        """Refuse a change beyond the limits that is neither accepted nor puts something back.
+        """Refuse a change beyond the limits that is neither accepted nor a restore.
 
         Args:
             tool: Number of the tool.
@@ -206,7 +206,7 @@ class ChangeGuard:
 
     @contextmanager
     def accepting(self, tool: int, jump: Jump) -> Iterator[None]:
-        """Let the tip of a tool be taken as far as this within the block; it goes on record.
+        """Allow the tip of a tool to be moved this far within the block; this is recorded.
 
         Args:
             tool: Number of the tool.
@@ -219,7 +219,7 @@ class ChangeGuard:
         require_engineer(
             self._outcomes,
             tr(
-                "let tool {tool} jump by {change:.3f} mm and {turn:.3f} degrees",
+                "accept a jump of tool {tool} by {change:.3f} mm and {turn:.3f} degrees",
                 tool=tool,
                 change=jump.length_mm,
                 turn=jump.angle_deg,

@@ -1,4 +1,4 @@
-"""What a controller is to its user, what only some kinds have, and whether it is simulated."""
+"""What a controller offers its user, what only some kinds have, and whether it is simulated."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -27,13 +27,13 @@ ValueT = TypeVar("ValueT", bound=Value)
 
 @dataclass(frozen=True, slots=True)
 class ValueReceipt(Generic[ValueT]):
-    """What setting a value did.
+    """The result of setting a value.
 
     Attributes:
-        request: The request, as it stands on the wire.
-        before: What was there.
-        requested: What was asked for.
-        read_back: What is there now.
+        request: The request, as sent on the wire.
+        before: The earlier value.
+        requested: The requested value.
+        read_back: The present value.
         skipped: It was there already, so nothing was sent.
     """
 
@@ -51,10 +51,10 @@ class DigitalIo(Protocol):
         """Read one input."""
 
     def set_output(self, bit: int, on: bool) -> ValueReceipt[bool] | None:
-        """Switch one output, and prove it as far as this controller lets it be proved.
+        """Switch one output, and confirm it as far as this controller allows.
 
         Returns:
-            ``None`` where an output cannot be read back: the acknowledgement is the proof.
+            ``None`` if an output cannot be read back: only the acknowledgement confirms it.
 
         Raises:
             NotReadyError: The state forbids it.
@@ -63,7 +63,7 @@ class DigitalIo(Protocol):
         """
 
     def preview_output(self, bit: int, on: bool) -> tuple[str, ...]:
-        """Return what :meth:`set_output` would send, as it stands on the wire."""
+        """Return what :meth:`set_output` would send, as sent on the wire."""
 
 
 class PointReader(Protocol):
@@ -84,7 +84,7 @@ class VariableTable(Protocol):
 
         Args:
             name: Name of the variable, as the project of the controller has it.
-            value: What it is to hold.
+            value: The new value.
             kind: Its type, such as ``Real``.
 
         Example:
@@ -121,21 +121,21 @@ class VariableTable(Protocol):
 
 
 class AlarmList(Protocol):
-    """What a controller wants looked after, apart from errors."""
+    """What needs attention on a controller, apart from errors."""
 
     def list(self) -> tuple[int, ...]:
-        """Read the numbers of the alarms that stand.
+        """Read the numbers of the active alarms.
 
         Raises:
-            RejectedError: This firmware does not tell them.
+            RejectedError: This firmware does not report them.
         """
 
     def reset(self, number: int) -> None:
-        """Reset one because a person asked for it, and prove that it is gone."""
+        """Reset one alarm at a person's request, and confirm that it is gone."""
 
 
 class Act(StrEnum):
-    """What a person asks of a controller as a whole."""
+    """An action that a person requests of a controller as a whole."""
 
     STOP = "stop"
     RESET = "reset"
@@ -145,15 +145,14 @@ class Act(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Capabilities:
-    """What this kind of controller can be asked for.
+    """What this kind of controller supports.
 
-    The last four say that the controller's attribute of that name is there.
+    The last four say whether the controller has the attribute of that name.
 
     Attributes:
-        pose_while_moving: Whether a position can be read while a movement is under way; else the
-            one line to the controller is waited on.
-        low_power: Whether each movement is made in a power mode of the controller's that is
-            gentle.
+        pose_while_moving: Whether a position can be read while a movement is in progress; if not,
+            the only line to the controller is busy until its end.
+        low_power: Whether each movement uses a gentle power mode of the controller.
         looks: Whether it has a vision system of its own (:class:`LookingController`).
         inputs_only: Whether ``io`` reads inputs and switches no output.
     """
@@ -172,7 +171,7 @@ class Capabilities:
 
 
 class Controller(Protocol):
-    """A controller that someone is connected to.
+    """A connected controller.
 
     Every call may raise a TransportError or RemoteProtocolError; after one the link is dead
     and a new connection is needed.
@@ -182,7 +181,7 @@ class Controller(Protocol):
     def identity(self) -> str:
         """How it is reached: the URL, without passwords and without options that name nothing.
 
-        Who it is, whatever the URL, is ``outcomes.identity``.
+        The identity that does not depend on the URL is ``outcomes.identity``.
         """
 
     @property
@@ -191,7 +190,7 @@ class Controller(Protocol):
 
     @property
     def capabilities(self) -> Capabilities:
-        """What can be asked for."""
+        """What it supports."""
 
     @property
     def tools(self) -> ToolTable:
@@ -223,69 +222,70 @@ class Controller(Protocol):
 
     @property
     def outcomes(self) -> OutcomeLog:
-        """The doubtful outcomes and the unfinished procedures of this controller."""
+        """The outcomes in doubt and the unfinished procedures of this controller."""
 
     @property
     def ledger(self) -> Ledger:
-        """What was done to it since connecting, and how much of that is proved."""
+        """What was done to it since connecting, and how much of that is confirmed."""
 
     @property
     def resolver(self) -> Resolver:
-        """Settles what was begun here and not proved finished."""
+        """Finishes or undoes interrupted jobs."""
 
     def status(self) -> ControllerStatus:
         """Read the state flags."""
 
     def condition(self) -> Mapping[str, object]:
-        """Read more about the state than the flags say, plain JSON.
+        """Read more about the state than the flags show, plain JSON.
 
         What cannot be read now, or not by this kind of controller, is ``None`` or left out.
         """
 
     def preview(self, act: Act) -> tuple[str, ...]:
-        """Return the requests of an act, as they stand on the wire. Reads at most."""
+        """Return the requests of an action, as sent on the wire. Reads at most."""
 
     def facts(self) -> ControllerFacts:
         """Read which controller and robots these are."""
 
     @property
     def change_guard(self) -> ChangeGuard:
-        """What holds back writes that take a tip farther than the cell allows."""
+        """Refuses writes that move a tip farther than the cell allows."""
 
     @property
     def latch(self) -> StopLatch:
-        """What holds everything back from :meth:`stop` until :meth:`release_stop`."""
+        """Refuses everything from :meth:`stop` until :meth:`release_stop`."""
 
     @property
     def patience(self) -> Patience:
-        """How long a call waits that would be refused because somebody else is at work."""
+        """How long a call waits that is refused because another user has the controller locked."""
 
     def stop(self) -> None:
         """Stop everything; from any thread, at any time, more than once.
 
         It sets the latch before it waits for anything: until :meth:`release_stop` no movement,
-        jog, write or program start leaves this process. Only the tool, power and speed of
-        before may be put back, and each tool of an open change once. Whoever was at work gets
-        StoppedError. It returns when the controller has shown that it is at rest.
+        jog, write or program start leaves this process. Only the earlier tool, power and speed
+        may be restored, and each tool of an open change once. Whoever was working gets
+        StoppedError. It returns when the controller has confirmed that it has stopped.
 
         Raises:
-            OutcomeUnknownError: Rest was not seen; the message says to use the emergency stop.
+            OutcomeUnknownError: The stop is not confirmed; the message says to use the emergency
+                stop.
         """
 
     def release_stop(self) -> None:
-        """Let this process act again after :meth:`stop`, because a person says so."""
+        """Release a stop at a person's request: this process may act again."""
 
     def reset_fault(self) -> None:
-        """Clear an error because a person asked for it."""
+        """Clear an error at a person's request."""
 
     def motors(self, on: bool) -> None:
-        """Switch the motors."""
+        """Switch the motors on or off."""
 
     def take_over(self, reason: str) -> None:
-        """Take the controller over from whoever works on it, because a person insists.
+        """Take the controller over from the user who has it locked, at a person's request.
 
-        The record keeps who insisted and why. The next act of whoever had it is refused: its
-        lease has another epoch, and so has a PLC's mailbox. What it began stays open here.
+        The journal records who took over and why. The next action of the earlier user is refused:
+        its lease has another epoch, and so has a PLC's mailbox. What it began stays open here.
 
         Args:
             reason: Why, in the person's words.
@@ -295,7 +295,7 @@ class Controller(Protocol):
         """
 
     def require_settled(self, request: str) -> None:
-        """Refuse ``request`` while something earlier is unsettled.
+        """Refuse ``request`` while an earlier job is unfinished.
 
         Raises:
             OutcomeUnknownError: Names it.
@@ -313,12 +313,12 @@ class Controller(Protocol):
 
         Args:
             kind: What it stands for.
-            request: What is begun, as a person may read it.
-            details: Plain JSON values needed to settle it.
-            operation: Id of a marker of before whose work is taken up; empty for a new one.
+            request: What is started, for display.
+            details: Plain JSON values needed to recover it.
+            operation: Id of an earlier marker whose work is taken up; empty for a new one.
 
         Raises:
-            ConfigError: That is impossible; nothing may be sent.
+            ConfigError: It cannot be stored; nothing may be sent.
             BusyError: Another process has the controller.
 
         Example:
@@ -332,24 +332,24 @@ class Controller(Protocol):
         """
 
     def finish(self, marker: Marker, *entries: NewEntry) -> None:
-        """Forget the marker of a procedure, and journal how it ended."""
+        """Remove the marker of a procedure, and record how it ended."""
 
     def procedure(
         self, request: str, *, wait_s: float | None = None
     ) -> AbstractContextManager[None]:
         """Let only this thread change something on the controller within the block.
 
-        What other threads change meanwhile is refused with BusyError, or waits. Where this call
-        may wait it takes the lease as well, so that no other program comes in between. The block
+        Changes by other threads are refused with BusyError meanwhile, or wait. If this call may
+        wait, it takes the lease as well, so that no other program comes in between. The block
         belongs to the thread that entered it.
 
         Args:
-            request: What the block does, as a person may read it.
+            request: What the block does, for display.
             wait_s: How long to wait for others, in seconds, 0 not at all; ``None`` for
                 ``patience.wait_s``.
 
         Raises:
-            BusyError: Others are at work still.
+            BusyError: Others are still working.
             StoppedError: A stop came while this waited.
 
         Example:
@@ -363,14 +363,14 @@ class Controller(Protocol):
         """
 
     def uninterrupted(self) -> AbstractContextManager[None]:
-        """Hold Ctrl-C back for a block that must be seen through."""
+        """Delay Ctrl-C for a block that must be completed."""
 
     def signs_of_life(self) -> AbstractContextManager[None]:
-        """Let others see within the block, once a second, that this process is at work.
+        """Show others within the block, once a second, that this process is at work.
 
-        The record and the controller are told, for lease and ownership alone: no command is
-        sent and no movement kept going. While a movement is unfinished on which nobody waits,
-        none is given.
+        They go to the record and the controller, for lease and ownership alone: they send no
+        command and sustain no movement. None is given while a movement is unfinished on which
+        nobody waits.
 
         Example:
             >>> import robolink
@@ -380,13 +380,13 @@ class Controller(Protocol):
         """
 
     def preserved(self, reason: str) -> AbstractContextManager[None]:
-        """Put back, at the end of the block, the tool, power and speed in force at its start.
+        """Restore, at the end of the block, the tool, power and speed of its start.
 
         A durable marker names the tool until that has been read back.
         """
 
     def close(self) -> None:
-        """Log out where that does no harm and close the link. Idempotent."""
+        """Log out if that is harmless, and close the link. Idempotent."""
 
     def __enter__(self) -> Self: ...
 
@@ -406,7 +406,7 @@ _MEDIUM: Final = "+sim://"
 
 
 def is_simulated_name(name: str) -> bool:
-    """Tell whether the name of a controller, or a serial number, is a simulator's.
+    """Return whether the name of a controller, or a serial number, is a simulator's.
 
     ``False`` says nothing: the name of a PLC does not tell.
 
@@ -423,19 +423,19 @@ def is_simulated_name(name: str) -> bool:
 
 
 def are_simulated_facts(facts: ControllerFacts) -> bool:
-    """Tell whether the serial numbers of a controller or its robots are a simulator's."""
+    """Return whether the serial numbers of a controller or its robots are a simulator's."""
     return any(map(is_simulated_name, (facts.controller_serial or "", *facts.robot_serials)))
 
 
 def says_it_is_simulated(controller: Controller, facts: ControllerFacts | None = None) -> bool:
-    """Tell whether a controller says of itself that nothing real moves; an answer is not guessed.
+    """Return whether a controller says that nothing real moves; without an answer, an error.
 
-    A PLC says it of its axes, in the mailbox (docs/reference/mailbox.md); a simulated EPSON
-    controller by its serial numbers. One that cannot be asked just now says nothing.
+    A PLC reports it for its axes, in the mailbox (docs/reference/mailbox.md); a simulated EPSON
+    controller by its serial numbers. One that cannot answer just now reports nothing.
 
     Args:
         controller: The controller; what can be read is read.
-        facts: What it said of itself, where it was asked already.
+        facts: Its earlier answer, if it was asked already.
 
     Example:
         >>> from robolink import connect

@@ -58,7 +58,7 @@ class Wrist(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Posture:
-    """What, beside the hand, tells apart the ways in which an arm reaches one pose.
+    """What distinguishes, besides the hand, the ways in which an arm reaches one pose.
 
     Elbow and wrist are a six-axis arm's; the joint flags say in which turn a joint stands
     (docs/reference/epson-robots.md, "Flags"). Robots without such a joint have 0.
@@ -143,7 +143,7 @@ def describe_pose(pose: Pose) -> str:
 
 
 def angle_difference_deg(a_deg: float, b_deg: float) -> float:
-    """Return ``a_deg - b_deg`` brought into [-180, 180)."""
+    """Return ``a_deg - b_deg`` as an angle in [-180, 180)."""
     return (a_deg - b_deg + 180.0) % 360.0 - 180.0
 
 

@@ -1,4 +1,4 @@
-"""Who a controller is, whatever the URL, what it says of itself, and the password that it takes."""
+"""A controller's identity, whatever the URL: its own answer, and the password that it takes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from typing import Final, TypeAlias
 
 
 class Secret:
-    """Wraps a password so that no format, log or traceback of ours can show it."""
+    """A password that no format, log or traceback of robolink can show."""
 
     __slots__ = ("_value",)
 
@@ -14,7 +14,7 @@ class Secret:
         self._value: Final = value
 
     def reveal(self) -> str:
-        """Return the text. Called where the login frame is built, and nowhere else."""
+        """Return the text. Only the code that builds the login frame calls it."""
         return self._value
 
     def __repr__(self) -> str:
@@ -29,7 +29,7 @@ class Secret:
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """Who a controller is, as far as it told.
+    """A controller's identity, as far as it reports it.
 
     Journal, markers, leases, backups and undo hang on the name, so it must not depend on how
     an address is spelled, on the medium, or on the name of a serial port.
@@ -56,12 +56,12 @@ class Identity:
 
     @property
     def own(self) -> bool:
-        """Whether the name rests on what the controller said of itself."""
+        """Whether the name comes from the controller's own answer."""
         return self.name != self.place
 
 
 def is_own_name(name: str) -> bool:
-    """Tell a name that rests on what a controller said of itself from an address.
+    """Return whether a name comes from a controller's own answer, and not from its address.
 
     ``softmotion:0A1B2C3D`` is one; ``softmotion@192.168.0.2:502`` and URLs are not.
     """
@@ -70,7 +70,7 @@ def is_own_name(name: str) -> bool:
 
 
 Who: TypeAlias = Callable[[], Identity]
-"""Asks a controller who it is, each time anew; raises what any exchange with it may raise."""
+"""Asks a controller for its identity, each time anew; raises what an exchange may raise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,8 +86,8 @@ class ControllerFacts:
         firmware: Version text.
         project: The project loaded in it.
         robot_number: The robot that motors and statements act on.
-        robot_models: One for each robot; without the extended queries, of the robot in
-            force only.
+        robot_models: One for each robot; without the extended queries, of the current
+            robot only.
         robot_serials: Likewise.
     """
 

@@ -1,8 +1,8 @@
-"""What is put on record about a tool: the words in which drivers and procedures report.
+"""What is recorded about a tool: the words in which drivers and procedures report.
 
 A value that is written may rest on an answer as much as on a touch: "is the new tip exactly as
 long as the old one?" decides Z. So whatever asks, asks through a primitive that keeps the answer:
-the runner of procedures, and the prompts of the command line. What was answered beforehand, by an
+the runner of procedures, and the prompts of the command line. What was answered in advance, by an
 option or ``--yes``, is kept with the question that it answered.
 """
 
@@ -47,7 +47,7 @@ PROOFS: Final = (
     EntryKind.NOT_APPLIED,
     EntryKind.ROLLED_BACK,
 )
-"""Entries whose value was read from the controller: the newest tells what a tool holds."""
+"""Entries with a value read from the controller: the newest one shows a tool's value."""
 
 NO_HISTORY: Final = (
     EntryKind.IDENTITY,
@@ -55,12 +55,12 @@ NO_HISTORY: Final = (
     EntryKind.LEASE,
     EntryKind.CHECK,
 )
-"""What is recorded of a controller without anything being changed on it."""
+"""Kinds of entries about a controller that record no change of it."""
 
 
 @dataclass(frozen=True, slots=True)
 class NewEntry:
-    """One thing to put on record.
+    """One new record.
 
     Attributes:
         kind: What it is about.
@@ -83,7 +83,7 @@ class NewEntry:
 
 @dataclass(frozen=True, slots=True)
 class Signature:
-    """Who did it and with what: the same for all entries of a run.
+    """Who did it and with what; the same for all entries of a run.
 
     Attributes:
         operator: Badge or name that the person gave; empty when none was given.
@@ -112,7 +112,7 @@ class Signature:
 
 @dataclass(frozen=True, slots=True)
 class Recorded:
-    """One thing that is on record.
+    """One record.
 
     Attributes:
         number: Its number; consecutive from 1.
@@ -204,7 +204,7 @@ def answer_entry(
 
 
 def answered_by_in_words(by: str) -> str:
-    """Return how a question was answered, in words; as it is where it is none of ours."""
+    """Return how a question was answered, in words; an unknown value as it is."""
     words = {
         AnsweredBy.PERSON: tr("asked and answered"),
         AnsweredBy.STAND_IN: tr("answered by the simulated person"),
@@ -232,18 +232,18 @@ _FORMER: Final = {
 
 
 def method_name_now(written: str) -> str:
-    """Return a method's name of now; one that never changed comes back as it is."""
+    """Return a method's present name; one that never changed is returned as it is."""
     return _FORMER.get(written, written)
 
 
 def with_method_name_now(details: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the details of an entry, with the method called what it is called now."""
+    """Return the details of an entry, with the method's present name."""
     written = details.get("method")
     now = {"method": method_name_now(written)} if isinstance(written, str) else {}
     return {**details, **now}
 
 
 def finding_named_now(how: str) -> str:
-    """Return how a station was found, "METHOD with tool N", with the method's name of now."""
+    """Return how a station was found, "METHOD with tool N", with the method's present name."""
     method, blank, rest = how.partition(" ")
     return f"{method_name_now(method)}{blank}{rest}"

@@ -1,4 +1,4 @@
-"""Values as JSON knows them, and dataclasses made of it again by their annotations.
+"""Values as JSON has them, and dataclasses rebuilt from them by their annotations.
 
 What is kept or printed names each field of a value once, here by its own name, with its unit in
 it. A class whose document is more than its fields says so in methods of its own, ``as_json`` and
@@ -18,7 +18,7 @@ T = TypeVar("T")
 
 
 def json_value(value: Any) -> Any:  # noqa: ANN401 - any value, any JSON
-    """Return a value as JSON knows it: dataclasses as objects, enums by value, tuples as lists.
+    """Return a value as JSON: dataclasses as objects, enums by value, tuples as lists.
 
     JSON has no infinity: a number that is not finite is ``None``.
 
@@ -68,7 +68,7 @@ def json_fields(value: object, *names: str, **renamed: str) -> dict[str, Any]:
 
 
 def from_fields(kind: type[T], document: Mapping[str, Any], *, partial: bool = False) -> T:
-    """Return the dataclass whose fields a JSON object holds; what it holds beside is left.
+    """Return the dataclass whose fields a JSON object holds; further keys are ignored.
 
     Args:
         kind: The class. Its annotations say what each value is made into.

@@ -1,4 +1,4 @@
-"""Which flange orientations a kinematics can take up, and the one rule by which a tool fits it.
+"""Which flange orientations a kinematics can reach, and the one rule by which a tool fits.
 
 A tool's place follows from the flange's orientation R and the tool's shift v as ``R v``. Where a
 part of R is not known in advance, a shift fits only when ``R v`` is the same whatever that part
@@ -48,11 +48,11 @@ _Z: Final[Direction3] = (0.0, 0.0, 1.0)
 
 
 class NotReachable(Exception):
-    """A kinematics cannot take up a position or an orientation; the text says why."""
+    """A kinematics cannot reach a position or an orientation; the text says why."""
 
 
 class OrientationDof(Enum):
-    """``OrientationDOF``: how much of a flange's orientation stays open."""
+    """``OrientationDOF``: how much of a flange's orientation is free."""
 
     ZERO = 0
     ONE = 1
@@ -121,7 +121,7 @@ class OrientationSpace:
         return cls(OrientationDof.THREE)
 
     def holds(self, rotation: RotationMatrix, tolerance: float = _UNIT) -> bool:
-        """Tell whether an orientation is a member of the space."""
+        """Return whether an orientation is a member of the space."""
         match self.dof:
             case OrientationDof.ZERO:
                 pairs = zip(self.m_ori_zero, rotation, strict=True)
@@ -132,7 +132,7 @@ class OrientationSpace:
                 return True
 
     def impossible(self, shift_mm: Direction3) -> Direction3:
-        """Return the part of a tool's shift that has no definite place, in mm along X, Y, Z.
+        """Return the part of a tool's shift without a definite place, in mm along X, Y, Z.
 
         All zeros when the tool fits.
         """
@@ -147,7 +147,7 @@ class OrientationSpace:
                 return (x, y, z)
 
     def accepts(self, shift_mm: Direction3) -> bool:
-        """Tell whether a tool with this shift fits."""
+        """Return whether a tool with this shift fits."""
         return math.hypot(*self.impossible(shift_mm)) <= ALONG_MM
 
 
@@ -300,7 +300,7 @@ AxisPositions = tuple[float, ...]
 """``AXISPOS_REF``: one value an axis, a0 first; degrees of a rotary axis, mm of a linear one."""
 
 FlangeFrame = tuple[Direction3, RotationMatrix]
-"""Where a flange stands: its place in mm, and how it is turned."""
+"""The place of a flange in mm, and its orientation."""
 
 
 class AxisKind(StrEnum):
@@ -311,7 +311,7 @@ class AxisKind(StrEnum):
 
 
 def is_custom(part: str) -> bool:
-    """Tell whether a name of a kinematics, or of a part of one, stands for a class."""
+    """Return whether a name of a kinematics, or of a part of one, stands for a class."""
     return ":" in part
 
 
@@ -378,7 +378,7 @@ class MCKinRefSM3(Protocol):
         """  # noqa: D205 - one sentence over two lines
 
     def cartesian_to_axes(self, flange: FlangeFrame, near: AxisPositions) -> AxisPositions:
-        """Return the axes that bring the flange there.
+        """Return the axis values that move the flange there.
 
         Args:
             flange: Its orientation is a member of the space that the image gave for it. A
@@ -411,7 +411,7 @@ class ISMPositionKinematics2(Protocol):
     """``ISMPositionKinematics2``: a kinematics of up to three axes that may carry another one."""
 
     def get_orientation_image(self) -> OrientationSpace:
-        """Return the orientations in which its flange can stand."""
+        """Return the orientations that its flange can have."""
 
 
 @runtime_checkable

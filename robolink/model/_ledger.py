@@ -1,4 +1,4 @@
-"""What was done to a controller over one connection, and how much of it is proved.
+"""What was done to a controller over one connection, and how much of it is confirmed.
 
 The durable markers say to the next process what this one had begun. The ledger says to whoever
 is told of an error what stands on the controller now: it is written to before the journal is,
@@ -22,7 +22,7 @@ Same = Callable[[ToolOffset | None, ToolOffset | None], bool]
 
 @dataclass(slots=True)
 class Account:
-    """What was begun in one block of work; made by :meth:`Ledger.open`.
+    """What was started in one block of work; made by :meth:`Ledger.open`.
 
     Attributes:
         before: What each tool held before the first write to it in this block.
@@ -39,7 +39,7 @@ class Account:
 
 @dataclass(slots=True)
 class _Deed:
-    """One command that was begun; ``answered`` when the controller is known to be done with it."""
+    """One command that was started; ``answered`` when the controller is known to have ended it."""
 
     marker: Marker
     answered: bool = False
@@ -85,7 +85,7 @@ class Ledger:
     # What is begun, and how it ends; told by whoever keeps the markers.
 
     def begin(self, marker: Marker) -> None:
-        """Note a command or a procedure that is about to begin; its marker is durable."""
+        """Note a command or a procedure that is about to start; its marker is durable."""
         with self._lock:
             self._open[marker.operation] = marker
             if marker.kind not in (MarkerKind.SET, MarkerKind.MOVE):
@@ -102,7 +102,7 @@ class Ledger:
                     account.selected_before = int(str(marker.details["before"]))
 
     def answered(self, marker: Marker) -> None:
-        """Note that the controller is done with it, whatever it did: what is read now counts."""
+        """Note that the controller has finished with it, whatever it did: later reads count."""
         with self._lock:
             if marker.operation in self._doubts:
                 self._doubts[marker.operation].answered = True
@@ -115,7 +115,7 @@ class Ledger:
                 self._prove(deed, found)
 
     def ended(self, marker: Marker) -> None:
-        """Note that its outcome is known: proved before, or refused, or a movement that ended."""
+        """Note that its outcome is known: confirmed, or refused, or a movement that ended."""
         with self._lock:
             deed = self._doubts.pop(marker.operation, None)
             if deed is None:
@@ -126,12 +126,12 @@ class Ledger:
                 self._selected = int(str(deed.marker.details["before"]))
 
     def recorded(self, marker: Marker) -> None:
-        """Note that its outcome is on record: its marker is gone."""
+        """Note that its outcome is recorded: its marker is gone."""
         with self._lock:
             self._open.pop(marker.operation, None)
 
     def open_writes(self, tool: int) -> tuple[Marker, ...]:
-        """Return the markers of writes to a tool whose outcome is known and not on record."""
+        """Return the markers of writes to a tool with a known, unrecorded outcome."""
         with self._lock:
             return tuple(
                 marker
@@ -142,7 +142,7 @@ class Ledger:
     # What is read besides.
 
     def saw_tool(self, tool: int, holds: ToolOffset | None) -> None:
-        """Note what a tool was read as."""
+        """Note the value read from a tool."""
         with self._lock:
             doubts = [deed for deed in self._doubts.values() if deed.tool == tool]
             if all(deed.answered for deed in doubts):
@@ -152,7 +152,7 @@ class Ledger:
                     self._holds[tool] = holds
 
     def saw_selected(self, tool: int | None) -> None:
-        """Note which tool was read as the selected one."""
+        """Note which tool read as selected."""
         with self._lock:
             doubts = [deed for deed in self._doubts.values() if deed.selects]
             if all(deed.answered for deed in doubts):
@@ -161,12 +161,12 @@ class Ledger:
                 self._selected = tool
 
     def saw_status(self, status: ControllerStatus, at_ns: int) -> None:
-        """Note what state was read, and when on the controller's clock."""
+        """Note the state that was read, and when on the controller's clock."""
         self._seen = (status, at_ns)
 
     @property
     def seen(self) -> tuple[ControllerStatus, int] | None:
-        """The state that was read last, and when on the controller's clock; ``None`` for never.
+        """The state read last, and when on the controller's clock; ``None`` for never.
 
         It takes no lock: whoever looks on from another thread holds up nobody at work.
         """
@@ -176,7 +176,7 @@ class Ledger:
 
     @contextmanager
     def block(self) -> Iterator[Account]:
-        """Let whatever ends the block early say what it left on the controller."""
+        """Add to whatever ends the block early what it left on the controller."""
         account = self.open()
         try:
             yield account
@@ -188,7 +188,7 @@ class Ledger:
 
     @contextmanager
     def telling(self) -> Iterator[None]:
-        """Let whatever leaves the block say what was left on the controller since connecting."""
+        """Add to whatever leaves the block what was left on the controller since connecting."""
         try:
             yield
         except BaseException as error:
@@ -196,7 +196,7 @@ class Ledger:
             raise
 
     def open(self) -> Account:
-        """Begin an account of what is done from now on."""
+        """Start an account of what is done from now on."""
         with self._lock:
             account = Account()
             self._accounts.append(account)
@@ -216,7 +216,7 @@ class Ledger:
                 self._unkept.append(account)
 
     def outcome(self, account: Account | None = None) -> ControllerOutcome:
-        """Return what stands of what was done in ``account``, by default since connecting."""
+        """Return the result of what was done in ``account``, by default since connecting."""
         with self._lock:
             since = self._whole if account is None else account
             doubts = self._doubts.values()
@@ -255,7 +255,7 @@ class Ledger:
         )
 
     def _stands(self, account: Account) -> bool:
-        """Whether something that was not kept was not put back either."""
+        """Whether something that was not kept was not restored either."""
         return any(
             not self.same(self._holds.get(tool, before), before)
             for tool, before in account.before.items()
@@ -277,7 +277,7 @@ def _plain(offset: ToolOffset | None) -> Components:
 
 
 def describe_outcome(outcome: ControllerOutcome, *, settles: bool = True) -> str:
-    """Return what moved, what was written, which tool is selected, and what settles the rest.
+    """Return what moved, what was written, which tool is selected, and how to recover the rest.
 
     It claims nothing that was not looked at.
 

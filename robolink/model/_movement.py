@@ -22,7 +22,7 @@ class InputEdge:
         number: The input as its controller counts: from 0 on an EPSON controller, from 1 in a
             PLC's mailbox.
         falling: Whether it is to go off, not on.
-        run_on: Whether the movement goes on to its target after the edge.
+        run_on: Whether the movement continues to its target after the edge.
     """
 
     number: int
@@ -30,20 +30,20 @@ class InputEdge:
     run_on: bool = False
 
     def awaited(self, on: bool) -> bool:
-        """Tell whether an input that is ``on`` shows what the movement waits for."""
+        """Return whether an input that is ``on`` shows what the movement waits for."""
         return on is not self.falling
 
     def require_ahead(self, on: bool, *, controller: str, request: str) -> None:
-        """Refuse an input that shows already what the movement waits for.
+        """Refuse an input that already shows what the movement waits for.
 
-        An EPSON controller would take such a movement for finished at once, and a PLC would drive
+        An EPSON controller would treat such a movement as finished at once, and a PLC would drive
         on to the target, the tip perhaps in contact (docs/reference/spel.md 7.1,
         docs/reference/mailbox.md).
 
         Args:
             on: Whether the input is on before the movement begins.
-            controller: Who is asked, for the error.
-            request: What is asked, for the error.
+            controller: The controller, for the error.
+            request: The request, for the error.
 
         Raises:
             NotReadyError: Names the input.
@@ -76,9 +76,9 @@ class MotionUntilInput(Protocol):
         """Wait for the end and return where the tip was at the edge.
 
         Returns:
-            ``None`` when the input did not switch on the way; the movement has arrived then.
-            What a controller cannot latch it reads at rest just past the edge: both edges of a
-            beam, and both directions, are late by the same amount then.
+            ``None`` when the input did not switch on the way; the movement has then arrived.
+            A controller that cannot latch the place reads it at rest just past the edge: both
+            edges of a beam, and both directions, are then late by the same amount.
 
         Raises:
             StoppedError: It was stopped before.
@@ -89,7 +89,7 @@ class MotionUntilInput(Protocol):
 
 
 class Path(StrEnum):
-    """How the robot travels to a target."""
+    """How the robot moves to a target."""
 
     JOINT = "joint"
     STRAIGHT = "straight"
@@ -125,8 +125,8 @@ class MotionProfile:
 class WorkBox:
     """The box that no target may leave, in base coordinates of the frame that moves.
 
-    A plan holds it about the place where the frame will be at the start (:meth:`reaching`); there
-    it is put when that place is known (:meth:`about`).
+    A plan defines it around the start place of the frame (:meth:`reaching`), and moves it there
+    once that place is known (:meth:`about`).
 
     Raises:
         ConfigError: A limit is no number.
@@ -144,7 +144,7 @@ class WorkBox:
 
     @classmethod
     def reaching(cls, sideways_mm: float, *, down_mm: float, up_mm: float) -> "WorkBox":
-        """Return the box that reaches so far from a place that is not known yet.
+        """Return the box that reaches so far from a place that is not yet known.
 
         Args:
             sideways_mm: In X and Y, to either side.
@@ -184,7 +184,7 @@ class WorkBox:
         return self.z_max_mm - self.z_min_mm
 
     def about(self, pose: Pose) -> "WorkBox":
-        """Return the same box about a place, which so far stood for nothing."""
+        """Return the same box about a place; so far it had none."""
         return WorkBox(
             pose.x_mm + self.x_min_mm,
             pose.x_mm + self.x_max_mm,
@@ -195,7 +195,7 @@ class WorkBox:
         )
 
     def larger(self, *, sideways_mm: float = 0.0, up_mm: float = 0.0) -> "WorkBox":
-        """Return the box that reaches further by so much, to all sides and up."""
+        """Return the box enlarged by so much, to all sides and up."""
         return WorkBox(
             self.x_min_mm - sideways_mm,
             self.x_max_mm + sideways_mm,
@@ -206,7 +206,7 @@ class WorkBox:
         )
 
     def holds(self, target: Pose) -> bool:
-        """Tell whether a target lies inside."""
+        """Return whether a target lies inside."""
         return (
             self.x_min_mm <= target.x_mm <= self.x_max_mm
             and self.y_min_mm <= target.y_mm <= self.y_max_mm
@@ -306,10 +306,10 @@ class MotionTerms:
 
     Attributes:
         who: What moves, and in which mode, to be followed by "will move".
-        watch: Who stops it when this computer falls silent, one sentence.
-        able: What was looked at and lets it move, as :meth:`MotionGroup.require_able` does; empty
-            where this kind of controller tells nothing of it. It holds also while the motors are
-            off.
+        watch: What stops it when this computer falls silent, one sentence.
+        able: What was checked and allows it to move, as :meth:`MotionGroup.require_able` does;
+            empty if this kind of controller reports nothing of it. It is valid also while the
+            motors are off.
     """
 
     who: str
@@ -325,20 +325,20 @@ class MotionGroup(Protocol):
         """What a person calls it."""
 
     def pose(self) -> Pose:
-        """Read where the frame in force is now (measured, not commanded)."""
+        """Read where the frame of the selected tool is now (measured, not commanded)."""
 
     def move_to(self, target: Pose, profile: MotionProfile, *, box: WorkBox) -> Motion:
         """Start one movement of the frame ``target.tool``; sent at most once.
 
         Args:
-            target: Where the frame ``target.tool`` is brought, base, mm and degrees.
+            target: Where to move the frame ``target.tool``, base, mm and degrees.
             profile: How: path, speed and accelerations.
             box: Where it may go.
 
         Raises:
             LimitError: The target lies outside ``box``.
-            NotReadyError: The state, the motors or the tool in force forbid it.
-            OutcomeUnknownError: An earlier command on this controller is unresolved.
+            NotReadyError: The state, the motors or the selected tool forbid it.
+            OutcomeUnknownError: An earlier command on this controller is not recovered.
 
         Example:
             >>> import robolink
@@ -360,7 +360,7 @@ class MotionGroup(Protocol):
     ) -> MotionUntilInput:
         """Start one straight movement during which the controller watches an input.
 
-        Sent at most once, and not at all when the input shows already what is waited for.
+        Sent at most once, and not at all if the input already shows what is waited for.
 
         Args:
             target: Where it ends when the input does not switch.
@@ -408,19 +408,19 @@ class MotionGroup(Protocol):
         """
 
     def requests_for(self, target: Pose, profile: MotionProfile) -> tuple[str, ...]:
-        """Return what :meth:`move_to` would send besides its reads, as it stands on the wire."""
+        """Return what :meth:`move_to` would send besides its reads, as sent on the wire."""
 
     def obstacle(self, target: Pose, path: Path, *, start: Pose | None = None) -> str:
-        """Return why the arm could not go there so, a sentence; empty where nothing is known.
+        """Return why the arm could not make this move, a sentence; empty if nothing is known.
 
-        Reads only, and is no promise: it is for whoever has other places to choose from, or would
-        rather not begin. The places are meant for the tool in force.
+        Reads only, and is no promise: it is for a caller that can choose another place, or need not
+        begin. The places are those of the selected tool.
 
         Args:
             target: Where to.
             path: How.
-            start: Where from, ``None`` where nobody knows; of a straight way only the end is looked
-                at then.
+            start: Where from, ``None`` if unknown; then only the end of a straight movement is
+                checked.
 
         Example:
             >>> import robolink
@@ -432,39 +432,39 @@ class MotionGroup(Protocol):
         """
 
     def deceleration_mm_s2(self) -> float | None:
-        """Read how it brakes in straight movements, ``None`` where it does not tell.
+        """Read how it brakes in straight movements, ``None`` if it does not report that.
 
-        By that it comes to rest beyond the edge of an input that ends a movement.
+        With this it stops beyond the edge of an input that ends a movement.
         """
 
     def run_up_mm(self, speed_mm_s: float) -> float | None:
-        """Read in what way a movement until an input reaches a speed, and comes to rest from it.
+        """Read the distance in which a movement until an input reaches a speed, and stops from it.
 
         Args:
             speed_mm_s: The speed.
 
         Returns:
-            The longer of both ways; ``None`` where it does not tell.
+            The longer of both distances; ``None`` if it does not report them.
         """
 
     def edge_step_mm(self, speed_mm_s: float) -> float | None:
-        """Return in what steps it tells where the edge of an input was, at a speed.
+        """Return the step in which it reports where the edge of an input was, at a speed.
 
         Args:
             speed_mm_s: The speed.
 
         Returns:
-            The step; ``None`` where nobody knows it.
+            The step; ``None`` if unknown.
         """
 
     def require_able(self, purpose: str) -> None:
-        """Refuse what no movement could begin in now; reads only.
+        """Refuse if no movement could start now; reads only.
 
-        For whoever asks a person first: nobody is asked whether the cell is clear, and then told
-        that the motors are off.
+        For a caller that asks a person first: otherwise the person would confirm a clear cell, and
+        then read that the motors are off.
 
         Args:
-            purpose: What it is to move for, in words.
+            purpose: The purpose of the movement, in words.
 
         Raises:
             NotReadyError: The motors are off, or the state forbids every movement.
@@ -474,24 +474,24 @@ class MotionGroup(Protocol):
         """Read what a person must know before it moves."""
 
     def base(self) -> tuple[float, ...] | None:
-        """Read where the base stands that positions count from.
+        """Read the place of the base, from which positions count.
 
         Returns:
-            X, Y, Z in mm and U, V, W in degrees, seen from the robot; ``None`` where this kind of
-            controller tells none.
+            X, Y, Z in mm and U, V, W in degrees, seen from the robot; ``None`` if this kind of
+            controller reports none.
         """
 
     def axes(self) -> Mapping[str, tuple[float, ...]]:
-        """Read the positions of the axes, by the names of what they count in."""
+        """Read the positions of the axes, by the names of their units."""
 
     def motors_on(self) -> bool | None:
-        """Read whether its motors are on, ``None`` where this kind does not tell it."""
+        """Read whether its motors are on, ``None`` if this kind does not report it."""
 
     def low_power(self) -> bool | None:
-        """Read whether it moves with little power, ``None`` where this kind has no such mode."""
+        """Read whether it moves with low power, ``None`` if this kind has no such mode."""
 
     def stop(self) -> None:
         """Stop it; may be called from any thread, at any time, more than once."""
 
     def abort_unfinished(self) -> None:
-        """End the movements that were begun here and whose end nobody has seen."""
+        """End the movements that were started here and whose end nobody has seen."""

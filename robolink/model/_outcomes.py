@@ -1,4 +1,4 @@
-"""Durable markers of what was begun and not proved finished, and what was found out about them."""
+"""Durable markers of interrupted jobs, and what was found out about them."""
 
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import AbstractContextManager
@@ -30,7 +30,7 @@ def new_operation() -> str:
 
 @dataclass(frozen=True, slots=True)
 class Marker:
-    """One command or procedure that was begun.
+    """One command or procedure that was started.
 
     Attributes:
         operation: Unique id of the command.
@@ -40,7 +40,7 @@ class Marker:
             ``HISTORY`` the record of what was done here before is missing.
         request: What was sent or begun, as a person may read it.
         begun_at: Wall-clock label, ISO 8601 UTC.
-        details: Plain JSON values needed to settle it.
+        details: Plain JSON values needed to recover it.
     """
 
     operation: str
@@ -66,7 +66,7 @@ class ClientRun:
 
 
 class OutcomeLog(Protocol):
-    """Keeps the markers of one controller, beyond the life of the process where it can.
+    """Keeps the markers of one controller, if possible beyond the life of the process.
 
     Attributes:
         signature: Who works here, and with what.
@@ -91,43 +91,43 @@ class OutcomeLog(Protocol):
 
     @property
     def identity(self) -> str:
-        """Who the controller is; it is asked if it was not asked yet."""
+        """The controller's identity; it is asked at first use."""
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Every name under which the controller is on record, its identity first."""
+        """Every name under which the controller is recorded, its identity first."""
 
     @property
     def robot(self) -> str:
-        """Of a controller with several robots the name of the one whose record this is.
+        """Which of several robots this record is about.
 
         Markers and the lease hold for the whole controller; tools, stations and what was done
-        to them are on record of the robot in force. Empty where there is one robot.
+        to them are on record of the current robot. Empty where there is one robot.
         """
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What a person should know about who the controller is, once, in sentences."""
+        """What a person should know once about the controller's identity, in sentences."""
 
     def ask(self, who: Who) -> None:
         """Let the controller say who it is, at the next use and not before."""
 
     def begin(self, marker: Marker) -> None:
-        """Store ``marker``; it is durable when this returns.
+        """Store ``marker``; it is durable on return.
 
         Raises:
             ConfigError: It cannot be stored. The command must not be sent then.
         """
 
     def clear(self, operation: str, *entries: NewEntry) -> None:
-        """Forget the marker and record how it ended; unknown ids are ignored.
+        """Remove the marker and record how it ended; unknown ids are ignored.
 
         Raises:
             ConfigError: It cannot be recorded; the marker stays.
         """
 
     def append(self, *entries: NewEntry) -> None:
-        """Put something on record; it is durable when this returns.
+        """Record something; it is durable on return.
 
         Raises:
             ConfigError: It cannot be recorded.
@@ -142,7 +142,7 @@ class OutcomeLog(Protocol):
         """
 
     def open_markers(self) -> tuple[Marker, ...]:
-        """Return what is unsettled, oldest first."""
+        """Return the unfinished jobs, oldest first."""
 
     def look(self) -> None:
         """Note the state of the lease; a later :meth:`begin` fails if it changed meanwhile.
@@ -166,31 +166,31 @@ class OutcomeLog(Protocol):
         """
 
     def take_over(self, reason: str) -> None:
-        """End the lease of whoever has it, because a person insists; this is recorded.
+        """End the lease, whoever has it, at a person's request; this is recorded.
 
         Raises:
             ConfigError: It cannot be recorded.
         """
 
     def note_client(self, client: str) -> None:
-        """Note, before a controller is asked for its ownership, under which token that is done.
+        """Note the token under which a controller will be asked for its ownership.
 
         It raises nothing: it only helps whoever meets the token later.
         """
 
     def forget_client(self, client: str) -> None:
-        """Forget the token again: nothing is owned under it any more."""
+        """Forget the token: nothing is owned under it any more."""
 
     def run_of(self, client: str) -> ClientRun | None:
-        """Return the run that noted a token, ``None`` for a token that nobody noted."""
+        """Return the run that noted a token, ``None`` if nobody noted it."""
 
     def beat(self) -> None:
-        """Let others see that this process is alive; cheap, and raises nothing."""
+        """Show others that this process is alive; cheap, and raises nothing."""
 
     def recorded(
         self, *, tool: int | None = None, change: str = "", kinds: Collection[EntryKind] = ()
     ) -> Iterator[Recorded]:
-        """Return what is on record about this controller, newest first.
+        """Return the records of this controller, newest first.
 
         Args:
             tool: Only entries about this tool.
@@ -212,11 +212,11 @@ class OutcomeLog(Protocol):
         """
 
     def close(self) -> None:
-        """Give the lease up; open markers stay, and block until they are settled."""
+        """Release the lease; open markers stay, and block until they are recovered."""
 
 
 class Verdict(StrEnum):
-    """What reading the controller says about an open marker."""
+    """What reading the controller shows about an open marker."""
 
     DONE = "done"
     NOT_APPLIED = "not applied"
@@ -227,7 +227,7 @@ class Verdict(StrEnum):
 
     @property
     def needs_a_person(self) -> bool:
-        """Whether reading the controller cannot settle it."""
+        """Whether reading the controller is not enough to recover it."""
         return self in (Verdict.CONFLICT, Verdict.LOOK)
 
 
@@ -240,7 +240,7 @@ class Finding:
         verdict: What became of it.
         sentence: The same for a person.
         action: What settling it will do beyond forgetting it, empty for nothing.
-        entries: What settling it puts on record.
+        entries: What recovering it records.
     """
 
     marker: Marker
@@ -251,10 +251,10 @@ class Finding:
 
 
 class Resolver(Protocol):
-    """Examines and settles what was begun on a controller and not proved finished."""
+    """Examines and recovers interrupted jobs on a controller."""
 
     def fence(self) -> None:
-        """Make sure that nothing sent earlier, and not answered, takes effect from here on.
+        """Make sure that nothing sent earlier and unanswered takes effect from here on.
 
         What is read before may be overtaken by a request that arrives late; so whoever settles
         something calls this first. It changes nothing that a person would notice, and does
@@ -273,7 +273,7 @@ class Resolver(Protocol):
         """
 
     def settle(self, finding: Finding) -> None:
-        """Do what ``finding.action`` says and forget the marker."""
+        """Do what ``finding.action`` says and remove the marker."""
 
 
 def begun_in_words(marker: Marker) -> str:

@@ -47,7 +47,7 @@ class ControllerStatus:
 
     @property
     def needs_reset(self) -> bool:
-        """Whether a reset comes before anything else; one does not clear a serious fault."""
+        """Whether a reset comes before anything else; a reset does not clear a serious fault."""
         return (self.emergency_stop or self.fault) and not self.serious_fault
 
     @property

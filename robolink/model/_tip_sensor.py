@@ -1,4 +1,4 @@
-"""What sees a tip from a distance: a camera, as whoever runs a procedure looks through it."""
+"""Sees a tip from a distance: a camera, as a procedure uses it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ TIP: Final = 0
 
 
 class SpotUnit(StrEnum):
-    """In what a sensor tells where it sees something."""
+    """The unit in which a sensor reports where it sees something."""
 
     PIXEL = "px"
     """Pixels of its image, X to the right and Y down, or however it counts them."""
@@ -51,15 +51,15 @@ class TipSensor(Protocol):
 
     @property
     def unit(self) -> SpotUnit:
-        """In what :meth:`see` answers."""
+        """The unit in which :meth:`see` answers."""
 
     @property
     def resolution_px(self) -> tuple[int, int] | None:
-        """Width and height of the image, ``None`` where it makes no difference."""
+        """Width and height of the image, ``None`` if that makes no difference."""
 
     @property
     def settle_s(self) -> float:
-        """How long the robot has to stand still before an exposure may begin, seconds."""
+        """How long the robot must have stopped before an exposure may start, seconds."""
 
     def see(self, mark: int = TIP) -> Sequence[Spot]:
         """Expose anew and return everything in the image that looks like ``mark``.
@@ -74,12 +74,12 @@ class TipSensor(Protocol):
         """
 
     def close(self) -> None:
-        """Let go of the camera."""
+        """Release the camera."""
 
 
 @runtime_checkable
 class ControllerSensor(Protocol):
-    """A :class:`TipSensor` that is asked through the controller of the cell."""
+    """A :class:`TipSensor` that is read through the cell's controller."""
 
     def beside(self, controller: Controller) -> TipSensor:
         """Return it as a connected controller shows it; reads only.
@@ -98,7 +98,7 @@ class LookingController(Protocol):
         """Which controller this is."""
 
     def require_looks(self) -> None:
-        """Find out whether looks can be taken; reads only.
+        """Check that looks can be taken; reads only.
 
         Raises:
             ConfigError: What takes them is not there.

@@ -58,7 +58,7 @@ class ToolOffset:
 
     @property
     def of_no_tool(self) -> bool:
-        """Whether a number in it is one that no tool has, as words in another order make it."""
+        """Whether one of its numbers is one that no tool has, as words in the wrong order give."""
         return of_no_tool(self.components())
 
     def rounded(self, decimals: int) -> "ToolOffset":
@@ -66,7 +66,7 @@ class ToolOffset:
         return ToolOffset(*[round(value, decimals) + 0.0 for value in self.components()])
 
     def matches(self, other: "ToolOffset", tolerance: float) -> bool:
-        """Tell whether every component agrees within ``tolerance`` (mm, degrees).
+        """Return whether every component agrees within ``tolerance`` (mm, degrees).
 
         Angles are compared modulo 360: a controller may store 270 as -90.
         """
@@ -99,7 +99,7 @@ def require_offset(name: str, offset: object) -> None:
 
 
 def of_no_tool(values: Sequence[float]) -> bool:
-    """Tell whether one of these numbers is none that a tool has, in whatever unit."""
+    """Return whether one of these numbers is one that no tool has, in any unit."""
     return any(value and not _LEAST < abs(value) < _MOST for value in values)
 
 
@@ -115,7 +115,7 @@ def describe_offset(offset: ToolOffset | None) -> str:
 
 
 def put_right(offset: ToolOffset | None) -> str:
-    """Return how a person puts a tool right that holds the values of none, empty for others."""
+    """Return how a person corrects a tool with impossible values; empty for other tools."""
     if offset is None or not offset.of_no_tool:
         return ""
     return tr(
@@ -132,10 +132,10 @@ def plain_offset(offset: ToolOffset | None) -> list[float] | None:
 
 
 def read_offset(value: object) -> ToolOffset | None:
-    """Return what :func:`plain_offset` was given.
+    """Return the offset from the output of :func:`plain_offset`.
 
     Raises:
-        ConfigError: It is no such value.
+        ConfigError: It is not such a value.
     """
     if value is None:
         return None
@@ -154,10 +154,10 @@ class Expect(Enum):
 
 
 ANY: Final = Expect.ANY
-"""Pass as ``expected`` to write whatever is stored now. Recorded as unconditional."""
+"""Pass as ``expected`` to write over any stored value. Recorded as unconditional."""
 
 Expected = ToolOffset | None | Literal[Expect.ANY]
-"""What the caller believes is stored: an offset, ``None`` for undefined, or :data:`ANY`."""
+"""The value that the caller expects: an offset, ``None`` for undefined, or :data:`ANY`."""
 
 
 def tool_changed(
@@ -168,12 +168,12 @@ def tool_changed(
     controller: str = "",
     request: str = "",
 ) -> ToolChangedError:
-    """Return the error for a tool that holds something else than its writer believes.
+    """Return the error for a tool that does not hold the value that its writer expects.
 
     Args:
         tool: Number of the tool.
-        found: What it holds, ``None`` for undefined.
-        expected: What its writer believes.
+        found: The value found, ``None`` for undefined.
+        expected: The value that its writer expects.
         controller: The controller's identity, for the error.
         request: What was asked, for the error.
 
@@ -202,7 +202,7 @@ def tool_changed(
 
 @dataclass(frozen=True, slots=True)
 class ToolReceipt:
-    """What a write or clear did, as proved by reading back.
+    """The result of a write or clear, as confirmed by reading back.
 
     ``skipped`` means that the value was already there and nothing was written.
     ``None`` stands for an undefined tool.
@@ -223,7 +223,7 @@ class ToolTable(Protocol):
         """Return the tool numbers that can be written."""
 
     def same(self, a: ToolOffset | None, b: ToolOffset | None) -> bool:
-        """Tell whether this controller would store both alike; undefined equals undefined only."""
+        """Return whether the controller would store both alike; undefined equals undefined only."""
 
     def require_writable(self, tool: int) -> None:
         """Refuse a tool number that cannot be written; sends nothing.
@@ -243,10 +243,10 @@ class ToolTable(Protocol):
         """
 
     def doubts(self, tools: Collection[int]) -> tuple[str, ...]:
-        """Return, in sentences, why the values that are read may not be those in force.
+        """Return, in sentences, why the values that are read may not be the active ones.
 
         Args:
-            tools: Those that are about to be changed.
+            tools: The tools about to be changed.
         """
 
     def write(
@@ -256,18 +256,18 @@ class ToolTable(Protocol):
 
         Args:
             tool: Its number, 1 and more.
-            offset: What it is to hold, mm and degrees; rounded to what the controller keeps.
-            expected: What is believed to be stored, ``None`` for undefined, ``ANY`` for anything.
-            wait_s: How long to wait for other threads and programs that are at work, in seconds,
+            offset: The new value, mm and degrees; rounded to what the controller stores.
+            expected: The value expected to be stored, ``None`` for undefined, ``ANY`` for anything.
+            wait_s: How long to wait for other threads and programs that are working, in seconds,
                 0 not at all; ``None`` for the controller's ``patience.wait_s``.
 
         Raises:
             ReservedToolError: Tool 0.
             ToolIndexError: There is no such tool.
-            ToolChangedError: Something else is stored; nothing was written.
+            ToolChangedError: Another value is stored; nothing was written.
             ReadBackError: Another value came back.
             NotReadyError: The state would not allow a write; nothing was written.
-            BusyError: Another thread or program is at work; nothing was written.
+            BusyError: Another thread or program is working; nothing was written.
             OutcomeUnknownError: No answer came to the write.
 
         Example:
@@ -280,7 +280,7 @@ class ToolTable(Protocol):
         """
 
     def preview_write(self, tool: int, offset: ToolOffset) -> tuple[str, ...]:
-        """Return what :meth:`write` would send besides its reads, as it stands on the wire.
+        """Return what :meth:`write` would send besides its reads, as sent on the wire.
 
         Empty when the value is stored already. Reads only; raises what the write would.
         """
@@ -303,13 +303,13 @@ class ToolTable(Protocol):
 
         Args:
             tool: Its number.
-            expected: What is believed to be stored.
-            then_select: The tool to put in force before, if ``tool`` is in force; 0 is the
-                flange. What is in force is left alone otherwise.
+            expected: The value expected to be stored.
+            then_select: The tool to select first, if ``tool`` is selected; 0 is the flange.
+                Otherwise the selection stays.
             wait_s: As for :meth:`write`.
 
         Raises:
-            SelectedToolError: The tool is in force and no other one is named; nothing was sent.
+            SelectedToolError: The tool is selected and no other one is named; nothing was sent.
             UndefinedToolError: The tool named has no definition; nothing was cleared.
 
         Example:
@@ -323,13 +323,13 @@ class ToolTable(Protocol):
         """
 
     def selected(self) -> int | None:
-        """Return the number of the tool in force, 0 for the flange.
+        """Return the number of the selected tool, 0 for the flange.
 
-        ``None`` where the controller does not tell.
+        ``None`` if the controller does not report it.
         """
 
     def select(self, tool: int, *, wait_s: float | None = None) -> None:
-        """Put a tool in force and read the selection back.
+        """Select a tool and read the selection back.
 
         Args:
             tool: Its number, 0 for the flange.
@@ -343,7 +343,7 @@ class ToolTable(Protocol):
 def read_for_verdict(
     tools: ToolTable, tool: int, known: Iterable[ToolOffset | None]
 ) -> ToolOffset | None:
-    """Read a tool whose value decides what becomes of a change, ``None`` when it is undefined.
+    """Read a tool whose value decides what happens to a change, ``None`` when it is undefined.
 
     A value that nobody is known to have written counts when it was read twice: the checksum of
     Remote RS232 does not notice two bytes that changed places (docs/reference/epson.md 2.1).
@@ -351,10 +351,10 @@ def read_for_verdict(
     Args:
         tools: The table.
         tool: Its number.
-        known: What it may well hold: the old value, the new one.
+        known: The values to expect: the old one, the new one.
 
     Raises:
-        UnclearAnswerError: Each of three looks shows something else.
+        UnclearAnswerError: Each of three reads shows another value.
         ToolIndexError: There is no such tool.
 
     Example:
@@ -381,7 +381,7 @@ def read_for_verdict(
 
 @dataclass(frozen=True, slots=True)
 class Jump:
-    """How far a new value takes the tip of a tool from where the stored one has it.
+    """How far a new value moves the tip of a tool from where the stored one has it.
 
     Attributes:
         length_mm: How far apart the tips are.
@@ -403,7 +403,7 @@ class Jump:
         return cls(length_mm, math.degrees(4.0 * math.asin(min(1.0, chord / 2.0))))
 
     def exceeds(self, length_mm: float | None, angle_deg: float | None) -> bool:
-        """Tell whether it is larger than a limit; ``None`` is none."""
+        """Return whether it is larger than a limit; ``None`` is no limit."""
         too_far = length_mm is not None and self.length_mm > length_mm
         return too_far or (angle_deg is not None and self.angle_deg > angle_deg)
 
@@ -427,7 +427,7 @@ class KinematicToolTable(Protocol):
     """A tool table of a machine whose kinematics does not carry every tool."""
 
     def require_measurable(self, components: Sequence[str]) -> None:
-        """Refuse to measure what the machine could not be told afterwards; only reads.
+        """Refuse to measure what the machine could not accept afterwards; only reads.
 
         Args:
             components: ``x_mm``, ``y_mm``, ``z_mm`` and other parts of a tool.

@@ -1,4 +1,4 @@
-"""Files with poses, whoever wrote them: read as they are, and never guessed at."""
+"""Files with poses of any origin: read as they are, without guesses."""
 
 from robolink.pose_tables.formats.epson_points import parse_pts, read_pts
 from robolink.pose_tables.orientation import RULES, RotationRule

@@ -42,12 +42,12 @@ def decoded(data: bytes) -> tuple[str, str]:
 
 
 def lines_of(text: str) -> list[str]:
-    """Return the lines; only CR and LF end one, not what else Unicode calls a line's end."""
+    """Return the lines; only CR and LF end one, not Unicode's other line ends."""
     return _LINE_END.split(text)
 
 
 def line_counter(text: str) -> Callable[[int], int]:
-    """Return what tells the number of the line, from 1, in which a place of ``text`` lies."""
+    """Return a function that gives the line number, from 1, of a place in ``text``."""
     ends = [found.start() for found in re.finditer("\n", text)]
     return lambda place: bisect_left(ends, place) + 1
 

@@ -1,4 +1,4 @@
-"""Numbers as files hold them: one strict form, and what is said of what only looks like one.
+"""Numbers as files hold them: one strict form, and sentences for near misses.
 
 A number is ASCII digits with a point, a sign and an exponent at most. A minus sign of typesetting
 and full-width digits of an input method are the same characters to whoever typed them, and are read
@@ -50,7 +50,7 @@ def number_of(text: str) -> float:
 
 
 def seems_number(text: str) -> bool:
-    """Tell whether a word is a number or a damaged one: digits with letters like digits, stars."""
+    """Return whether a word is a number or a damaged one: digits with look-alike letters, stars."""
     text = plain(text.strip())
     return bool(_NEARLY.fullmatch(text) or _STARS.fullmatch(text))
 
@@ -74,7 +74,7 @@ _FAR_M: Final = 50.0
 
 
 def settled_length(raw: RawTable, said: str | None) -> tuple[LengthUnit, str]:
-    """Return the unit, and who says it: ``file``, ``format``, ``option`` or ``default``.
+    """Return the unit, and its source: ``file``, ``format``, ``option`` or ``default``.
 
     Args:
         raw: What was read.
@@ -107,7 +107,7 @@ def settled_length(raw: RawTable, said: str | None) -> tuple[LengthUnit, str]:
 
 
 def metres_question(positions: Sequence[Sequence[float]]) -> OpenQuestion | None:
-    """Return the question for the unit where numbers without one do not look like mm."""
+    """Return the question for the unit if numbers without one do not look like mm."""
     if not looks_like_metres(positions):
         return None
     return which_length(tr("its lengths have no unit, and do not look like mm"), positions)

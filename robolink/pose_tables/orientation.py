@@ -80,12 +80,12 @@ def from_rotation_vector(x: float, y: float, z: float) -> Matrix:
 
 
 def is_rotation(matrix: Sequence[float], within: float = ROTATION_WITHIN) -> bool:
-    """Tell whether the rows have the length 1 and stand upright on each other; either hand."""
+    """Return whether the rows have length 1 and are perpendicular to each other; either hand."""
     return _deviation(matrix) <= within
 
 
 def checked(matrix: Sequence[float], line: int) -> Matrix:
-    """Return the rotation that a matrix of a file stands for, free of its rounding.
+    """Return the rotation of a matrix in a file, without its rounding.
 
     Raises:
         UnusableText: It is no rotation, or a left-handed one.
@@ -238,7 +238,7 @@ def rule_named(name: str) -> RotationRule:
 
 
 def order_for(rule: RotationRule, letters: Sequence[str]) -> tuple[int, ...] | None:
-    """Return where each angle of ``rule`` stands among columns called ``letters``.
+    """Return the position of each angle of ``rule`` among columns called ``letters``.
 
     ``None``: columns of these names do not hold angles of this rule.
     """

@@ -1,4 +1,4 @@
-"""What a file leaves open, and what is asked then: which columns, which unit, which rule."""
+"""What a file leaves open, and the questions about it: columns, units, rotation rule."""
 
 import math
 import re
@@ -30,7 +30,7 @@ _FULL_TURN_RAD: Final = 2 * math.pi * (1 + 1e-6)
 
 
 def which_columns(numeric: Sequence[bool], rows: Sequence[Sequence[float]] = ()) -> OpenQuestion:
-    """Ask what the columns of a table without a header are.
+    """Ask for the meaning of the columns of a table without a header.
 
     Args:
         numeric: Whether each column holds numbers; a first one of words is taken for names.
@@ -52,7 +52,7 @@ def which_columns(numeric: Sequence[bool], rows: Sequence[Sequence[float]] = ())
 
 
 def _readings(count: int, rows: Sequence[Sequence[float]]) -> list[str]:
-    """Return what so many columns of numbers may be, the likeliest first."""
+    """Return the possible meanings of so many columns of numbers, the likeliest first."""
     if count < 3:
         return []
     if count == 3:
@@ -75,7 +75,7 @@ def _placed(reading: str, numeric: Sequence[bool]) -> str:
 
 
 def which_rotation(heads: Sequence[ColumnHead], numeric: Sequence[bool] = ()) -> OpenQuestion:
-    """Ask what the columns mean of which none, or too little, is known to say how a pose turns.
+    """Ask for the meaning of columns of which too few are known to say how a pose turns.
 
     Args:
         heads: All columns.
@@ -112,7 +112,7 @@ def which_rotation(heads: Sequence[ColumnHead], numeric: Sequence[bool] = ()) ->
 def _turns(
     heads: Sequence[ColumnHead], turning: Sequence[int], known: Sequence[int]
 ) -> Iterator[tuple[Sequence[int], Sequence[str]]]:
-    """Yield columns that may turn a pose, and as what."""
+    """Yield columns that may turn a pose, and in what way."""
     for names in (("u",), ("u", "v", "w"), ("qx", "qy", "qz", "qw")):
         places = [place for place in known if heads[place].meaning in names]
         if len(places) == len(names):
@@ -192,7 +192,7 @@ def which_angle_unit(
 
 
 def which_length(why: str, positions: Iterable[Sequence[float]]) -> OpenQuestion:
-    """Ask for the unit of length, of those in which a robot could stand there."""
+    """Ask for the unit of length, among those in which a robot could be there."""
     far = max((abs(value) for place in positions for value in place), default=0.0)
     units = [unit for unit in ("mm", "m", "in") if far * LengthUnit(unit).mm <= FAR_MM]
     return OpenQuestion(
@@ -207,23 +207,23 @@ def which_length(why: str, positions: Iterable[Sequence[float]]) -> OpenQuestion
 
 
 def looks_like_metres(positions: Iterable[Sequence[float]]) -> bool:
-    """Tell whether all X and Y lie where in mm no flange is (docs/reference/calibration.md 3)."""
+    """Return whether all X and Y lie where in mm no flange is (docs/reference/calibration.md 3)."""
     return all(abs(p[0]) < _METRES_BELOW and abs(p[1]) < _METRES_BELOW for p in positions)
 
 
 def may_be_radians(rows: Iterable[Sequence[float]]) -> bool:
-    """Tell whether angles of which some are not 0 all lie within a turn in radians."""
+    """Return whether angles of which some are not 0 all lie within a turn in radians."""
     largest = max((abs(angle) for row in rows for angle in row), default=0.0)
     return 0 < largest <= _FULL_TURN_RAD
 
 
 def may_be_degrees(rows: Iterable[Sequence[float]]) -> bool:
-    """Tell whether a rotation vector is longer than a turn in radians, which none has to be."""
+    """Return whether a rotation vector is longer than a turn in radians, which none has to be."""
     return any(math.hypot(*row) > _FULL_TURN_RAD for row in rows)
 
 
 def unit_in(comments: Iterable[str], *, angle: bool) -> str:
-    """Return the first comment that speaks of a unit other than mm and degrees."""
+    """Return the first comment that names a unit other than mm and degrees."""
     for comment in comments:
         found = _UNIT_IN_COMMENT.search(comment)
         if found and bool(_ANGLE_WORD.search(found[0])) == angle:

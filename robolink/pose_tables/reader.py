@@ -1,4 +1,4 @@
-"""A file of poses, whoever wrote it: one reader for every command, recipe and program.
+"""A file of poses of any origin: one reader for every command, recipe and program.
 
 First the bytes become text, then the shapes that makers define are looked for, by what nothing else
 begins with; what is left is a table. What the file does not say is asked for and never guessed
@@ -183,7 +183,7 @@ def _is_json(text: str) -> bool:
 
 
 def _require_in_reach(raw: RawTable, mm: float) -> None:
-    """Refuse numbers that no robot stands at: where a point or a sign between two was lost.
+    """Refuse numbers that no robot reaches: a decimal point or a sign between two was lost.
 
     Raises:
         UnusableText: A place is further away than any axis goes, or an angle is.
@@ -201,7 +201,7 @@ def _require_in_reach(raw: RawTable, mm: float) -> None:
 
 
 def _require_one_unit(raw: RawTable) -> None:
-    """Refuse a pose that lies where the others do only when it is read in metres, or they are.
+    """Refuse a pose that lies near the others only in metres, or the other way round.
 
     Raises:
         UnusableText: There is one: a file that was put together from two.
@@ -218,7 +218,7 @@ def _require_one_unit(raw: RawTable) -> None:
 
 
 def _undisputed(raw: RawTable, choices: ReadingChoices) -> RawTable:
-    """Refuse what a person says about a file whose format says it.
+    """Refuse a person's statement about a file whose format states it.
 
     Raises:
         UnusableText: The person named columns, or another rule for angles.

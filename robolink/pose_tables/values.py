@@ -1,4 +1,4 @@
-"""What a file of poses holds, what a person adds to it, and how it was understood."""
+"""What a file of poses holds, what a person adds to it, and how it was read."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -73,7 +73,7 @@ class TabledPose:
 
 @dataclass(frozen=True, slots=True)
 class ReadingChoices:
-    """What a person says about a file, because the file does not.
+    """What a person states about a file, because the file does not.
 
     Attributes:
         columns: A name for every column, ``-`` for one to skip; ``x,y,z,u`` for example.
@@ -88,7 +88,7 @@ class ReadingChoices:
 
 @dataclass(frozen=True, slots=True)
 class HowRead:
-    """How a file was understood, for a person to look over.
+    """How a file was read, for a person to check.
 
     Attributes:
         encoding: Of the bytes.
@@ -119,7 +119,7 @@ class HowRead:
 
 @dataclass(frozen=True, slots=True)
 class PoseTable:
-    """The poses of a file, in its order, and how it was understood."""
+    """The poses of a file, in its order, and how it was read."""
 
     entries: tuple[TabledPose, ...]
     how: HowRead
@@ -154,7 +154,7 @@ class RawPose:
 
 @dataclass(slots=True)
 class RawTable:
-    """What a format makes of a text, before its unit of length is settled.
+    """What a format makes of a text, before its unit of length is known.
 
     Attributes:
         layout: Name of the format.
@@ -201,7 +201,7 @@ class UnusableText(Exception):
 
 @contextmanager
 def at_line(line: int) -> Iterator[None]:
-    """Name the line of a refusal from inside the block that names none itself."""
+    """Add the line to an error of the block that names none itself."""
     try:
         yield
     except UnusableText as cause:
@@ -211,7 +211,7 @@ def at_line(line: int) -> Iterator[None]:
 
 @contextmanager
 def at_pose(number: int) -> Iterator[None]:
-    """Name the number of the pose of a refusal from inside the block that names no place."""
+    """Add the number of the pose to an error of the block that names no place."""
     try:
         yield
     except UnusableText as cause:
@@ -220,7 +220,7 @@ def at_pose(number: int) -> Iterator[None]:
 
 
 class NotFiniteText(UnusableText):
-    """Where a finite number belongs there is something else."""
+    """Something else is where a finite number must be."""
 
     def __init__(self, name: str, value: object, line: int = 0) -> None:
         super().__init__(tr("{name} is {value!r}", name=name, value=value), line)

@@ -1,4 +1,4 @@
-"""What calibration methods share: ways to a place, touches of a pin, looks of a camera, sampling.
+"""What calibration methods share: paths to a place, touches of a pin, looks, sampling.
 
 A procedure is a generator of steps (:mod:`robolink.runner`); a source runs procedures for one tool.
 """

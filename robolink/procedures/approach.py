@@ -1,4 +1,4 @@
-"""The ways of a tip to a place and away from it, without dragging it along; turning in the air.
+"""Paths of a tip to a place and away from it, without dragging it along; turning in the air.
 
 One joint movement by half a turn would bring frame and angle to their ends on a way of its own:
 half way the tip of a selected tool would be as far from its place as its offset is long. In short
@@ -51,7 +51,7 @@ def offset_z(pose: Pose, by_mm: float) -> Pose:
 
 
 def seek_or_retract(step: Seek, *, here: Pose, safe_z_mm: float) -> Procedure[Pose]:
-    """Seek; without an edge, lift the frame straight up and let the refusal stand.
+    """Seek; without an edge, lift the frame straight up and raise the error.
 
     Args:
         step: What is sought.
@@ -97,7 +97,7 @@ Place = tuple[float, float, float]
 
 
 def turn_in_air(here: Pose, turn_deg: float, *, lift_mm: float) -> Procedure[None]:
-    """Lift the frame in force, turn it about itself, and leave it there.
+    """Lift the current frame, turn it about itself, and leave it there.
 
     Args:
         here: Where it is.
@@ -133,15 +133,15 @@ def require_turn_inside(
     swings: Mapping[str, ToolOffset],
     tool: ToolOffset | None = None,
 ) -> None:
-    """Refuse a turn on whose whole way the flange, or a tip, gets too far from where it is.
+    """Refuse a turn during which the flange, or a tip, gets too far from where it is.
 
     Args:
-        here: Where the frame in force is.
+        here: Where the selected frame is.
         turn_deg: By how much U changes.
         lift_mm: How far it is lifted first.
         reach_mm: How far from its own place each of them may get, in every direction.
         swings: The tips that are looked at: what each is called, and its offset from the flange.
-        tool: The tool in force, about whose tip it turns; ``None`` for the flange.
+        tool: The selected tool, about whose tip it turns; ``None`` for the flange.
 
     Raises:
         ConfigError: As :func:`turn_in_air`.

@@ -1,4 +1,4 @@
-"""How marks are brought before a camera."""
+"""How marks are moved before a camera."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -19,7 +19,7 @@ all; a whole turn would bring 0.50 sigma in place of 0.55. In steps of less than
 that no controller has two ways to choose from, and all in one direction."""
 
 TWO_ANGLES_DEG: Final = (0.0, 120.0)
-"""Two that tell the camera's own error from what is on the tool."""
+"""Two angles that separate the camera's own error from the tool."""
 
 LEAST_BESIDE_MM: Final = 0.2
 """An approach that begins nearer to its place does not show whether the spot moves with the tip."""
@@ -27,7 +27,7 @@ LEAST_BESIDE_MM: Final = 0.2
 
 @dataclass(frozen=True, slots=True)
 class LookPlan:
-    """How marks are brought before a camera.
+    """How marks are moved before a camera.
 
     Attributes:
         turns_deg: Angles U of the looks, counted toward zero from where the tool stands.
@@ -68,7 +68,7 @@ _UNSEEN: Final = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Something to be looked at.
+    """Something to look at.
 
     Attributes:
         u_deg: U of the frame meanwhile.
@@ -85,7 +85,7 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class CameraDrive:
-    """The way of one frame from place to place, and whether the spot goes with it.
+    """The movement of one frame from place to place, and whether the spot moves with it.
 
     Each place is looked at twice: from beside it, where its approach begins anyway, and at it. A
     spot that is the tip moves by what the robot moved meanwhile; one that does not is met once
@@ -163,7 +163,7 @@ class CameraDrive:
         return seen
 
     def _witnessed(self, place: Place, beside: SeenAt | None, look: SeenAt) -> Procedure[SeenAt]:
-        """Return a look whose spot is known to have moved with the robot.
+        """Return a look whose spot is confirmed to have moved with the robot.
 
         Raises:
             CalibrationError: ``tip_did_not_move``, ``camera_changed``, ``spot_changed``.
@@ -185,7 +185,7 @@ class CameraDrive:
         return look
 
     def _more_closely(self, place: Place) -> Procedure[tuple[SeenAt, SeenAt]]:
-        """Look beside a place and at it with all pictures, both met from the same side.
+        """Look beside a place and at it with all pictures, both approached from the same side.
 
         From nearer where nothing is seen at the whole distance, and where what is seen moves by
         another vector: a camera that changed shows that one wrong in the same way.
@@ -224,7 +224,7 @@ class CameraDrive:
         raise watch.refusal(place.mark, wrong) if wrong else unseen
 
     def _again(self, place: Place, earlier: SeenAt) -> Procedure[tuple[SeenAt, SeenAt]]:
-        """Look where a mark was looked at before, and at its place, both met from one side."""
+        """Look where a mark was seen before, and at its place, both approached from one side."""
         start, at = self._at_place(place, earlier), self.pose(place)
         yield Notify(_in_doubt())
         yield from self._met(start)
@@ -240,7 +240,7 @@ class CameraDrive:
         return replace(self.pose(place), x_mm=earlier.x_mm, y_mm=earlier.y_mm)
 
     def _met(self, at: Pose) -> Procedure[None]:
-        """Go to a place beside the camera's middle from the side from which all are met."""
+        """Go to a place beside the camera's middle, from the side of all approaches."""
         yield Move(
             _shifted(at, -self.plan.beside_mm),
             Path.STRAIGHT,
@@ -252,7 +252,7 @@ class CameraDrive:
         yield Move(at, Path.STRAIGHT, tr("Approaching the camera from the same side."))
 
     def _look_beside(self, place: Place) -> Procedure[SeenAt | None]:
-        """Take one picture where the approach begins; ``None`` where it does not tell."""
+        """Take one picture where the approach begins; ``None`` if it shows nothing."""
         beside = self._beside(place)
         pictures = self.plan.pictures if self._measures_pixels else 1
         try:
@@ -275,7 +275,7 @@ class CameraDrive:
     def centred(
         self, places: Sequence[Place], here: Pose, found: Callable[[Sequence[SeenAt]], ToolOffset]
     ) -> Procedure[ToolOffset]:
-        """Look where marks are, and return where they are to be expected from now on.
+        """Look where marks are, and return where to expect them from now on.
 
         Args:
             places: What to look at; ends before the camera, at the last of them.
@@ -331,7 +331,7 @@ class CameraDrive:
     def angles_in_reach(
         self, here: Pose, places: Callable[[Sequence[float]], Sequence[Place]]
     ) -> Procedure[tuple[float, ...]]:
-        """Return the angles of the plan, or others where the arm cannot take them up.
+        """Return the angles of the plan, or others if the arm cannot reach them.
 
         They are turned to the other side then, or half as far.
 
@@ -383,7 +383,7 @@ class CameraDrive:
 
     @property
     def _measures_pixels(self) -> bool:
-        """Whether the next movement is the first by which a camera is found."""
+        """Return whether the next movement is the first by which a camera is found."""
         return not self.calibrated and not self.watch.pairs
 
     def _beside(self, place: Place) -> Pose:

@@ -1,4 +1,4 @@
-"""Looks of a camera: as samples of a measurement, and as the proof of a new tip."""
+"""Looks of a camera: as samples of a measurement, and as the test of a new tip."""
 
 from collections.abc import Callable, Sequence
 from typing import Final, Generic
@@ -15,7 +15,7 @@ from robolink.stations import CameraStation
 
 
 class CameraSamples(Generic[ResultT]):
-    """Looks, and what they say; implements :class:`Sampler`.
+    """Looks, and their result; implements :class:`Sampler`.
 
     Args:
         drive: Brings marks before the camera.
@@ -56,7 +56,7 @@ class CameraSamples(Generic[ResultT]):
         self._last: Place | None = None
 
     def at(self, places: Sequence[Place], *, retake: bool) -> Procedure[ResultT]:
-        """Look at every place, and return what that says. Ends lifted.
+        """Look at every place, and return the result. Ends lifted.
 
         Args:
             places: What to look at.
@@ -127,7 +127,7 @@ def verify_by_looking(
         angles_deg: Its angles U at which the tip is looked at.
         tolerance_mm: Largest drift that passes.
         camera_error_mm: What the camera is off by, as the measurement found it.
-        aside: Where the tip is expected, seen from the frame in force; not 0 where a difference
+        aside: Where the tip is expected, seen from the selected frame; not 0 where a difference
             to a reference was written.
         radius_px: How wide its spot was in the measurement; ``None`` where nobody told.
 
@@ -193,7 +193,7 @@ def nearest_first(angles_deg: Sequence[float], here: Pose) -> list[float]:
 def seen_drift(
     station: CameraStation, look: SeenAt, place: Place, camera_error_mm: tuple[float, float]
 ) -> Drift:
-    """Return how far from where the controller puts it a mark was seen.
+    """Return how far a mark was seen from where the controller puts it.
 
     Args:
         station: Where the camera is, and what its pixels mean.

@@ -1,4 +1,4 @@
-"""What the looks of one run say about the camera itself: does the spot move as the tip does?"""
+"""Checks, over the looks of one run, that the spot in the camera moves as the tip does."""
 
 import math
 from collections.abc import Sequence
@@ -58,7 +58,7 @@ class SpotWatch:
     _play_mm: float = 0.0
 
     def expect_radius(self, mark: int, radius_px: float | None) -> None:
-        """Take over how wide a spot was in the measurement that is proved now."""
+        """Take over the width of a spot from the measurement that is now tested."""
         if radius_px is not None:
             self._radii_px.setdefault(mark, []).append(radius_px)
 
@@ -69,7 +69,7 @@ class SpotWatch:
         return look
 
     def in_mm(self, look: SeenAt) -> bool:
-        """Return whether it is known where in the base something was seen."""
+        """Return whether the place in the base of something seen is known."""
         if look.unit is SpotUnit.BASE_MM:
             return True
         return self.calibrated and self.station.model is not None
@@ -101,7 +101,7 @@ class SpotWatch:
         return self._follows_in_pixels(movement)
 
     def known_before(self, mark: int, u_deg: float, look: SeenAt) -> SeenAt | None:
-        """Return an earlier look at the same mark in the same orientation that tells something.
+        """Return an earlier look at the same mark in the same orientation that is informative.
 
         ``None`` where there is none, where it was taken too near to this one, and where nobody
         knows yet what a pixel is: the fit of all looks compares those.
@@ -128,7 +128,7 @@ class SpotWatch:
                 self._radii_px.setdefault(mark, []).append(look.spot.radius_px)
 
     def learn_play(self, before: SeenAt, after: SeenAt) -> None:
-        """Remember how far a movement was off because its places were met from two sides."""
+        """Remember how far off a movement was because its places were approached from two sides."""
         movement = self.movement(before, after)
         off_mm = math.dist(movement.seen, movement.known_mm)
         # More than that was a false find, which is no reason to believe the next.
@@ -214,7 +214,7 @@ class SpotWatch:
         return movement.like(self.pairs[0], within=FOLLOWS_UNCALIBRATED)
 
     def _least_px(self, movement: SeenMovement) -> float:
-        """Return what a movement shows at least in pixels, before any camera is known."""
+        """Return the least pixels that a movement shows, before any camera is known."""
         least_px = LEAST_SHARE * movement.known_length_mm / self.longest_mm_per_px
         return max(least_px, _BEYOND_NOISE * movement.noise)
 

@@ -1,4 +1,4 @@
-"""What a proof is made from, as plain values: at once, or by whoever takes a change up again."""
+"""The plain values of a turn test: made at once, or after a change is taken up again."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from robolink.runner import Move, Procedure, Seek, foreseen_steps
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class KeptProof(ABC):
-    """The proof of one tool. What derives from it is a frozen dataclass of plain values.
+    """The turn test of one tool. Subclasses are frozen dataclasses of plain values.
 
     A change writes it down in its durable marker before it writes the offset
     (docs/decisions/0013-an-unverified-change-is-taken-back.md).
@@ -44,7 +44,7 @@ class KeptProof(ABC):
 
     @abstractmethod
     def moves(self, here: Pose) -> int:
-        """Return how many movements the robot makes by itself after a break, as it is foreseen.
+        """Return how many movements the robot makes by itself after a break, by the preview.
 
         Args:
             here: Where the frame of the new tool is.
@@ -52,7 +52,7 @@ class KeptProof(ABC):
 
     @property
     def obstacle(self) -> str:
-        """Why it cannot be kept, as a code; empty where it can."""
+        """Why it cannot be kept, as a code; empty if it can."""
         return ""
 
     @abstractmethod
@@ -65,7 +65,7 @@ class KeptProof(ABC):
 
     @abstractmethod
     def prove_after_a_break(self, context: MeasurementContext) -> VerifyResult:
-        """Make it where nobody knows any more where the tip is; the tool is selected.
+        """Make it when the place of the tip is no longer known; the tool is selected.
 
         Raises:
             CalibrationError, LimitError: It cannot be made.
@@ -74,7 +74,7 @@ class KeptProof(ABC):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlacedProof(KeptProof):
-    """A proof whose steps begin where the frame in force is."""
+    """A turn test whose steps start where the selected frame is."""
 
     def prove(self, context: MeasurementContext) -> VerifyResult:
         """Make it; see :meth:`KeptProof.prove`."""
@@ -97,7 +97,7 @@ class PlacedProof(KeptProof):
         """
 
     def steps_after_a_break(self, here: Pose) -> Procedure[VerifyResult]:
-        """Return the steps from wherever the robot stands now; the same where they go up first.
+        """Return the steps from wherever the robot is now; the same if they go up first.
 
         Args:
             here: Where the frame of the new tool is.
@@ -107,7 +107,7 @@ class PlacedProof(KeptProof):
 
 @runtime_checkable
 class KeepsProof(Protocol):
-    """A source whose proof can be made after a break, too."""
+    """A source whose turn test can also be made after a break."""
 
     def proof(
         self,
@@ -118,7 +118,7 @@ class KeepsProof(Protocol):
         tip: ToolOffset,
         tolerance_mm: float,
     ) -> KeptProof:
-        """Return the proof of what was measured.
+        """Return the turn test of what was measured.
 
         Args:
             context: What to work with; nothing moves.
@@ -145,7 +145,7 @@ class KeepsProof(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class ProofBasis:
-    """What a source is told of a tip whose proof it makes.
+    """What a source needs to know of a tip to make its turn test.
 
     Attributes:
         context: What to work with; nothing moves.
@@ -179,7 +179,7 @@ class ProofBasis:
 
 
 class ProvesAgain(ABC):
-    """A source that proves by a :class:`KeptProof`, at once and after a break alike.
+    """A source whose turn test is a :class:`KeptProof`, at once and after a break alike.
 
     What derives from it defines :meth:`proof_of`. A class that overrides :meth:`proof` itself
     needs no other.
@@ -201,7 +201,7 @@ class ProvesAgain(ABC):
         tip: ToolOffset,
         tolerance_mm: float,
     ) -> VerifyResult:
-        """Prove the new tip; see :class:`~robolink.procedures.MovingSource`."""
+        """Test the new tip; see :class:`~robolink.procedures.MovingSource`."""
         context.controller.tools.select(tool)
         proof = self.proof(context, tool, result, tip=tip, tolerance_mm=tolerance_mm)
         return proof.prove(context)
@@ -215,12 +215,12 @@ class ProvesAgain(ABC):
         tip: ToolOffset,
         tolerance_mm: float,
     ) -> KeptProof:
-        """Return the proof of what was measured; see :class:`KeepsProof`."""
+        """Return the turn test of what was measured; see :class:`KeepsProof`."""
         return self.proof_of(ProofBasis(context, tool, result, tip, tolerance_mm))
 
     @abstractmethod
     def proof_of(self, basis: ProofBasis) -> KeptProof:
-        """Return the proof of what was measured.
+        """Return the turn test of what was measured.
 
         Args:
             basis: What was measured, and what for.
@@ -234,7 +234,7 @@ def _proof_as_overridden(self: ProvesAgain, basis: ProofBasis) -> KeptProof:
 
 
 def movements(steps: Procedure[VerifyResult], here: Pose) -> int:
-    """Return how many movements of the robot's own some steps have, as they are foreseen."""
+    """Return how many movements of the robot some steps have, by the preview."""
     foreseen = foreseen_steps(steps, here)
     return sum(isinstance(one.step, (Move, Seek)) for one in foreseen)
 

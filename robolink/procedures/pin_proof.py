@@ -1,4 +1,4 @@
-"""The proof of a tip on a pin: turn about it, stop beside the pin, and let a person touch it."""
+"""The turn test of a tip on a pin: turn about it, stop beside the pin, let a person touch it."""
 
 import math
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ from robolink.procedures.witnessed_touches import TouchPlan, heights_agree, plai
 from robolink.runner import AngleShown, Notify, Procedure, TouchedAt, first_clear
 
 MOST_MORE: Final = 2
-"""Touches that a drift may take which is neither surely inside nor surely outside."""
+"""Most further touches for a drift that is neither certainly inside nor certainly outside."""
 
 
 @checks_arguments
@@ -49,9 +49,9 @@ def verify_by_turning(
         angles_deg: Tool angles U at which the tip is brought back onto the pin.
         tolerance_mm: Largest drift that passes, with its guard band.
         u_mm: Standard uncertainty of the drift that one touch shows, ``None`` for the usual one.
-        written: The offset in force.
+        written: The active offset.
         tip: Where the tip was found. It differs from ``written`` where a difference was
-            written, and then the frame in force does not turn about the tip.
+            written, and then the selected frame does not turn about the tip.
         in_space: Whether its height counts as drift. Only a contact input tells a height as well as
             a place; what a person sees of it scatters more (docs/reference/evidence.md 1), so their
             heights are compared by a limit of their own.
@@ -111,13 +111,13 @@ def _nearer(u_deg: float, angle_deg: float) -> float:
 
 
 class _Turning:
-    """Brings the new tip back onto the pin at angles of U.
+    """Moves the new tip back to the pin at angles of U.
 
     Args:
         plan: Lift, clearance, contact input.
         contact: Pose of the new tool's tip on the pin.
         limit_mm: Largest drift that passes.
-        written: The offset in force.
+        written: The active offset.
         tip: Where the tip was found.
     """
 
@@ -137,7 +137,7 @@ class _Turning:
     def shown(
         self, angle_deg: float, earlier: tuple[AngleShown, ...] = ()
     ) -> Procedure[tuple[Pose, TouchedAt]]:
-        """Have the pin touched; returns where the tip should have been, and where it was."""
+        """Let a person touch the pin; returns where the tip should have been, and where it was."""
         self._touches.tell_of(earlier)
         place = place_on_pin(self._contact, angle_deg, self._written, self._tip)
         found = yield from self._touches.again(
@@ -150,7 +150,7 @@ class _Turning:
         return place, found
 
     def on_paper(self, angles_deg: Sequence[float]) -> Procedure[None]:
-        """Take all, as it is foreseen."""
+        """Take all, by the preview."""
         nominal = replace(self._plan, nominal=True)
         paper = _Turning(nominal, self._contact, self._limit_mm, self._written, self._tip)
         for angle_deg in angles_deg:
@@ -185,7 +185,7 @@ _ENOUGH_DOF: Final = 4
 
 @dataclass(slots=True)
 class DriftProof:
-    """What the touches of a proof show so far.
+    """What the touches of a turn test have shown so far.
 
     Attributes:
         tolerance_mm: Largest drift that passes, with its guard band.
@@ -200,7 +200,7 @@ class DriftProof:
     _in_space: bool = False
 
     def add(self, place: Pose, found: TouchedAt, *, in_space: bool = False) -> None:
-        """Take a touch.
+        """Add a touch.
 
         Args:
             place: Where the tip should have been.
@@ -224,7 +224,7 @@ class DriftProof:
         self._apart.setdefault(place.u_deg, []).append(apart)
 
     def undecided(self) -> Drift | None:
-        """Return the drift that needs another touch; none where one is outside for sure."""
+        """Return the drift that needs another touch; none if one is certainly outside."""
         drifts = self._drifts()
         verdicts = [self._judged(one) for one in drifts]
         if DriftVerdict.FAILED in verdicts or DriftVerdict.UNDECIDED not in verdicts:
@@ -253,7 +253,7 @@ class DriftProof:
         )
 
     def result(self, heights_agree: bool = True) -> VerifyResult:
-        """Return what they say together."""
+        """Return their joint result."""
         return VerifyResult(
             self._drifts(),
             self.tolerance_mm,
@@ -263,7 +263,7 @@ class DriftProof:
         )
 
     def _drifts(self) -> tuple[Drift, ...]:
-        """Return the mean drift at each angle; a mean of n is surer by the root of n."""
+        """Return the mean drift at each angle; a mean of n scatters less by the root of n."""
         drifts = []
         for angle_deg, apart in self._apart.items():
             dx_mm, dy_mm, dz_mm = (sum(axis) / len(apart) for axis in zip(*apart, strict=True))
@@ -273,12 +273,12 @@ class DriftProof:
 
 
 def place_on_pin(contact: Pose, angle_deg: float, written: ToolOffset, tip: ToolOffset) -> Pose:
-    """Return where the frame in force should be with the tip on the pin.
+    """Return where the selected frame should be with the tip on the pin.
 
     Args:
         contact: Pose of the new tool's tip on the pin.
         angle_deg: Tool angle U.
-        written: The offset in force.
+        written: The active offset.
         tip: Where the tip was found.
     """
     frame = replace(contact, u_deg=angle_deg)
@@ -342,7 +342,7 @@ class TurnTest(KeptProof):
         )
 
     def steps_after_a_break(self) -> Procedure[VerifyResult]:
-        """Return the steps where nobody knows any more where the tip is.
+        """Return the steps when the place of the tip is no longer known.
 
         A person brings it onto the pin first, so that the first movement that the robot makes by
         itself is straight up from there. A place farther from the measured one than the clearance

@@ -28,11 +28,11 @@ if TYPE_CHECKING:
 
 
 LEAST_TURN_DEG: Final = 10.0
-"""Nearer in U two touches of a plan never lie that puts them further apart than twice as much."""
+"""Least turn between two touches of a plan whose angles are more than twice as far apart."""
 
 
 class PinTouches(WitnessedTouches):
-    """The touches of one pin in one measurement or one proof.
+    """The touches of one pin in one measurement or one turn test.
 
     Args:
         plan: Lift, clearance, contact input.
@@ -71,7 +71,7 @@ class PinTouches(WitnessedTouches):
         self._drawing: StandoffSeries | None = None
 
     def first(self, key: Hashable = None) -> Procedure[TouchedAt]:
-        """Let the person bring the tip onto the pin from wherever it is, and lift off.
+        """Let the person move the tip onto the pin from wherever it is, and lift off.
 
         Args:
             key: By which a later touch takes the place of this one; ``None`` for its U.
@@ -86,7 +86,7 @@ class PinTouches(WitnessedTouches):
         The tip starts lifted and over the pin.
 
         Args:
-            expected: Pose of the frame in force with the tip on the pin, as far as it is known.
+            expected: Pose of the selected frame with the tip on the pin, as far as it is known.
             key: By which a later touch takes the place of this one.
             turning: What the way over the pin is for.
             instruction: What the person is to do.
@@ -223,12 +223,12 @@ class PinTouches(WitnessedTouches):
 
 
 def lowering() -> str:
-    """Return what the way down beside a pin is for."""
+    """Return the purpose of the move down beside a pin."""
     return tr("Lowering beside the pin.")
 
 
 def lift_off(plan: TouchPlan, touch: Pose) -> Move:
-    """Return the step that takes the tip off the pin, after which it may turn."""
+    """Return the step that lifts the tip off the pin, after which it may turn."""
     return Move(
         offset_z(plain_pose(touch), plan.lift_mm), Path.STRAIGHT, tr("Lifting off the pin.")
     )
@@ -278,7 +278,7 @@ def turned_touches(
     *,
     comes_down: bool = True,
 ) -> Procedure[None]:
-    """Touch at one angle after the other; nothing is made of it.
+    """Touch at one angle after the other, without a result.
 
     To be looked at before the first of them is taken: the plan is a nominal one then.
 
@@ -306,7 +306,7 @@ def turned_touches(
 
 
 def _turned(contact: Pose, u_deg: float, guess: ToolOffset) -> Pose:
-    """Return the flange pose at ``u_deg`` that brings the tip, by ``guess``, to the same point."""
+    """Return the flange pose at ``u_deg`` that moves the tip, by ``guess``, to the same point."""
     turned = replace(plain_pose(contact), u_deg=u_deg)
     tip = guess.components()[:3]
     before_x, before_y = FlangePlane.of(contact).in_base(*tip)

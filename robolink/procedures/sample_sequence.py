@@ -33,7 +33,7 @@ def finalize_samples(
     *,
     retake: bool,
 ) -> Procedure[ResultT]:
-    """Return the result of all samples; the worst may have been taken again. Ends lifted.
+    """Return the result of all samples; the worst may have been repeated. Ends lifted.
 
     Args:
         method: How it is taken and solved.
@@ -98,7 +98,7 @@ def resume_samples(
     taken: Sequence[TakenT],
     again: int | None,
 ) -> Procedure[ResultT]:
-    """Take one again, or one more, of a measurement that has ended. Ends lifted.
+    """Repeat one sample, or add one, in a measurement that has ended. Ends lifted.
 
     All others stay as they are.
 
@@ -158,7 +158,7 @@ def worst_of(result: CalibrationResult, times: Mapping[int, int]) -> int:
 def agreement(
     method: Sampler[PlaceT, TakenT, ResultT], fit: CalibrationResult, *, last: int
 ) -> str:
-    """Return how well those agree that were taken so far, and what the tip is repeatable to.
+    """Return how well the samples so far agree, and what the tip is repeatable to.
 
     What it is accurate to is judged once, when it was measured.
 
@@ -234,7 +234,7 @@ often on a lucky one."""
 
 @dataclass(frozen=True, slots=True)
 class SamplingPolicy:
-    """How a measurement with many touches or crossings goes on.
+    """How a measurement with many touches or crossings continues.
 
     Attributes:
         until_mm: End early when the tip is repeatable to this, in 95 %
@@ -256,7 +256,7 @@ def sample_sequentially(
     places: Sequence[PlaceT],
     sampling: SamplingPolicy,
 ) -> Procedure[ResultT]:
-    """Take all after the first, and return what they say. Ends lifted.
+    """Take all after the first, and return their result. Ends lifted.
 
     As soon as they check each other it tells after each how well they agree, what the tip is
     repeatable to, and what one more would make of that.
@@ -318,7 +318,7 @@ def sample_sequentially(
 
 
 def may_end_early(count: int, *, unknowns: int, sigma_stated: bool) -> bool:
-    """Tell whether a measurement of ``count`` coordinates can be good enough before the last one.
+    """Return whether a measurement of ``count`` coordinates can be good enough early.
 
     Args:
         count: How many coordinates are measured.
@@ -348,7 +348,7 @@ def _progress(
     taken: Sequence[TakenT],
     following: TakenT | None,
 ) -> Notify:
-    """Return what those so far say."""
+    """Return the result so far."""
     told = agreement(method, fit, last=len(taken) - 1)
     shown = fit_subject(method, fit, taken)
     within_mm = fit.repeatable_to_mm

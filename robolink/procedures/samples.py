@@ -1,4 +1,4 @@
-"""What a method takes at each place, what was taken so far, and how one of it is taken again."""
+"""What a method takes at each place, what was taken so far, and how one sample is repeated."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ ResultT_co = TypeVar("ResultT_co", bound=CalibrationResult, covariant=True)
 
 
 class Sampler(Protocol[PlaceT_contra, TakenT, ResultT_co]):
-    """How one method takes a touch, a look or a crossing, and what it makes of all of them."""
+    """How one method takes a touch, a look or a crossing, and solves all of them."""
 
     @property
     def known(self) -> str:
@@ -41,10 +41,10 @@ class Sampler(Protocol[PlaceT_contra, TakenT, ResultT_co]):
         """
 
     def away(self) -> Procedure[None]:
-        """Lift the tip to where a person may take their time; nothing where it is there."""
+        """Lift the tip to where a person may take their time; nothing if it is there."""
 
     def solve(self, taken: Sequence[TakenT]) -> ResultT_co:
-        """Return what they say, with their residuals in their order.
+        """Return their result, with their residuals in their order.
 
         Raises:
             CalibrationError: They say nothing that can be trusted.
@@ -59,16 +59,16 @@ class AddsSamples(Protocol[PlaceT_co, TakenT_contra]):
     """A method that can take more than its plan says."""
 
     def next_place(self, taken: Sequence[TakenT_contra]) -> Procedure[PlaceT_co | None]:
-        """Return where one more tells most, ``None`` where the arm has no room for it."""
+        """Return the most informative further place, ``None`` if the arm has no room for it."""
 
 
 class SequentialSampler(
     Sampler[PlaceT_contra, TakenT, ResultT_co], Protocol[PlaceT_contra, TakenT, ResultT_co]
 ):
-    """What one method takes at each place, and what one more would bring."""
+    """What one method takes at each place, and what one more would add."""
 
     def foreseen(self, place: PlaceT_contra) -> TakenT:
-        """Return what would be taken at a place, as far as :meth:`gain` looks at it."""
+        """Return what would be taken at a place, as far as :meth:`gain` uses it."""
 
     def gain(self, taken: Sequence[TakenT]) -> float:
         """Return the standard deviation of the tip as a multiple of a single one's."""
@@ -78,7 +78,7 @@ class SequentialSampler(
 
 
 class TouchNames(ABC):
-    """What samplers of touches say alike."""
+    """Words that samplers of touches share."""
 
     __slots__ = ()
 
@@ -130,7 +130,7 @@ class Samples(Generic[PlaceT, TakenT, ResultT]):
         self.taken = list(taken)
 
     def take(self, index: int) -> Procedure[None]:
-        """Take the one at a place, once more or for the first time.
+        """Take the sample at a place, again or for the first time.
 
         One that the person asks for again meanwhile comes first.
         """
@@ -160,7 +160,7 @@ class Samples(Generic[PlaceT, TakenT, ResultT]):
         return True
 
     def solved(self) -> ResultT:
-        """Return what they say.
+        """Return their result.
 
         Raises:
             CalibrationError: They say nothing that can be trusted.

@@ -1,4 +1,4 @@
-"""Where a measurement comes from: what every source of it offers to a nozzle change."""
+"""Sources of a measurement: what each of them offers to a nozzle change."""
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -104,7 +104,7 @@ class MeasurementContext:
     def telling(
         self, on_step: Callable[[StepDone], None], *, tool: int | None = None
     ) -> Iterator[None]:
-        """Tell ``on_step`` of every step taken inside the block.
+        """Report every step of the block to ``on_step``.
 
         Args:
             on_step: Told of each.
@@ -117,11 +117,11 @@ class MeasurementContext:
             self._on_step = self._tool = None
 
     def ask_once(self, question: str, *, given: AnsweredBy | None = None) -> bool | None:
-        """Ask what holds for the whole change, once however many tools need it.
+        """Ask a question for the whole change, once however many tools need it.
 
         Args:
             question: What a yes agrees to.
-            given: How a yes was given beforehand, ``None`` where it was not.
+            given: How a yes was given in advance, ``None`` where it was not.
 
         Returns:
             The answer, which is on record then; ``None`` where nobody is to be asked.
@@ -180,7 +180,7 @@ class MeasurementContext:
     def measure(
         self, steps: Callable[[Pose], Procedure[T]], *, camera: TipSensor | None = None
     ) -> T:
-        """Take the steps of a measurement, in Tool 0: it is the flange that moves.
+        """Take the steps of a measurement, in Tool 0: the flange moves.
 
         Args:
             steps: Returns them, given where the flange is.
@@ -291,10 +291,10 @@ class TipSource(Protocol):
 
 @runtime_checkable
 class MovingSource(TipSource, Protocol):
-    """Measures a tip by moving the robot, and so can turn about the new tip as well."""
+    """Measures a tip by moving the robot, and can therefore turn about the new tip."""
 
     def procedure(self, stored: ToolOffset | None, here: Pose) -> Procedure[CalibrationResult]:
-        """Return the steps of a measurement, for a look at them before anything moves.
+        """Return the steps of a measurement, for a preview before anything moves.
 
         Args:
             stored: The offset stored now.
@@ -346,11 +346,11 @@ class MovingSource(TipSource, Protocol):
 
 @runtime_checkable
 class TouchesFurther(Protocol):
-    """A source in which a person may go back to the touches of a measurement."""
+    """A source in which a person may return to the touches of a measurement."""
 
     @property
     def can_add_touch(self) -> bool | None:
-        """Whether one more can be made than planned; ``None`` where none can be made again."""
+        """Whether one more can be made than planned; ``None`` if none can be repeated."""
 
     def further(
         self,
@@ -359,7 +359,7 @@ class TouchesFurther(Protocol):
         result: CalibrationResult,
         again: int | None,
     ) -> CalibrationResult:
-        """Go on with a measurement that has ended, in Tool 0; ends lifted.
+        """Continue a measurement that has ended, in Tool 0; ends lifted.
 
         Args:
             context: What to work with.
@@ -388,7 +388,7 @@ class TouchesFurther(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class _AddsTouch:
-    """A source that says ``adds_touch``, the name of before, and derives from no base of ours."""
+    """A source with the former name ``adds_touch`` that derives from none of robolink's bases."""
 
     source: Any
 
@@ -407,7 +407,7 @@ class _AddsTouch:
 
 
 def touching_further(source: object) -> TouchesFurther | None:
-    """Return a source as one in which a person may go back to the touches; ``None`` for another."""
+    """Return a source that lets a person return to the touches; ``None`` for another."""
     if isinstance(source, TouchesFurther):
         return source
     if not hasattr(source, "adds_touch") or not hasattr(source, "further"):
@@ -418,7 +418,7 @@ def touching_further(source: object) -> TouchesFurther | None:
 
 @runtime_checkable
 class StopsAbovePin(Protocol):
-    """A source that brings the tip near a pin, and leaves the rest to the person."""
+    """A source that moves the tip near a pin, and leaves the rest to the person."""
 
     @property
     def clearance_mm(self) -> float | None:
@@ -427,18 +427,18 @@ class StopsAbovePin(Protocol):
 
 @runtime_checkable
 class FindsStation(Protocol):
-    """A source whose measurement tells where a station is, beside where the tip is."""
+    """A source whose measurement shows where a station is, besides the tip."""
 
     def found_station(self, result: CalibrationResult, tool: int) -> Found | None:
-        """Return what a kept measurement says about the station, ``None`` for nothing."""
+        """Return what a kept measurement shows about the station, ``None`` for nothing."""
 
 
 @runtime_checkable
 class RequiresMotion(Protocol):
-    """A source whose measurement holds only where the robot can move as it presumes."""
+    """A source whose measurement is valid only if the robot can move as it assumes."""
 
     def require_able(self, group: MotionGroup, change_mm: float) -> None:
-        """Find out whether it can, before anything moves; only reads.
+        """Check that it can, before anything moves; only reads.
 
         Args:
             group: What moves the tip.
@@ -454,7 +454,7 @@ class RequiresSensor(Protocol):
     """A source that needs equipment besides the robot."""
 
     def require_ready(self) -> None:
-        """Find out whether the equipment is there and can be used, before anything moves.
+        """Check that the equipment is there and usable, before anything moves.
 
         Raises:
             CalibrationError: ``sensor_not_found``, ``camera_not_calibrated``.

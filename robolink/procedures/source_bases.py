@@ -1,4 +1,4 @@
-"""What sources of one kind share: of touches, of an input that the tip switches, of looks."""
+"""What sources of one kind share: of touches, of a switched input, of looks."""
 
 from abc import abstractmethod
 from collections.abc import Callable, Iterator, Sequence
@@ -93,7 +93,7 @@ class LazySource:
         tip: ToolOffset,
         tolerance_mm: float,
     ) -> VerifyResult:
-        """Prove the new tip; see :class:`~robolink.procedures.MovingSource`."""
+        """Test the new tip; see :class:`~robolink.procedures.MovingSource`."""
         return self._source.verify(context, tool, result, tip=tip, tolerance_mm=tolerance_mm)
 
     def proof(
@@ -105,7 +105,7 @@ class LazySource:
         tip: ToolOffset,
         tolerance_mm: float,
     ) -> KeptProof:
-        """Return the proof of what was measured; see :class:`~robolink.procedures.KeepsProof`.
+        """Return the turn test of what was measured; see :class:`~robolink.procedures.KeepsProof`.
 
         Raises:
             ConfigError: The source proves in a way that cannot be kept.
@@ -178,7 +178,7 @@ class InputSource(ProvesAgain, Generic[PlanT]):
         return context.measure(lambda here: source.steps(stored, here))
 
     def told_by(self, context: MeasurementContext) -> Self:  # noqa: ARG002 - for overriding
-        """Return the source with what only the controller tells of its movements; it is asked now.
+        """Return the source with what the controller reports of its movements; it is asked now.
 
         Args:
             context: What to work with.
@@ -193,7 +193,7 @@ class InputSource(ProvesAgain, Generic[PlanT]):
         return self.foreseen().steps(stored, here)
 
     def foreseen(self) -> Self:
-        """Return the source whose steps are only shown."""
+        """Return the source for a preview of its steps."""
         plan = replace(self.plan, until_mm=None, retake=False)
         return cast(Self, replace(cast(Any, self), plan=plan))
 
@@ -209,11 +209,11 @@ class InputSource(ProvesAgain, Generic[PlanT]):
 
 @runtime_checkable
 class TouchesPin(Protocol):
-    """A source in which a person touches a pin, or a surface, in measurement and proof."""
+    """A source in which a person touches a pin, or a surface, in measurement and turn test."""
 
     @property
     def touch(self) -> TouchPlan:
-        """How the tip is taken off what it touches, and brought back."""
+        """How the tip is lifted off what it touches, and returned."""
 
     def with_touch(self, plan: TouchPlan) -> Self:
         """Return the same source with another plan of its touches."""
@@ -267,7 +267,7 @@ class TouchSource(ProvesAgain):
         return self.foreseen().steps(stored)
 
     def foreseen(self) -> Self:
-        """Return the source whose steps are only shown: all of them, each stop at its highest."""
+        """Return the source for a preview: all steps, each stop at its highest."""
         return self.with_touch(replace(self.touch, nominal=True))
 
     @property
@@ -300,7 +300,7 @@ class TouchSource(ProvesAgain):
     def further_steps(
         self, here: Pose, taken: Sequence[TouchedAt], again: int | None, stored: ToolOffset | None
     ) -> Procedure[CalibrationResult]:
-        """Return the steps that make one touch again. They run in Tool 0 and end lifted.
+        """Return the steps that repeat one touch. They run in Tool 0 and end lifted.
 
         Args:
             here: Where the flange is.
@@ -342,7 +342,7 @@ class PinSource(TouchSource):
 
 
 class ManualPinSource(PinSource):
-    """Measures by touching one pin at angles of U, and proves by turning about the new tip."""
+    """Measures by touching one pin at angles of U, and tests by turning about the new tip."""
 
     __slots__ = ()
 
@@ -359,13 +359,13 @@ class ManualPinSource(PinSource):
 
 
 def middles_of_gaps(angles_deg: Sequence[float]) -> list[float]:
-    """Return the angles between those that were measured, the one farthest from any first."""
+    """Return the angles midway between the measured ones, the one farthest from any first."""
     gaps = sorted(pairwise(sorted(angles_deg)), key=lambda gap: gap[0] - gap[1])
     return [(low + high) / 2 for low, high in gaps]
 
 
 def touches_of(result: CalibrationResult) -> list[TouchedAt]:
-    """Return the touches that a measurement rests on; none where it rests on other poses too."""
+    """Return the touches behind a measurement; none if it rests on other poses too."""
     touches = [pose for pose in result.inputs if isinstance(pose, TouchedAt)]
     return touches if len(touches) == len(result.inputs) else []
 
@@ -374,7 +374,7 @@ _HALF_A_TURN_DEG = 180.0
 
 
 def angles_between(measured_deg: Sequence[float]) -> tuple[float, ...]:
-    """Return angles for a proof, inside the arc of the measured ones and equal to none of them.
+    """Return angles for a turn test, inside the measured arc and different from each of them.
 
     Half a turn on from a single one, where an error shows twofold.
     """
@@ -385,14 +385,14 @@ def angles_between(measured_deg: Sequence[float]) -> tuple[float, ...]:
 
 
 def proof_angles(result: CalibrationResult, tool: int) -> tuple[float, ...]:
-    """Return U of a new tool at which what looks measured is proved; see :func:`angles_between`."""
+    """Return U of a new tool for the test of measured looks; see :func:`angles_between`."""
     return angles_between(
         [tip_pose(pose, result.offset, tool=tool).u_deg for pose in result.inputs]
     )
 
 
 def camera_error_of(result: CalibrationResult) -> tuple[float, float]:
-    """Return what a measurement found its camera to be off by, base X and Y in mm."""
+    """Return the camera error that a measurement found, base X and Y in mm."""
     from robolink.calibration import CameraRound  # numpy, which a look does without
 
     error_mm = result.camera_error_mm if isinstance(result, CameraRound) else None
@@ -400,7 +400,7 @@ def camera_error_of(result: CalibrationResult) -> tuple[float, float]:
 
 
 def radius_of(result: CalibrationResult) -> float | None:
-    """Return how wide the spot was in the looks of a measurement, ``None`` where nobody told."""
+    """Return the spot width in the looks of a measurement, ``None`` if not reported."""
     looks = [pose for pose in result.inputs if isinstance(pose, SeenAt)]
     told = [look.spot.radius_px for look in looks if look.spot.radius_px is not None]
     return median(told) if told else None
@@ -408,7 +408,7 @@ def radius_of(result: CalibrationResult) -> float | None:
 
 @contextmanager
 def calibrated_camera(sensor: str | TipSensor, station: CameraStation) -> Iterator[TipSensor]:
-    """Open a camera whose pixels mean something, or that answers in millimetres.
+    """Open a camera whose pixels are calibrated, or that answers in millimetres.
 
     Raises:
         CalibrationError: ``sensor_not_found`` or ``camera_not_calibrated``.
@@ -455,7 +455,7 @@ class LookSource(ProvesAgain):
         return calibrated_camera(self.sensor, self.station)
 
     def require_ready(self) -> None:
-        """Find out whether the camera is there; see :class:`RequiresSensor`."""
+        """Check that the camera is there; see :class:`RequiresSensor`."""
         with self.opened():
             pass
 

@@ -1,4 +1,4 @@
-"""Touches of a surface that a person makes, each but the first from a distance that is drawn.
+"""Touches of a surface by a person, each but the first from a random distance.
 
 Nothing ever tilts in contact: the tip is lifted, tilted in the air, and brought to a distance
 along the surface's normal; the last bit is done by the person. How far away it stops is drawn, so
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class SurfaceTouches(WitnessedTouches):
-    """The touches of one surface in one measurement or one proof.
+    """The touches of one surface in one measurement or one turn test.
 
     Args:
         plan: Lift, clearance, contact input.
@@ -51,16 +51,16 @@ class SurfaceTouches(WitnessedTouches):
 
     @property
     def taken(self) -> tuple[TouchedAt, ...]:
-        """All that count, in the order of the plan: one made again stands where it stood."""
+        """All that count, in the order of the plan: a repeated one keeps its place."""
         return tuple(self._by_number.values())
 
     def others(self, key: Hashable) -> tuple[TouchedAt, ...]:
-        """Return those that count beside the one known by ``key``."""
+        """Return those that count besides the one known by ``key``."""
         number = self._numbers.get(key)
         return tuple(touch for at, touch in self._by_number.items() if at != number)
 
     def first(self, key: Hashable) -> Procedure[TouchedAt]:
-        """Let the person bring the tip onto the surface from wherever it is, and lift off."""
+        """Let the person move the tip onto the surface from wherever it is, and lift off."""
         return (yield from self.shown(tr("Jog the tip onto the surface."), key=key))
 
     def again(
@@ -78,7 +78,7 @@ class SurfaceTouches(WitnessedTouches):
         The tip starts lifted.
 
         Args:
-            expected: Pose of the frame in force with the tip on the surface, as far as it is known.
+            expected: Pose of the selected frame with the tip on the surface, as far as it is known.
             normal: The surface's unit normal there, away from it.
             key: By which a later touch takes the place of this one.
             columns: What tip and surface could explain; see ``SurfaceStandoffs.next``.

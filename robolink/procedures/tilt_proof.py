@@ -1,4 +1,4 @@
-"""The proof with a tilting tool: how it begins after a break, and what touches of a surface show.
+"""The test with a tilting tool: how it starts after a break, and what surface touches show.
 
 Where nobody knows any more where the tip is, a person brings it into contact first, the tool as
 upright as it was measured, so that the first movement that the robot makes by itself is straight up
@@ -40,7 +40,7 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TiltingProof(PlacedProof):
-    """A proof by touches of a tool that tilts.
+    """A turn test by touches of a tool that tilts.
 
     Attributes:
         touch: Lift, clearance, contact input.
@@ -88,7 +88,7 @@ class TiltingProof(PlacedProof):
 
     @abstractmethod
     def _first(self) -> tuple[str, str]:
-        """Return what the person is asked for first, and what the way up from there is for."""
+        """Return the first request to the person, and the purpose of the move up from there."""
 
     @abstractmethod
     def _apart_mm(self, found: Pose) -> Vector:
@@ -111,13 +111,13 @@ class TiltingProof(PlacedProof):
 
 
 def lean_against(upright: Pose, pose: Pose) -> float:
-    """Return by how many degrees a tool leans against another attitude, however it is turned."""
+    """Return by how many degrees a tool leans from another attitude, however it is turned."""
     turned = rotation_of(pose) @ rotation_of(upright).T
     return math.degrees(math.acos(min(1.0, max(-1.0, float(turned[2, 2])))))
 
 
 def upright_of(result: CalibrationResult, written: ToolOffset, tool: int) -> Pose:
-    """Return how the frame of a written offset stood at the first touch of a measurement."""
+    """Return the attitude of the written frame at the first touch of a measurement."""
     return tip_pose(plain_pose(result.inputs[0]), written, tool=tool)
 
 
@@ -126,7 +126,7 @@ Direction = tuple[float, float, float]
 
 @dataclass(slots=True)
 class SurfaceProof:
-    """What touches of a known surface say about where the tip is.
+    """What touches of a known surface show about the place of the tip.
 
     Attributes:
         shown_at: The pose in which the drift is shown.
@@ -143,10 +143,10 @@ class SurfaceProof:
     _beyond_mm: list[float] = field(default_factory=list)
 
     def add(self, place: Pose, found: TouchedAt, normal: Direction) -> None:
-        """Take a touch.
+        """Add a touch.
 
         Args:
-            place: Where the frame in force should have been.
+            place: Where the selected frame should have been.
             found: Where it was.
             normal: The surface's unit normal there.
 
@@ -177,7 +177,7 @@ class SurfaceProof:
         return verdict is DriftVerdict.UNDECIDED
 
     def drift(self) -> Drift:
-        """Return where the tip is beside where it should be, base axes at ``shown_at``."""
+        """Return how far the tip is from where it should be, base axes at ``shown_at``."""
         rows = np.array(self._rows)
         turned = rotation_of(self.shown_at)
         _, sizes, _ = np.linalg.svd(rows, full_matrices=False)
@@ -188,7 +188,7 @@ class SurfaceProof:
         return Drift(self.shown_at.u_deg, dx_mm, dy_mm, dz_mm, u_mm)
 
     def result(self) -> VerifyResult:
-        """Return what they say together."""
+        """Return their joint result."""
         return VerifyResult(
             (self.drift(),), self.tolerance_mm, inputs=tuple(self.touches), in_space=True
         )

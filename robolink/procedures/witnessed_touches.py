@@ -1,4 +1,4 @@
-"""Touches that a person makes from where the robot stopped, and whether each was made.
+"""Touches by a person from where the robot stopped, and whether each was made.
 
 A touch counts when something was done since the robot stopped: the tip was jogged, or a contact
 input switched (docs/reference/evidence.md 1). Another try is asked for, then it is refused.
@@ -35,7 +35,7 @@ _SEED_BITS: Final = 48
 
 @dataclass(frozen=True, slots=True)
 class TouchPlan:
-    """How a tip is taken off the pin and brought back.
+    """How a tip is lifted off the pin and returned.
 
     Attributes:
         lift_mm: How far the tip is lifted before anything turns.
@@ -64,7 +64,7 @@ class TouchPlan:
 
 
 def fresh_seed() -> int:
-    """Return the seed of a run: nobody can know the standoffs of a run before it."""
+    """Return the seed of a run: nobody can predict the standoffs."""
     return runtime.random_number(_SEED_BITS)
 
 
@@ -89,11 +89,11 @@ TOUCH_CODES: Final = (
     "camera_changed",
     "spot_changed",
 )
-"""Why touches do not count, in a measurement and in a proof; and why looks of a camera do not."""
+"""Reasons why touches, or looks of a camera, do not count, in a measurement and in a turn test."""
 
 
 def was_jogged(touch: TouchedAt) -> bool:
-    """Tell whether a person jogged from where the robot had stopped."""
+    """Return whether a person jogged from where the robot had stopped."""
     return witnessed_by(touch).made(_PRINTED_MM)
 
 
@@ -123,7 +123,7 @@ def require_touches(touches: Sequence[TouchedAt], *, sigma_z_mm: float) -> None:
 
 
 def heights_agree(heights_mm: Sequence[float], sigma_z_mm: float) -> bool:
-    """Tell whether heights of a tip on one pin differ by no more than touches scatter."""
+    """Return whether heights of a tip on one pin differ by no more than touches scatter."""
     from robolink.calibration import height_limit_mm  # numpy, which a look does without
 
     limit_mm = height_limit_mm(len(heights_mm), sigma_z_mm)
@@ -146,7 +146,7 @@ _PRINTED_MM: Final = 0.001
 
 
 def witnessed_by(touch: TouchedAt) -> "WitnessedTouch":
-    """Return what the mathematics knows of a touch."""
+    """Return a touch as the mathematics needs it."""
     from robolink.calibration import Standoff, WitnessedTouch  # numpy
 
     return WitnessedTouch(
@@ -189,12 +189,12 @@ MOST_ASKED: Final = 3
 
 
 def you_touch() -> str:
-    """Return what follows where the robot stops beside what is touched."""
+    """Return the next step after the robot stopped beside what is touched."""
     return tr("You jog the tip into contact.")
 
 
 class WitnessedTouches(ABC):
-    """The touches of one thing in one measurement or one proof.
+    """The touches of one thing in one measurement or one turn test.
 
     Args:
         plan: Lift, clearance, contact input.
@@ -222,7 +222,7 @@ class WitnessedTouches(ABC):
         self._seed: int | None = None
 
     def shown(self, instruction: str, *, key: Hashable = None) -> Procedure[TouchedAt]:
-        """Let the person bring the tip into contact from wherever it is, and lift off.
+        """Let the person move the tip into contact from wherever it is, and lift off.
 
         Nothing witnesses such a touch but those that follow.
 
@@ -286,7 +286,7 @@ class WitnessedTouches(ABC):
         )
 
     def adopt(self, touches: Mapping[Hashable, TouchedAt]) -> None:
-        """Take over the touches of a measurement that is gone on with.
+        """Take over the touches of a measurement that is continued.
 
         Args:
             touches: By the keys by which later ones take their places, in their order.
@@ -295,7 +295,7 @@ class WitnessedTouches(ABC):
         self._numbers = {key: number for number, key in enumerate(touches, start=1)}
 
     def tell_of(self, earlier: tuple[AngleShown, ...]) -> None:
-        """Have the next ones asked for with what the touches of a proof have shown so far."""
+        """Show with the next requests what the touches of a turn test have shown so far."""
         self._earlier = earlier
 
     @property
@@ -304,7 +304,7 @@ class WitnessedTouches(ABC):
         return self._plan
 
     def _subject(self, arrival: Pose | None) -> TouchSubject:
-        """Return what a screen shows of the touch that is asked for."""
+        """Return what a screen shows of the requested touch."""
         first = self._by_number.get(1)
         total = self._total
         return TouchSubject(
@@ -321,26 +321,26 @@ class WitnessedTouches(ABC):
 
     @property
     def _by_number(self) -> dict[int, TouchedAt]:
-        """Those that count, by the numbers that a person knows them by."""
+        """The touches that count, by the numbers that a person knows them by."""
         numbered = {self._numbers[key]: touch for key, touch in self._taken.items()}
         return dict(sorted(numbered.items()))
 
     def _count(self) -> int:
-        """Return which touch the next one is that is not made again, from 1."""
+        """Return the number, from 1, of the next touch that is not a repeat."""
         return max(self._numbers.values(), default=0) + 1
 
     @property
     def _may_be_typed(self) -> bool:
-        """Whether the pose of one may be typed in place of being read."""
+        """Whether the pose of one may be typed instead of read."""
         return False
 
     @property
     def _compares_heights(self) -> bool:
-        """Whether the heights of the touches say something by themselves."""
+        """Whether the heights of the touches show something by themselves."""
         return False
 
     def _not_yet(self, touch: TouchedAt, arrival: Pose) -> NotYet | None:
-        """Return why a touch does not count yet, while the tip is still there."""
+        """Return why a touch does not yet count, while the tip is still there."""
         if arrival.tool is None or touch.tool == arrival.tool:
             return None
         return NotYet(
@@ -353,13 +353,13 @@ class WitnessedTouches(ABC):
         )
 
     def _drawn_from(self) -> int:
-        """Return from what the standoffs are drawn; the touches on record say it."""
+        """Return the source of the random standoffs; the recorded touches name it."""
         self._seed = fresh_seed() if self._plan.seed is None else self._plan.seed
         return self._seed
 
     @abstractmethod
     def off(self, touch: Pose) -> Move:
-        """Return the step that takes the tip out of contact."""
+        """Return the step that lifts the tip out of contact."""
 
     @abstractmethod
     def _not_jogged(self, away_mm: float) -> str:
@@ -367,7 +367,7 @@ class WitnessedTouches(ABC):
 
     @abstractmethod
     def _how_to_make(self) -> str:
-        """Return what a person is to do whose touches do not count."""
+        """Return what a person has to do whose touches do not count."""
 
     def _answered(
         self, ask: Ask, arrival: Pose, standoff_mm: tuple[float, float, float]

@@ -5,7 +5,7 @@ from typing import Final
 
 
 class Role(Enum):
-    """Which end of the line a codec plays."""
+    """The end of the line that a codec serves."""
 
     HOST = auto()
     DEVICE = auto()

@@ -1,4 +1,4 @@
-"""The lines between a SPEL+ program that calls back and this software, for both ends.
+"""The lines between this software and a SPEL+ program that starts it, for both ends.
 
 docs/reference/spel_callback.md, "The lines", is their description. Nothing here opens a port.
 
@@ -70,7 +70,7 @@ def read_components(fields: Sequence[str]) -> tuple[float, ...]:
 
 
 def read_place(fields: Sequence[str]) -> tuple[float, ...]:
-    """Return X and Y of a place, mm.
+    """Read X and Y of a place, mm.
 
     Raises:
         RemoteProtocolError: They are none.
@@ -103,7 +103,7 @@ def read_tool(fields: Sequence[str]) -> ToolOffset | None:
 
 
 def same_thousandths(one: ToolOffset | None, other: ToolOffset | None) -> bool:
-    """Tell whether two tools are the same where the controller prints them."""
+    """Return whether two tools are the same to the digits that the controller prints."""
     return tool_fields(one) == tool_fields(other)
 
 
@@ -117,7 +117,7 @@ def _field(value: float) -> str:
 VERSION: Final = "RL1"
 
 LONGEST_LINE: Final = 255
-"""A SPEL+ string holds no more characters (docs/reference/spel.md 17)."""
+"""Most characters of a SPEL+ string (docs/reference/spel.md 17)."""
 
 _BASE: Final = 251
 _PRIME: Final = 8_388_593
@@ -130,7 +130,7 @@ _LAST_NUMBER: Final = 999_999
 
 
 class CallbackWord(StrEnum):
-    """What a line says. The first row is sent by the program, the second is answered."""
+    """The kinds of lines. The program sends the first row; the second is answered."""
 
     HELLO = "HELLO"
     BEGIN = "BEGIN"
@@ -231,7 +231,7 @@ _END = b"\r\n"
 
 
 class CallbackCodec:
-    """Takes bytes, gives lines. One that was no line ends it for good: nothing is guessed."""
+    """Turns bytes into lines. An invalid line ends it for good: nothing is guessed."""
 
     def __init__(self) -> None:
         self._held = bytearray()
@@ -239,7 +239,7 @@ class CallbackCodec:
         self._failed: RemoteProtocolError | None = None
 
     def receive(self, data: bytes) -> None:
-        """Take what came. Memory is bounded by one line beyond what was given."""
+        """Accept received bytes. Memory is bounded by one line beyond what was given."""
         if self._failed is not None:
             return
         self._held += data

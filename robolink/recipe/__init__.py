@@ -1,4 +1,4 @@
-"""Recipes: a nozzle change written down once, as a TOML file; what one says, asks and needs.
+"""Recipes: a nozzle change written as a TOML file; what one states, asks and needs.
 
 A recipe is checked by pydantic, which is imported when the first one is loaded or one of its
 tables is named, and not before. docs/recipes.md explains every key.

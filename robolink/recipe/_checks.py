@@ -1,4 +1,4 @@
-"""What is wrong in a recipe that only two of its keys together show."""
+"""Errors in a recipe that only two of its keys together show."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, fields
@@ -32,7 +32,7 @@ from robolink.recipe._tables import (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Draft:
-    """What of a recipe is right in itself; ``None`` for the rest, which is told already.
+    """The correct parts of a recipe; ``None`` for the rest, which is already reported.
 
     Attributes:
         given: The keys at the top of the file, right or wrong.
@@ -54,7 +54,7 @@ class Draft:
 
     @classmethod
     def of(cls, sound: Mapping[str, Any], *, given: Collection[str]) -> "Draft":
-        """Return the draft made of the tables that are right in themselves."""
+        """Return the draft of the tables that are right by themselves."""
         names = {field.name for field in fields(cls)}
         return cls(given=given, **{name: sound[name] for name in sound if name in names})
 
@@ -72,7 +72,7 @@ def moments(draft: Draft) -> Iterator[Problem]:
             continue
         if entry.at not in _OF_ONE_TOOL:
             yield Problem(
-                where, tr('means nothing here: "{at}" comes once for all tools', at=entry.at)
+                where, tr('has no effect here: "{at}" comes once for all tools', at=entry.at)
             )
         elif known is not None and entry.tool not in known:
             yield Problem(
@@ -82,7 +82,7 @@ def moments(draft: Draft) -> Iterator[Problem]:
 
 
 def answers(draft: Draft) -> Iterator[Problem]:
-    """Check that a nozzle and its lot are asked once, and before they are put on record."""
+    """Check that a nozzle and its lot are asked for once, and before they are recorded."""
     asked: set[tuple[str, int | None]] = set()
     for number, prompt in enumerate(draft.prompts or (), start=1):
         if prompt.answer not in _FOR_THE_RECORD:
@@ -91,8 +91,8 @@ def answers(draft: Draft) -> Iterator[Problem]:
             yield Problem(
                 f"prompts#{number}.at",
                 tr(
-                    "is too late for this answer: the measurement is on record by then; write "
-                    '"start" or "before_measure"'
+                    "is too late for this answer: the measurement is already recorded by then; "
+                    'write "start" or "before_measure"'
                 ),
             )
         if asked & {(prompt.answer, prompt.tool), (prompt.answer, None)}:
@@ -108,7 +108,7 @@ def _entries(draft: Draft) -> Iterator[tuple[str, Prompt | Output]]:
 
 
 def tool_numbers(draft: Draft) -> Iterator[Problem]:
-    """Check that no tool stands there twice."""
+    """Check that no tool is listed twice."""
     seen: set[int] = set()
     for place, tool in _tools(draft):
         if tool.number in seen:
@@ -117,7 +117,7 @@ def tool_numbers(draft: Draft) -> Iterator[Problem]:
 
 
 def points(draft: Draft) -> Iterator[Problem]:
-    """Check that each tool has the points that the method needs, and nobody else's."""
+    """Check that each tool has the points that the method needs, and no others."""
     source = draft.source
     if source is None:
         return
@@ -126,10 +126,10 @@ def points(draft: Draft) -> Iterator[Problem]:
         where = f"{place}.points"
         if not isinstance(parameters, PointsParameters):
             if tool.points is not None:
-                yield Problem(where, tr('means nothing without kind = "points" in [source]'))
+                yield Problem(where, tr('has no effect without kind = "points" in [source]'))
             if tool.poses is not None:
                 yield Problem(
-                    f"{place}.poses", tr('means nothing without kind = "points" in [source]')
+                    f"{place}.poses", tr('has no effect without kind = "points" in [source]')
                 )
         elif tool.poses is not None:
             if tool.points is not None:
@@ -153,7 +153,7 @@ def _owned(where: str, tool: Tool, owners: dict[int, int]) -> Iterator[Problem]:
 
 
 def standstill(draft: Draft) -> Iterator[Problem]:
-    """Check that nothing says how to move where nothing moves."""
+    """Check that nothing states how to move if nothing moves."""
     if draft.source is None or draft.source.of_method.needs.motion:
         return
     said = [key for key in ("poses", "speeds", "box") if key in draft.given]
@@ -165,7 +165,8 @@ def standstill(draft: Draft) -> Iterator[Problem]:
         )
     if draft.verify:
         yield Problem(
-            "verify", tr('cannot be true: nothing moves with kind = "points", so nothing is proved')
+            "verify",
+            tr('cannot be true: nothing moves with kind = "points", so there is no turn test'),
         )
     if draft.refusal is not None and draft.refusal.action == "measure_again":
         yield Problem(
@@ -175,7 +176,7 @@ def standstill(draft: Draft) -> Iterator[Problem]:
 
 
 def upright(draft: Draft) -> Iterator[Problem]:
-    """Check that the flange is tilted only where the measurement can bear it."""
+    """Check that the flange is tilted only if the measurement allows it."""
     source = draft.source
     if source is None:
         return
@@ -266,7 +267,7 @@ def parameters(draft: Draft) -> Iterator[Problem]:
 
 
 def _stated(draft: Draft) -> StatedLimits | None:
-    """Return by what it is judged, ``None`` where that cannot be told."""
+    """Return the stated limits, ``None`` if that cannot be told."""
     table = draft.tolerances
     if table is None:
         return None if "tolerances" in draft.given else NOTHING_STATED
@@ -280,7 +281,7 @@ def _placed(problem: Problem) -> Problem:
 
 
 def place(draft: Draft) -> Iterator[Problem]:
-    """Check that the station says where it is, where the method goes there."""
+    """Check that the station states its place, if the method goes there."""
     station, source = draft.station, draft.source
     if station is None or source is None or source.of_method.needs.place is None:
         return
@@ -306,18 +307,18 @@ def both_coordinates(draft: Draft) -> Iterator[Problem]:
 
 
 def height(draft: Draft) -> Iterator[Problem]:
-    """Check that Z can be measured where it is to be."""
+    """Check that Z can be measured, if it is to be."""
     if draft.source is None or draft.z is None:
         return
     method = draft.source.of_method
     if draft.z != "measured" and method.only_z:
-        yield Problem("z", tr('must be "measured": a touch tells Z and nothing else'))
+        yield Problem("z", tr('must be "measured": a touch measures only Z'))
     if draft.z == "measured" and method.unmeasured_z:
         yield Problem("z", spoken(method.unmeasured_z))
 
 
 def orientation(draft: Draft) -> Iterator[Problem]:
-    """Check that a measured orientation is not to be compared with a reference."""
+    """Check that a measured orientation is not compared with a reference."""
     if draft.source is None or draft.basis != "difference":
         return
     if "v_deg" in draft.source.of_method.measures:
@@ -327,19 +328,19 @@ def orientation(draft: Draft) -> Iterator[Problem]:
 
 
 def verification(draft: Draft) -> Iterator[Problem]:
-    """Check that a drift is judged only where one is measured."""
+    """Check that a drift is judged only if one is measured."""
     limits, source = draft.tolerances, draft.source
     if limits is None or source is None or "drift_mm" not in limits.model_fields_set:
         return
     if draft.verify is False or not source.of_method.needs.motion:
-        yield Problem("tolerances.drift_mm", tr("means nothing: no drift is measured"))
+        yield Problem("tolerances.drift_mm", tr("has no effect: no drift is measured"))
 
 
 def refusals(draft: Draft) -> Iterator[Problem]:
-    """Check that attempts are allowed where it is measured again."""
+    """Check that attempts are allowed if the measurement is repeated."""
     refusal = draft.refusal
     if refusal is not None and refusal.action == "stop" and refusal.attempts is not None:
-        yield Problem("refusal.attempts", tr('means nothing without action = "measure_again"'))
+        yield Problem("refusal.attempts", tr('has no effect without action = "measure_again"'))
 
 
 _CHECKS: Final[tuple[Callable[[Draft], Iterator[Problem]], ...]] = (
@@ -361,5 +362,5 @@ _CHECKS: Final[tuple[Callable[[Draft], Iterator[Problem]], ...]] = (
 
 
 def problems_together(draft: Draft) -> tuple[Problem, ...]:
-    """Return everything that is wrong between tables that are right in themselves."""
+    """Return all errors between tables that are right by themselves."""
     return tuple(problem for check in _CHECKS for problem in check(draft))

@@ -1,4 +1,4 @@
-"""From a file to a recipe, or to everything that is wrong in it."""
+"""From a file to a recipe, or to all its errors."""
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
@@ -19,7 +19,7 @@ from robolink.recipe._recipe import Recipe, json_schema, recipe_of_all_methods
 
 
 def with_names_of_now(document: Mapping[str, Any]) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Return a recipe with the names of now, and what to tell whoever wrote the ones of before.
+    """Return a recipe with the present names, and the warnings about former ones.
 
     What is no name of before is left for the checks to find.
     """
@@ -77,7 +77,7 @@ def _known_schema(_methods: tuple[str, ...]) -> dict[str, Any]:
 
 
 def problems_of(error: ValidationError) -> list[Problem]:
-    """Return everything that pydantic objects to."""
+    """Return everything that pydantic reports."""
     schema = _known_schema(method_names())
     details = error.errors(include_url=False, include_input=False)
     return [_problem(detail, schema) for detail in details if not _follows(detail, details)]
@@ -85,7 +85,7 @@ def problems_of(error: ValidationError) -> list[Problem]:
 
 @dataclass(frozen=True, slots=True)
 class _Place:
-    """Where in a recipe something stands.
+    """A place in a recipe.
 
     Attributes:
         path: Path of the key.
@@ -123,7 +123,7 @@ def _resolved(node: dict[str, Any], schema: dict[str, Any]) -> dict[str, Any]:
 
 
 def _follows(detail: Any, details: Sequence[Any]) -> bool:  # noqa: ANN401 - pydantic's own form
-    """Tell whether a list is called too short only because what it holds is wrong."""
+    """Return whether a list is reported as too short only because its content is wrong."""
     place = detail["loc"]
     return detail["type"] == "too_short" and any(
         len(other["loc"]) > len(place) and other["loc"][: len(place)] == place for other in details
@@ -147,7 +147,7 @@ def _problem(detail: Any, schema: dict[str, Any]) -> Problem:  # noqa: ANN401 - 
 
 
 def _unknown(place: _Place, top: Sequence[str]) -> str:
-    """Return what to say about a key that does not exist where it stands.
+    """Return the sentence for a key that does not exist in its place.
 
     Args:
         place: Where it stands.
@@ -159,7 +159,7 @@ def _unknown(place: _Place, top: Sequence[str]) -> str:
 
 
 def _missing(key: str) -> str:
-    """Return what to say about a key that is required."""
+    """Return the sentence for a required key."""
     match key:
         case "basis":
             return tr(
@@ -193,14 +193,14 @@ RECIPE_FILE: Final = FileKind(
 
 @dataclass(frozen=True, slots=True)
 class LoadedRecipe:
-    """A recipe that is right, and the file it came from.
+    """A correct recipe, and the file it came from.
 
     Attributes:
         recipe: What the file says.
         path: The file.
         sha256: Hash of the bytes that were read, hexadecimal; the journal keeps it, so that a
             change of the recipe shows.
-        notes: What to tell whoever wrote it: names of before, with those of now.
+        notes: What to tell whoever wrote it: former names, with those of now.
     """
 
     recipe: Recipe
@@ -230,7 +230,7 @@ def load_recipe(path: Path) -> LoadedRecipe:
 
 
 def check_recipe(path: Path) -> tuple[Problem, ...]:
-    """Return everything that is wrong in a recipe; nothing when it is right.
+    """Return all errors in a recipe; none if it is right.
 
     Raises:
         ConfigError: It cannot be read, or is no TOML.

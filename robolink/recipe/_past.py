@@ -1,4 +1,4 @@
-"""What the record says of a recipe before anything is connected: when, how long, what is due."""
+"""The records of a recipe, before anything is connected: when, how long, what is due."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ _LAST: Final = 5
 
 @dataclass(frozen=True, slots=True)
 class RecipePast:
-    """What is on record of a recipe.
+    """The records of a recipe.
 
     Attributes:
         last: The end of the last change with it on this controller; ``None`` for none.
@@ -42,7 +42,7 @@ class RecipePast:
 def pasts_of(
     recipes: Sequence["LoadedRecipe"], journal: "Journal", address: str
 ) -> tuple[RecipePast, ...]:
-    """Return what is on record of each recipe.
+    """Return the records of each recipe.
 
     Args:
         recipes: The recipes.
@@ -84,7 +84,7 @@ def _last_done(ends: Iterable[Recorded]) -> Recorded | None:
 
 
 def _usual_s(ends: Iterable[Recorded]) -> float | None:
-    """Return the median of how long the last changes took; each tool's entry says it."""
+    """Return the median duration of the last changes, from each tool's entry."""
     took: dict[str, float] = {}
     for one in ends:
         said = one.details.get("took_s")
@@ -98,7 +98,7 @@ def _changes_left(loaded: "LoadedRecipe", journal: "Journal", address: str) -> i
 
 
 def changes_left_of(loaded: "LoadedRecipe", journal: "Journal", address: str) -> dict[int, int]:
-    """Return after how many more changes a full calibration is due, by tool; 0 for now.
+    """Return how many more changes each tool may have before a full calibration; 0 for none.
 
     Tools of which the record does not say it are left out.
 

@@ -84,12 +84,12 @@ class Recipe(Table):
 
     @property
     def verifies(self) -> bool:
-        """Whether the new tips are proved by turning about them."""
+        """Whether the new tips get a turn test."""
         return self.source.of_method.needs.motion and self.verify is not False
 
     @property
     def parameters(self) -> MethodParameters:
-        """The parameters of its method, with what stands at the top of the recipe."""
+        """The parameters of its method, with the values from the top of the recipe."""
         parameters = self.source.parameters
         for one in fields_of(type(parameters)):
             if one.option.from_recipe:
@@ -98,7 +98,7 @@ class Recipe(Table):
         return parameters
 
     def is_for(self, cell: str) -> bool:
-        """Tell whether it may be run at a cell; ``""`` stands for one that has no name."""
+        """Return whether it may be run at a cell; ``""`` stands for one that has no name."""
         return not self.cells or cell in self.cells
 
     @property
@@ -109,7 +109,7 @@ class Recipe(Table):
     @field_validator("*")
     @classmethod
     def _hand_on(cls, value: T, info: ValidationInfo) -> T:
-        """Hand on what is right in itself: how it goes with the rest is checked in any case."""
+        """Pass on what is right by itself: how it goes with the rest is checked in any case."""
         if isinstance(info.context, dict):
             info.context[info.field_name] = value
         return value
@@ -119,7 +119,7 @@ _made_for: tuple[str, ...] = method_names()
 
 
 def recipe_of_all_methods() -> type[Recipe]:
-    """Return the recipe, made anew when there are other methods than before."""
+    """Return the recipe, rebuilt if the set of methods has changed."""
     global _made_for  # noqa: PLW0603 - one registry of methods, one recipe
     if method_names() != _made_for:
         Recipe.model_rebuild(force=True)

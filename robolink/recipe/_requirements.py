@@ -1,4 +1,4 @@
-"""What a recipe asks for: of a controller or a whole kind of them, and of whoever runs it."""
+"""What a recipe requires: of a controller or a kind of controllers, and of whoever runs it."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -25,7 +25,7 @@ def beyond(
     writes: bool = True,
     axes: int | None = None,
 ) -> tuple[str, ...]:
-    """Return what a recipe asks for and a controller cannot do, a sentence each.
+    """Return what a recipe requires and a controller cannot do, a sentence each.
 
     Args:
         recipe: The recipe.
@@ -71,7 +71,7 @@ def beyond(
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """What was given with the command.
+    """Answers given with the command.
 
     Attributes:
         yes: Whether every yes-or-no question is answered with yes.
@@ -91,7 +91,7 @@ class Answers:
     early: Mapping[tuple[int, int | None], str] = field(default_factory=dict, hash=False)
 
     def prepared(self, number: int, prompt: "Prompt", tool: int | None = None) -> str | None:
-        """Return the answer that was given beforehand, ``None`` when there is none.
+        """Return the answer given in advance, ``None`` if there is none.
 
         Args:
             number: Number of the prompt in the recipe, from 1.
@@ -117,7 +117,7 @@ class Answers:
         return self.texts.get(number)
 
     def given_by(self, number: int, prompt: "Prompt", tool: int | None = None) -> AnsweredBy:
-        """Return how a prompt was answered beforehand.
+        """Return how a prompt was answered in advance.
 
         Args:
             number: Number of the prompt in the recipe, from 1.
@@ -134,7 +134,7 @@ class Answers:
         return AnsweredBy.YES if prompt.answer == "yes" else AnsweredBy.OPTION
 
     def ids_wanted(self, recipe: "Recipe") -> Iterator[tuple[int, "Prompt", int | None]]:
-        """Yield the prompts for ids that nobody has answered, with the tool each is asked for."""
+        """Yield the unanswered prompts for ids, with the tool that each is for."""
         for number, prompt in enumerate(recipe.prompts, start=1):
             if prompt.answer not in ("nozzle", "lot"):
                 continue
@@ -146,7 +146,7 @@ class Answers:
                     yield number, prompt, tool
 
     def missing(self, recipe: "Recipe") -> Iterator[str]:
-        """Yield what nobody answered beforehand, as what would."""
+        """Yield what was not answered in advance, as the option that would answer it."""
         for number, prompt in enumerate(recipe.prompts, start=1):
             if self.prepared(number, prompt) is None:
                 yield _option(number, prompt)
@@ -159,7 +159,7 @@ class Answers:
 
 
 def require_answers(answers: Answers, recipe: "Recipe") -> None:
-    """Refuse, before anything is sent, to run where a question would find nobody.
+    """Refuse, before anything is sent, to run if a question would find nobody.
 
     Raises:
         DeclinedError: Nobody is there to say it; names what is missing.

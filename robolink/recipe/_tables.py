@@ -32,7 +32,7 @@ PointNumber = Annotated[int, Field(ge=0, le=999)]
 
 
 class Table(BaseModel):
-    """What all tables have in common."""
+    """What all tables share."""
 
     model_config = ConfigDict(
         extra="forbid",
@@ -90,7 +90,7 @@ class StationTable(Table):
 
     @property
     def place_mm(self) -> tuple[float, float, float]:
-        """Where it is, once recipe or record have said so."""
+        """Where it is, once stated by the recipe or the record."""
         x_mm, y_mm, z_mm = self.x_mm, self.y_mm, self.z_mm
         assert x_mm is not None  # noqa: S101 - the recipe was checked and located
         assert y_mm is not None  # noqa: S101
@@ -147,7 +147,7 @@ class Speeds(Table):
 
 
 class Box(Table):
-    """How far the flange may go from where it is when the recipe starts."""
+    """How far the flange may go from where the recipe starts."""
 
     sideways_mm: Annotated[float, Field(ge=1)] = 150.0
     """How far in X and in Y, mm."""
@@ -158,7 +158,7 @@ class Box(Table):
 
     @property
     def reach(self) -> WorkBox:
-        """The same, about wherever the flange will be."""
+        """The same, around any later place of the flange."""
         return WorkBox.reaching(self.sideways_mm, down_mm=self.down_mm, up_mm=self.up_mm)
 
 
@@ -211,7 +211,7 @@ class AccuracyTable(Table):
 
     @property
     def stated(self) -> dict[str, float]:
-        """What is stated, by key."""
+        """The stated values, by key."""
         return {key: value for key, value in self.model_dump().items() if value is not None}
 
 
@@ -256,7 +256,7 @@ _DESCRIBED = ConfigDict(use_attribute_docstrings=False)
 
 
 class MethodTable(Table):
-    """What the tables of all methods have in common."""
+    """What the tables of all methods share."""
 
     model_config = _DESCRIBED
 
@@ -279,7 +279,7 @@ class MethodTable(Table):
 
 
 class _Line(Table):
-    """A table inside of one, such as a light beam."""
+    """A table inside another, such as a light beam."""
 
     model_config = _DESCRIBED
 
@@ -292,7 +292,7 @@ class AnyKind:
     def __get_pydantic_core_schema__(
         self, _source: object, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        """Return the union of the tables of all methods that there are now."""
+        """Return the union of the tables of all present methods."""
         tables = tuple(map(method_table, all_methods()))
         return handler.generate_schema(
             Annotated[Union[tables], Field(discriminator="kind")]  # noqa: UP007 - made at run time

@@ -1,4 +1,4 @@
-"""The page of all keys of a recipe, made from what its tables declare: docs/recipe-keys.md.
+"""The page of all recipe keys, made from their declarations: docs/recipe-keys.md.
 
 ``python -m robolink.recipe.page`` prints it.
 """
@@ -83,7 +83,7 @@ def _meaning(value: Schema, tables: Mapping[str, Schema]) -> str:
 
 
 def _limits(value: Schema) -> str:
-    """Return what a value may be, in words."""
+    """Return the allowed values, in words."""
     if "enum" in value:
         return ", ".join(f'`"{word}"`' for word in value["enum"])
     if value.get("type") == "boolean":
@@ -112,7 +112,7 @@ def _pointed_at(value: Schema) -> str:
 
 
 def _written(default: object) -> str:
-    """Return a default as it would be typed; empty where nothing stands for it."""
+    """Return a default as a person would type it; empty if it cannot be typed."""
     if isinstance(default, str) and default:
         return f'`"{default}"`'
     return f"{default:g}" if isinstance(default, (int, float)) else ""

@@ -1,4 +1,4 @@
-"""What the screen of a machine shows, held against what its map finds.
+"""Compares the screen of a machine with what its map finds.
 
 A probe tells word order and offset; neither it nor one value tells that Y and Z are not exchanged,
 or that the map of tool 1 does not lead to tool 2. So each component is compared, and each tool by
@@ -28,7 +28,7 @@ _TEST_VALUES: Final = (7.3, 4.6, 8.9, 5.2, 9.7, 6.1, 3.4, 2.8, 1.5)
 
 
 class MapDiffersError(ConfigError):
-    """The map finds something else than the machine's own screen shows: it is wrong."""
+    """The map finds another value than the machine's own screen shows: the map is wrong."""
 
 
 class MapValue(NamedTuple):
@@ -79,7 +79,7 @@ class ComparedValue:
 
 @dataclass(frozen=True, slots=True)
 class OpenValue:
-    """One value that is still to be compared.
+    """One value still to be compared.
 
     Attributes:
         value: Which.
@@ -107,7 +107,7 @@ def values_of(register_map: RegisterMap) -> dict[MapValue, Number]:
 
 
 def compare(register_map: RegisterMap, found: Found, value: MapValue, shown: str) -> ComparedValue:
-    """Hold one value against what the machine's own screen shows.
+    """Compare one value with the machine's own screen.
 
     The screen may round or cut off; that many digits are compared as were typed, and too few of
     them, or digits that another value shows too, confirm nothing.
@@ -154,7 +154,7 @@ def compare(register_map: RegisterMap, found: Found, value: MapValue, shown: str
 def compare_test(
     register_map: RegisterMap, before: Found, found: Found, value: MapValue, entered: str
 ) -> ComparedValue:
-    """Hold one value against what a person has just entered at the machine's own screen.
+    """Compare one value with what a person has just entered at the machine's own screen.
 
     All digits of such a value are known, however few the screen shows.
 
@@ -186,7 +186,7 @@ def compare_test(
     if value in before and _alike(before[value], typed, digits):
         raise ConfigError(
             tr(
-                "{key} read {shown} before as well, so this proves nothing.",
+                "{key} already read {shown} before, so this confirms nothing.",
                 **_said(value, text),
             ),
             remedy=tr("Enter another value at the machine's own screen."),
@@ -197,7 +197,7 @@ def compare_test(
 def to_compare(
     register_map: RegisterMap, found: Found, compared: Mapping[MapValue, ComparedValue]
 ) -> list[OpenValue]:
-    """Return which values show, together with those that were compared, that a map is right.
+    """Return the values that, with those already compared, show that a map is right.
 
     Args:
         register_map: The map.
@@ -224,20 +224,20 @@ def to_compare(
 
 
 def tool_known(compared: Mapping[MapValue, ComparedValue], tool: int) -> bool:
-    """Whether a comparison showed that this tool's place is not another one's."""
+    """Whether a comparison showed that this tool's place is not another tool's."""
     return any(one.tells_tool for value, one in compared.items() if value.tool == tool)
 
 
 def component_known(
     register_map: RegisterMap, compared: Mapping[MapValue, ComparedValue], value: MapValue
 ) -> bool:
-    """Whether a comparison showed this component, at this tool or one that is laid out alike."""
+    """Whether a comparison showed this component, at this tool or one with the same layout."""
     alike = _like(register_map, value)
     return any(one.tells_component for other, one in compared.items() if other in alike)
 
 
 class _Plan:
-    """The values that are to be compared, and what will be told once they are."""
+    """The values to compare, and what will be known afterwards."""
 
     def __init__(
         self, register_map: RegisterMap, found: Found, compared: Mapping[MapValue, ComparedValue]
@@ -250,7 +250,7 @@ class _Plan:
     def add(
         self, first: MapValue, tells: Callable[[ComparedValue], bool], choice: list[MapValue]
     ) -> None:
-        """Choose a value that stands now and tells, best one that tells both; else a test value."""
+        """Choose a present value that is informative, best one that does both; or a test value."""
         made = [one for value in choice if (one := self._as_it_stands(value)) and tells(one)]
         for one in sorted(made, key=lambda one: not (one.tells_component and one.tells_tool)):
             self.told[one.value] = one
@@ -287,7 +287,7 @@ class _Plan:
 
 
 def _read(value: MapValue, shown: str) -> tuple[str, float, int]:
-    """Return what was typed with a point, as a number, and how many digits are behind it."""
+    """Return a typed number with its decimal point, and how many digits follow it."""
     text = shown.strip().replace(",", ".")
     if not _PLAIN.fullmatch(text):
         raise ConfigError(
@@ -323,7 +323,7 @@ def _require_alike(found: Found, value: MapValue, text: str, typed: float, digit
         raise _differs(found, value, text, typed, digits)
     if not typed:
         raise ConfigError(
-            tr("{key} reads 0: a 0 proves nothing.", key=value),
+            tr("{key} reads 0, and a 0 confirms nothing.", key=value),
             remedy=tr(
                 "Enter a test value for it at the machine's own screen, compare that, and put the "
                 "0 back there."
@@ -380,7 +380,7 @@ def _said(value: MapValue, text: str) -> dict[str, object]:
 
 
 def _digits_needed(number: Number) -> int:
-    """Return how many digits after the point show a number to hundredths, or to its own step."""
+    """Return how many decimals show a number to hundredths, or to its own step."""
     step = _step(number)
     return next((d for d in range(_FINEST) if step * 10**d >= 1 - _SLACK), _FINEST)
 
@@ -390,7 +390,7 @@ def _step(number: Number) -> float:
 
 
 def _like(register_map: RegisterMap, value: MapValue) -> list[MapValue]:
-    """Return this component of all tools that are laid out like this one."""
+    """Return this component of all tools with the same layout."""
     layout = _layout(register_map.slots[value.tool])
     return [
         MapValue(slot.tool, value.component)

@@ -1,4 +1,4 @@
-"""That a person compared a map's values with what the HMI shows: kept for one map at one PLC.
+"""A person's comparison of a map's values with the HMI: kept for one map at one PLC.
 
 Nothing else tells a right map from one with two components exchanged. A file that was changed is
 another map. A PLC is the one that its own
@@ -43,7 +43,7 @@ class Confirmation:
     compared: Mapping[MapValue, ComparedValue] = field(hash=False)
 
     def knows_tool(self, tool: int) -> bool:
-        """Whether a comparison showed that this tool's place is not another one's."""
+        """Whether a comparison showed that this tool's place is not another tool's."""
         return tool_known(self.compared, tool)
 
     def missing(self, register_map: RegisterMap) -> list[MapValue]:
@@ -57,7 +57,7 @@ class Confirmation:
 
 
 def confirmation_of(identity: str, register_map: RegisterMap) -> Confirmation | None:
-    """Return what was compared of this very map at this PLC, ``None`` when nothing was.
+    """Return what was compared of this very map at this PLC, ``None`` for nothing.
 
     A record that cannot be read confirms nothing, and neither does one of the first format, in
     which one value stood for all.
@@ -81,7 +81,7 @@ def confirmation_of(identity: str, register_map: RegisterMap) -> Confirmation | 
 def confirm(
     identity: str, register_map: RegisterMap, *, by: str, compared: Iterable[ComparedValue]
 ) -> Confirmation:
-    """Put on record that a person found values of this map right at this PLC.
+    """Record that a person found values of this map right at this PLC.
 
     What was on record before stays.
 
@@ -133,7 +133,7 @@ def confirm(
 
 
 def revoke(identity: str, register_map: RegisterMap) -> Confirmation | None:
-    """Take back that a map is right, because a comparison showed that it is not.
+    """Withdraw the confirmation of a map, because a comparison showed that it is wrong.
 
     Returns:
         Who had confirmed it, ``None`` when nobody had.

@@ -84,7 +84,7 @@ class Component(NamedTuple):
 
 
 def component_of(name: str) -> Component | None:
-    """Return what a variable stands for, ``None`` where its name does not clearly say it."""
+    """Return the component that a variable's name means, ``None`` if that is unclear."""
     name = unicodedata.normalize("NFKC", name)
     name = _CHINESE_WORD.sub(lambda word: f" {_CHINESE[word[0]]} ", name)
     if not name.isascii():
@@ -102,7 +102,7 @@ def component_of(name: str) -> Component | None:
 
 
 def _read(words: list[str]) -> Component | None:
-    """Return what stands behind the word for a tool: its number, its axis, and words beside."""
+    """Return what follows the word for a tool: its number, its axis, and further words."""
     numbers = [word for word in words if word.isdigit()]
     axes = [word for word in words if word in COMPONENTS]
     units = [word for word in words if word in _UNIT_WORDS]
@@ -169,7 +169,7 @@ class _BadRowError(ValueError):
 
 
 def draft_from_csv(path: Path) -> MapDraft:
-    """Return the beginning of a map; rows that cannot be used are named and left out.
+    """Return the beginning of a map; unusable rows are named and left out.
 
     Raises:
         ConfigError: The list cannot be read, or names no component of a tool that can be used.

@@ -1,4 +1,4 @@
-"""From a file to a map, or to everything that is wrong in it.
+"""From a file to a map, or to all its errors.
 
 What no key says alone: that places do not overlap and can be read and written as needed.
 """
@@ -52,7 +52,7 @@ def load_map(path: Path) -> RegisterMap:
 
 
 def check_map(path: Path) -> tuple[Problem, ...]:
-    """Return everything that is wrong in a map; nothing when it is right.
+    """Return all errors in a map; none if it is right.
 
     Raises:
         ConfigError: It cannot be read, or is no TOML.
@@ -82,7 +82,7 @@ _COMMIT_DEPTH: Final = 2
 
 
 def problems_of(error: "ValidationError") -> list[Problem]:
-    """Return everything that pydantic objects to."""
+    """Return everything that pydantic reports."""
     return [
         Problem(_path(detail["loc"]), _sentence(detail))
         for detail in error.errors(include_url=False, include_input=False)
@@ -118,7 +118,7 @@ def _sentence(detail: Any) -> str:  # noqa: ANN401 - pydantic's own form
 
 
 def _missing(location: Sequence[int | str]) -> str:
-    """Return what to write where a whole table is missing; empty for a key of a table."""
+    """Return what to write for a missing table; empty for a key of a table."""
     match tuple(location):
         case ("schema",):
             return tr('is missing: begin the file with schema = "robolink/plc-map/1"')
@@ -138,7 +138,7 @@ _MOST_READ: Final = 125
 
 @dataclass(frozen=True, slots=True)
 class _Claim:
-    """A place that something in the map takes.
+    """A place in use by something in the map.
 
     ``shared`` tells whether it is only looked at, and leaves room for others that are.
     """
@@ -159,7 +159,7 @@ class _Claim:
 
 
 def problems_together(file: "MapFile", found: RegisterMap) -> list[Problem]:
-    """Return what is wrong with the places of a map as a whole."""
+    """Return errors between the places of a map."""
     return [
         *_twice(file),
         *(
@@ -202,7 +202,7 @@ def _slot(position: int, slot: MapSlot, found: RegisterMap) -> Iterator[Problem]
 
 
 def _unreadable(where: str, components: Mapping[str, Number]) -> Iterator[Problem]:
-    """Find out whether one request reads all components."""
+    """Check that one request reads all components."""
     if len({number.table for number in components.values()}) > 1:
         yield Problem(where, tr("has components in two tables; one request must read them all"))
     elif components and len(span_of(components)) > _MOST_READ:
@@ -251,7 +251,10 @@ def _probe(found: RegisterMap) -> Iterator[Problem]:
     if len(set(words)) < len(words) or not any(words):
         yield Problem(
             "probe.value",
-            tr("does not tell the word order: take a number with no two words alike, as 12.3456"),
+            tr(
+                "does not show the word order: use a number whose words all differ, for example "
+                "12.3456"
+            ),
         )
 
 

@@ -1,4 +1,4 @@
-"""What a map says, ready for use: places with units, without defaults left open.
+"""A map ready for use: places with units, without open defaults.
 
 How a length or an angle stands in registers.
 
@@ -98,7 +98,7 @@ class Signal:
 
     @property
     def writable(self) -> bool:
-        """Whether it can be written without touching anything beside it."""
+        """Whether it can be written without changing anything beside it."""
         return self.table.writable and self.bit is None
 
     @property
@@ -122,7 +122,7 @@ class Word:
 
 @dataclass(frozen=True, slots=True)
 class RegisterWords:
-    """Registers in a row that hold a number of the machine's own."""
+    """Neighbouring registers that hold a number of the machine's own."""
 
     table: RegisterTable
     address: int
@@ -217,18 +217,18 @@ class Number:
         return tuple(self._as_stored(words))
 
     def decode(self, words: tuple[int, ...]) -> float:
-        """Return the value in mm or degrees; it may be no number, or an absurd one."""
+        """Return the value in mm or degrees; it may be not a number, or an absurd one."""
         raw: float
         data = struct.pack(f">{len(words)}H", *self._as_stored(list(words)))
         (raw,) = struct.unpack(_FORMATS[self.type], data)
         return raw * self.factor + 0.0  # which takes the sign off a negative zero
 
     def is_absurd(self, value: float) -> bool:
-        """Tell whether ``value`` is no number, or smaller than any length that is not 0."""
+        """Return whether ``value`` is not a number, or smaller than any length that is not 0."""
         return not math.isfinite(value) or 0 < abs(value / self.factor) < _TINY
 
     def slack(self, value: float) -> float:
-        """Return how far from ``value`` another may be that these registers hold alike."""
+        """Return how far from ``value`` another may be that these registers store alike."""
         if self.type.whole:
             return abs(self.factor) / 2
         if self.type is NumberType.REAL:
@@ -251,7 +251,7 @@ ANGLES: Final = frozenset("uvw")
 
 
 class AllZero(StrEnum):
-    """What a slot means whose registers are all zero.
+    """The meaning of a slot whose registers are all zero.
 
     A CODESYS PLC zeroes what clients may write when its watchdog expires
     (docs/reference/softmotion.md 4.1), so that all zeros may be a lost link and no tool
@@ -265,7 +265,7 @@ class AllZero(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class MapSlot:
-    """Where one tool stands.
+    """Where one tool is stored.
 
     Attributes:
         tool: Its number.
@@ -302,7 +302,7 @@ def span_of(components: Mapping[str, Number]) -> range:
 
 
 class CommitKind(StrEnum):
-    """How the PLC is told to take new values over."""
+    """How the PLC is asked to take new values over."""
 
     COMMIT_BIT = "commit_bit"
     LEVEL = "level"
@@ -311,7 +311,7 @@ class CommitKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Commit:
-    """How new values come into force.
+    """How new values take effect.
 
     Attributes:
         kind: The handshake.
@@ -340,7 +340,7 @@ class Commit:
 
 @dataclass(frozen=True, slots=True)
 class MapProbe:
-    """A constant in the PLC that tells word order and offset."""
+    """A constant in the PLC that shows word order and offset."""
 
     number: Number
     value: float
@@ -357,7 +357,7 @@ class Input:
 
 @dataclass(frozen=True, slots=True)
 class RegisterMap:
-    """One whole map that is right.
+    """One whole, correct map.
 
     Attributes:
         name: What people call the machine.
@@ -366,7 +366,7 @@ class RegisterMap:
         commit: How new values come into force.
         probe: The constant to compare before anything is believed, if there is one.
         permit: On while offsets may be written, if there is such a signal.
-        selected: Number of the tool in force, if the PLC tells it.
+        selected: Number of the selected tool, if the PLC tells it.
         device_id: Where a number stands that tells this machine from every other one, if it
             has one.
         flange: Where the flange is, by component; empty where the PLC does not tell.
@@ -390,5 +390,5 @@ class RegisterMap:
 
     @property
     def writable(self) -> bool:
-        """Whether tools can be written: all stand in holding registers."""
+        """Whether tools can be written: all are in holding registers."""
         return all(slot.table.writable for slot in self.slots.values())

@@ -46,7 +46,7 @@ AngleUnit = Literal["deg", "rad"]
 
 
 class Keys(BaseModel):
-    """What all tables have in common."""
+    """What all tables share."""
 
     model_config = ConfigDict(
         extra="forbid", frozen=True, strict=True, allow_inf_nan=False, hide_input_in_errors=True
@@ -54,7 +54,7 @@ class Keys(BaseModel):
 
 
 class NumberDefaults(Keys):
-    """``[numbers]``: what holds for every number that does not say otherwise."""
+    """``[numbers]``: applies to every number that does not say otherwise."""
 
     table: TableName = "holding"
     type: TypeName | None = None
@@ -78,7 +78,7 @@ class NumberKeys(Keys):
 
 
 class ProbeKeys(NumberKeys):
-    """``[probe]``: a constant, compared before anything is believed; in no unit."""
+    """``[probe]``: a constant, compared before any value is believed; in no unit."""
 
     value: float
 
@@ -101,7 +101,7 @@ class WordKeys(Keys):
 
 
 class WordsKeys(WordKeys):
-    """``[device_id]``: registers in a row that tell this machine from every other one."""
+    """``[device_id]``: neighbouring registers that identify this machine."""
 
     words: Annotated[int, Field(ge=1, le=8)] = 2
 
@@ -166,7 +166,7 @@ class LevelKeys(_Handshake):
 
 
 class NoneKeys(Keys):
-    """``kind = "none"``: what is written counts."""
+    """``kind = "none"``: written values take effect at once."""
 
     kind: Literal["none"]
     settle_s: Seconds = 0.2

@@ -1,4 +1,4 @@
-"""The report of a tool change: one HTML page that needs nothing beside itself."""
+"""The report of a tool change: one self-contained HTML page."""
 
 from robolink.report._page import render, render_drift, save, save_drift
 from robolink.report._recorded import recorded_fit, reports_of

@@ -52,7 +52,7 @@ def plain(text: str) -> str:
 
 
 def rounded(value: float, digits: int = 3) -> str:
-    """Return a number as the eye reads it."""
+    """Return a number as a person reads it."""
     # Adding zero takes the sign off what rounds to zero.
     return f"{round(value, digits) + 0.0:.{digits}f}"
 

@@ -1,4 +1,4 @@
-"""The pages of a change and of a drift. Each runs no script and loads nothing: it can be mailed."""
+"""The pages of a change and of a drift. They run no script and load nothing: mail them as files."""
 
 from collections.abc import Iterator, Sequence
 from functools import cache
@@ -85,12 +85,12 @@ def templates() -> Environment:
 
 
 def figure(value: float, digits: int = 3) -> Markup:
-    """Return a number: rounded to the eye, whole for a program that reads the page."""
+    """Return a number: rounded for people, exact for a program that reads the page."""
     return Markup('<data value="{}">{}</data>').format(repr(float(value)), rounded(value, digits))
 
 
 def half(value: float, digits: int = 4) -> Markup:
-    """Return half of an interval: never 0 to the eye, whole for a program that reads the page."""
+    """Return half of an interval: never shown as 0, exact for a program that reads the page."""
     return Markup('<data value="{}">{}</data>').format(repr(float(value)), stated_mm(value, digits))
 
 
@@ -127,7 +127,7 @@ def _shown(value: Any) -> Any:  # noqa: ANN401 - whatever a template shows
 def save(
     report: Report, path: Path, *, others: Sequence[Report] = (), replace: bool = False
 ) -> None:
-    """Write the page of a change; it is whole and on the disk when this returns.
+    """Write the page of a change; on return it is complete and on the disk.
 
     Args:
         report: What became of a tool.
@@ -209,7 +209,7 @@ def save_drift(
     robolink_version: str,
     replace: bool = False,
 ) -> None:
-    """Write that page; it is whole and on the disk when this returns.
+    """Write that page; on return it is complete and on the disk.
 
     Args:
         cells: Each with one measured change or more.

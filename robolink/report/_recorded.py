@@ -40,7 +40,7 @@ from robolink.report._values import (
 
 
 def recorded_fit(details: Mapping[str, Any]) -> CalibrationResult:
-    """Return what a measurement came to, from the details of its entry.
+    """Return the result of a measurement, from the details of its entry.
 
     What older entries do not say is left empty.
 
@@ -61,7 +61,7 @@ def recorded_fit(details: Mapping[str, Any]) -> CalibrationResult:
 
 
 def recorded_pose(pose: Mapping[str, Any]) -> Pose:
-    """Return a pose of an entry, which has no key for what the controller does not tell."""
+    """Return a pose of an entry; it has no key for what the controller does not report."""
     return from_fields(Pose, pose, partial=True)
 
 
@@ -130,12 +130,12 @@ def report_of_tool(
 
 
 def _facts(said: Mapping[str, Any] | None) -> ControllerFacts:
-    """Return what the controller said of itself when it was measured; nothing in old entries."""
+    """Return the controller's own answers at the measurement; none in old entries."""
     return from_fields(ControllerFacts, said or {}, partial=True)
 
 
 def _touch(said: Mapping[str, Any]) -> TouchOnRecord:
-    """Return how a touch was made; the robot stopped beside the pin or the person brought it."""
+    """Return how a touch was made: the robot stopped beside the pin, or a person jogged to it."""
     brought = said.get("arrival") is None
     return TouchOnRecord(
         standoff_mm=None if brought else tuple(said["standoff_mm"]),
@@ -182,9 +182,9 @@ def _end(entries: Sequence[Recorded], end: Recorded) -> tuple[Outcome, str]:
 
 
 def _offsets(tool: int, entries: Sequence[Recorded], *, done: bool) -> dict[str, ToolOffset | None]:
-    """Return 'before' and 'after', as far as they are on record.
+    """Return 'before' and 'after', as far as they are recorded.
 
-    The first that says so counts: when an old value is put back, that is written too.
+    The first that says so counts: when an old value is restored, that is written too.
     """
     found: dict[str, ToolOffset | None] = {}
     for entry in entries:
@@ -209,7 +209,7 @@ def _undoing(entries: Sequence[Recorded]) -> str:
 
 
 def _of_several(tool: int, entry: Recorded) -> Mapping[str, Any]:
-    """Return what the beginning of a change of several tools says about one of them."""
+    """Return what the first entry of a change of several tools says about one of them."""
     tools: Any = entry.details.get("tools", {})
     said: Mapping[str, Any] = tools.get(str(tool), {})
     return said
@@ -239,7 +239,7 @@ def _verification(entry: Recorded | None, done: Recorded | None) -> VerifyResult
 
 
 def _seating(said: Mapping[str, Any] | None) -> Mapping[str, Any] | None:
-    """Return what an entry says of the seating; of an old one it is not on record.
+    """Return the seating in an entry; an old entry has none.
 
     Raises:
         KeyError, TypeError: It cannot be understood.
@@ -277,7 +277,7 @@ def reports_of(
     check: str,
     problems: Sequence[str] = (),
 ) -> tuple[Report, ...]:
-    """Return what became of each tool of a change.
+    """Return the result for each tool of a change.
 
     Args:
         entries: All that is on record about the change, in the order in which it was stored.
@@ -351,7 +351,7 @@ def _tools(entry: Recorded) -> Iterator[int]:
 
 
 def _concerns(entry: Recorded, tool: int) -> bool:
-    """Tell whether an entry is about a tool, or about the whole change."""
+    """Return whether an entry is about a tool, or about the whole change."""
     if entry.kind in _NOT_ABOUT_A_CHANGE:
         return entry.kind is EntryKind.DECISION and entry.tool in (None, tool)
     return entry.tool in (None, tool)
@@ -374,20 +374,20 @@ def _judged(entries: Sequence[Recorded]) -> Iterator[Judgement]:
 
 
 def _stands_in_the_head(entry: Recorded) -> bool:
-    """Tell whether an entry only repeats which nozzle or lot it was: an older one, unasked."""
+    """Return whether an entry only repeats which nozzle or lot it was: an older one, unasked."""
     named = entry.verdict and entry.verdict in (entry.signature.nozzle, entry.signature.lot)
     return bool(named) and entry.kind is EntryKind.DECISION and "question" not in entry.details
 
 
 def _what(entry: Recorded) -> str:
-    """Return what a row is about: a question that was answered says more than its kind."""
+    """Return what a row is about: an answered question says more than its kind."""
     if entry.kind is EntryKind.DECISION and "question" in entry.details:
         return tr("answer")
     return str(entry.kind)
 
 
 def _answer(entry: Recorded) -> str:
-    """Return what was asked and what was answered, and how; empty for what was no question."""
+    """Return question, answer and how it was answered; empty if it was no question."""
     details = entry.details
     if entry.kind is not EntryKind.DECISION or "question" not in details:
         return ""

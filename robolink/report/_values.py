@@ -1,4 +1,4 @@
-"""What a report says, before it has a form."""
+"""The content of a report, before it has a form."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -10,7 +10,7 @@ from robolink.model import ControllerFacts, Pose, Recorded, Signature, ToolOffse
 
 
 class Outcome(StrEnum):
-    """What became of the change."""
+    """How the change ended."""
 
     PROPOSED = "proposed"
     VERIFIED = "verified"
@@ -27,7 +27,7 @@ class Outcome(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What was judged on the way, in words.
+    """What was judged in the process, in words.
 
     Attributes:
         what: What it was about.
@@ -179,7 +179,7 @@ class Report:
 
     @property
     def widened_mm(self) -> float | None:
-        """What the tip is accurate to by a wider statement that a person took, else ``None``."""
+        """What the tip is accurate to by a wider statement that a person accepted, or ``None``."""
         own_mm = None if self.fit is None else self.fit.accurate_to_mm
         now_mm = None if self.verification is None else self.verification.accurate_to_mm
         return None if now_mm is None or (own_mm is not None and now_mm <= own_mm) else now_mm

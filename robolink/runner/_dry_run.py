@@ -1,4 +1,4 @@
-"""A procedure walked through on paper: its movements, and what stands in the way of the arm."""
+"""Walks through a procedure without motion: its movements, and what blocks the arm."""
 
 from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ OptionT = TypeVar("OptionT")
 
 @dataclass(frozen=True, slots=True)
 class ForeseenStep:
-    """A step of a procedure that nobody has taken.
+    """A step of a procedure that was not taken.
 
     Attributes:
         step: Which.
@@ -41,7 +41,7 @@ class ForeseenStep:
 
     @property
     def move(self) -> Move | None:
-        """The movement, of a search too; ``None`` for a step that moves nothing by itself."""
+        """The movement, of a search too; ``None`` for a step that moves nothing itself."""
         step = self.step
         if isinstance(step, Seek):
             return Move(step.target, Path.STRAIGHT, step.purpose)
@@ -49,7 +49,7 @@ class ForeseenStep:
 
 
 def nothing_in_the_way(step: Consider, *, known: bool) -> tuple[str, ...]:  # noqa: ARG001 - the form of an answer
-    """Answer that nothing is known against any of the movements."""
+    """Answer that nothing is known to block any of the movements."""
     return ("",) * len(step.moves)
 
 
@@ -60,7 +60,7 @@ def foreseen_steps(
     known: bool = True,
     consider: Callable[..., tuple[str, ...]] = nothing_in_the_way,
 ) -> Generator[ForeseenStep, None, tuple[Pose, bool]]:
-    """Yield the steps of a procedure, and return where they lead, and whether that is known.
+    """Yield the steps of a procedure; return where they lead, and whether that is known.
 
     Args:
         procedure: What is followed; it is used up.
@@ -110,7 +110,7 @@ def foreseen_steps(
 
 
 def considered(step: Consider) -> Iterator[tuple[Move, Pose | None]]:
-    """Yield each movement with where it begins."""
+    """Yield each movement with its start."""
     yield from zip(step.moves, step.starts or repeat(None), strict=False)
 
 
@@ -119,7 +119,7 @@ def first_clear(
     steps: Callable[[OptionT], Procedure[object]],
     here: Pose,
 ) -> Procedure[OptionT]:
-    """Return the first option whose movements can all be made. Nothing moves.
+    """Return the first option whose movements are all possible. Nothing moves.
 
     Args:
         options: What there is to choose from, the best first.
@@ -167,11 +167,11 @@ def first_clear(
 
 @dataclass(frozen=True, slots=True)
 class ArmAhead:
-    """What an arm says about movements of its flange that nobody has made yet.
+    """An arm's answer about future movements of its flange.
 
     Attributes:
         group: The arm.
-        tool: The tool in force now, for which its controller answers.
+        tool: The selected tool now, for which its controller answers.
         selected: Its offset.
     """
 
@@ -181,20 +181,20 @@ class ArmAhead:
 
     @classmethod
     def of(cls, controller: Controller) -> "ArmAhead":
-        """Return the arm of a controller, with the tool that is in force."""
+        """Return the arm of a controller, with the selected tool."""
         group = controller.groups[0]
         tool = group.pose().tool or 0
         return cls(group, tool, controller.tools.read(tool) if tool else None)
 
     def considered(self, step: Consider, *, known: bool) -> tuple[str, ...]:
-        """Answer what a procedure wants to know; nothing where its places are not known."""
+        """Answer a procedure's question; nothing if its places are unknown."""
         # Where a person will have brought the tip is not known, so neither what is in the way.
         if not known:
             return nothing_in_the_way(step, known=known)
         return tuple(starmap(self.obstacle, considered(step)))
 
     def obstacle(self, move: Move, start: Pose | None) -> str:
-        """Return why the arm cannot make a movement of the flange, empty where it can."""
+        """Return why the arm cannot make a movement of the flange, empty if it can."""
         begin = None if start is None else self._tip(start)
         return self.group.obstacle(self._tip(move.target), move.path, start=begin)
 

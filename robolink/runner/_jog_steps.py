@@ -158,7 +158,7 @@ def typed_pose(text: str, here: Pose, settings: RunSettings) -> Pose:
 
 
 def way_in_words(before: Pose, after: Pose) -> str:
-    """Say that a jog is done, how far it went (measured), and where the tool is now.
+    """Report that a jog is done, how far it went (measured), and where the tool is now.
 
     Args:
         before: Where it was, mm and degrees.
@@ -225,7 +225,7 @@ def parse_steps(text: str) -> dict[str, float]:
 
 
 def refuse_decimal_comma(text: str) -> None:
-    """Refuse jog steps whose numbers are written with a comma: it parts two steps as well.
+    """Refuse jog steps with decimal commas: a comma also separates two steps.
 
     Raises:
         ConfigError: A number has one; the sentence says how to write it.

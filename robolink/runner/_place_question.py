@@ -1,4 +1,4 @@
-"""Asking a person to bring the tool somewhere: jog steps, then the word that it is there.
+"""Asks a person to move the tool somewhere: jog steps, then a confirmation.
 
 What is kept with the pose is how it was taken: after how long, and whether a contact input
 switched meanwhile. What it proves is for the procedure to say (docs/reference/evidence.md 1).
@@ -33,11 +33,12 @@ MOST_NOT_YET: Final = 3
 """So often a place is asked for that is not to be taken yet, before it ends the measurement."""
 
 AGAIN: Final = "taken_again"
-"""The code with which a person wants an earlier touch again."""
+"""The code of a person's request to repeat an earlier touch."""
 
 MOST_REFUSED: Final = 10
-"""So many answers in a row that lead nowhere end a question: whoever answers, a person or what
-stands in for one, would go on like that."""
+"""This many useless answers in a row end a question: a person, or a substitute, would continue in
+the same way.
+"""
 
 _QUESTIONS: Final = {
     TeachPrompt.PIN: Question.PLACE,
@@ -93,7 +94,7 @@ class PlaceQuestion:
         self._by_hand = isinstance(operator, GuidedOperator)
 
     def answer(self) -> TouchedAt:
-        """Ask until the person says that it is there; return the pose, and how it was taken.
+        """Ask until the person confirms the place; return the pose, and how it was taken.
 
         Raises:
             CalibrationError: ``typed_ahead``; ``taken_again`` where the person wants an earlier
@@ -140,7 +141,7 @@ class PlaceQuestion:
         return (self._controller.clock.now_ns() - self._asked_ns) / NS_PER_S
 
     def _again(self, word: str) -> "TakenAgainError | None":
-        """Return the end of this question by which an earlier touch is made again.
+        """Return the answer to this question that repeats an earlier touch.
 
         ``again`` alone is the one before, ``again 1`` the first; ``None`` where there is none.
         """
@@ -155,7 +156,7 @@ class PlaceQuestion:
         return TakenAgainError(int(named))
 
     def _looked_at(self, word: str) -> tuple[TouchedAt, NotYet | None]:
-        """Return where the tip is, by what the controller or a person says, and why not yet.
+        """Return where the tip is, by the controller or a person, and why not yet.
 
         Raises:
             ConfigError: What was typed is no pose that is taken.
@@ -175,7 +176,7 @@ class PlaceQuestion:
         if self._typed is None:
             raise ConfigError(
                 tr("A pose is typed only at a touch that a turn test proves afterwards."),
-                remedy=tr("Bring the tip onto it, and take it."),
+                remedy=tr("Jog the tip onto it, then take it."),
             )
         return self._typed(word, here)
 
@@ -198,7 +199,7 @@ class PlaceQuestion:
         return why or (step.judge(touch) if step.judge is not None else None)
 
     def _without_contact(self) -> NotYet | None:
-        """Say at once what whoever judges the touch would say of it."""
+        """Report at once what the check of the touch would say about it."""
         edge = self._step.contact
         if edge is None or self._contact is None or self._contact.look():
             return None
@@ -233,7 +234,7 @@ class PlaceQuestion:
         self._ask()
 
     def _jogged(self, word: str, refused: int) -> int:
-        """Jog; return how many jogs in a row were refused now."""
+        """Jog; return how many jogs in a row have now been refused."""
         try:
             again = self._jog(word)
             self._steps.add(parse_steps(word))
@@ -244,7 +245,7 @@ class PlaceQuestion:
         return 0
 
     def _refuse(self, error: ConfigError, refused: int) -> int:
-        """Say why something is not taken; return how many in a row were not now."""
+        """Report why an answer is refused; return how many in a row have now been refused."""
         if isinstance(error, JournalError):
             raise error  # no mistake of the person's: the record cannot be kept any more
         # A typing mistake ends nothing; the limits held and nothing was sent.
@@ -268,7 +269,7 @@ class PlaceQuestion:
 
 
 class TakenAgainError(CalibrationError):
-    """A person wants an earlier touch again.
+    """A person wants to repeat an earlier touch.
 
     A procedure that does not hear it ends, and is begun anew.
 
@@ -286,7 +287,7 @@ class TakenAgainError(CalibrationError):
 
 
 class _ContactWatch:
-    """Watches the input that shows contact while a person is asked."""
+    """Watches the contact input while a person is asked."""
 
     def __init__(self, io: DigitalIo, edge: InputEdge) -> None:
         self._io = io
@@ -300,12 +301,12 @@ class _ContactWatch:
         return on
 
     def switched(self) -> bool:
-        """Tell whether it shows contact now, and did not since the question."""
+        """Return whether it shows contact now, and did not since the question."""
         return self.look() and self._was_off
 
 
 def inputs_of(controller: Controller) -> DigitalIo:
-    """Return the inputs of a controller, one of which is to show contact.
+    """Return the inputs of a controller, one of which shows contact.
 
     Raises:
         ConfigError: It has none.
@@ -319,5 +320,5 @@ def inputs_of(controller: Controller) -> DigitalIo:
 
 
 def ended_by_operator() -> DeclinedError:
-    """Return the end that a person asked for; who puts a value back says so himself."""
-    return DeclinedError(tr("You stopped it."), remedy=tr("The robot stands still."))
+    """Return the end that a person requested; a caller that restores a value reports it itself."""
+    return DeclinedError(tr("You stopped it."), remedy=tr("The robot has stopped."))

@@ -1,4 +1,4 @@
-"""The person at the cell: how one is asked, and what a question, a movement or a remark is about.
+"""The person at the cell: how one is asked, and the subject of a question or a movement.
 
 A terminal that shows one line after the other needs the sentence alone. A screen draws: where the
 touches lie, how far each is off, where the arm goes. Both are asked the same questions and answer
@@ -17,7 +17,7 @@ POLL_S: Final = 1.0
 
 
 class Question(Enum):
-    """What kind of answer is wanted."""
+    """The kind of answer that is wanted."""
 
     PLACE = "place"
     """Jog steps until the tip is on the reference point, then an empty line."""
@@ -41,20 +41,20 @@ class Question(Enum):
 
 
 class Operator(Protocol):
-    """The person at the cell, or whoever stands in for one."""
+    """The person at the cell, or a substitute."""
 
     def tell(self, text: str) -> None:
         """Show something that needs no answer."""
 
     def ask(self, question: str, kind: Question) -> None:
-        """Show what is to be done or decided; :meth:`poll` fetches the answer."""
+        """Show what to do or decide; :meth:`poll` fetches the answer."""
 
     def poll(self, wait_s: float) -> str | None:
         """Return the next line of the answer, ``None`` if none came within ``wait_s``."""
 
 
 def awaited_line(operator: Operator, look: Callable[[], object], *, wait_s: float = POLL_S) -> str:
-    """Return the next line that a person types, looking at the controller while there is none.
+    """Return the next typed line; read the controller while there is none.
 
     Whoever asks a person fetches the answer here: an idle client is cut off after the remote
     time-out (docs/reference/epson.md 1.1), and a person may take longer than that to look into the
@@ -82,7 +82,7 @@ def awaited_line(operator: Operator, look: Callable[[], object], *, wait_s: floa
 
 @dataclass(frozen=True, slots=True)
 class AngleShown:
-    """What the touches of a turn test at one angle have shown.
+    """What the touches of a turn test have shown at one angle.
 
     Attributes:
         u_deg: The angle U of the tool.
@@ -98,7 +98,7 @@ class AngleShown:
 
 @dataclass(frozen=True, slots=True)
 class TouchSubject:
-    """A place to which a person brings the tip.
+    """A place to which a person moves the tip.
 
     Attributes:
         number: Which touch it is, from 1; 0 for a place that is no touch.
@@ -136,10 +136,10 @@ class TouchSubject:
 
 @dataclass(frozen=True, slots=True)
 class JogRange:
-    """Jogging for its own sake: nothing is measured, and it ends where the person leaves it.
+    """Jogging only: nothing is measured, and it ends where the person leaves it.
 
     Attributes:
-        start: Where the frame in force was when it began.
+        start: Where the selected frame was when it began.
         box: Where it may go.
     """
 
@@ -188,7 +188,7 @@ class FitSubject:
 
 @dataclass(frozen=True, slots=True)
 class MoveSubject:
-    """A movement that begins.
+    """A movement that starts.
 
     Attributes:
         target: Where to.
@@ -207,7 +207,7 @@ class MoveSubject:
 
 @dataclass(frozen=True, slots=True)
 class JogSubject:
-    """A step that a person made.
+    """A step by a person.
 
     Attributes:
         before, after: Where the tip was and is, as it was read.
@@ -221,7 +221,7 @@ class JogSubject:
 
 @dataclass(frozen=True, slots=True)
 class ChoiceRow:
-    """One of several things that a person may choose.
+    """One of several choices of a person.
 
     Attributes:
         does: What it does, a sentence.
@@ -234,7 +234,7 @@ class ChoiceRow:
 
 @dataclass(frozen=True, slots=True)
 class OfferedChoice:
-    """What a person may choose from. The first row is safe: whoever only presses ENTER gets it.
+    """The choices of a person. The first row is the safe one, which ENTER alone chooses.
 
     Attributes:
         title: What the question belongs to.
@@ -247,17 +247,17 @@ class OfferedChoice:
 
 @runtime_checkable
 class GuidedOperator(Operator, Protocol):
-    """An operator who is shown what it is about, before it is said or asked.
+    """An operator that is shown the subject before a message or a question.
 
     A person sits at it: what a hand cannot do is not taken from it.
     """
 
     def regard(self, subject: object) -> None:
-        """Take what comes next to be about ``subject``; one that is not known is left out."""
+        """Note ``subject`` as the subject of what comes next; an unknown one is ignored."""
 
 
 def regard(operator: Operator, subjects: Sequence[object]) -> None:
-    """Show an operator what comes next is about, where the operator is shown such things."""
+    """Show an operator the subject of what comes next, if the operator can show it."""
     if isinstance(operator, GuidedOperator):
         for subject in subjects:
             operator.regard(subject)

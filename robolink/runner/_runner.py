@@ -69,7 +69,7 @@ from robolink.sensing import median_spot, scatter_of, seen_in
 
 
 def ended_by(status: ControllerStatus) -> str:
-    """Return why a controller goes on with nothing, empty where it does."""
+    """Return why a controller cannot continue, empty if it can."""
     if status.serious_fault:
         return tr("The controller reported a serious error.")
     if status.emergency_stop:
@@ -102,7 +102,7 @@ class EndingWatch:
         self._had_power = False
 
     def obstacle(self, status: ControllerStatus) -> str:
-        """Return why nothing goes on, empty where it does."""
+        """Return why nothing can continue, empty if it can."""
         off = status.unpowered or status.disabled
         lost, self._had_power = off and self._had_power, self._had_power or not off
         return ended_by(status) or (tr("The motors went off.") if lost else "")
@@ -146,7 +146,7 @@ class Runner:
         tool: Number of the tool that it is about, for the record of what is answered; ``None``
             where it is about none or several.
 
-    Every answer is put on record here, and not by whoever asks; see :class:`Asking`.
+    Every answer is recorded here, and not by whoever asks; see :class:`Asking`.
 
     Example:
         >>> from robolink.model import Path, Pose, WorkBox
@@ -351,7 +351,7 @@ class Runner:
         return typed_pose(text, here, self._settings)
 
     def _seen_through(self, go: Callable[[], T], target: Pose) -> T:
-        """Move, and once more from where the robot stands if this computer was too busy to.
+        """Move, and again from where the robot is if this computer was too busy to.
 
         The controller has ended the movement, so that what follows is another one, to the same
         place; a person decides on it, a bounded number of times.
@@ -365,7 +365,7 @@ class Runner:
                 self._repeats_left -= 1
 
     def _stands(self, target: Pose) -> bool:
-        """Whether the robot rests, ready, with the tool in force that the step is meant for."""
+        """Whether the robot has stopped, is ready, and has the step's tool selected."""
         status = self._controller.status()
         return status.state is ControllerState.READY and self._group.pose().tool == target.tool
 
@@ -389,7 +389,7 @@ class Runner:
         return self.confirm_or(question, also=()) is True
 
     def confirm_or(self, question: str, *, also: Collection[str], decides: str = "") -> bool | str:
-        """Ask one that a further word may answer; see :meth:`Asking.confirm_or`.
+        """Ask a question that a further word may answer; see :meth:`Asking.confirm_or`.
 
         Args:
             question: What a yes agrees to.
@@ -414,7 +414,7 @@ class Runner:
         return self._asking.confirm_or(question, also=also, decides=decides)
 
     def choose(self, question: str, offered: OfferedChoice) -> int:
-        """Have one of several rows chosen under the same watch; see :meth:`Asking.choose`."""
+        """Let a person choose one of several rows under this watch; see :meth:`Asking.choose`."""
         return self._asking.choose(question, offered)
 
     def ask_text(self, question: str) -> str:
@@ -456,14 +456,14 @@ class Runner:
 
 
 def _answer(done: StepDone) -> Pose | bool | str | None:
-    """Return what a procedure is sent for a step: an offer that nobody heard is not accepted."""
+    """Return the answer to a procedure's step: an offer that nobody heard is declined."""
     if isinstance(done.step, Confirm):
         return done.word or done.accepted is True
     return done.pose
 
 
 def ask_for_pose(instruction: str, jog: JogRange | None = None) -> Procedure[Pose]:
-    """Let a person bring the tool somewhere, for its own sake; returns the pose there.
+    """Let a person move the tool somewhere, without a measurement; returns the pose there.
 
     Args:
         instruction: What the person is to do.

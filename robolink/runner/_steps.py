@@ -1,4 +1,4 @@
-"""The vocabulary in which a procedure asks for things to happen.
+"""The steps that a procedure can ask for.
 
 A procedure is a generator. It yields steps and is sent what came of them; its return value
 is a proposal. It knows no controller, no clock and no person, so it can be tested by feeding
@@ -20,12 +20,12 @@ from robolink.runner._prompt_context import FitSubject, JogRange, TouchSubject
 from robolink.timing import NS_PER_S, Clock
 
 FINEST_STEP: Final = 0.1
-"""The last step before a touch is not longer, in mm or degrees: who comes in steps of a millimetre
-stops up to half of one away (docs/decisions/0041)."""
+"""Longest last step before a touch, in mm or degrees: with steps of a millimetre a person stops up
+to half of one away (docs/decisions/0041).
+"""
 
 SETTLING_S: Final = 0.3
-"""So long after a step of its own a hand is not believed: the key was pressed for what came
-before."""
+"""For this long after a step keys are ignored: they were pressed for what came before."""
 
 OLDEST_READING_S: Final = 1.0
 """What took longer to read is not where the tip is now."""
@@ -35,7 +35,7 @@ _ROUNDING: Final = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class NotYet:
-    """Why a place is not taken.
+    """Why a place is refused.
 
     Attributes:
         code: By which a program knows it, and with which it ends when it is asked for again and
@@ -64,12 +64,12 @@ class StepsTaken:
         self._ended_ns: int | None = None
 
     def add(self, deltas: Mapping[str, float]) -> None:
-        """Take a step that has just ended, mm and degrees by axis."""
+        """Add a step that has just ended, mm and degrees by axis."""
         self._last = max(map(abs, deltas.values()), default=0.0)
         self._ended_ns = self._clock.now_ns()
 
     def too_coarse(self) -> NotYet | None:
-        """Refuse a place that was reached by a long step."""
+        """Refuse a place that a long step reached."""
         if self._last <= FINEST_STEP + _ROUNDING:
             return None
         return NotYet(
@@ -81,7 +81,7 @@ class StepsTaken:
         )
 
     def too_soon(self) -> NotYet | None:
-        """Refuse what a hand cannot have meant."""
+        """Refuse what a person cannot have meant."""
         ended_ns = self._ended_ns
         if ended_ns is None or (self._clock.now_ns() - ended_ns) / NS_PER_S >= SETTLING_S:
             return None
@@ -94,7 +94,7 @@ def still_moving() -> NotYet:
 
 
 def no_contact(number: int) -> NotYet:
-    """Return that the input which is to show contact shows none."""
+    """Return that the contact input shows no contact."""
     return NotYet(
         "not_touched",
         tr("Contact input {n} is off: the tip does not touch.", n=number),
@@ -102,13 +102,13 @@ def no_contact(number: int) -> NotYet:
 
 
 def old_reading(seconds: float) -> NotYet:
-    """Return that the controller took so long to say where the tip is."""
+    """Return that the controller took too long to report where the tip is."""
     return NotYet("old_reading", tr("No reading from the controller for {s} s.", s=round(seconds)))
 
 
 @dataclass(frozen=True, slots=True)
 class Move:
-    """Drive the frame in force to ``target``; answered with the pose that was reached.
+    """Drive the selected frame to ``target``; answered with the pose that was reached.
 
     Attributes:
         target: Where to.
@@ -126,7 +126,7 @@ class Move:
 
 
 class TeachPrompt(Enum):
-    """What a person shows with the pose to which they bring the tool."""
+    """What a person shows with the pose to which they move the tool."""
 
     PIN = "pin"
     """The tip is on the reference point."""
@@ -143,7 +143,7 @@ class TeachPrompt(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Ask:
-    """Let a person bring the tool somewhere; answered with :class:`TouchedAt`, the pose then.
+    """Let a person move the tool somewhere; answered with :class:`TouchedAt`, the pose then.
 
     When answers keep coming before anybody could have read the question, whoever runs the
     procedure throws CalibrationError ``typed_ahead`` into it. The frame is then where it was.
@@ -171,7 +171,7 @@ class Ask:
 
 @dataclass(frozen=True, slots=True)
 class Seek:
-    """Drive the frame in force straight on until an input switches; answered with the pose then.
+    """Drive the selected frame straight on until an input switches; answered with the pose then.
 
     When the input shows the edge already, or not on the way, whoever runs the procedure throws
     CalibrationError ``edge_passed`` or ``no_edge`` into it. The frame is then where it was, or
@@ -186,7 +186,7 @@ class Seek:
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """Have the camera say where it sees a mark; answered with :class:`SeenAt`.
+    """Let the camera report where it sees a mark; answered with :class:`SeenAt`.
 
     When it sees none, or two, whoever runs the procedure throws CalibrationError
     ``tip_not_seen``, ``several_tips_seen`` and their like into it.
@@ -211,7 +211,7 @@ def _as_it_is(pose: Pose) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SeenAt(Pose):
-    """The pose of the frame in force, and where the camera saw the mark meanwhile.
+    """The pose of the selected frame, and where the camera saw the mark at that time.
 
     Attributes:
         spot: Where, in the camera's unit.
@@ -248,7 +248,7 @@ class SeenAt(Pose):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TouchedAt(Pose):
-    """The pose of the frame in force when a person said that it was there, and how it came there.
+    """The selected frame's pose at a person's confirmation, and how it got there.
 
     Attributes:
         seconds: From the question to the answer, by the controller's clock; ``None`` where nobody
@@ -299,7 +299,7 @@ class TouchedAt(Pose):
 
 @dataclass(frozen=True, slots=True)
 class Consider:
-    """Find out which movements could not be made; answered with one text for each of them.
+    """Find out which movements are impossible; answered with one text for each of them.
 
     Nothing moves. The text says why not; it is empty where nothing is known against it, and in a
     look ahead, where the places are only foreseen.
@@ -316,7 +316,7 @@ class Consider:
 
 @dataclass(frozen=True, slots=True)
 class Notify:
-    """Let a person know how it goes; answered with ``None``.
+    """Show a person the progress; answered with ``None``.
 
     Attributes:
         text: In a sentence.
@@ -345,7 +345,7 @@ class Confirm:
 
 
 TakenStep = Move | Ask | Seek | Look | Notify | Confirm
-"""What happens in the cell, or to a person; it is told of and foreseen."""
+"""A step in the cell, or for a person; it is reported and previewed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -371,7 +371,6 @@ Step = TakenStep | Consider
 T = TypeVar("T")
 
 Procedure = Generator[Step, Any, T]
-"""Yields steps, is sent what each step is answered with, returns a result.
-
-The type of an answer follows from the step, which a generator's type cannot say.
+"""Yields steps, receives the answer of each step, returns a result. The type of an answer follows
+from the step, which a generator's type cannot express.
 """

@@ -1,4 +1,4 @@
-"""Asking a person for a word: what counts as a yes and as a no, and the record of the answer."""
+"""Asks a person for a word: what counts as a yes and as a no, and the record of the answer."""
 
 import unicodedata
 from collections.abc import Callable, Collection
@@ -22,13 +22,13 @@ MORE: Final = "more"
 """The word for one more touch than planned."""
 
 BACK: Final = "back"
-"""The word for going back to the touches."""
+"""The word for returning to the touches."""
 
 _NO: Final = frozenset({"n", "no", "nein", "否"})
 
 
 def yes_or_no(line: str) -> bool | None:
-    """Return what a typed line says; ``None`` when it is neither a yes nor a no."""
+    """Return the meaning of a typed line; ``None`` for neither a yes nor a no."""
     word = line.strip().casefold()
     if word in _YES:
         return True
@@ -36,7 +36,7 @@ def yes_or_no(line: str) -> bool | None:
 
 
 def ask_yes_no(operator: Operator, question: str, answer: Callable[[], str]) -> bool:
-    """Ask; what is neither yes nor no is asked once more, and then it is a no.
+    """Ask; an answer that is neither yes nor no is asked once more, then it is a no.
 
     A barcode or a key held down is neither, and must not decide anything.
 
@@ -62,7 +62,7 @@ def ask_yes_no(operator: Operator, question: str, answer: Callable[[], str]) -> 
 def ask_yes_no_or(
     operator: Operator, question: str, answer: Callable[[], str], *, also: Collection[str]
 ) -> bool | str:
-    """Ask as :func:`ask_yes_no` does, of somebody who may also answer with one of further words.
+    """Ask as :func:`ask_yes_no` does, a person who may also answer with a further word.
 
     Args:
         operator: Who is asked.
@@ -146,7 +146,7 @@ class Asking:
         return said
 
     def choose(self, question: str, offered: OfferedChoice) -> int:
-        """Have one of several rows chosen; return its index, 0 where no other was clearly meant.
+        """Let a person choose a row; return its index, 0 if no other was clearly meant.
 
         Args:
             question: What is asked.
@@ -224,7 +224,7 @@ def _listed(offered: OfferedChoice) -> list[str]:
 
 
 def _row_meant(line: str, count: int) -> int | None:
-    """Return the index of the row that a line means, ``None`` for none of them."""
+    """Return the index of the row that a line means, ``None`` for none."""
     word = unicodedata.normalize("NFKC", line)
     if word in ("", "q"):
         return 0

@@ -1,4 +1,4 @@
-"""Two crossed light beams that a program drove its tip through, edge by edge."""
+"""Two crossed light beams through which a program moved its tip, edge by edge."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import astuple, dataclass, field, replace
@@ -22,8 +22,9 @@ LEAST_OF_A_ROUND: Final = 4
 """Each beam both ways."""
 
 LEAST_TURN_DEG: Final = 60.0
-"""From 60 degrees on, a proof shows beams that were moved by e as a drift of e or more:
-2 e sin(turn / 2)."""
+"""From 60 degrees on, a turn test shows beams that were moved by e as a drift of e or more: 2 e
+sin(turn / 2).
+"""
 
 LEAST_SHAFT_MM: Final = 1.0
 """How much deeper the shaft is crossed, at least, so that its lean shows."""
@@ -34,7 +35,7 @@ _ONE_ANGLE_DEG: Final = 1.0
 
 @dataclass(slots=True)
 class _Travels:
-    """Crossings in the order in which they came, and the edge at which the tip went in last."""
+    """Crossings in the order in which they came, and the last edge at which the tip entered."""
 
     crossings: "list[Crossing]" = field(default_factory=list)
     entered: tuple[int, Pose] | None = None
@@ -80,7 +81,7 @@ class ProgramCrossings:
         self._measured, self._proving = _Travels(), _Travels()
 
     def add(self, flange: Pose, seen: Sequence[str], *, proof: bool) -> int:
-        """Take an edge; see ``ProgramMeasure``.
+        """Add an edge; see ``ProgramMeasure``.
 
         Raises:
             CalibrationError: ``no_edge``, ``edge_order`` or ``too_many_poses``.
@@ -159,7 +160,7 @@ class ProgramCrossings:
         written: ToolOffset,  # noqa: ARG002
         proof: "VerifyResult",
     ) -> "VerifyResult":
-        """Return the proof, which counts from there already; see ``ProgramMeasure``."""
+        """Return the turn test, which already counts from there; see ``ProgramMeasure``."""
         return proof
 
     def on_record(self) -> Mapping[str, object]:
@@ -182,7 +183,7 @@ class ProgramCrossings:
 
 
 def _deeper_mm(crossings: "Sequence[Crossing]", shaft: "Sequence[Crossing]") -> float:
-    """Return how much deeper the shaft was crossed; it tells where the end of a needle is.
+    """Return how much deeper the shaft was crossed; it shows where the end of a needle is.
 
     Raises:
         CalibrationError: ``shaft_not_crossed``, ``too_few_poses``.
@@ -225,7 +226,7 @@ def _both_ways(result: "CalibrationResult") -> "CalibrationResult":
 
 
 def _require_turned(poses: Sequence[Pose], measured: Sequence[Pose]) -> None:
-    """Refuse a proof at the angle of the measurement: beams that were moved show alike there."""
+    """Refuse a test at the angle of the measurement: moved beams would look the same there."""
     turns_deg = [
         abs(angle_difference_deg(_heading_deg(one), _heading_deg(other)))
         for one in poses
@@ -250,7 +251,7 @@ def _is_at(crossing: "Crossing", heading_deg: float) -> bool:
 
 
 def _headings(crossings: "Sequence[Crossing]") -> list[float]:
-    """Return the angles at which the beams were crossed, each once."""
+    """Return the angles of the crossings, each once."""
     found: list[float] = []
     for crossing in crossings:
         if not any(_is_at(crossing, heading_deg) for heading_deg in found):

@@ -1,4 +1,4 @@
-"""What a program's change leaves in the journal: open from before it may write to its end.
+"""A program's change in the journal: open from before it may write to its end.
 
 Source: docs/reference/rules.md 6, with the program in the place of the driver. The marker is the
 one of any tool change, so ``robolink recover`` settles it where the controller can be read.
@@ -54,7 +54,7 @@ class ProgramChange:
         self._marker = marker
 
     def note(self, kind: EntryKind, verdict: str, **details: object) -> None:
-        """Put something about it on record.
+        """Record something about it.
 
         Raises:
             JournalError: It is not stored.
@@ -62,7 +62,7 @@ class ProgramChange:
         self._log.append(self._entry(kind, verdict, details))
 
     def allow_keeping(self, verdict: str, **details: object) -> None:
-        """Put the proof on record, durably, before the program is told to keep the value.
+        """Record the turn test durably, before the program is told to keep the value.
 
         Raises:
             JournalError, BusyError: It is not stored, or another works on the controller.
@@ -73,21 +73,21 @@ class ProgramChange:
         self.note(EntryKind.VERIFY, verdict, **details)
 
     def end_kept(self, value: ToolOffset | None) -> bool:
-        """Close it as kept; false, and on record as a conflict, where that cannot be."""
+        """Close it as kept; return false, and record a conflict, if that is impossible."""
         if self.proved and same_thousandths(value, self.requested):
-            self._close(EntryKind.DONE, tr("proved, and kept by the program"), value)
+            self._close(EntryKind.DONE, tr("tested, and kept by the program"), value)
             return True
         return self._conflict(value)
 
     def end_restored(self, value: ToolOffset | None) -> bool:
-        """Close it as put back; false, and on record as a conflict, where that cannot be."""
+        """Close it as restored; return false, and record a conflict, if that is impossible."""
         if same_thousandths(value, self.before):
-            self._close(EntryKind.ROLLED_BACK, tr("put back by the program"), value)
+            self._close(EntryKind.ROLLED_BACK, tr("restored by the program"), value)
             return True
         return self._conflict(value)
 
     def end_never_written(self, value: ToolOffset | None) -> bool:
-        """Close it where the program never kept it open; false where the tool is another."""
+        """Close it if the program never kept it open; false if the tool is another."""
         if same_thousandths(value, self.before):
             self._close(EntryKind.NOT_APPLIED, tr("never written by the program"), value)
             return True
@@ -118,7 +118,7 @@ class ProgramChange:
 
 
 def record_name(serial: str, robot: int, controllers: Collection[str]) -> str:
-    """Return the name under which a robot is on record; empty where it has no number of its own.
+    """Return the name under which a robot is recorded; empty if it has no number of its own.
 
     Args:
         serial: What RobotSerial$ gives.
@@ -144,7 +144,7 @@ def record_name(serial: str, robot: int, controllers: Collection[str]) -> str:
 def begin_change(
     log: "JournalOutcomeLog", tool: int, before: ToolOffset | None, requested: ToolOffset
 ) -> ProgramChange:
-    """Store that a program is about to write a tool, durably, and take the lease.
+    """Store durably that a program is about to write a tool, and take the lease.
 
     Raises:
         JournalError: It is not stored; the program must not get the value.

@@ -1,4 +1,4 @@
-"""What a program's measurement is held to, whatever it measured with."""
+"""The limits of a program's measurement, whatever it measured with."""
 
 import math
 from collections.abc import Sequence
@@ -21,7 +21,7 @@ _SAME_MM: Final = 0.002
 
 @dataclass(frozen=True, slots=True)
 class CallbackLimits:
-    """What a program's measurement is held to.
+    """The limits of a program's measurement.
 
     Attributes:
         tolerance_mm: Largest drift about the new tip, and how far from the truth it may be in
@@ -54,7 +54,7 @@ def believed(
     limits: CallbackLimits,
     facts: "AccuracyFacts",
 ) -> "CalibrationResult":
-    """Return a result with what it is accurate to; refuse what nobody who looks on would catch.
+    """Return a result with its accuracy; refuse what nobody watching would catch.
 
     Args:
         result: What was measured.
@@ -78,7 +78,7 @@ def believed(
 
 
 def _require_known(result: "CalibrationResult", limit_mm: float) -> None:
-    """Refuse an offset that may be further off than is allowed, or of which nothing says it.
+    """Refuse an offset that may be further off than is allowed, or whose accuracy is unknown.
 
     Raises:
         CalibrationError: ``uncertain``, or ``not_judged``.
@@ -90,8 +90,8 @@ def _require_known(result: "CalibrationResult", limit_mm: float) -> None:
         raise CalibrationError(
             "uncertain",
             tr(
-                "The tip is known within {within:.3f} mm; {limit:g} mm are allowed. The largest "
-                "part is: {row}.",
+                "The tip is accurate to {within:.3f} mm; the limit is {limit:g} mm. Largest "
+                "row: {row}.",
                 within=accuracy.within_mm,
                 limit=limit_mm,
                 row=accuracy.largest.title,
@@ -122,7 +122,7 @@ def require_poses_sent(count: int, least: int) -> None:
 
 
 def require_own(poses: Sequence[Pose], used: Sequence[Pose]) -> None:
-    """Refuse poses of a proof that were used for the measurement: they would prove nothing.
+    """Refuse test poses that the measurement used: they would confirm nothing.
 
     Raises:
         CalibrationError: ``proof_is_a_copy``.

@@ -1,4 +1,4 @@
-"""A tip that the calibrated camera of a program saw, at its places and beside them."""
+"""A tip that a program's calibrated camera saw, at its places and beside them."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -48,7 +48,7 @@ class LookPair:
 
     @property
     def way_mm(self) -> float:
-        """How far the robot went between them."""
+        """How far the robot moved between them."""
         one, other = self.beside.flange, self.at.flange
         return math.dist((one.x_mm, one.y_mm), (other.x_mm, other.y_mm))
 
@@ -155,7 +155,7 @@ class ProgramLooks:
         self._proving: list[Sighting] = []
 
     def add(self, flange: Pose, seen: Sequence[str], *, proof: bool) -> int:
-        """Take a look; see ``ProgramMeasure``.
+        """Add a look; see ``ProgramMeasure``.
 
         Raises:
             CalibrationError: ``tip_not_seen``, ``several_tips_seen`` or ``too_many_poses``.
@@ -192,7 +192,7 @@ class ProgramLooks:
         return solve_camera_round(looks, stored=stored, sigma_mm=self._limits.sigma_mm)
 
     def prove(self, result: "CalibrationResult", written: ToolOffset) -> "VerifyResult":
-        """Return how far from where the controller puts it the tip is seen; see ``ProgramMeasure``.
+        """Return how far from its place by the controller the tip is seen; see ``ProgramMeasure``.
 
         Raises:
             CalibrationError: ``too_few_poses``, ``picture_stands_still``, ``no_look_beside``,
@@ -239,7 +239,7 @@ class ProgramLooks:
         written: ToolOffset,  # noqa: ARG002
         proof: "VerifyResult",
     ) -> "VerifyResult":
-        """Return the proof, which counts from there already; see ``ProgramMeasure``."""
+        """Return the turn test, which already counts from there; see ``ProgramMeasure``."""
         return proof
 
     def on_record(self) -> Mapping[str, object]:
@@ -270,7 +270,7 @@ def _at_places(looks: "Sequence[Sighting]", least: int) -> "list[Sighting]":
 
 
 def _require_new_pictures(looks: "Sequence[Sighting]") -> None:
-    """Refuse pictures that stand still: they show any offset by which the tool was turned.
+    """Refuse pictures that do not change: they confirm any offset about which the tool turned.
 
     A tip that is turned about itself is seen at one place, but never to the last digit.
 

@@ -1,4 +1,4 @@
-"""One program and what it is answered, line by line; no socket here.
+"""One program and its answers, line by line; no socket here.
 
 Each question is answered by one line. What cannot be understood ends the conversation without an
 answer, and the program, left without one, puts the old value back.
@@ -72,7 +72,7 @@ _LENGTHS: Final = {
 """Questions, and how many fields each has; of a pose the method decides how many."""
 
 _POSE_FIELDS: Final = 7
-"""The tool in force, and six lengths and angles; what was seen there follows."""
+"""The selected tool, and six lengths and angles; what was seen there follows."""
 
 
 @dataclass(slots=True)
@@ -93,7 +93,7 @@ class CallbackConversation:
     """Answers one program.
 
     Args:
-        journal: Where all is put on record.
+        journal: Where all is recorded.
         limits: What its measurements are held to.
         peer: From where it calls, as a person may read it.
         signature: Who watches over it, and with what software.
@@ -173,12 +173,12 @@ class CallbackConversation:
         return CallbackLine(line.number, word, fields)
 
     def beat(self) -> None:
-        """Let others see that a change is under way."""
+        """Show others that a change is in progress."""
         if self._log is not None:
             self._log.beat()
 
     def close(self) -> None:
-        """Give the lease up. What is open stays open until the program, or a person, tells."""
+        """Release the lease. What is open stays open until program or person says how it ended."""
         if self._log is not None:
             self._log.close()
 
@@ -203,7 +203,7 @@ class CallbackConversation:
         return CallbackWord.WELCOME, ()
 
     def _settle(self, operation: str, tool: int, value: ToolOffset | None, *, kept: bool) -> None:
-        """Close what the program was in the middle of when the link was cut."""
+        """Close the program's change when the link is cut."""
         log = self._require_log()
         changes, _ = open_changes(log)
         for change in changes:
@@ -329,7 +329,7 @@ class CallbackConversation:
         assert run.facts is not None  # noqa: S101 - a value was given
         proof = proved(run.measure, run.result, change.requested, run.facts)
         change.allow_keeping(
-            tr("proved by what the program saw after it wrote"),
+            tr("confirmed by what the program saw after the write"),
             max_drift_mm=proof.max_drift_mm,
             tolerance_mm=self._limits.tolerance_mm,
             warnings=list(proof.warnings),
@@ -353,7 +353,7 @@ class CallbackConversation:
     # What stands.
 
     def _refused(self, error: RobolinkError) -> Answer:
-        """Put a refusal on record; a program that has written puts the old value back."""
+        """Record a refusal; a program that has written restores the old value."""
         code = error.code if isinstance(error, CalibrationError) else _code(error)
         run, log = self._run, self._log
         self._say(code, error)
@@ -377,7 +377,7 @@ class CallbackConversation:
         return CallbackWord.REFUSE, (code,)
 
     def _unrecorded(self, code: str, error: RobolinkError, *, besides: RobolinkError) -> str:
-        """Tell why a refusal is not on record, unless it was refused for that; return the code."""
+        """Report why a refusal was not recorded, unless it was refused for it; return the code."""
         if str(error) != str(besides):
             self._say(code, error)
         return code

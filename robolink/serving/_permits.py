@@ -1,4 +1,4 @@
-"""A PLC's program says by its permit where its tip touches; robolink writes, and is proved right.
+"""A PLC's program permits robolink to read where its tip touches, to write, and to test.
 
 The permit (``xPermit``) is all that a program tells a client of the profile ``tools`` of its own
 accord. While a contact gives it, its coming says that the tip, clear before, touches now
@@ -34,7 +34,7 @@ _SEEN: Final = ("1", "1")
 
 @dataclass(frozen=True, slots=True)
 class PermitPlan:
-    """What the program of a PLC does, as both sides agreed.
+    """The actions of a PLC's program, as agreed by both sides.
 
     Attributes:
         tool: The slot that it measures.
@@ -77,7 +77,7 @@ class PermitPlan:
 
 
 def free_machine(controller: Controller, *, patience_s: float = 12.0) -> None:
-    """Take a mailbox, so that it is given back at the end of the session.
+    """Take a mailbox, so that it is released at the end of the session.
 
     A process that was killed after its change was on record as settled never gave it back, and the
     machine's program still waits for that. What is not settled keeps it blocked.
@@ -110,7 +110,7 @@ def free_machine(controller: Controller, *, patience_s: float = 12.0) -> None:
 
 
 class PermitCall:
-    """One calibration that a PLC's program asks for, over one connection.
+    """One calibration requested by a PLC's program, over one connection.
 
     Args:
         controller: The PLC, connected. Closed afterwards, it is given back, unless something is
@@ -160,7 +160,7 @@ class PermitCall:
         self._touches = touches_by(plan.method, limits)
 
     def answer(self) -> ToolOffset | None:
-        """Wait for the touches, write, prove, and keep the value or put the old one back.
+        """Wait for the touches, write, test, and keep the value or restore the old one.
 
         Returns:
             The value that is kept; ``None`` where nobody called.
@@ -200,7 +200,7 @@ class PermitCall:
             for _ in range(plan.proofs):
                 self._take(self._next(), written, proof=True)
             proved(self._touches, result, written, facts)
-            change.keep(tr("proved by what the program touched after the write"))
+            change.keep(tr("confirmed by what the program touched after the write"))
         return written
 
     @property
@@ -228,7 +228,7 @@ class PermitCall:
         return pose
 
     def _touch(self, patience_s: float | None) -> Pose | None:
-        """Return the pose at the next touch; ``None`` where it did not come.
+        """Return the pose at the next touch; ``None`` if it did not come.
 
         It counts where the permit was off at a look before, and the group stands still.
         """
@@ -243,7 +243,7 @@ class PermitCall:
         return None
 
     def _stood(self, controller: Controller) -> Pose:
-        """Return where it stands, once nothing changed while it was looked at."""
+        """Return where it is, once two reads show no change."""
         selected, pose = controller.tools.selected(), controller.groups[0].pose()
         again, status = controller.groups[0].pose(), controller.status()
         if pose != again or not (status.remote and status.ready):

@@ -1,4 +1,4 @@
-"""A tip that a program brought onto a pin, touch by touch."""
+"""A tip that a program moved onto a pin, touch by touch."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -28,7 +28,7 @@ LEAST_PROOFS: Final = 2
 
 @dataclass(slots=True)
 class _Touches:
-    """Poses of the flange at which a program says that its tip was on the pin.
+    """Poses of the flange at which a program reports that its tip was on the pin.
 
     Attributes:
         poses: They, in the order in which they came.
@@ -67,7 +67,7 @@ class ProgramTouches:
         self._measured, self._proving = _Touches(), _Touches()
 
     def add(self, flange: Pose, seen: Sequence[str], *, proof: bool) -> int:
-        """Take a touch; see ``ProgramMeasure``."""
+        """Add a touch; see ``ProgramMeasure``."""
         touches = self._proving if proof else self._measured
         require_room(len(touches.poses))
         touches.poses.append(flange)
@@ -80,7 +80,7 @@ class ProgramTouches:
         return self._method.solve(self._measured.poses, stored)
 
     def prove(self, result: "CalibrationResult", written: ToolOffset) -> "VerifyResult":
-        """Return what touches of their own of the same point show; see ``ProgramMeasure``.
+        """Return what separate touches of the same point show; see ``ProgramMeasure``.
 
         Raises:
             CalibrationError: ``touches_not_witnessed``, ``too_few_poses``, ``proof_is_a_copy``,
@@ -123,7 +123,7 @@ class ProgramTouches:
 
 
 def touches_by(method: str, limits: CallbackLimits) -> ProgramTouches:
-    """Return touches of a pin, ``n-angle`` or ``pivot``, of which there is none yet."""
+    """Return an empty set of touches of a pin, ``n-angle`` or ``pivot``."""
     if method == "pivot":
         from robolink.methods.pivot import PivotTouches
 

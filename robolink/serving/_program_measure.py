@@ -1,4 +1,4 @@
-"""What a program may measure with, how sure a cell is of it, and what its proof is held to."""
+"""What a program may measure with, its accuracy in a cell, and the limits of its turn test."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, ClassVar, Protocol
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class ProgramMeasure(Protocol):
-    """What one calibration of a program measures, and proves, with.
+    """What one calibration of a program measures and tests with.
 
     Attributes:
         length: How many fields follow a pose.
@@ -28,7 +28,7 @@ class ProgramMeasure(Protocol):
     by_contact: ClassVar[bool]
 
     def add(self, flange: Pose, seen: Sequence[str], *, proof: bool) -> int:
-        """Take a flange pose and what was seen there; return how many there are now.
+        """Add a flange pose and what was seen there; return how many there are now.
 
         Raises:
             CalibrationError: It is refused.
@@ -36,7 +36,7 @@ class ProgramMeasure(Protocol):
         """
 
     def solve(self, stored: ToolOffset) -> "CalibrationResult":
-        """Return the offset that was measured; what is not measured is kept from ``stored``.
+        """Return the measured offset; what is not measured is kept from ``stored``.
 
         Raises:
             CalibrationError: Nothing trustworthy follows; its code says why.
@@ -52,7 +52,7 @@ class ProgramMeasure(Protocol):
     def from_place(
         self, result: "CalibrationResult", written: ToolOffset, proof: "VerifyResult"
     ) -> "VerifyResult":
-        """Return a proof as drifts from the place that was measured or is known."""
+        """Return a turn test as drifts from the measured or known place."""
 
     def on_record(self) -> Mapping[str, object]:
         """Return what was measured, plain JSON."""
@@ -61,7 +61,7 @@ class ProgramMeasure(Protocol):
 def measure_named(
     name: str, limits: CallbackLimits, station: Callable[[str, StationKind], "Station"]
 ) -> ProgramMeasure:
-    """Return what a program asked for: a method, and behind ``@`` the station it stands at.
+    """Return a program's choice: a method, and behind ``@`` its station.
 
     Args:
         name: ``n-angle``, ``pivot``, ``camera``, or ``beams@STATION``.
@@ -126,7 +126,7 @@ def facts_for_program(
 
 
 def statements_on_record(result: "CalibrationResult") -> dict[str, object]:
-    """Return what the journal keeps of how sure a result is, plain JSON."""
+    """Return a result's accuracy as the journal stores it, plain JSON."""
     return {
         "known_within_mm": result.repeatable_to_mm,
         "repeatable_to_mm": result.repeatable_to_mm,
@@ -142,7 +142,7 @@ def proved(
     written: ToolOffset,
     facts: "AccuracyFacts",
 ) -> "VerifyResult":
-    """Return the proof of a value that was written; refuse one that contradicts its measurement.
+    """Return the turn test of a written value; refuse one that contradicts its measurement.
 
     A contradiction of the scatter alone passes where what it shows lies within what the result is
     accurate to; nobody looks on who could be asked (docs/reference/evidence.md 20).

@@ -1,4 +1,4 @@
-"""Listens for programs: one thread for each that calls, and a bound on how many."""
+"""Listens for programs: one thread for each caller, and a limit on how many."""
 
 import ipaddress
 import socket
@@ -92,13 +92,13 @@ class CallbackServer:
         self.address: tuple[str, int] = self._listener.getsockname()[:2]
 
     def start(self) -> None:
-        """Begin to listen, in a thread of its own."""
+        """Start listening, in a thread of its own."""
         thread = threading.Thread(target=self._listen, name="robolink-serve", daemon=True)
         self._threads.append(thread)
         thread.start()
 
     def close(self) -> None:
-        """Cut every program off, each of which puts back what is not kept, and end."""
+        """Disconnect every program, which then restores what was not kept, and end."""
         self._closed = True
         with self._lock:
             links = tuple(self._links)
@@ -150,7 +150,7 @@ class CallbackServer:
         self._threads = [one for one in self._threads if one.is_alive()] + [thread]
 
     def _refusal(self, peer: str) -> str:
-        """Return why a program is cut off unheard; empty where it is admitted."""
+        """Return why a program is disconnected unheard; empty if it is admitted."""
         ip = _ip(peer)
         allowed = ip in self._allowed if self._allowed else ipaddress.ip_address(ip).is_loopback
         if not allowed:

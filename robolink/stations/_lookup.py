@@ -1,4 +1,4 @@
-"""The stations of a cell: what the cell file declares, with what the journal has learnt since."""
+"""The stations of a cell: those of the cell file, with what the journal has learnt since."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -119,7 +119,7 @@ def _station(name: str, said: object) -> Station:
 
 
 def _together(declared: Station, learnt: Station) -> Station:
-    """Return what a measurement found, with what only the cell file says."""
+    """Return what a measurement found, with what only the cell file states."""
     return replace(
         learnt,
         x_mm=declared.x_mm if learnt.x_mm is None else learnt.x_mm,
@@ -141,7 +141,7 @@ _TURN_DEG: Final = 360.0
 
 
 def base_now(controller: Controller) -> tuple[float, ...] | None:
-    """Read where the base stands that positions count from.
+    """Read the place of the base, from which positions count.
 
     Args:
         controller: The controller, connected.
@@ -159,7 +159,7 @@ def base_now(controller: Controller) -> tuple[float, ...] | None:
 
 
 def learnt_elsewhere(controller: Controller, station: Station) -> tuple[float, ...] | None:
-    """Return the base that stands now, if a station was learnt in another one; else ``None``.
+    """Return the present base, if a station was learnt in another one; else ``None``.
 
     Nothing is asked for a station whose base is not on record.
 
@@ -174,7 +174,7 @@ def learnt_elsewhere(controller: Controller, station: Station) -> tuple[float, .
 
 
 def require_base_of(controller: Controller, station: Station) -> None:
-    """Refuse to use a station that was learnt in another base: its place is another one now.
+    """Refuse a station that was learnt in another base: its place has changed.
 
     Args:
         controller: The controller, connected.

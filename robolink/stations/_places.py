@@ -1,4 +1,4 @@
-"""From a station to what a procedure works with."""
+"""From a station to the values that a procedure uses."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -129,7 +129,7 @@ def pin_of(station: Station) -> "Pin":
 
 
 def _three_axes(rows: object, sigma_mm: float) -> tuple[tuple[float, ...], ...]:
-    """Return the covariance of a pin; of an axis that was not measured what is known of all."""
+    """Return the covariance of a pin; an unmeasured axis has that of all."""
     if not isinstance(rows, Sequence) or len(rows) not in (2, 3):
         return ()
     place = [[sigma_mm**2 if i == j else 0.0 for j in range(3)] for i in range(3)]
@@ -174,7 +174,7 @@ def beam_station(station: Station) -> BeamStation:
 
 
 def _beam(line: Mapping[str, float], sigma_mm: float) -> "Beam":
-    """Return a beam as it is on record; one of before says nothing of how sure it is."""
+    """Return a beam as recorded; an old record has no uncertainty."""
     from robolink.calibration import Beam  # numpy, which a look does without
 
     return from_fields(Beam, {"sigma_mm": sigma_mm, **line}, partial=True)
@@ -206,7 +206,7 @@ def camera_station(station: Station) -> CameraStation:
 
 
 def sensor_of(station: Station) -> str:
-    """Return the name or URL of the camera at a station, empty when nobody knows it.
+    """Return the name or URL of the camera at a station, empty if unknown.
 
     What the cell file says goes before what the camera was calibrated through.
     """

@@ -12,11 +12,11 @@ from robolink.model import EntryKind, NewEntry, Recorded, finding_named_now, jso
 from robolink.timing import local_label, wall_time
 
 AGREEING_MM: Final = 2.0
-"""So far may the cell file be from what was learnt: a search finds the station still."""
+"""How far the cell file may be from the learnt place: a search still finds the station."""
 
 
 class StationKind(StrEnum):
-    """What a station is."""
+    """The kind of a station."""
 
     PIN = "pin"
     BEAMS = "beams"
@@ -26,7 +26,7 @@ class StationKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Gauge:
-    """What is measured against, as it goes on record.
+    """What is measured against, as it is recorded.
 
     Attributes:
         id: Its id, as on its certificate.
@@ -122,7 +122,7 @@ class Station:
 
     @property
     def check_due(self) -> datetime | None:
-        """When it has to be learnt again; ``None`` when nothing says so, or nobody ever did."""
+        """When it has to be relearnt; ``None`` if nothing says so, or nobody ever did."""
         if self.check_every_days is None or not self.found_at:
             return None
         return datetime.fromisoformat(self.found_at) + timedelta(days=self.check_every_days)
@@ -136,7 +136,7 @@ class Station:
         return " ".join(filter(None, (self._contradiction(), self._check(now), self._gauge(now))))
 
     def gauge_overdue(self, now: datetime | None = None) -> bool:
-        """Tell whether the calibration of its gauge has run out; the due day itself still counts.
+        """Return whether the calibration of its gauge has expired; the due day itself still counts.
 
         Args:
             now: The time of day; the computer's own by default.
@@ -147,7 +147,7 @@ class Station:
         return date.fromisoformat(self.gauge_due) < today
 
     def gauge_on_record(self) -> Gauge | None:
-        """Return the gauge as a measurement made now puts it on record; ``None`` for none."""
+        """Return the gauge as a present measurement records it; ``None`` for none."""
         if not self.gauge:
             return None
         return Gauge(self.gauge, self.id, self.gauge_due, self.gauge_overdue())
@@ -221,7 +221,7 @@ class Found:
 
 
 def station_entry(found: Found, *, base: tuple[float, ...] | None = None) -> NewEntry:
-    """Return the entry that makes a measurement of a station count from now on.
+    """Return the entry that makes a measurement of a station apply from now on.
 
     Args:
         found: What was found.
@@ -254,7 +254,7 @@ _COMMON = frozenset(
 
 
 def station_of(entry: Recorded) -> Station | None:
-    """Return the station that an entry speaks of, ``None`` when it cannot be read."""
+    """Return the station in an entry, ``None`` if it cannot be read."""
     details = entry.details
     name, kind = details.get("station"), details.get("kind")
     if not isinstance(name, str) or kind not in list(StationKind):
@@ -280,7 +280,7 @@ def _number(value: object) -> float | None:
 
 
 def _base(value: object) -> tuple[float, ...] | None:
-    """Return a base of an entry; one that is no six numbers is none."""
+    """Return the base in an entry; one without six numbers is none."""
     numbers = [_number(one) for one in value] if isinstance(value, list) else []
     known = tuple(one for one in numbers if one is not None)
     return known if len(known) == len(numbers) == _AXES else None

@@ -1,4 +1,4 @@
-"""Asking the process that holds a controller to stop it."""
+"""Asks the process that has a controller to stop it."""
 
 import json
 import os
@@ -30,7 +30,7 @@ _RESTS_S: Final = 8.0
 
 @dataclass(frozen=True, slots=True)
 class LastSeen:
-    """What a process that has a controller saw of it last.
+    """The last reading of a controller by the process that has it.
 
     Attributes:
         status: The state flags.
@@ -64,7 +64,7 @@ class ControllerHolder:
     look: str | tuple[str, int] | None = None
 
     def last_seen(self) -> LastSeen | None:
-        """Return what it saw of its controller last; ``None`` where it has not read it yet.
+        """Return its last reading of its controller; ``None`` if it has none yet.
 
         Nothing is read from the controller for it, and the work there does not wait.
 
@@ -97,7 +97,7 @@ class ControllerHolder:
             raise HolderGoneError(self.pid) from error
 
     def ask_to_stop(self, who: str) -> str:
-        """Let it stop its controller; return the state that shows rest.
+        """Ask it to stop its controller; return the state that confirms the stop.
 
         Args:
             who: Who asks, as the person at the other terminal is told.
@@ -158,7 +158,7 @@ _TOLD: Final = (
 
 
 class HolderGoneError(Exception):
-    """A process that was said to have the controller does not take a request."""
+    """A process that should have the controller does not accept a request."""
 
     def __init__(self, pid: int) -> None:
         super().__init__(pid)
@@ -166,7 +166,7 @@ class HolderGoneError(Exception):
 
 
 def holders_of(keys: Set[str]) -> Iterator[ControllerHolder]:
-    """Yield the processes on this computer that hold a controller, the latest first.
+    """Yield the processes on this computer that have a controller, the latest first.
 
     Args:
         keys: Its far end (:func:`~robolink.transport.far_end_of`), and its own name where that is

@@ -1,4 +1,4 @@
-"""A process that holds a controller listens for the stop from a second terminal.
+"""Listens, in a process that has a controller, for the stop from a second terminal.
 
 EPSON serves one client (docs/reference/epson.md 1.1), a serial line is opened once, and a CANopen
 node answers one at a time. So whoever has the controller is the one who can stop it: it listens on
@@ -36,7 +36,7 @@ from robolink.transport import far_end_of
 KIND: Final = "holders"
 
 MOST_BYTES: Final = 4096
-"""Nothing that is asked here is longer."""
+"""Most bytes of a request."""
 
 _HEARD_S: Final = 1.0
 _LAST_ANSWER_S: Final = 10.0
@@ -46,28 +46,28 @@ _LONGEST_PATH: Final = 100
 """Bytes of a socket's path; Linux takes 107, others 103."""
 
 Answer = Callable[[socket.socket, dict[str, object]], None]
-"""Answers one who has the token."""
+"""Answers a caller with the token."""
 
 
 class Stoppable(Protocol):
     """What the listener needs of a controller."""
 
     def stop(self) -> None:
-        """Bring it to rest; any thread may call it."""
+        """Stop it; any thread may call this."""
 
     def status(self) -> ControllerStatus:
         """Read its state."""
 
 
 class Seen(Protocol):
-    """What was seen of a controller last; looked up by another thread, without a lock."""
+    """The last reading of a controller; another thread asks for it, without a lock."""
 
     def __call__(self) -> tuple[ControllerStatus, int] | None:
-        """Return the state, and how many nanoseconds old it is; ``None`` for never."""
+        """Return the state and its age in nanoseconds; ``None`` for never."""
 
 
 class StopListener(ClosedAtExit):
-    """Listens while a controller is held; a context manager.
+    """Listens while this process has a controller; a context manager.
 
     Leave it before the controller is closed: it then waits for a stop that is under way.
 
@@ -134,7 +134,7 @@ class StopListener(ClosedAtExit):
             raise
 
     def close(self) -> None:
-        """Stop listening, after a stop that is under way has been answered. Idempotent."""
+        """Stop listening, after a stop in progress has been answered. Idempotent."""
         self._end_servers()
         self._card.unlink(missing_ok=True)
 
@@ -143,7 +143,7 @@ class StopListener(ClosedAtExit):
             server.close()
 
     def _publish(self, card: dict[str, object]) -> None:
-        """Write where to knock; not synced to the disk, because it dies with the process."""
+        """Write the address to contact; not synced to the disk: it ends with the process."""
         draft = self._card.with_suffix(".new")
         descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
         with open(descriptor, "w", encoding="utf-8") as file:
@@ -178,7 +178,7 @@ class StopListener(ClosedAtExit):
 
 
 class _LocalServer(ClosedAtExit):
-    """Hears one after the other, in a thread of its own; a context manager.
+    """Serves one request after the other, in a thread of its own; a context manager.
 
     Args:
         path: Where to listen, if that can be.
@@ -203,7 +203,7 @@ class _LocalServer(ClosedAtExit):
         return self._path or list(self._socket.getsockname())
 
     def close(self) -> None:
-        """Stop listening, after an answer that is under way. Idempotent."""
+        """Stop listening, after an answer in progress. Idempotent."""
         with suppress(OSError):
             self._wake.send(b"\0")
         self._thread.join(_LAST_ANSWER_S)
@@ -234,7 +234,7 @@ class _LocalServer(ClosedAtExit):
 
 
 def _tell(caller: socket.socket, answer: dict[str, object]) -> None:
-    """Send one line; whoever asked may have left.
+    """Send one line; the caller may have left.
 
     Args:
         caller: Who asked.

@@ -1,4 +1,4 @@
-"""The note that a stop leaves, so that nothing moves again before somebody has looked.
+"""The note that a stop leaves, so that nothing moves before somebody has looked.
 
 It stands in the state folder, is written after the frame of the stop and never before, and is
 taken away by ``reset``, by ``release``, or by the person who is shown it and goes on.
@@ -49,7 +49,7 @@ class StopNote:
 
     @property
     def sentence(self) -> str:
-        """What a person is told of it."""
+        """What a person is told about it."""
         if not self.when:
             return tr("This controller was stopped; the record of who did it cannot be read.")
         if not self.confirmed:
@@ -67,7 +67,7 @@ class StopNote:
         )
 
     def is_about(self, name: str) -> bool:
-        """Tell whether it may be about the controller ``name``; in doubt it is."""
+        """Return whether it may be about the controller ``name``; true if in doubt."""
         return not (name and self.controller) or name == self.controller
 
 
@@ -111,7 +111,7 @@ def leave_note(
 
 
 def find_note(keys: Set[str], name: str = "") -> StopNote | None:
-    """Return the note about a controller; one that cannot be read is a note all the same.
+    """Return the note about a controller; an unreadable one still counts.
 
     Args:
         keys: Its far end.
@@ -125,7 +125,7 @@ def find_note(keys: Set[str], name: str = "") -> StopNote | None:
 
 
 def clear_note(keys: Set[str], name: str = "") -> None:
-    """Take the notes about a controller away, under whatever keys they were left.
+    """Remove the notes about a controller, under whatever keys they were left.
 
     Args:
         keys: Its far end.
@@ -154,7 +154,7 @@ def _paths(keys: Iterable[str]) -> list[Path]:
 
 
 def _content(path: Path) -> bytes | None:
-    """Return what is in a note, nothing for one that cannot be read, ``None`` without one."""
+    """Return a note's content, nothing for an unreadable one, ``None`` without one."""
     try:
         return path.read_bytes()
     except FileNotFoundError:

@@ -1,4 +1,4 @@
-"""For whoever brings a kind of controller or a method: what it is held to, and what to try it with.
+"""Contract tests for a new kind of controller or method, and a cell on paper to try it with.
 
 The checks are plain functions; any test framework, or none, can call them. They are the bar for the
 kinds of this package too (``tests/contract/test_controller_contract.py``).

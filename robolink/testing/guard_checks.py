@@ -1,4 +1,4 @@
-"""Promises about what is refused: each check tries the forbidden act, and looks at what it left.
+"""Promises about refusals: each check tries a forbidden act, and looks at what it left.
 
 That a driver says when asked that something is forbidden proves nothing about its writes.
 """
@@ -166,7 +166,7 @@ def what_is_asked_for_is_compared_as_it_is_sent(subject: Subject) -> None:
 
 
 def defined(controller: Controller, tool: int) -> ToolOffset:
-    """Return what a tool holds, once it holds something.
+    """Return a tool's value, once it has one.
 
     Args:
         controller: Where it is.
@@ -214,7 +214,7 @@ def _refuses_acts(controller: Controller, tool: int, kind: type[RobolinkError], 
 
 @contextmanager
 def left_unsettled(subject: Subject) -> Iterator[Controller | None]:
-    """Connect to what a killed process left, for a block; ``None`` where its record went with it.
+    """Connect to what a killed process left, for a block; ``None`` if its record is gone too.
 
     Args:
         subject: What is connected to.

@@ -1,4 +1,4 @@
-"""Promises about movement: inside the box, for the tool in force, and ended by a stop."""
+"""Promises about movement: inside the box, for the selected tool, and ended by a stop."""
 
 from dataclasses import replace
 from typing import Final
@@ -104,7 +104,7 @@ def a_stop_ends_a_movement(subject: Subject) -> None:
 
 
 def what_is_unsettled_holds_movements_back(subject: Subject) -> None:
-    """Nobody knows how long the tool in force is then, nor where the robot was to go."""
+    """Nobody knows how long the selected tool is then, nor where the robot was to go."""
     with left_unsettled(subject) as second:
         if second is not None:
             subject.prepare(second)
@@ -194,4 +194,4 @@ MOVING_CHECKS: Final[tuple[Check, ...]] = (
 """They move the robot, a step up and down again."""
 
 WRITING_WHILE_MOVING_CHECKS: Final[tuple[Check, ...]] = (nothing_is_written_while_it_moves,)
-"""They do both, so a tool has to be named that may be written."""
+"""They do both, so a tool that may be written has to be named."""

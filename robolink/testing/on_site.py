@@ -1,4 +1,4 @@
-"""The checks that write or move, on a controller that works: what was there comes back.
+"""The checks that write or move, on a controller in service: everything is restored.
 
 The checks connect anew, stop and are interrupted on purpose, and a process may be killed among
 them. So before the first of them a durable change and a durable selection stand in the record of
@@ -60,13 +60,13 @@ class Connect(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class _Kept:
-    """What comes back.
+    """What is restored.
 
     Attributes:
         change: Marker of the tool that is written; ``None`` where none is.
         selection: Marker of tool, power and speed in force; ``None`` where the kind tells of none.
         before: What the tool holds.
-        selected: The tool in force.
+        selected: The selected tool.
     """
 
     change: Marker | None
@@ -84,7 +84,7 @@ def kept_on_site(
     agree: Callable[[Controller], None],
     trials: Sequence[Ledger] = (),
 ) -> Iterator[None]:
-    """Surround checks by a record of what was there, and put that back at their end.
+    """Surround checks by a record of the present state, and restore that at their end.
 
     From the moment at which it stands on record until it is back, Ctrl-C ends the block alone.
     Whatever leaves the block says what stands then, and not what a check had just done.
@@ -99,7 +99,7 @@ def kept_on_site(
 
     Raises:
         ConfigError: The tool is the selected one, or is not there.
-        OutcomeUnknownError: Something earlier is unsettled; or it could not be put back, and
+        OutcomeUnknownError: An earlier job is unfinished; or it could not be restored, and
             stays open for ``recover``.
 
     Example:
@@ -158,7 +158,7 @@ def kept_on_site(
 
 
 def _without_doubt(error: BaseException) -> BaseException:
-    """Return what an outcome was unknown for, once it has been read and nothing is left of it."""
+    """Return the cause of an unknown outcome, once it has been read and nothing is left of it."""
     caused = error.__cause__ if isinstance(error, OutcomeUnknownError) else None
     return caused if isinstance(caused, RobolinkError) else error
 
@@ -200,7 +200,7 @@ def _put_on_record(controller: Controller, reason: str, tool: int | None) -> _Ke
 
 
 def _put_back(connect: Connect, kept: _Kept, tool: int | None, ledgers: list[Ledger]) -> None:
-    """Put back what is on record; the ledger of that joins those of the checks.
+    """Restore the recorded state; the ledger of that joins those of the checks.
 
     Raises:
         OutcomeUnknownError: It could not be, and stays open for ``recover``.
@@ -227,7 +227,7 @@ def _put_back(connect: Connect, kept: _Kept, tool: int | None, ledgers: list[Led
 
 @contextmanager
 def _reached_again(connect: Connect) -> Iterator[Controller]:
-    """Connect, though whoever stopped the checks may have the controller's only login yet."""
+    """Connect, although whoever stopped the checks may still have the only login."""
     deadline = Deadline.after(SystemClock(), _STOP_S)
     with ExitStack() as stack:
         while True:
@@ -242,7 +242,7 @@ def _reached_again(connect: Connect) -> Iterator[Controller]:
 
 
 def _once_free(controller: Controller, act: Callable[[], object]) -> None:
-    """Do what a PLC refuses while it still takes a check, whose link was lost, for its owner.
+    """Do what a PLC refuses while it still treats a check, whose link was lost, as its owner.
 
     Raises:
         LeaseHeldError: Somebody else owns it.
@@ -276,7 +276,7 @@ def _await_rest(controller: Controller) -> None:
 
 
 def _restore_tool(controller: Controller, kept: _Kept, tool: int) -> None:
-    """Give the tool back what it held; a check may have left any value of its own there."""
+    """Restore the tool's value; a check may have left any value of its own there."""
     marker = kept.change
     assert marker is not None  # noqa: S101 - asked for by the caller
     tools = controller.tools
@@ -297,7 +297,7 @@ def _restore_tool(controller: Controller, kept: _Kept, tool: int) -> None:
             EntryKind.ROLLED_BACK if written else EntryKind.NOT_APPLIED,
             operation=mine.operation,
             tool=tool,
-            verdict=tr("checked against the contract; it holds what it held before"),
+            verdict=tr("checked against the contract; its earlier value is restored"),
             details={**mine.details, "value": plain_offset(kept.before)},
         ),
     )

@@ -52,12 +52,12 @@ class PaperCell:
     on, and a mark that is not said is not seen.
 
     Attributes:
-        here: Where the frame in force is.
+        here: Where the selected frame is.
         steps: The steps that were answered, in order.
         told: What a person was told.
 
     Args:
-        here: Where the frame in force is before.
+        here: Where the selected frame is before.
         tip: Where the tip really is, seen from that frame; its axes are those that a person shows.
         touched: Where the tip is in contact: a point, base, or the point of a surface to which a
             person brings it from a place.

@@ -1,4 +1,4 @@
-"""Promises that are looked at without changing anything."""
+"""Promises that are checked without changing anything."""
 
 import json
 from typing import Final

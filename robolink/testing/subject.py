@@ -1,4 +1,4 @@
-"""What a check is given, and how it says that a promise is broken."""
+"""What a check is given, and how it reports a broken promise."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -9,12 +9,12 @@ from robolink.model import Controller, ToolOffset
 
 
 class ContractBrokenError(AssertionError):
-    """A controller does not keep a promise that every kind of controller makes."""
+    """A controller breaks a promise that every kind of controller makes."""
 
 
 @dataclass(frozen=True, slots=True)
 class Subject:
-    """The controller that is looked at.
+    """The controller under test.
 
     Attributes:
         connect: Connects anew; called once or twice by each check, which closes what it opened.
@@ -30,7 +30,7 @@ class Subject:
 
     @contextmanager
     def kept(self) -> Iterator[Controller]:
-        """Connect for a block, and put back the tool and what is selected at its end.
+        """Connect for a block, and restore the tool and the selection at its end.
 
         Ctrl-C, or an error of robolink, that ended the block is told in place of what it then
         keeps from being put back.
@@ -52,7 +52,7 @@ class Subject:
     def put_back(
         self, controller: Controller, before: ToolOffset | None, selected: int | None
     ) -> None:
-        """Give the tool what it held, and select what was selected.
+        """Restore the tool's value and the selection.
 
         Args:
             controller: A connection to the controller.
@@ -90,7 +90,7 @@ class Subject:
 
     @contextmanager
     def releasing_stop(self, controller: Controller) -> Iterator[None]:
-        """Surround a stop that a check gives: whatever ends the block, it is in force no longer.
+        """Surround a stop that a check gives: the stop is released whatever ends the block.
 
         That of somebody else, who stops the checks, stays.
 
@@ -112,7 +112,7 @@ Check = Callable[[Subject], None]
 
 
 def require(kept: object, promise: str) -> None:
-    """Say that a promise is broken unless it is kept.
+    """Report a broken promise unless it is kept.
 
     Raises:
         ContractBrokenError: It is not.
@@ -122,7 +122,7 @@ def require(kept: object, promise: str) -> None:
 
 
 def another_offset(value: ToolOffset | None) -> ToolOffset:
-    """Return an offset that no controller takes for the same."""
+    """Return an offset that no controller treats as the same."""
     return ToolOffset(10.0, 20.0, 30.0) if value is None else replace(value, x_mm=value.x_mm + 0.5)
 
 
@@ -130,7 +130,7 @@ def another_offset(value: ToolOffset | None) -> ToolOffset:
 def refused(
     kinds: type[RobolinkError] | tuple[type[RobolinkError], ...], promise: str
 ) -> Iterator[None]:
-    """Surround what has to be refused by an error of one kind, or of one of several.
+    """Surround what must be refused by an error of one kind, or of one of several.
 
     Raises:
         ContractBrokenError: It was not, or by another error.

@@ -20,7 +20,7 @@ _BY: Final = "robolink.testing"
 
 
 def confirm_whole_map(controller: Controller) -> Confirmation:
-    """Put on record, under the name of this package, that every value of a map was compared.
+    """Record, under the name of this package, that every value of a map was compared.
 
     Never at a machine: there a person compares (``robolink expert plc check-map``).
 
@@ -40,7 +40,7 @@ def confirm_whole_map(controller: Controller) -> Confirmation:
 
 @dataclass(frozen=True, slots=True)
 class CheckOutcome:
-    """How one promise was found.
+    """The result of one check.
 
     Attributes:
         name: Of the check.
@@ -57,7 +57,7 @@ class CheckOutcome:
 
 
 def outcomes(subject: Subject, checks: Iterable[Check] = READING_CHECKS) -> Iterator[CheckOutcome]:
-    """Hold a controller to some promises, one after the other, and tell how each was found.
+    """Check some promises of a controller, one after the other, and report each.
 
     Args:
         subject: The controller.
@@ -83,7 +83,7 @@ def outcomes(subject: Subject, checks: Iterable[Check] = READING_CHECKS) -> Iter
 
 
 def _found_before(error: BaseException) -> str:
-    """Return what was found broken before the check could not even put back what was there."""
+    """Return what was broken before the check could restore anything."""
     context = error.__context__
     while context is not None and not isinstance(context, ContractBrokenError):
         context = context.__context__
@@ -96,7 +96,7 @@ def _place_of(error: BaseException) -> str:
 
 
 def _said_by(error: BaseException) -> str:
-    """Return the text of an error, which may be one that cannot even say that."""
+    """Return the text of an error, which may be one that cannot even show that."""
     try:
         return str(error)
     except Exception:
@@ -104,7 +104,7 @@ def _said_by(error: BaseException) -> str:
 
 
 def check_controller(subject: Subject, *, writes: bool = True, moves: bool = True) -> None:
-    """Hold a controller to everything that its capabilities promise.
+    """Check everything that a controller's capabilities promise.
 
     Args:
         subject: The controller.

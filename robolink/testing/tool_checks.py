@@ -169,7 +169,7 @@ def a_cleared_tool_is_undefined(subject: Subject) -> None:
 
 
 def a_selection_is_read_back(subject: Subject) -> None:
-    """A tool in force keeps its definition, and only a defined one comes into force."""
+    """A selected tool keeps its definition, and only a defined one comes into force."""
     with subject.kept() as controller:
         tools = controller.tools
         value = another_offset(tools.read(subject.tool))
@@ -222,7 +222,7 @@ def one_procedure_at_a_time(subject: Subject) -> None:
 
 
 def _written_whole(controller: Controller, tool: int) -> tuple[ToolOffset, tuple[str, ...]]:
-    """Write a value with as many components as this kind holds; return it, and their names.
+    """Write a value with as many components as this kind has; return it, and their names.
 
     Raises:
         RobolinkError: It takes none, or a write that it took did not end as it should.
@@ -284,4 +284,4 @@ WRITING_CHECKS: Final[tuple[Check, ...]] = (
     one_procedure_at_a_time,
     *GUARD_CHECKS,
 )
-"""They write one tool, and put it back."""
+"""They write one tool, and restore it."""

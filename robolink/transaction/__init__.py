@@ -1,4 +1,4 @@
-"""Tool changes that are done, or were never: all or none, put back once, recoverable."""
+"""Tool changes: all or none, restored at most once, recoverable."""
 
 from typing import TYPE_CHECKING
 

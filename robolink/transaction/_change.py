@@ -1,4 +1,4 @@
-"""One tool change: written as a whole, kept as a whole, or taken back as a whole.
+"""One tool change: written as a whole, kept as a whole, or restored as a whole.
 
 The order is that of docs/reference/rules.md 6: look at the lease, read the old values, compare them
 with what is expected, store the intent durably (which takes the lease), write, read back. A change
@@ -50,14 +50,14 @@ from robolink.transaction._put_back import PutBack, Step, left_unverified, put_b
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """What one tool is to hold.
+    """The intended value of one tool.
 
     Attributes:
         tool: Its number.
         offset: The new value; ``None`` clears it.
         expected: What the caller believes it holds now.
         details: More for the journal, plain JSON.
-        then_select: The tool to put in force before this one is cleared, should this one be in
+        then_select: The tool to select before this one is cleared, should this one be in
             force; without it that is refused.
 
     Raises:
@@ -82,7 +82,7 @@ _OUT_OF_REACH = (OutcomeUnknownError, TransportError, RemoteProtocolError, Lease
 
 
 class ToolChange:
-    """A change under way; a context manager that takes back what was not kept.
+    """A change in progress; a context manager that restores what was not kept.
 
     Attributes:
         kept: Whether the new values stay.
@@ -92,7 +92,7 @@ class ToolChange:
         wanted: The tools to change, each once, in the order in which they are written.
         verify: Whether something is to be verified between the writes and :meth:`keep`.
         marked: More for its durable marker, plain JSON.
-        tell: Told, in sentences, what was put back.
+        tell: Told, in sentences, what was restored.
         order: The order that it carries out; with the values it is kept that this is done.
         describe: Makes the result of the order from what was written.
         wait_s: How long the block, and then :meth:`write`, waits for other threads and programs
@@ -181,13 +181,13 @@ class ToolChange:
             ToolChangedError: A tool does not hold what was expected; nothing was written.
             NotAllowedError: A tip would be taken farther than the cell allows, which nobody has
                 accepted; nothing was written.
-            SelectedToolError: A tool in force is to be cleared, and none is named to be selected
+            SelectedToolError: A selected tool is to be cleared, and none is named to be selected
                 in its place; nothing was written.
-            OutcomeUnknownError: Something earlier is unsettled, or a write was not answered.
-            ReadBackError: Another value came back; the old ones are put back.
+            OutcomeUnknownError: An earlier job is unfinished, or a write was not answered.
+            ReadBackError: Another value came back; the old ones are restored.
             ConfigError: The intent cannot be stored; nothing was written.
             BusyError: Another process has the controller.
-            StoppedError: A stop came; what was written is put back.
+            StoppedError: A stop came; what was written is restored.
         """
         with self._controller.patience.within(self._wait_s):
             self._controller.latch.require_open(self.request)
@@ -224,14 +224,14 @@ class ToolChange:
             return self._receipts
 
     def keep(self, verdict: str = "") -> None:
-        """Put on record that the new values stay.
+        """Record that the new values stay.
 
         Args:
             verdict: Why, in words.
 
         Raises:
             ConfigError: It cannot be recorded; the change stays open for ``recover``.
-            StoppedError: A stop came before; what was written is put back.
+            StoppedError: A stop came before; what was written is restored.
         """
         self._controller.latch.require_open(self.request)
         if self._marker is None:
@@ -270,7 +270,7 @@ class ToolChange:
 
     @property
     def request(self) -> str:
-        """What is done, as a person may read it."""
+        """What is done, for display."""
         numbers = ", ".join(str(wanted.tool) for wanted in self._wanted)
         return tr("change of tool {numbers}", numbers=numbers)
 
@@ -311,7 +311,7 @@ class ToolChange:
         return steps
 
     def _selected_before(self, steps: list[Step]) -> int | None:
-        """Return the tool in force where this change, or taking it back, may need to know it."""
+        """Return the selected tool if this change, or restoring it, may need to know it."""
         clears = any(wanted.then_select is not None for wanted in self._wanted)
         defines = any(step.before is None and step.requested is not None for step in steps)
         return self._controller.tools.selected() if clears or defines else None
@@ -359,7 +359,7 @@ class ToolChange:
             raise refusal from error
 
     def _proved_begun(self) -> Iterator[Step]:
-        """Return what was begun, with what was read before each write, not what was believed."""
+        """Return what was started, with the values read before each write, not the expected."""
         account = self._account
         assert account is not None  # noqa: S101 - __enter__ opened it
         for step in self._begun:
@@ -369,7 +369,7 @@ class ToolChange:
                 yield step
 
     def _select_again(self) -> None:
-        """Put the tool in force again that gave way to a clear of this change."""
+        """Select the tool again that gave way to a clear of this change."""
         if not any(wanted.then_select is not None for wanted in self._wanted):
             return
         tools, before = self._controller.tools, self._selected
@@ -384,7 +384,7 @@ class ToolChange:
             )
 
     def _settle_account(self, error: BaseException | None) -> None:
-        """Let whoever is told of ``error`` know what stands, and which tool is selected."""
+        """Add to ``error`` what stands, and which tool is selected."""
         ledger, account = self._controller.ledger, self._account
         assert account is not None  # noqa: S101 - __enter__ opened it
         try:
@@ -398,7 +398,7 @@ class ToolChange:
                 note_outcome(error, ledger.outcome(account))
 
     def _leave_open(self, error: RobolinkError) -> None:
-        """Say what stands in the journal for ``recover``; nothing where no write was sent."""
+        """Report what stands in the journal for ``recover``; nothing if no write was sent."""
         tools = self._controller.ledger.outcome(self._account).tools
         stand = [number for number, tool in tools.items() if tool.differs or not tool.known]
         if not stand:
@@ -420,7 +420,7 @@ class ToolChange:
                 self._controller.outcomes.append(*entries)
 
     def _close_writes(self, result: PutBack) -> None:
-        """Forget the markers of writes whose value is known to be gone again.
+        """Remove the markers of writes whose value is known to be gone again.
 
         They stand open where a fault of the controller, or of the journal, came between write
         and record.
@@ -440,12 +440,12 @@ def change_tools(
     describe: Describe = plain_result,
     wait_s: float | None = None,
 ) -> tuple[ToolReceipt, ...]:
-    """Write tools that nothing is to verify: all of them, or none.
+    """Write tools without a turn test: all of them, or none.
 
     Args:
         controller: The controller, connected.
         wanted: The tools to change.
-        tell: Told what was put back.
+        tell: Told what was restored.
         order: The order that this carries out (:func:`robolink.transaction.carrying_out`).
         describe: Makes the result of the order from what was written.
         wait_s: As for :class:`ToolChange`.

@@ -34,7 +34,7 @@ LONGEST_ORDER: Final = 64
 """Characters of an order's id."""
 
 Describe = Callable[[Sequence[ToolReceipt]], Mapping[str, object]]
-"""Returns the result of a change, plain JSON, that a second delivery is given."""
+"""Returns the result of a change, plain JSON, for a second delivery."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class DoneOrder:
 
 @dataclass(frozen=True, slots=True)
 class Order:
-    """An order under way.
+    """An order in progress.
 
     Attributes:
         id: Its id.
@@ -69,7 +69,7 @@ class Order:
 
 @dataclass(frozen=True, slots=True)
 class OrderedChange:
-    """What a change puts on record about the order that it carries out.
+    """What a change records about its order.
 
     Attributes:
         order: The order.
@@ -80,7 +80,7 @@ class OrderedChange:
     describe: Describe
 
     def kept(self, receipts: Sequence[ToolReceipt]) -> NewEntry:
-        """Return the entry by which the order counts as carried out."""
+        """Return the entry that makes the order count as carried out."""
         tools = {str(receipt.tool): plain_offset(receipt.read_back) for receipt in receipts}
         details = {**self._said(receipts), "tools": tools}
         return NewEntry(EntryKind.ORDER, verdict=tr("order carried out"), details=details)
@@ -102,7 +102,7 @@ class OrderedChange:
 
 
 def plain_result(receipts: Sequence[ToolReceipt]) -> dict[str, object]:
-    """Return what was written, plain JSON: the result of an order that nobody described."""
+    """Return what was written, plain JSON: the default result of an order."""
     return {
         "tools": [
             {
@@ -134,7 +134,7 @@ def require_order_id(order: str) -> str:
 def carrying_out(
     controller: Controller, order: str, job: Mapping[str, object], *, wait_s: float | None = None
 ) -> Iterator[Order]:
-    """Keep the lease, look the order up, and put its id on record with all that is done for it.
+    """Keep the lease, look the order up, and record its id with all that is done for it.
 
     Where :attr:`Order.done` says that it was carried out before, nothing is to be done; else the
     order goes with the change: :class:`ToolChange`, :func:`change_tools` and
@@ -151,7 +151,7 @@ def carrying_out(
         ConfigError: The id is none, or the order is not to be carried out again: it was another
             job, or what it did was taken back, or closed on a person's word.
         ToolChangedError: A tool that it wrote holds another value since.
-        OutcomeUnknownError: Something earlier is unsettled, perhaps this very order, or what was
+        OutcomeUnknownError: An earlier job is unfinished, perhaps this very order, or what was
             in force before it and is not put back.
 
     Example:
@@ -191,13 +191,13 @@ def carrying_out(
 
 
 def order_of(marker: Marker) -> str:
-    """Return for which order a change was begun, empty for none."""
+    """Return the order of a change, empty for none."""
     ordered = marker.details.get("ordered")
     return str(ordered["order"]) if isinstance(ordered, dict) and "order" in ordered else ""
 
 
 def kept_later(marker: Marker, now: Mapping[int, ToolOffset | None]) -> tuple[NewEntry, ...]:
-    """Return the entry by which an order counts as carried out whose change is found complete.
+    """Return the entry that makes an order count as carried out when its change is found complete.
 
     Args:
         marker: The marker of the change.
@@ -208,7 +208,7 @@ def kept_later(marker: Marker, now: Mapping[int, ToolOffset | None]) -> tuple[Ne
 
 
 def forgotten(marker: Marker) -> tuple[NewEntry, ...]:
-    """Return the entry by which an order ends whose change nobody looked at."""
+    """Return the entry that ends an order whose change nobody looked at."""
     return _ended(marker, tr("dropped without a check"), forgotten=True)
 
 
@@ -236,7 +236,7 @@ def _found(outcomes: OutcomeLog, order: str) -> Recorded | None:
 def _done(
     controller: Controller, order: str, job: Mapping[str, object], entry: Recorded
 ) -> DoneOrder:
-    """Return how an order ended, if that still is so; reads only.
+    """Return how an order ended, if that is still so; reads only.
 
     Raises:
         ConfigError, ToolChangedError: See :func:`carrying_out`.

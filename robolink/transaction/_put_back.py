@@ -1,4 +1,4 @@
-"""Putting an old value back: once, and only over what this change wrote."""
+"""Restores an old value: once, and only over what this change wrote."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ class Step:
 
 @dataclass(frozen=True, slots=True)
 class PutBack:
-    """What became of one tool whose change was taken back.
+    """The result for one tool whose change was restored.
 
     Attributes:
         tool: Its number.
@@ -66,7 +66,7 @@ def put_back(
     spoiled: int | None = None,
     selected: int | None = None,
 ) -> list[PutBack]:
-    """Give each tool its old value back, the last one first, with one write each at most.
+    """Restore each tool's old value, the last one first, with at most one write each.
 
     A stop does not hinder it, once for each tool (docs/reference/rules.md 5).
 
@@ -159,7 +159,7 @@ def _entry(kind: EntryKind, step: Step, now: ToolOffset | None, sentence: str) -
 
 
 def left_unverified(tools: Sequence[int], *, marked: bool) -> str:
-    """Return the sentence for tools that could not be put back, since the link is gone.
+    """Return the sentence for tools that could not be restored, since the link is gone.
 
     Args:
         tools: Their numbers.
@@ -173,7 +173,7 @@ def left_unverified(tools: Sequence[int], *, marked: bool) -> str:
             numbers=numbers,
         )
     return tr(
-        "Tool {numbers} may hold the new value, which was never tested; 'robolink "
-        "recover' puts the old one back.",
+        "Tool {numbers} may hold the new value, which was never tested; 'robolink recover' "
+        "restores the old one.",
         numbers=numbers,
     )

@@ -1,4 +1,4 @@
-"""Open markers settled: those of the driver, and those of whole changes; and what ``recover`` does.
+"""Recovers open markers: those of the driver, and those of whole changes.
 
 It reads, settles what reading can settle, and asks for the rest. It may be killed at any point and
 run again: each step looks at the controller anew, a tool that holds its old value is never written,
@@ -43,7 +43,7 @@ _LOG: Final = PackageLog(__package__)
 
 
 class Settler:
-    """Examines and settles what was left open on one controller.
+    """Examines and recovers what was left open on one controller.
 
     What is settled was read behind a fence: no request of before can change it afterwards
     (docs/reference/rules.md 1).
@@ -118,11 +118,11 @@ class Settler:
         numbers = ", ".join(
             str(step.tool) for step, is_old in zip(steps, old, strict=True) if not is_old
         )
-        action = tr("Put the old value of tool {numbers} back", numbers=numbers)
+        action = tr("Restore the old value of tool {numbers}", numbers=numbers)
         return Finding(marker, Verdict.NOT_FINISHED, text, action)
 
     def settle(self, finding: Finding) -> None:
-        """Do what ``finding.action`` says and forget the marker.
+        """Do what ``finding.action`` says and remove the marker.
 
         Raises:
             RobolinkError: It could not be done; the marker stays.
@@ -148,7 +148,7 @@ class Settler:
             outcomes.change = outcomes.order = ""
 
     def forget(self, marker: Marker) -> None:
-        """Forget a marker on a person's word alone.
+        """Remove a marker because a person confirms it, without reading.
 
         Raises:
             LeaseHeldError: Another client has the controller.
@@ -166,7 +166,7 @@ class Settler:
         )
 
     def _require_robot(self, marker: Marker) -> None:
-        """Refuse to judge by one robot's tools what was begun on another robot."""
+        """Refuse to judge by one robot's tools what was started on another robot."""
         begun_on, in_force = marker.details.get("robot"), self._controller.outcomes.robot
         if begun_on and begun_on != in_force:
             raise NotReadyError(
@@ -332,7 +332,7 @@ def recover(
     tell: Callable[[Finding, bool], None] = lambda _finding, _settled: None,
     later: Collection[str] = (),
 ) -> Recovery:
-    """Settle what an earlier process left open: by reading, and with a person's word.
+    """Finish or undo an interrupted job: by reading, and by asking a person.
 
     Nothing that moved or was written is sent again. What was sent and not answered is fenced off
     first, so that nothing arrives behind the look that settles it; on a PLC that takes the
@@ -384,7 +384,7 @@ def look(
     keep: bool = False,
     tell: Callable[[Finding], None] = lambda _finding: None,
 ) -> tuple[Finding, ...]:
-    """Return what :func:`recover` would find, and tell what it would; reads only.
+    """Return what :func:`recover` would find, and report what it would; reads only.
 
     Args:
         controller: The controller, connected.
@@ -408,12 +408,12 @@ def look(
 
 
 def _in_order(markers: Sequence[Marker]) -> list[Marker]:
-    """Return markers in the order in which they are settled."""
+    """Return markers in the order of their recovery."""
     return sorted(markers, key=lambda marker: _ORDER.index(marker.kind))
 
 
 def _told_with(marker: Marker, others: Sequence[Marker]) -> Marker | None:
-    """Return the open change or procedure of which a command was a part, ``None`` for none.
+    """Return the open change or procedure that a command was part of, ``None`` for none.
 
     What was found out about the command is overtaken by what becomes of the whole: a tool that
     holds the new value, and a moment later the old one again.

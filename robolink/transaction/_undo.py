@@ -1,4 +1,4 @@
-"""Undoing a change: what the tools held before it, or any value proved earlier, is written back.
+"""Undoes a change: writes back what the tools held before it, or any earlier value.
 
 An undo is a change like any other (docs/reference/rules.md 6): it expects what the journal proved
 last, writes all of its tools or none, and can itself be undone. What the record says of a tool,
@@ -75,7 +75,7 @@ class ChangedSince:
 
 
 def last_proof(controller: Controller, tool: int) -> Recorded | None:
-    """Return the newest entry that says what was read from ``tool`` after a write."""
+    """Return the newest entry with a value read from ``tool`` after a write."""
     return next(
         (
             entry
@@ -87,7 +87,7 @@ def last_proof(controller: Controller, tool: int) -> Recorded | None:
 
 
 def changed_since(controller: Controller, tool: int, now: ToolOffset | None) -> ChangedSince | None:
-    """Compare a tool with what this software last proved to be in it.
+    """Compare a tool with the last value that this software confirmed in it.
 
     Args:
         controller: The controller, connected.
@@ -149,7 +149,7 @@ _ENDS = (EntryKind.DONE, EntryKind.ROLLED_BACK)
 
 
 def id_of_change(entry: Recorded) -> str:
-    """Return by which id a person names what an entry belongs to.
+    """Return the id by which a person names what an entry belongs to.
 
     A single write that was made outside of a change is known by its operation.
     """
@@ -202,7 +202,7 @@ def _nothing_to_undo(change: str, *, taken_back: bool) -> str:
 
 
 def proof_numbered(outcomes: OutcomeLog, number: int) -> Recorded | None:
-    """Return the entry of that number if it says what was read from a tool."""
+    """Return the entry of that number if it has a value read from a tool."""
     for entry in outcomes.recorded(kinds=PROOFS):
         if entry.number <= number:
             known = entry.number == number and entry.tool is not None and "value" in entry.details
@@ -211,14 +211,14 @@ def proof_numbered(outcomes: OutcomeLog, number: int) -> Recorded | None:
 
 
 def tool_of(entry: Recorded) -> int:
-    """Return which tool an entry is about."""
+    """Return the tool of an entry."""
     if entry.tool is None:
         raise _unreadable(entry)
     return entry.tool
 
 
 def offset_of(entry: Recorded, name: str) -> ToolOffset | None:
-    """Return a value of an entry, ``None`` for an undefined tool."""
+    """Return the offset in an entry, ``None`` for an undefined tool."""
     if name not in entry.details:
         raise _unreadable(entry)
     return read_offset(entry.details[name])
@@ -236,7 +236,7 @@ def _unreadable(entry: Recorded) -> ConfigError:
 
 @dataclass(frozen=True, slots=True)
 class UndoPlan:
-    """What an undo is to do.
+    """The plan of an undo.
 
     Attributes:
         steps: The tools to write: what each holds now, and what it is to hold again.
@@ -255,7 +255,7 @@ class UndoPlan:
 
 @dataclass(frozen=True, slots=True)
 class Undone:
-    """What an undo did.
+    """The result of an undo.
 
     Attributes:
         change: Its own id in the journal, by which it can be undone; empty when nothing was
@@ -321,13 +321,13 @@ def undo(
     Args:
         controller: The controller, connected.
         plan: What to do.
-        then_select: The tool to put in force in place of one that is in force and becomes
+        then_select: The tool to select in place of one that is in force and becomes
             undefined; without it that is refused.
-        tell: Told what was put back when it fails on the way.
+        tell: Told what was restored when it fails on the way.
 
     Raises:
         NotAllowedError: It takes an engineer; nothing was sent.
-        SelectedToolError: The tool in force would become undefined; nothing was sent.
+        SelectedToolError: The selected tool would become undefined; nothing was sent.
         RobolinkError: As :func:`robolink.transaction.change_tools`.
 
     Example:
@@ -386,7 +386,7 @@ def _plan_to(controller: Controller, number: int, tool: int | None) -> UndoPlan:
             remedy=tr("Name that tool, or leave {tool} out.", tool=remedy_word(RemedyWord.TOOL)),
         )
     sentence = tr(
-        "bring tool {tool} back to what entry {number} of {at} proved",
+        "restore tool {tool} to the value confirmed by entry {number} of {at}",
         tool=proved,
         number=number,
         at=local_label(entry.at),
@@ -416,7 +416,7 @@ def _plan(
 
 
 def _expected(controller: Controller, tool: int, old: ToolOffset | None) -> ToolOffset | None:
-    """Read a tool and refuse to go on when somebody else wrote it."""
+    """Read a tool and refuse to continue if somebody else wrote it."""
     now = controller.tools.read(tool)
     changed = changed_since(controller, tool, now)
     if changed is not None and not controller.tools.same(now, old):

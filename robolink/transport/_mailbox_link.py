@@ -18,7 +18,7 @@ HEARTBEAT_WORD: Final = 62
 
 
 class MailboxHead(NamedTuple):
-    """What changes first in the response block.
+    """The first words to change in the response block.
 
     It only says *when* to read the block; nothing is decided from it.
     """
@@ -52,7 +52,7 @@ class MailboxLink(Protocol):
 
     @property
     def identity(self) -> str:
-        """Which far end this is: the URL, without the options that do not name one."""
+        """The far end's identity: the URL, without the options that do not identify it."""
 
     @property
     def place(self) -> str:
@@ -77,7 +77,7 @@ class MailboxLink(Protocol):
         """Write the 64 words of the command block in one piece."""
 
     def read_head(self) -> MailboxHead:
-        """Return the beginning of the response block, as new as it is to be had."""
+        """Return the beginning of the response block, as fresh as possible."""
 
     def read_response(self) -> tuple[int, ...]:
         """Return the 112 words of the response block, read in one piece."""

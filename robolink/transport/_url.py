@@ -67,7 +67,7 @@ class LinkUrl:
 
     @property
     def address(self) -> str:
-        """The URL as a link calls its far end: with those options only that tell far ends apart.
+        """The URL as a link names its far end: only with the options that distinguish far ends.
 
         Nothing is opened, and an option that makes no sense stays as it is written.
         """
@@ -152,7 +152,7 @@ _Choice = TypeVar("_Choice")
 
 
 class UrlOptions:
-    """The options of one URL; whoever knows some takes them, and :meth:`finish` ends it.
+    """The options of one URL; each reader takes its own, and :meth:`finish` ends it.
 
     Every method raises :class:`~robolink.errors.ConfigError` that names the option.
     """
@@ -224,7 +224,7 @@ class UrlOptions:
         return self._left.pop(name, default)
 
     def finish(self) -> None:
-        """Refuse what nobody has taken."""
+        """Refuse options that nobody has taken."""
         if self._left:
             raise ConfigError(
                 tr(
@@ -243,7 +243,7 @@ _LOOPBACK: Final = frozenset({"127.0.0.1", "::1"})
 
 
 def far_end_of(url: str) -> frozenset[str]:
-    """Return the keys of the far end of a URL; two URLs with a common key lead to the same.
+    """Return the keys of a URL's far end; two URLs with a common key lead to the same.
 
     A host name may have several addresses, so there may be several keys. An address that cannot
     be found out is the name itself.

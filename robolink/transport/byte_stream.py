@@ -1,4 +1,4 @@
-"""The contract of a byte transport, and the transport that tells what passes."""
+"""The contract of a byte transport, and a transport that reports its traffic."""
 
 from collections.abc import Collection
 from typing import Protocol
@@ -19,11 +19,11 @@ class Transport(Protocol):
 
     @property
     def url(self) -> str:
-        """Where it leads, as a person wrote it, with nothing secret in it."""
+        """Where it leads, as a person wrote it, without secrets."""
 
     @property
     def identity(self) -> str:
-        """Which far end this is: the URL without its options."""
+        """The far end's identity: the URL without its options."""
 
     @property
     def place(self) -> str:
@@ -99,7 +99,7 @@ def link_closed(identity: str) -> TransportClosedError:
 
 
 class TracingTransport:
-    """Passes everything on to ``inner`` and tells ``sink`` what went by.
+    """Passes everything on to ``inner`` and reports the traffic to ``sink``.
 
     Bytes are told before they are sent, because after a failure an unknown part of them may be
     out. An end of stream is told as received ``b""``. A secret is told as
@@ -128,7 +128,7 @@ class TracingTransport:
 
     @property
     def logs(self) -> bool:
-        """Whether it, or one within, tells the log of its package."""
+        """Whether it, or one within, writes to the log of its package."""
         inner = self._inner
         return self.traffic.logs or (isinstance(inner, TracingTransport) and inner.logs)
 
@@ -170,7 +170,7 @@ class TracingTransport:
 
 
 def logged(transport: Transport, *, log: PackageLog | None = None) -> TracingTransport:
-    """Return a transport that tells the log what passes; one that does so already, as it is.
+    """Return a transport that logs its traffic; one that already does, as it is.
 
     Args:
         transport: Moves the bytes.

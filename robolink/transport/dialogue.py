@@ -1,4 +1,4 @@
-r"""What went over a connection, as a file: evidence that can be read, mailed and replayed.
+r"""The traffic of a connection as a file: evidence that can be read, mailed and replayed.
 
 One JSON object a line. A connection begins with a line that carries the schema; each line
 after it is one piece of the stream. Bytes are written as the characters of the same number
@@ -60,7 +60,7 @@ class Dialogue:
     passages: tuple[Passage, ...]
 
     def joined(self) -> "Dialogue":
-        """Return the dialogue with pieces that follow one another in a direction made one."""
+        """Return the dialogue with consecutive pieces of one direction joined."""
         passages = []
         for (direction, secret), group in groupby(
             self.passages, lambda passage: (passage.direction, passage.secret)

@@ -61,14 +61,14 @@ _PROBES_OUT, _LAST_DATA, _LAST_ACK = 3, 19, 20
 
 
 def set_keepalive(connection: socket.socket) -> None:
-    """Have the kernel probe a silent far end, and give up one that acknowledges nothing."""
+    """Let the kernel probe a silent far end, and give up one that acknowledges nothing."""
     for level, name, value in _OPTIONS:
         if hasattr(socket, name):
             connection.setsockopt(getattr(socket, level), getattr(socket, name), value)
 
 
 def unheard(connection: socket.socket) -> OSError | None:
-    """Return that the far end is gone: two probes unanswered, and silent for 2.5 s.
+    """Return the error for a far end that is gone: two probes unanswered, silent for 2.5 s.
 
     ``None`` while it is there, and where the system does not tell (all but Linux): the kernel's own
     3 s hold then.
@@ -307,7 +307,7 @@ class TcpTransport:
             raise self._ended(self._unheard) from self._unheard
 
     def _end_of_stream(self) -> bytes:
-        """Tell our own close, which wakes a waiting read with nothing, from the far side's."""
+        """Distinguish our own close, which wakes a waiting read with nothing, from the peer's."""
         if self._closed:
             raise self._ended(None)
         return b""
@@ -334,7 +334,7 @@ class TcpTransport:
 
 
 def _peer(connection: socket.socket) -> str:
-    """Return address and port of the far end, empty when it has gone already."""
+    """Return address and port of the far end, empty if it is already gone."""
     try:
         host, port, *_ = connection.getpeername()
     except (OSError, ValueError):
@@ -347,7 +347,7 @@ def _peer(connection: socket.socket) -> str:
 
 
 def looker(connection: socket.socket) -> Callable[[], bool]:
-    """Return a function that tells at once whether ``connection`` can be read.
+    """Return a function that reports at once whether ``connection`` can be read.
 
     It is for one thread, and cheap: what it needs is made once.
     """

@@ -1,4 +1,4 @@
-"""What passes on a link, told to whoever listens, with every secret left out.
+"""Reports the traffic of a link to listeners, without its secrets.
 
 Every link tells its traffic here: byte streams (EPSON, Modbus, anybody's) through
 :class:`~robolink.transport.TracingTransport`, a CAN bus frame by frame, a mailbox without bytes
@@ -23,7 +23,7 @@ from robolink.timing import Clock
 Direction = Literal["sent", "received"]
 
 TraceSink = Callable[[int, Direction, bytes], None]
-"""Takes the time in ns of the link's clock, the direction and the bytes."""
+"""Receives the time in ns of the link's clock, the direction and the bytes."""
 
 SECRET_PLACEHOLDER: Final = b"<secret>"
 """Stands in a trace for every secret, whatever its content and length."""
@@ -39,7 +39,7 @@ _TEXT: Final = bytes(range(0x20, 0x7F)) + b"\t\r\n"
 
 
 class Listeners:
-    """Who is told of the links that are opened within a block; see :func:`told_to`.
+    """Who receives the traffic of the links that a block opens; see :func:`told_to`.
 
     Attributes:
         sinks: Each is told of all traffic.
@@ -52,7 +52,7 @@ class Listeners:
 
 
 class _ThisThread(local):
-    """Who is told of what this thread opens."""
+    """Who receives the traffic of what this thread opens."""
 
     listeners: Listeners | None = None
 
@@ -65,7 +65,7 @@ _R = TypeVar("_R")
 
 @contextmanager
 def told_to(*sinks: TraceSink | None) -> Iterator[Listeners]:
-    """Let each link that is opened within the block tell its traffic to ``sinks``.
+    """Report the traffic of each link that the block opens to ``sinks``.
 
     A kind of controller passes nothing on for that, so none can forget to.
 
@@ -95,7 +95,7 @@ def told_to(*sinks: TraceSink | None) -> Iterator[Listeners]:
 
 
 def told_alike(opened: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Let a link that is opened later tell its traffic to whoever is told of it now.
+    """Report the traffic of a link that is opened later to the present listeners.
 
     Args:
         opened: Opens it.
@@ -114,7 +114,7 @@ def told_alike(opened: Callable[_P, _R]) -> Callable[_P, _R]:
 
 
 class Traffic:
-    """What passes on one link, told to the trace of its connection and to the log.
+    """Reports the traffic of one link to the trace of its connection and to the log.
 
     It is told to whoever was given to :func:`told_to` when it was made. What listens and fails is
     told no more, and said once on standard error: the dialogue goes on.
@@ -161,15 +161,15 @@ class Traffic:
 
     @property
     def logs(self) -> bool:
-        """Whether it tells the log, where anybody listens to that."""
+        """Whether it writes to the log, if anybody reads that."""
         return self._log is not None
 
     def listened(self) -> bool:
-        """Whether anybody is told; who moves bytes looks at it before it tells of any."""
+        """Whether anybody listens; a link checks this before it reports traffic."""
         return True if self._sinks else self._debugs()
 
     def show_answers(self, answers: Collection[bytes]) -> None:
-        """Say which answers to a secret hold none of it, so that they are told as they are.
+        """Name the answers to a secret that hold none of it, so that they are shown as they are.
 
         Args:
             answers: Each whole, with its line end.
@@ -177,7 +177,7 @@ class Traffic:
         self._harmless = answers
 
     def sent(self, data: bytes, *, secret: bool = False, request: str = "") -> None:
-        """Tell of what goes out now.
+        """Report what is sent now.
 
         Args:
             data: The bytes.
@@ -203,7 +203,7 @@ class Traffic:
             self._tell("sent", data)
 
     def received(self, data: bytes, *, request: str = "") -> None:
-        """Tell of what came in; empty is the end of the stream.
+        """Report what was received; empty is the end of the stream.
 
         Args:
             data: The bytes.
@@ -254,7 +254,7 @@ def _never() -> bool:
 
 
 def repeats(secret: str, data: bytes) -> bool:
-    """Tell whether an answer repeats a secret, or six characters of it.
+    """Return whether an answer repeats a secret, or six characters of it.
 
     Args:
         secret: It; one of fewer than four characters may stand anywhere by chance.

@@ -1,4 +1,4 @@
-"""The transport contract as checks that any transport can be held to.
+"""The transport contract as checks for any transport.
 
 Each check takes a *maker* and needs no test framework, so a third party can run the same
 checks on a transport of its own; it raises AssertionError with a sentence. A fake must pass
@@ -22,7 +22,7 @@ _PATIENCE_S = 5.0
 
 
 class FarEnd(Protocol):
-    """The other end of a transport, in the hands of a check."""
+    """The other end of a transport, controlled by a check."""
 
     def send(self, data: bytes) -> None:
         """Send all of ``data`` to the transport."""
@@ -152,7 +152,7 @@ def check_bytes_that_trickle_in_do_not_extend_a_deadline(make: PairMaker) -> Non
 
 
 def check_closing_wakes_a_waiting_thread(make: PairMaker) -> None:
-    """Close from another thread ends a receive and a wait, soon."""
+    """Closing in another thread ends a receive and a wait, soon."""
     with make() as pair:
         near, late = pair.near, _late(pair.near)
         ends: list[object] = []

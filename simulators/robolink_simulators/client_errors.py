@@ -1,4 +1,4 @@
-"""What the clients of a simulator say when no answer of a simulator comes."""
+"""The errors of a simulator's clients when no simulator answers."""
 
 from robolink.errors import (
     ConnectError,
@@ -10,7 +10,7 @@ from robolink.messages import tr
 
 
 def nobody_listens(url: str) -> ConnectError:
-    """Return the error of a port that takes no connection.
+    """Return the error for a port that accepts no connection.
 
     Args:
         url: Where, without its token; so in all of these.
@@ -22,7 +22,7 @@ def nobody_listens(url: str) -> ConnectError:
 
 
 def is_gone(url: str) -> TransportBrokenError:
-    """Return the error of one that has answered before and takes no connection any more."""
+    """Return the error for a simulator that answered before and accepts no connection any more."""
     return TransportBrokenError(
         tr("The simulator at {url} is gone.", url=url),
         remedy=tr("Start it again."),
@@ -30,7 +30,7 @@ def is_gone(url: str) -> TransportBrokenError:
 
 
 def ended_unanswered(url: str) -> TransportBrokenError:
-    """Return the error of a connection that ended before the answer was whole."""
+    """Return the error for a connection that ended before the answer was whole."""
     return TransportBrokenError(
         tr("The connection to {url} ended without an answer.", url=url),
         remedy=tr(
@@ -41,7 +41,7 @@ def ended_unanswered(url: str) -> TransportBrokenError:
 
 
 def is_silent(url: str, timeout_s: float) -> TransportTimeoutError:
-    """Return the error of an answer that did not come in time."""
+    """Return the error for an answer that did not come in time."""
     return TransportTimeoutError(
         tr("No answer came from {url} within {seconds:g} s.", url=url, seconds=timeout_s),
         remedy=tr(
@@ -52,7 +52,7 @@ def is_silent(url: str, timeout_s: float) -> TransportTimeoutError:
 
 
 def is_no_simulator(url: str) -> RemoteProtocolError:
-    """Return the error of an answer that no simulator gives."""
+    """Return the error for an answer that no simulator gives."""
     return RemoteProtocolError(
         tr("Something answers on {url}, but it is no simulator of robolink.", url=url),
         remedy=tr(

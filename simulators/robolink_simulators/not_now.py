@@ -1,10 +1,10 @@
-"""What a simulated machine cannot do as it is now, however well it was asked."""
+"""What a simulated machine cannot do in its present state, however correct the request."""
 
 from robolink.errors import ConfigError
 
 
 class NotNowError(ConfigError):
-    """What was asked for is there and was asked for rightly; this machine, or its state, bars it.
+    """The request exists and is correct, but this machine, or its state, prevents it.
 
     Whoever asks again when that has changed, or asks another machine, may be served.
     """

@@ -1,4 +1,4 @@
-"""Pytest fixtures that bring simulated controllers; tests connect by URL themselves.
+"""Pytest fixtures with simulated controllers; tests connect by URL themselves.
 
 What robolink would keep about a controller in the tester's own state folder (journal, markers,
 backups) goes into a folder of the test's own. docs/testing.md shows each fixture.
@@ -119,7 +119,7 @@ def robolink_state(
 def robolink_journal(
     robolink_state: Path,  # noqa: ARG001 - the journal of the test, not the tester's
 ) -> "Journal":
-    """The journal of this test; what tests and commands did on its cells stands in it."""
+    """The journal of this test, with what tests and commands did on its cells."""
     from robolink.journal import open_journal
 
     return open_journal()
@@ -127,7 +127,7 @@ def robolink_journal(
 
 @pytest.fixture
 def virtual_clock(request: pytest.FixtureRequest) -> Iterator["ManualClock"]:
-    """The time of the cells in the process: it stands still until somebody waits or steps it.
+    """The time of the cells in the process: it passes only when somebody waits or steps it.
 
     A test all of whose cells are on a port has stepped the time of none: it fails.
     """

@@ -67,7 +67,7 @@ class SimulatedCamera:
         return [Spot(x, y, radius_px=radius_px) for x, y, radius_px in self._picture(mark)]
 
     def close(self) -> None:
-        """Let go of it."""
+        """Release it."""
         self._close()
 
 

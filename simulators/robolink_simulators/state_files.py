@@ -1,4 +1,4 @@
-"""What a simulated controller keeps over a restart, as one small file."""
+"""What a simulated controller retains over a restart, as one small file."""
 
 import json
 import random
@@ -34,7 +34,7 @@ def drawn_serial(origin: str = "") -> str:
 
 
 class StateNotKeptError(NotNowError):
-    """A file of a state cannot be written, so what was changed would not outlive a restart."""
+    """A state file cannot be written, so changes would not outlive a restart."""
 
 
 class StateFile(ABC):
@@ -57,15 +57,15 @@ class StateFile(ABC):
 
     @abstractmethod
     def _document(self) -> Mapping[str, object]:
-        """Return what is to be kept now, in values of its own."""
+        """Return what to store now, as independent values."""
 
     @abstractmethod
     def _take(self, document: Any) -> bool:  # noqa: ANN401 - whatever the file holds
-        """Take over what a file holds; whether that was all that is kept."""
+        """Take over the content of a file; return whether that was everything."""
 
     @abstractmethod
     def _foreign(self, path: Path) -> str:
-        """Return the sentence for a file that holds something else."""
+        """Return the sentence for a file with other content."""
 
     def restore(self) -> bool:
         """Give the controller what the file holds; False when there is none.
@@ -86,7 +86,7 @@ class StateFile(ABC):
         return True
 
     def save_changes(self) -> None:
-        """Put a new state in the place of the old one; a crash leaves one of them whole.
+        """Replace the old state with a new one; a crash leaves one of them whole.
 
         Its folder is made where there is none. A state that is written already stays.
 

@@ -281,7 +281,7 @@ def test_after_the_third_time_it_ends_with_the_name_of_what_is_wrong(show, code,
 def test_a_way_to_the_wrong_side_is_offered_again_or_stays_in_doubt(accepts):
     guide = Guide(sigma_mm=0.0, shows=[(-60.0 * X, 0.0)], accepts=accepts)
     result = measured(guide)
-    assert guide.offers[0].startswith("This move leads 163 degrees away from +X")
+    assert guide.offers[0].startswith("This move is 163 degrees off the stored +X")
     assert ("turned_from_stored" in result.warnings) is (not accepts)
     right = result.offset.components() == pytest.approx(TOOL.components(), abs=1e-6)
     assert right is bool(accepts)

@@ -81,7 +81,7 @@ def test_an_operator_may_not_write_a_sign_error_and_is_told_the_figure(cell, too
     for more in ((), ("--yes",), ("--accept-jump", "30")):
         code, _, err = cell("anna", *SIGN_ERROR, *more)
         assert code == 9, err
-        assert "anna may not let tool 1 jump by 24.000 mm" in err
+        assert "anna may not accept a jump of tool 1 by 24.000 mm" in err
         assert "Ask an engineer" in err
     assert tools.get(1) == STORED
 
@@ -196,7 +196,7 @@ def test_a_restore_is_asked_about_and_an_undo_is_not(cell, tools, tmp_path):
     # What was there before was proved, and the engineer who undoes has it on record.
     assert cell("eva", "undo", "--yes")[0] == 0
     assert tools.get(1) == STORED
-    assert "let tool 1 jump by 24.000 mm" in cell("eva", "journal", "list")[1]
+    assert "accept a jump of tool 1 by 24.000 mm" in cell("eva", "journal", "list")[1]
     assert cell("eva", "undo", "--yes")[0] == 0
     assert cell("eva", "restore", file, "--yes", "--accept-jump", "24.1")[0] == 0
     assert tools.get(1) == STORED

@@ -206,7 +206,7 @@ def test_on_a_terminal_the_person_is_asked_and_may_leave(shown, serve, person):
     code, _, err = shown(*check)
     assert code == 9
     assert "type at least 2 after the point" in err
-    assert "are on record" in err
+    assert "are recorded" in err
     asks = person(plc, "3.21", None, "", "-75.07\n", "4.000")
     code, out, _ = shown(*check)
     assert (code, asks.answers) == (0, [])
@@ -263,7 +263,7 @@ def test_a_zero_proves_nothing(shown, serve):
     for tool in (1, 2):
         plc.program.set_tool(tool, {"x": 0.0, "y": 0.001 * tool})
     code, _, err = shown("-c", url, "plc", "check-map", "--shows", "1.x=0")
-    assert (code, "a 0 proves nothing" in err) == (2, True)
+    assert (code, "a 0 confirms nothing" in err) == (2, True)
 
 
 @pytest.mark.parametrize(

@@ -71,7 +71,7 @@ def test_it_is_told_who_is_at_work_and_never_to_recover(plc, run_beside):
         code, err = run_beside("-c", plc, *command)
         assert code == 0
         assert "Ann Lee (ann, process" in err
-        assert "on pc-7) has been at work on this controller since" in err
+        assert "on pc-7) has had this controller locked since" in err
         assert "calibration of tool 1" in err
         assert "It is still working" in err
         assert "recover' puts" not in err
@@ -100,7 +100,7 @@ def test_a_holder_on_another_computer_is_named_without_waiting(plc, run_beside):
     session(plc, boot="another start of another system")
     code, err = run_beside("-c", plc, "status")
     assert code == 0
-    assert "has been at work on this controller" in err
+    assert "has had this controller locked" in err
     assert "Watch it for a while" in err
 
 
@@ -122,7 +122,7 @@ def test_doctor_does_not_send_anybody_to_recover_beside_it(plc, run_beside, caps
     session(plc)
     main.run(["doctor"])
     shown = capsys.readouterr()
-    assert "at work on this controller" in shown.out + shown.err
+    assert "has had this controller locked" in shown.out + shown.err
     assert "recover" not in shown.out + shown.err
 
 

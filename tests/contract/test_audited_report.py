@@ -62,7 +62,7 @@ def test_machine_gauge_people_times_budget_touches_and_rule_stand_on_the_page(ce
         "combined",
         "Test for a step: F",
         "How the touches were made",
-        "1 brought by the person",
+        "1 jogged by the person",
         "Decision rule (after ISO 14253-1)",
         "The tool conforms",
     ):

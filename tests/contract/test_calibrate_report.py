@@ -87,7 +87,7 @@ def test_a_write_from_poses_is_reported(command, tmp_path):
     assert "There was no turn test of the new tip." in page
     assert "typed poses; taught with tool 0" in page
     # As in the page of the journal.
-    for said in ("Entries of the journal", "done by", "What was judged", "report number"):
+    for said in ("Entries of the journal", "done by", "Limits and verdicts", "report number"):
         assert said in page
 
 

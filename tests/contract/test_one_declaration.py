@@ -47,7 +47,7 @@ RELATIONS = [
     ("z-touch", {"speeds_mm_s": (2, 2), "input": 5}, "speeds_mm_s", "must differ by a factor"),
     ("z-touch", {"until_mm": 0.1, "input": 5}, "until_mm", "has nothing to leave out"),
     ("beams", {"search_mm": 6}, "aside_mm", "must be larger than"),
-    ("beams", {"repeats": 1, "retake": True}, "retake", "means nothing: nothing is repeated"),
+    ("beams", {"repeats": 1, "retake": True}, "retake", "has no effect: nothing is repeated"),
     ("beams", {"until_mm": 0.1}, "until_mm", "has nothing to leave out"),
     ("n-angle", {"angles_deg": (0, 90, 90)}, "angles_deg", "must not hold the same angle"),
     ("n-angle", {"angles_deg": (0, 90, 180), "count": 4}, "count", "excludes"),

@@ -278,7 +278,7 @@ def test_a_typed_z_beyond_the_cell_takes_an_engineer(cell, recipe, tmp_path, mon
     line = ("-c", "a", "recalibrate", recipe(TOUCH, z="typed"), *assist)
     refused = cell.run(*line, "--operator", "ben")
     assert refused.code == 9
-    assert "ben may not let tool 1 jump by 5" in refused.err
+    assert "ben may not accept a jump of tool 1 by 5" in refused.err
     assert cell.tool_1 == before
     done = cell.run(*line, "--operator", "anna")
     assert done.code == 0, done.err
@@ -381,7 +381,7 @@ def test_a_jump_takes_an_engineer(cell, recipe, tmp_path, monkeypatch):
     done = run("--operator", "anna", "--accept-jump", "5")
     assert done.code == 0, done.err
     decisions = [entry.verdict for entry in journal(cell, EntryKind.DECISION)]
-    assert any("let tool 1 jump by" in verdict for verdict in decisions)
+    assert any("accept a jump of tool 1 by" in verdict for verdict in decisions)
 
 
 @pytest.mark.parametrize("nth", [2, 7, 12])

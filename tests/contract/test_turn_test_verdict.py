@@ -39,7 +39,7 @@ def newest(controller: SimpleController):
     return next(iter(controller.outcomes.recorded(kinds=(EntryKind.VERIFY,))))
 
 
-TAKES_BACK = "Put the old value back."
+TAKES_BACK = "Restore the old value."
 AGAIN = "Make one more touch."
 LEARNS = "Learn the station again."
 MOUNT = "Check the mount of the nozzle."

@@ -106,7 +106,7 @@ def check_the_next_command_says_what_is_selected(cell: EpsonRecipeCell) -> None:
     assert shown.code == 0, shown.err
     if cell.selected != 1:
         assert "Tool 0 is selected now; it was tool 1 before" in shown.err
-        assert "This puts tool 1 back, with the earlier power mode and speed" in shown.err
+        assert "This restores tool 1, with the earlier power mode and speed" in shown.err
     assert shown.err.count(f'robolink -c "{cell.url}" recover') == len(markers)
     assert cell.open_markers() == markers
 

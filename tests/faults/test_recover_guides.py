@@ -72,7 +72,7 @@ def test_what_reading_can_tell_is_settled_and_the_movement_waits_for_a_word(cell
     assert cell.settings() == cell.settings_before
     assert kinds(cell) == {MarkerKind.MOVE}
     said = ended.err + ended.out
-    assert "  done: Put the old value of tool 1 back" in said
+    assert "  done: Restore the old value of tool 1" in said
     (pose,) = poses(said)
     assert pose.endswith("(tool 1)"), "the cell's own tool is selected by then"
     assert "'robolink recover' again on a terminal, or with --yes" in said
@@ -110,7 +110,7 @@ def test_a_dry_run_tells_what_it_would_do_and_does_nothing(cell):
     before, sent = cell.open_markers(), len(cell.writes())
     ended = cell.run("recover", "--dry-run")
     assert ended.code == 6, ended.err
-    assert "  to do: Put the old value of tool 1 back" in ended.err
+    assert "  to do: Restore the old value of tool 1" in ended.err
     assert "  to do: you decide" in ended.err
     assert cell.open_markers() == before
     assert (len(cell.writes()), cell.changed()) == (sent, {1})

@@ -274,7 +274,7 @@ def test_a_contradiction_after_a_break_is_asked_about_at_the_terminal(cell, said
     cell.simulator.world.pin_mm = (x_mm + 0.15, y_mm, z_mm)
     written = len(cell.writes())
     ended, questions = new_chosen(cell, answers=said)
-    assert "1 Put the old value back." in questions[4]
+    assert "1 Restore the old value." in questions[4]
     assert "Keep the value" not in questions[4], "a wider one is over the limit of the recipe"
     assert (ended.code, told in ended.err) == (8, True), ended.err
     assert (cell.changed(), cell.open_markers()) == (set(), ())

@@ -245,7 +245,7 @@ def test_insisting_on_a_free_lease_is_recorded_and_fences_who_has_looked(leases)
     anna.look()
     bert.take_over("to be sure")
     (entry,) = leases.entries()
-    assert "Nobody worked on this cell" in entry.verdict
+    assert "Nobody had this controller locked" in entry.verdict
     with pytest.raises(LeaseLostError):
         anna.begin(marker("b"))
 

@@ -279,7 +279,7 @@ def test_a_component_that_is_zero_in_all_tools_needs_a_test_value():
     zero = {tool: {**held, "y": 0.0, "z": 0.0} for tool, held in TRUE.items()}
     for wrong in (None, lambda right: changed(right, **EXCHANGED)):
         machine = Machine(wrong, true=zero)
-        with pytest.raises(ConfigError, match="a 0 proves nothing"):
+        with pytest.raises(ConfigError, match="a 0 confirms nothing"):
             compare(machine.map, machine.found(), Y, "0.00")
         held = machine.compare(X, U, MapValue(2, "x"))
         wanted = to_compare(machine.map, machine.found(), held.compared)
@@ -305,7 +305,7 @@ def test_a_component_that_is_zero_in_all_tools_needs_a_test_value():
 def test_a_test_value_has_to_come_and_all_its_digits_count():
     machine = Machine()
     found = machine.found()
-    with pytest.raises(ConfigError, match="before as well"):
+    with pytest.raises(ConfigError, match="already read"):
         compare_test(machine.map, found, found, X, "12.5")
     with pytest.raises(MapDiffersError):
         compare_test(machine.map, {**found, X: 0.0}, {**found, X: 12.46}, X, "12.5")

@@ -187,7 +187,7 @@ BAD = {
     "a probe that tells nothing": (
         GOOD + "[probe]\naddress = 90\nvalue = 0.0\n",
         "probe.value",
-        "does not tell the word order",
+        "does not show the word order",
     ),
     "another schema": (
         GOOD.replace("plc-map/1", "plc-map/2"),

@@ -143,7 +143,7 @@ def test_the_angles_are_those_of_the_method(text, where, what):
         (
             with_(BEAMS, "[source]", "repeats = 1", "retake = true"),
             "source.retake",
-            "means nothing: nothing is repeated",
+            "has no effect: nothing is repeated",
         ),
         (
             with_(BEAMS, "[source]", "until_mm = 0.01"),
@@ -535,8 +535,8 @@ def test_attempts_belong_to_measuring_again():
     [
         ("before_measure", 3, None),
         ("before_measure", 4, "is not a tool of this recipe"),
-        ("start", 3, 'means nothing here: "start" comes once'),
-        ("before_write", 4, 'means nothing here: "before_write" comes once'),
+        ("start", 3, 'has no effect here: "start" comes once'),
+        ("before_write", 4, 'has no effect here: "before_write" comes once'),
     ],
 )
 def test_prompts_and_outputs_name_tools_of_the_recipe_where_one_is_measured(kind, at_, tool, what):

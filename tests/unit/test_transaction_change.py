@@ -194,7 +194,9 @@ def test_a_link_that_is_gone_leaves_the_change_to_recover(cell):
     with cell.connected() as controller:
         with pytest.raises(OutcomeUnknownError) as lost:
             change_tools(controller, wanted(1, 2), tell=told.append)
-    sentence = "Tool 1, 2 may hold the new value, which was never tested; 'robolink recover' puts"
+    sentence = (
+        "Tool 1, 2 may hold the new value, which was never tested; 'robolink recover' restores"
+    )
     assert sentence in lost.value.remedy
     assert sentence in told[0]
     kinds = {marker.kind for _, marker in cell.journal.open_markers()}
@@ -220,7 +222,7 @@ def test_a_change_that_another_recovered_meanwhile_is_neither_kept_nor_taken_bac
 
 def test_an_operator_may_not_write_blindly(cell):
     with cell.connected(cell.log("Ann", role=PersonRole.OPERATOR)) as controller:
-        with pytest.raises(NotAllowedError, match="Ann may not write tool 2 blindly"):
+        with pytest.raises(NotAllowedError, match="Ann may not write tool 2 without comparing"):
             change_tools(controller, [*wanted(1), Wanted(2, NEW[2], ANY)])
     assert cell.tools == OLD
     assert cell.journal.open_markers() == ()

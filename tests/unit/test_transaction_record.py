@@ -131,7 +131,7 @@ def test_what_is_not_finished_is_put_back(cell, controller, verify, there):
     assert finding.verdict is Verdict.NOT_FINISHED
     assert not finding.verdict.needs_a_person
     numbers = ", ".join(map(str, there))
-    assert finding.action == f"Put the old value of tool {numbers} back"
+    assert finding.action == f"Restore the old value of tool {numbers}"
     why = "never tested" if verify else "the change is not complete"
     assert finding.sentence.endswith(f"Written, but {why}.")
     Settler(controller).settle(finding)

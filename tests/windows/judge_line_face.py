@@ -28,7 +28,7 @@ def start(console):
 def test_a_person_types_steps_is_refused_an_unjogged_touch_and_stops(console, simulator):
     start(console)
     console.type("take\r")
-    console.see("Not yet: the tip still stands where the robot put it.")
+    console.see("Not yet: the tip is still where the robot stopped.")
     console.type("z-0.1\r")
     console.see(r"Z -80\.(09|10)")  # the arm repeats to some microns
     console.type("stop\r")

@@ -35,7 +35,7 @@ def test_a_needle_is_changed_from_the_scan_to_done(opened, simulator, way):
     console.see("Touch 1 of 2")
     console.rest(0.6)
     console.press(["5"])
-    console.see("Not yet: the tip still stands where the robot put it")
+    console.see("Not yet: the tip is still where the robot stopped")
     console.touch()
     console.see("Touch 2 of 2")
     console.touch()

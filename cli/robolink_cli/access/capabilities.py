@@ -66,7 +66,7 @@ def io_of(controller: "Controller") -> "DigitalIo":
 
 
 def preferences_of(controller: "Controller") -> "frozenset[Preference] | None":
-    """Return the preferences set in a controller, ``None`` for one that does not tell."""
+    """Return the preferences of a controller, ``None`` if it does not report them."""
     from robolink.controllers import EpsonController
 
     return controller.preferences() if isinstance(controller, EpsonController) else None

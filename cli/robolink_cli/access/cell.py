@@ -1,4 +1,4 @@
-"""What ``-c NAME`` stands for, and what the cell says where the command line says nothing."""
+"""Resolves ``-c NAME``, and the values that the cell supplies where the command line has none."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
 
 def is_cell_name(given: str) -> bool:
-    """Tell a cell's name from a URL."""
+    """Return whether a name is a cell's and not a URL."""
     return "+" not in given and "://" not in given
 
 
 def link_options(cell: "Cell") -> dict[str, Any]:
-    """Return what a cell says about reaching its controller, by the names of the options.
+    """Return the cell's settings for reaching its controller, by the names of the options.
 
     A cell whose file states no remote time-out has none: it cannot be read over the wire
     (docs/reference/epson.md 1.1), so nothing moves until a person states it.
@@ -35,7 +35,7 @@ def link_options(cell: "Cell") -> dict[str, Any]:
 def with_cell_limits(
     cell: "Cell | None", options: Mapping[str, Any], keys: Mapping[str, str]
 ) -> dict[str, Any]:
-    """Return a command's options; those that nobody typed are taken from the cell.
+    """Return a command's options; untyped ones are taken from the cell.
 
     Args:
         cell: The cell, if ``-c`` named one.
@@ -53,7 +53,7 @@ def with_cell_limits(
 
 
 def require_expected_robot(controller: "Controller", cell: "Expected") -> None:
-    """Refuse to work on another robot than the cell file names.
+    """Refuse to work on another robot than the one in the cell file.
 
     Raises:
         ConfigError: The controller has another robot, or does not say which.
@@ -79,25 +79,25 @@ def require_expected_robot(controller: "Controller", cell: "Expected") -> None:
 
 
 def complete_cell(context: click.Context, parameter: click.Parameter, start: str) -> list[str]:  # noqa: ARG001 - click's form
-    """Return the cells whose names begin so, for TAB; reads nothing but the cell files."""
+    """Return the cells whose names begin so, for TAB; reads only the cell files."""
     from robolink.config import cell_names
 
     return [name for name in cell_names() if name.startswith(start)]
 
 
 def only_cell() -> str:
-    """Return the name of the only cell that the cell files describe, empty where there is none."""
+    """Return the name of the only cell in the cell files, empty if there is none."""
     names = _names()
     return names[0] if len(names) == 1 else ""
 
 
 def which_cell(name: str) -> str:
-    """Return the line that says which cell was taken."""
+    """Return the line that says which cell is used."""
     return tr("cell: {name}", name=name)
 
 
 def nothing_named() -> ConfigError:
-    """Return the refusal of a command that needs a controller, where none is named."""
+    """Return the error of a command that needs a controller and has none."""
     names = _names()
     if not names:
         return ConfigError(

@@ -37,7 +37,7 @@ def page_of_change(change: str) -> tuple[str, ...]:
 
 
 def free_page(change: str, *, replace: bool = False) -> Path:
-    """Return where a page is written that nobody names: an older one of the same change stays.
+    """Return where to write a page without a name: an older one of the same change stays.
 
     Args:
         change: Its whole id.

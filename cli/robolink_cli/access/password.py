@@ -46,7 +46,7 @@ def find_password(
 
 
 def from_places(path: str | None, variable: str | None) -> Secret | None:
-    """Return the password of a file or else of the environment, None where neither has one.
+    """Return the password from a file or else from the environment, None if neither has one.
 
     Args:
         path: The file, if one is named.
@@ -63,7 +63,7 @@ def from_places(path: str | None, variable: str | None) -> Secret | None:
 
 
 def from_keyring(identity: str) -> Secret | None:
-    """Return the password that the system's keyring has, None where it has none.
+    """Return the password in the system's keyring, None if it has none.
 
     Raises:
         ConfigError: The keyring failed in a way of its own, of D-Bus for example.

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def recording(path: str | None, controller: str) -> "Iterator[TraceSink | None]":
-    """Append what goes over the connection to a file, line by line, without the login.
+    """Append the traffic of the connection to a file, line by line, without the login.
 
     Appended, so that a morning of commands makes one recording, which is replayed in the
     same order.

@@ -1,4 +1,4 @@
-"""What a person must know about something that was begun and not proved finished."""
+"""What a person must know about interrupted jobs."""
 
 from contextlib import suppress
 from typing import TYPE_CHECKING
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def note_unsettled(controller: "Controller", markers: "Sequence[Marker]", url: str) -> None:
-    """Say what was begun and not proved finished, and what to do about each.
+    """Show the interrupted jobs, and what to do about each.
 
     Args:
         controller: The controller, connected; the link may be gone.
@@ -35,7 +35,7 @@ def note_unsettled(controller: "Controller", markers: "Sequence[Marker]", url: s
 
 
 def way_back(url: str, *, reset_first: bool) -> str:
-    """Return the commands that settle what was left open, in the order that works.
+    """Return the commands that recover what was left open, in the order that works.
 
     Args:
         url: How a person names the controller.
@@ -45,7 +45,7 @@ def way_back(url: str, *, reset_first: bool) -> str:
 
 
 def _needs_reset(controller: "Controller") -> bool:
-    """Return whether a reset comes first: read, or else as it was seen last."""
+    """Return whether a reset comes first: as read now, or else as last seen."""
     from robolink.errors import RobolinkError
 
     with suppress(RobolinkError):
@@ -54,7 +54,7 @@ def _needs_reset(controller: "Controller") -> bool:
 
 
 def note_at_work(outcomes: "OutcomeLog", url: str) -> bool:
-    """Say who else is working on a controller; return whether somebody is.
+    """Show who else has the controller locked; return whether anybody has.
 
     What is open then is not left behind: whoever began it puts it back himself.
     """
@@ -74,7 +74,7 @@ def note_at_work(outcomes: "OutcomeLog", url: str) -> bool:
 
 
 def marker_notice(marker: "Marker", url: str) -> str:
-    """Return the sentences about an unsettled marker, and the command that settles it."""
+    """Return the sentences about an open marker, and the command that recovers it."""
     from robolink.model import MarkerKind
 
     back = way_back(url, reset_first=False)
@@ -123,7 +123,7 @@ def _record_missing(marker: "Marker", url: str) -> str:
 
 
 def note_change(controller: "Controller", tool: int, now: "ToolOffset | None") -> None:
-    """Say when a tool does not hold what was last proved to be in it, and the usual causes."""
+    """Show when a tool does not hold its last confirmed value, and the usual causes."""
     from robolink.errors import JournalError
     from robolink.transaction import changed_since
 
@@ -135,7 +135,7 @@ def note_change(controller: "Controller", tool: int, now: "ToolOffset | None") -
 
 
 def _selected_now(controller: "Controller", marker: "Marker") -> str:
-    """Return which tool is in force: read, or else as far as the markers know it."""
+    """Return which tool is selected: as read, or else as far as the markers know it."""
     from robolink.errors import RobolinkError
 
     try:
@@ -176,7 +176,7 @@ def _unfinished(marker: "Marker", back: str, now: str) -> str:
         remedy = tr("Next: {command}", command=back)
     else:
         remedy = tr(
-            "This puts tool {tool} back, with the earlier power mode and speed: {commands}",
+            "This restores tool {tool}, with the earlier power mode and speed: {commands}",
             commands=back,
             tool=before,
         )

@@ -1,1 +1,1 @@
-"""The commands, by what a person is about to do."""
+"""The commands, grouped by what a person is about to do."""

@@ -1,6 +1,6 @@
 """robot, cell, expert: groups whose commands live in the families.
 
-Beside them ``config``, the group of before, whose commands are part of ``cell`` now.
+Beside them ``config``, the former group, whose commands are part of ``cell`` now.
 """
 
 from typing import Final
@@ -155,4 +155,4 @@ def expert() -> None:
 config = LazyGroup(
     name="config", lazy={}, renamed=_CONFIG, help=declared("Look at the cell files.")
 )
-"""The group of before; what it held is named in ``cell``."""
+"""The former group; what it held is named in ``cell``."""

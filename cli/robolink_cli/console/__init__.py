@@ -1,1 +1,1 @@
-"""Output and input at a console: what leaves, in which form, and with which exit code."""
+"""Output and input at a console: the form of the output, and the exit codes."""

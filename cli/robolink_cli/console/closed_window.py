@@ -1,4 +1,4 @@
-"""The window of a Windows console is closed: the work is ended in order, in the time that there is.
+"""The window of a Windows console is closed: ends the work in order, in the time that is left.
 
 Windows calls a handler in a thread of its own, and ends the process when that returns, after 5 s at
 the latest ("HandlerRoutine callback function" of Microsoft's console documentation). So the handler

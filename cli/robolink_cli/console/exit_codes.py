@@ -28,7 +28,7 @@ _COMMAND: Final = (
 
 
 def was_refused(error: BaseException) -> bool:
-    """Tell whether the same command would end the same way: no person ended it.
+    """Return whether the same command would end the same way: no person ended it.
 
     Args:
         error: What ended it.
@@ -42,7 +42,7 @@ def was_refused(error: BaseException) -> bool:
 def next_of(
     text: str, error: BaseException, outcome: "ControllerOutcome", typed: Sequence[str]
 ) -> str:
-    """Return the sentences of an error without the command that it ended as what comes next.
+    """Return an error's sentences without the next command, which the error ended.
 
     ``recover`` gives way to what comes before it; of another command nothing stays.
 
@@ -70,7 +70,7 @@ def next_of(
 
 
 def recover_after(robolink: str, *, again: bool, reset_first: bool) -> str:
-    """Return the commands that settle what was left open, in the order that works.
+    """Return the commands that recover what was left open, in the order that works.
 
     A controller in its error state, and one whose emergency stop was released without a reset,
     refuses what ``recover`` has to ask it. Where ``recover`` itself was refused, a look shows
@@ -180,7 +180,7 @@ def exit_code(error: BaseException) -> int:
 
 
 def report(error: BaseException, *, as_json: bool, typed: Sequence[str] = ()) -> int:
-    """Tell a person, or a machine, about ``error``; return the exit code.
+    """Report ``error`` to a person or a program; return the exit code.
 
     Args:
         error: What ended a command.
@@ -214,7 +214,7 @@ def report(error: BaseException, *, as_json: bool, typed: Sequence[str] = ()) ->
 
 
 def is_cut_off(error: BaseException) -> bool:
-    """Tell whether a command ended because nobody reads its output any more."""
+    """Return whether a command ended because nobody reads its output any more."""
     return isinstance(error, Interrupted) and error.by is EndedBy.OUTPUT_CLOSED
 
 
@@ -245,7 +245,7 @@ def error_body(error: BaseException, typed: Sequence[str] = ()) -> dict[str, obj
 
 
 def _ending(error: KeyboardInterrupt) -> EndedBy:
-    """Return what ended it; a KeyboardInterrupt that does not say so is Ctrl-C."""
+    """Return what ended it; a KeyboardInterrupt without a cause is Ctrl-C."""
     return error.by if isinstance(error, Interrupted) else EndedBy.CTRL_C
 
 

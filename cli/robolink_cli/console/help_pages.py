@@ -50,7 +50,7 @@ def _as_collected(text: str) -> str:
 
 
 def _paragraphs(text: str) -> Iterator[tuple[str, bool]]:
-    """Yield the paragraphs of a text, and whether one keeps its lines, as click has it."""
+    """Yield the paragraphs of a text, and whether one keeps its lines, as click does."""
     for part in re.split(r"\n\s*\n", text.strip("\n")):
         if part.startswith("\b"):
             yield part[1:].lstrip("\n"), True
@@ -69,12 +69,12 @@ def _wrapped(text: str, width: int, indent: str = "") -> str:
 
 
 def _is_a_line(text: str, width: int) -> bool:
-    """Tell whether click would write a text as it stands: one line that fits."""
+    """Return whether click would write a text unchanged: one line that fits."""
     return 0 < len(text) <= width and text.isprintable() and text == text.strip()
 
 
 class WideHelpFormatter(click.HelpFormatter):
-    """As click's, for pages that hold characters of two columns; English pages stay click's.
+    """Click's, for pages with characters of two columns; English pages stay click's.
 
     What fits on its line is written without click's wrapper: to load it and to measure each text
     took two thirds of the time of the front page, after the imports.
@@ -123,7 +123,7 @@ class WideHelpFormatter(click.HelpFormatter):
                 self.write(f"{blank}{' ' * first}{line}\n")
 
     def _wrote_lines(self, rows: list[tuple[str, str]], col_max: int, col_spacing: int) -> bool:
-        """Write a list of which each row is one line, without wide characters; False for others."""
+        """Write a list whose rows are one line each, without wide characters; False for others."""
         most = max((len(name) for name, _ in rows), default=0)
         width = max(self.width - most - col_spacing - 2, 10)
         plain = 0 < most <= col_max and all(
@@ -135,7 +135,7 @@ class WideHelpFormatter(click.HelpFormatter):
 
 
 class WideContext(click.Context):
-    """A context whose help pages are written so."""
+    """A context whose help pages are written in this way."""
 
     formatter_class = WideHelpFormatter
 

@@ -1,4 +1,4 @@
-"""In which language this command speaks, and whether the console can show it.
+"""The language of this command, and whether the console can show it.
 
 ``--lang``, ROBOLINK_LANG, ``language`` in the cell file or the user's, what the system is set to;
 what names no language that we have is English (docs/reference/languages.md 1). Nothing of it is
@@ -40,7 +40,7 @@ _now: Final[list[str]] = []
 
 
 def language_now() -> str:
-    """Return the language in which the command line that is carried out speaks."""
+    """Return the language of the present command line."""
     spoken(" ")  # it is found with the first text, whichever that is
     return _now[-1] if _now else ENGLISH
 
@@ -50,13 +50,13 @@ _listening: Final[list["_Listener"]] = []
 
 
 def other_language() -> str:
-    """Return the language that a person may change to; empty where the console shows no other."""
+    """Return the language that a person may switch to; empty if the console shows no other."""
     other = CHINESE if language_now() == ENGLISH else ENGLISH
     return other if other == ENGLISH or _unshown_here(other) is None else ""
 
 
 def speak_from_now(language: str) -> None:
-    """Speak a language for the rest of this command line; where that cannot be, say why.
+    """Use a language for the rest of this command line; if that is impossible, say why.
 
     Args:
         language: One of :data:`robolink.locale.languages.LANGUAGES`.
@@ -67,7 +67,7 @@ def speak_from_now(language: str) -> None:
 
 @contextmanager
 def speaking_for(arguments: Sequence[str]) -> Iterator[None]:
-    """Speak the language of one command line, for the block.
+    """Use the language of one command line, for the block.
 
     Args:
         arguments: The command line without the program's name; it may be wrong.
@@ -102,7 +102,7 @@ class _Listener:
         return self._begin(chosen_language(self._arguments, os.environ))
 
     def change_to(self, language: str) -> None:
-        """Speak another language."""
+        """Switch to another language."""
         self.end()
         install(None)
         install(self._begin(language))
@@ -119,7 +119,7 @@ class _Listener:
         return translate
 
     def _let_click_speak(self, language: str) -> None:
-        """Hand click its own sentences, which it asks gettext for."""
+        """Translate click's own sentences, for which it asks gettext."""
         import gettext
 
         self._before = os.environ.get("LANGUAGE", "")
@@ -129,7 +129,7 @@ class _Listener:
         gettext.textdomain(CLICK)
 
     def end(self) -> None:
-        """Leave the process as it was found."""
+        """Restore the process's earlier language."""
         if self._before is None:
             return
         _now.clear()
@@ -144,7 +144,7 @@ class _Listener:
 
 
 def chosen_language(arguments: Sequence[str], environment: Mapping[str, str]) -> str:
-    """Return the language that a command line speaks; English for what we do not have.
+    """Return the language of a command line; English for those that robolink lacks.
 
     Args:
         arguments: The command line without the program's name.
@@ -159,7 +159,7 @@ def chosen_language(arguments: Sequence[str], environment: Mapping[str, str]) ->
 
 
 def _of_system(environment: Mapping[str, str]) -> str | None:
-    """Return the language that the system is set to, ``None`` for one that we do not have.
+    """Return the system's language, ``None`` for one that robolink lacks.
 
     LANGUAGE names those that a person would rather read, the best first; like gettext, it is heard
     only where the locale is no bare C (GNU gettext manual, "Specifying a Priority List").
@@ -186,7 +186,7 @@ def _typed(arguments: Sequence[str]) -> str:
 
 
 def _from_files(environment: Mapping[str, str]) -> str:
-    """Return ``language`` of the first cell file that has one; the site's speaks for nobody."""
+    """Return ``language`` of the first cell file that has one; a site's file does not count."""
     named = environment.get("ROBOLINK_CONFIG", "")
     files = [os.path.expanduser(named)] if named else []
     for path in (*files, "robolink.toml", _of_user(environment)):
@@ -236,7 +236,7 @@ def _of_windows() -> str:
 
 
 def _shown_here(language: str) -> bool:
-    """Tell whether the console has the characters, and say why not."""
+    """Return whether the console has the characters, and say if not."""
     encoding = _unshown_here(language)
     if encoding is not None:
         _remark(

@@ -1,4 +1,4 @@
-"""Decimal numbers as a person types them: ASCII, and nothing that only Python calls a number.
+"""Decimal numbers as a person types them: ASCII, without the forms that only Python knows.
 
 ``float()`` reads full-width digits, ``1_0`` and numbers with blanks around them; whoever typed one
 of these meant something else, or pasted it (docs/faults.md, "Numbers").
@@ -19,7 +19,7 @@ _NUMBER: Final = re.compile(
 
 
 def decimal(text: str) -> float:
-    """Return the number that ``text`` is.
+    """Return the decimal number in ``text``.
 
     Raises:
         ValueError: It is none.

@@ -1,4 +1,4 @@
-"""The one place at which text leaves for a console, or for a reader who may leave.
+"""The one place at which text is written to a console, or to a reader who may leave.
 
 What is shown holds words of controllers, of people and of files, and a terminal obeys what it
 is sent: an escape sequence clears the screen, rewrites a line that was read already, or types
@@ -52,7 +52,7 @@ codecs.register_error(PLAINLY, _plainly)
 
 
 def tolerate_any_console() -> None:
-    """Show what the console's encoding lacks as an escape instead of raising.
+    """Show characters that the console's encoding lacks as escapes, without an error.
 
     A technician's console may be cp1252, cp936 or plain ASCII, and a degree sign must not
     end a calibration; nor must a slip of the fingers that the encoding does not know.
@@ -81,7 +81,7 @@ def help_width() -> int:
 
 
 def may_be_guided() -> bool:
-    """Tell whether a person sits at both ends of this process's terminal."""
+    """Return whether a person is at both ends of this process's terminal."""
     try:
         ends = [stream.fileno() for stream in (sys.stdin, sys.stderr)]
         return all(os.isatty(end) and _is_no_other_device(end) for end in ends)
@@ -90,7 +90,7 @@ def may_be_guided() -> bool:
 
 
 def is_terminal(stream: TextIO | None) -> bool:
-    """Tell whether a stream is a terminal, where a person can be."""
+    """Return whether a stream is a terminal, where a person can be."""
     try:
         return (
             stream is not None
@@ -102,7 +102,7 @@ def is_terminal(stream: TextIO | None) -> bool:
 
 
 def _is_no_other_device(descriptor: int) -> bool:
-    """Tell whether what says that it is a terminal is one: on Windows NUL and a port say so too."""
+    """Return whether a supposed terminal is one: on Windows NUL and a port claim it too."""
     if sys.platform != "win32":
         return True
     import ctypes
@@ -122,7 +122,7 @@ _NARROWEST: Final = 20
 
 
 def visible(text: str) -> str:
-    r"""Return ``text`` with everything that a terminal would obey as ``\x1b`` or ``\u202e``.
+    r"""Return ``text`` with each control character as ``\x1b`` or ``\u202e``.
 
     CRLF, with which controllers end their lines, is a line feed.
     """
@@ -140,7 +140,7 @@ _shown_by: ShownBy | None = None
 
 @contextmanager
 def shown_by(shower: ShownBy) -> Iterator[None]:
-    """Hand what is to be shown on a terminal to whoever draws on it, for the block."""
+    """Pass terminal output to another writer, for the block."""
     global _shown_by  # noqa: PLW0603 - a process has one terminal
     before, _shown_by = _shown_by, shower
     try:
@@ -150,7 +150,7 @@ def shown_by(shower: ShownBy) -> Iterator[None]:
 
 
 def drawn_elsewhere() -> bool:
-    """Tell whether somebody else draws on the terminal now."""
+    """Return whether somebody else draws on the terminal now."""
     return _shown_by is not None and is_terminal(sys.stdout)
 
 
@@ -168,7 +168,7 @@ def show(text: str, *, beside: bool = False) -> None:
 
 
 def draw(text: str, *, beside: bool = False) -> None:
-    """Write a text on the terminal: :func:`show` for whoever draws there now.
+    """Write a text on the terminal: :func:`show` for the present writer.
 
     Args:
         text: One line or several.
@@ -202,7 +202,7 @@ def beside(text: str, taken: int) -> str:
 
 
 def terminal_width(stream: TextIO) -> int:
-    """Return how many columns there are, 0 where nobody knows or nothing can be said in them.
+    """Return the number of columns, 0 if unknown or too few for a sentence.
 
     Args:
         stream: Where it is to stand.
@@ -216,7 +216,7 @@ def terminal_width(stream: TextIO) -> int:
 
 
 def hand_over(document: str) -> None:
-    """Write JSON for a program; it is ASCII, and escapes what it holds by itself."""
+    """Write JSON for a program; it is ASCII, and escapes its own content."""
     import click
 
     click.echo(document)
@@ -226,7 +226,7 @@ class _Watched(io.FileIO):
     """A file that ends the command when it cannot be written to."""
 
     def write(self, data: "ReadableBuffer") -> int:
-        """Write, or end the command; then the rest goes nowhere.
+        """Write, or end the command; the rest is then discarded.
 
         Raises:
             Interrupted: The reader has left.
@@ -242,7 +242,7 @@ class _Watched(io.FileIO):
 
 
 def send_nowhere(descriptor: int) -> None:
-    """Let everything that is written to a descriptor vanish from now on."""
+    """Discard everything that is written to a descriptor from now on."""
     with suppress(OSError):
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, descriptor)

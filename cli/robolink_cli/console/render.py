@@ -1,4 +1,4 @@
-"""What a command shows: text for people, or one JSON document for machines.
+"""Output of a command: text for people, or one JSON document for machines.
 
 With ``--json``, stdout carries exactly one document and everything for people goes to
 stderr. That there is one document and not two is so by construction: :func:`emit_json` hands
@@ -24,7 +24,7 @@ _LOG = "robolink.log"
 
 
 def json_is_on() -> bool:
-    """Tell whether ``--json`` was given, before or after the command's name."""
+    """Return whether ``--json`` was given, before or after the command's name."""
     context = click.get_current_context(silent=True)
     return context is not None and bool(context.meta.get(_JSON))
 
@@ -38,12 +38,12 @@ LOG_LEVELS: Final = ("debug", "info", "warning", "error")
 
 
 def want_log(context: click.Context, option: str, value: str) -> None:
-    """Keep what an option says of the log of this invocation."""
+    """Keep the log options of this invocation."""
     context.meta.setdefault(_LOG, {})[option] = value
 
 
 def log_wanted() -> tuple[str, str]:
-    """Return the file and the level of the log that was asked for; empty where none was."""
+    """Return the file and the level of the requested log; empty without one."""
     wanted: dict[str, str] = click.get_current_context().meta.get(_LOG, {})
     return wanted.get("log_file", ""), wanted.get("log_level", "")
 
@@ -62,7 +62,7 @@ def say_listed(texts: Mapping[str, str]) -> None:
 
 
 def note(text: str) -> None:
-    """Show a person a remark beside the result; always on stderr, and no word of it is cut."""
+    """Show a person a remark beside the result; always on stderr, and no word is cut."""
     show(text if drawn_elsewhere() else sentences(text), beside=True)
 
 
@@ -100,12 +100,12 @@ def emit(kind: str, payload: Mapping[str, object], show: Callable[[], None]) -> 
 
 
 def show_requests(requests: Sequence[str]) -> None:
-    """Give the requests that a dry run would have sent, as they stand on the wire."""
+    """Show the requests that a dry run would have sent, as sent on the wire."""
     emit("dry-run", {"requests": list(requests)}, lambda: say("\n".join(requests)))
 
 
 def emit_json(schema: str, payload: Mapping[str, object]) -> None:
-    """Hand over the document of this command; it is printed when the command has ended.
+    """Keep the document of this command, which is printed when the command has ended.
 
     Args:
         schema: For example ``robolink/status/1``.
@@ -118,7 +118,7 @@ def emit_json(schema: str, payload: Mapping[str, object]) -> None:
 
 
 def print_document(context: click.Context) -> None:
-    """Print what :func:`emit_json` was given, if anything."""
+    """Print the document from :func:`emit_json`, if any."""
     if _DOCUMENT in context.meta:
         hand_over(context.meta[_DOCUMENT])
 
@@ -131,7 +131,7 @@ def dumps(schema: str, payload: Mapping[str, object]) -> str:
 
 
 def next_lines(steps: "Sequence[NextStep]", cell: str = "") -> list[str]:
-    """Return what a person does next, a sentence and a command each; nothing for no step.
+    """Return what a person does next, a sentence and a command each; nothing without a step.
 
     Args:
         steps: What follows.

@@ -1,4 +1,4 @@
-"""How a person at a shell says what the library's sentences ask for."""
+"""The library's requests in the words of a shell user."""
 
 from typing import Final
 

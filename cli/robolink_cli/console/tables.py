@@ -1,4 +1,4 @@
-"""A table that fits: numbers whole, words folded between words, and turned where it is too wide.
+"""A table that fits: numbers whole, words folded between words, and turned if too wide.
 
 rich makes columns narrower until a table fits, and cuts numbers and words for it. So how wide each
 is gets decided here; rich draws.
@@ -33,7 +33,7 @@ _WORDS: Final = r"\S+|\s+"
 
 
 def has_wide(text: str) -> bool:
-    """Tell whether a text holds a character of two columns."""
+    """Return whether a text holds a character of two columns."""
     return not text.isascii() and re.search(_HAS_WIDE, text) is not None
 
 
@@ -43,7 +43,7 @@ def padded(text: str, width: int) -> str:
 
 
 def columns(text: str) -> int:
-    """Return how many columns of a terminal a line takes."""
+    """Return the number of terminal columns of a line."""
     if text.isascii():
         return len(text)
     from rich.cells import cell_len  # here, because English help pages do without rich
@@ -77,7 +77,7 @@ def cut(text: str, width: int) -> str:
 
 
 def pieces(row: str, width: int) -> Iterator[str]:
-    """Yield a row that is one long word, such as a path, in pieces: nothing of it is lost."""
+    """Yield the pieces of a row that is one long word, such as a path: nothing is lost."""
     while columns(row) > width:
         piece = cut(row, width)
         yield piece
@@ -86,7 +86,7 @@ def pieces(row: str, width: int) -> Iterator[str]:
 
 
 def within(text: str, width: int) -> str:
-    """Return a text whose long lines are broken at blanks, each as far from the edge as it began.
+    """Return a text whose long lines are broken at blanks, with their indent kept.
 
     Lines that fit keep their blanks.
     """
@@ -133,7 +133,7 @@ def drawn_table(title: str, heads: Row, rows: Sequence[Row], width: int) -> "Tab
 
 
 def column_widths(heads: Row, rows: Sequence[Row], width: int) -> list[int] | None:
-    """Return how wide each column is in a table of at most ``width``; ``None`` where none fits.
+    """Return the column widths of a table of at most ``width``; ``None`` if none fits.
 
     A number is never folded, a word only where it is a long one.
 
@@ -170,13 +170,13 @@ def column_widths(heads: Row, rows: Sequence[Row], width: int) -> list[int] | No
 
 
 def is_figures(cells: Row) -> bool:
-    """Tell whether these are numbers, numbers with a mark, or nothing."""
+    """Return whether these are numbers, numbers with a mark, or nothing."""
     bare = (cell.strip().lstrip("*+-").replace(".", "", 1) for cell in cells)
     return all(digits.isdigit() or not digits for digits in bare)
 
 
 def _widest_piece(text: str) -> int:
-    """Return how wide the widest part of a text is that stays on one line."""
+    """Return the width of the widest part of a text that stays on one line."""
     words = filled(text, 1).split("\n") if has_wide(text) else text.split()
     return min(_NARROWEST, max(map(columns, words), default=0))
 
@@ -199,13 +199,13 @@ def _table(title: str, heads: Row, rows: Sequence[Row], widths: Sequence[int]) -
 
 
 def _folded(text: str, width: int) -> str:
-    """Return a text in rows of at most ``width``, a word in pieces only where it is longer."""
+    """Return a text in rows of at most ``width``; a word is cut only if it is longer."""
     rows = text.split("\n") if columns(text) <= width else filled(text, width).split("\n")
     return "\n".join(piece for row in rows for piece in pieces(row, width))
 
 
 def _lines(title: str, heads: Row, rows: Sequence[Row], width: int) -> list[str]:
-    """Return each cell in a line behind the name of its column, the rows apart from each other."""
+    """Return each cell in a line behind the name of its column, the rows separated."""
     name = min(max(map(columns, heads)) + 2, width // 2)
     lines = [title]
     for row in rows:

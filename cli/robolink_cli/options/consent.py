@@ -1,4 +1,4 @@
-"""Options that answer a question beforehand, or say that nothing is to be changed."""
+"""Options that answer a question in advance, or ask for a dry run."""
 
 from collections.abc import Callable
 from typing import Annotated, Any, TypeVar
@@ -61,16 +61,16 @@ Plain = Annotated[
 
 
 class MotionOption(click.Option):
-    """An option that says how to move."""
+    """An option for how to move."""
 
 
 def motion_option(*names: str, **attributes: Any) -> Callable[[Any], Any]:  # noqa: ANN401 - click's form
-    """Add an option that says how to move, as ``click.option`` does."""
+    """Add an option for how to move, as ``click.option`` does."""
     return click.option(*names, cls=MotionOption, **attributes)
 
 
 def refuse_motion_options(context: click.Context) -> None:
-    """Refuse options that say how to move when nothing moves.
+    """Refuse options for how to move when nothing moves.
 
     Raises:
         ConfigError: Names the first that was given.

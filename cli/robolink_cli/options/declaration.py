@@ -1,4 +1,4 @@
-"""What a command takes, declared once: in the signature of its function.
+"""A command's parameters, declared once: in the signature of its function.
 
 The decorators of ``session.context`` and ``options.shared`` read it. The name of an option, its
 type, whether it must be given, its default and its unit come from the parameter, so a
@@ -28,7 +28,7 @@ _UNITS: Final = {"_mm_s": "MM_S", "_mm": "MM", "_deg": "DEG", "_s": "S"}
 
 
 class CliParameter:
-    """An option or argument of a command, beside what the parameter of the function says.
+    """An option or argument of a command, besides what the function's parameter says.
 
     A parameter that begins with an underscore is for an option that is kept elsewhere.
 
@@ -43,11 +43,11 @@ class CliParameter:
 
 
 class CliOption(CliParameter):
-    """Is typed behind its name."""
+    """A person types it behind its name."""
 
 
 class CliArgument(CliParameter):
-    """Is typed by its place."""
+    """A person types it by its place."""
 
 
 class _Declared(NamedTuple):
@@ -114,7 +114,7 @@ def add_declared(
     shared: Callable[[Callable[..., Any]], Callable[..., Any]],
     framed: Callable[..., Any] | None = None,
 ) -> Any:  # noqa: ANN401 - a command or what becomes one
-    """Add what the signature of a function declares, and the options that it shares with others.
+    """Add what a function's signature declares, and the options that it shares with others.
 
     Args:
         function: It.
@@ -132,7 +132,7 @@ def add_declared(
 
 
 def opening_log(command: CommandT) -> CommandT:
-    """Return a command that opens its log, if one is wanted, before it does anything.
+    """Return a command that opens its log, if wanted, before it does anything.
 
     A stop does that afterwards.
 
@@ -154,7 +154,7 @@ def opening_log(command: CommandT) -> CommandT:
 
 
 def declared_options(function: Callable[..., Any]) -> Decorator:
-    """Return what adds all that the signature of another function declares, in its order."""
+    """Return what adds all that another function's signature declares, in order."""
 
     def add(command: Any) -> Any:  # noqa: ANN401 - a decorator of click
         for one in reversed(tuple(_declared_by(function))):
@@ -165,7 +165,7 @@ def declared_options(function: Callable[..., Any]) -> Decorator:
 
 
 def packed(function: CommandT) -> CommandT:
-    """Return what takes each option by itself, and hands a function its groups of options.
+    """Return what takes each option by itself, and passes a function its groups of options.
 
     A group is a named tuple whose fields are declared as parameters are.
     """

@@ -1,4 +1,4 @@
-"""How far taught points lead elsewhere: the options, the reading, the table."""
+"""How far taught points move: the options, the reading, the table."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class ImpactRequest:
-    """Which points are to be judged: numbers on the controller, or a ``.pts`` file."""
+    """The points to judge: numbers on the controller, or a ``.pts`` file."""
 
     numbers: tuple[int, ...] = ()
     path: Path | None = None
@@ -48,7 +48,7 @@ ImpactFile = Annotated[
 def impact_request(
     numbers: str | None, path: Path | None, *, names: tuple[str, str]
 ) -> ImpactRequest | None:
-    """Return which points are meant, ``None`` for none.
+    """Return the requested points, ``None`` for none.
 
     Raises:
         ConfigError: Both forms were given.
@@ -66,7 +66,7 @@ def impact_request(
 def judge(
     points: "dict[int, Pose | None] | None", *, old: "ToolOffset | None", new: "ToolOffset"
 ) -> "Impact | None":
-    """Return what the change does at ``points``.
+    """Return the effect of the change at ``points``.
 
     ``None`` when no points were asked for, or when the tool was undefined: a program cannot
     have driven to them with it (docs/reference/epson.md 1.5).

@@ -1,4 +1,4 @@
-"""--log-file and --log-level: what robolink decided, sent and received, in a file, for any command.
+"""--log-file and --log-level: robolink's decisions and traffic in a file, for any command.
 
 The file is opened before a command does anything, and one that cannot be written refuses it; but
 for a stop, which neither waits for a log nor fails because of one: what it sent is logged
@@ -27,7 +27,7 @@ _opened: "list[LogFile]" = []
 
 
 def open_log_file(path: str, level: str) -> None:
-    """Let what is logged from here on be appended to a file.
+    """Append what is logged from here on to a file.
 
     Args:
         path: The file.
@@ -104,7 +104,7 @@ def began(command: str, path: str, level: str) -> None:
 def log_afterwards(
     path: str, level: str, heard: "Sequence[tuple[int, Direction, bytes]]", sentence: str, url: str
 ) -> str:
-    """Log what a stop sent and what became of it, once it is over.
+    """Log what a stop sent and how it ended, once it is over.
 
     Returns:
         Why that was not possible; empty where it was.

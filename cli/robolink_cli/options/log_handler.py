@@ -15,7 +15,7 @@ LINE: Final = "%(asctime)s %(levelname)s %(process)d %(threadName)s %(name)s %(m
 
 
 class LogFile(logging.handlers.WatchedFileHandler):
-    """Appends a line a record, at once; opens the file anew where it was moved or deleted.
+    """Appends a line a record, at once; reopens the file if it was moved or deleted.
 
     A line goes out in one piece, so that those of two processes are not mixed. What cannot be
     written is said once on standard error, and ends nothing.
@@ -39,21 +39,21 @@ class LogFile(logging.handlers.WatchedFileHandler):
         return cast("TextIOWrapper", append_to_named(Path(self.baseFilename), encoding="utf-8"))
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Append one record; whatever fails is said once."""
+        """Append one record; a failure is reported once."""
         try:
             super().emit(record)
         except Exception as error:
             self._complain(error)
 
     def close(self) -> None:
-        """Close the file; what a full disk does not take is told like any line of it."""
+        """Close the file; a full disk is reported like that of any line."""
         try:
             super().close()
         except OSError as error:
             self._complain(error)
 
     def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802, ARG002 - logging's form
-        """Say once that the disk is full, or whatever it is."""
+        """Report once that the disk is full, or any other failure."""
         import sys
 
         self._complain(sys.exc_info()[1])

@@ -1,4 +1,4 @@
-"""Where poses come from when nothing moves, and the options that say so."""
+"""The source of poses when nothing moves, and its options."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -63,7 +63,7 @@ _STATED: Final = {3: set[str](), 4: {"z_mm"}, 6: {"z_mm", "v_deg", "w_deg"}}
 
 @dataclass(frozen=True, slots=True)
 class PoseSource:
-    """What was given in place of a measurement: exactly one of the three.
+    """The source given in place of a measurement: exactly one of the three.
 
     Attributes:
         kind: Which one.
@@ -95,7 +95,7 @@ class PoseSource:
 
     @property
     def sentence(self) -> str:
-        """What a report says about it."""
+        """Its sentence in a report."""
         if self.kind == "points":
             points = ", ".join(f"P{number}" for number in self.points)
             named = tr("points taught on the pendant, {points}", points=points)
@@ -130,7 +130,7 @@ class PoseSource:
 def pose_source_options(
     *, points: str, typed: str, path: str
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Add what says where poses come from, passed on as ``poses``.
+    """Add the options for the source of poses, passed on as ``poses``.
 
     These are ``--points``, ``--pose``, ``--poses``, ``--taught-tool``, ``--axes-held`` and how a
     file is read.
@@ -240,7 +240,7 @@ def pose_source(
     choices: ReadingChoices,
     axes_held: bool,
 ) -> PoseSource | None:
-    """Return what the options name, ``None`` when the robot is to measure.
+    """Return the source that the options name, ``None`` when the robot is to measure.
 
     Raises:
         ConfigError: More than one source, or none to which ``--taught-tool``, ``--axes-held`` or

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class ReportRequest:
-    """Where a report is wanted, and whether a file that is there may go."""
+    """Where a report is wanted, and whether it may replace a file."""
 
     path: Path
     replace: bool = False
@@ -94,7 +94,7 @@ class ReportDraft:
         given: tuple[str, ...],
         impact: "Impact",
     ) -> None:
-        """Note a typed offset that is only looked at."""
+        """Note a typed offset of a dry run."""
         self._proposed = {
             "tool": tool,
             "before": before,
@@ -132,7 +132,7 @@ class ReportDraft:
         }
 
     def note_result(self, result: "ToolReceipt | VerifyResult") -> None:
-        """Note what was written, or how the verification ended."""
+        """Note what was written, or how the turn test ended."""
         from robolink.model import ToolReceipt
 
         if isinstance(result, ToolReceipt):

@@ -83,12 +83,12 @@ def all_shared(command: CommandT) -> CommandT:
 
 
 class _Language(click.ParamType[str]):
-    """A language by any of its names; what the environment says is not refused."""
+    """A language by any of its names; environment variables are never refused."""
 
     name = "language"
 
     def convert(self, value: str, param: click.Parameter | None, ctx: click.Context | None) -> str:
-        """Return the language, English for what a variable names and nobody speaks here."""
+        """Return the language, English if a variable names one that robolink lacks."""
         found = language_named(value)
         if found is None and value != os.environ.get(VARIABLE):
             self.fail(
@@ -165,7 +165,7 @@ def _complete_level(
 
 
 def lang_option(command: CommandT) -> CommandT:
-    """Add ``--lang``. Which language is meant was found out before click read the line."""
+    """Add ``--lang``. The language was found before click read the line."""
     return click.option(
         OPTION,
         type=_Language(),
@@ -190,7 +190,7 @@ def controller_argument(command: CommandT) -> CommandT:
 
 
 def origin_of(option: str) -> str | None:
-    """Return the option or variable by which a person gave ``option``, None when nobody did."""
+    """Return the option or variable by which a person gave ``option``, None without one."""
     origins: dict[str, str] = click.get_current_context().meta.get(_ORIGINS, {})
     return origins.get(option)
 
@@ -296,7 +296,7 @@ def _keep_named(context: click.Context, parameter: click.Parameter, value: str |
 
 
 def _require_one_controller(context: click.Context, origin: str, value: object) -> None:
-    """Refuse two names that a person typed, in whatever order they stand."""
+    """Refuse two controller names on the command line, in any order."""
     named = {origin, context.meta.get(_ORIGINS, {}).get("url")}
     if named == {"--controller", _CELL_OR_URL} and context.meta[GIVEN]["url"] != value:
         raise click.UsageError(

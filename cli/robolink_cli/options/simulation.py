@@ -1,4 +1,4 @@
-"""The options of the commands that serve a simulated controller, in the groups that they share."""
+"""The options of the commands that serve a simulated controller, in shared groups."""
 
 import codecs
 import sys
@@ -47,7 +47,7 @@ Encoding = Annotated[
 
 
 def tell_encoding(taken: str | None, *, named: str | None) -> None:
-    """Say which code page was taken, where nobody named it and the text may look wrong."""
+    """Show which code page is used, if nobody named one and the text may look wrong."""
     if named is not None or taken in _PLAIN:
         return
     if taken is None:
@@ -137,7 +137,7 @@ FaultPlan = Annotated[
 
 
 class SimulationOptions(NamedTuple):
-    """What every simulated controller has that a maker of robots or of controls sells."""
+    """The options of every simulated controller that a maker of robots or of controls sells."""
 
     seed: Seed = 1
     state: Annotated[
@@ -193,7 +193,7 @@ class ServedLife(NamedTuple):
 
 
 def one_place(context: click.Context, given: click.Parameter, value: Any) -> Any:  # noqa: ANN401 - of either
-    """Refuse ``--tcp`` beside ``--serial``, for a controller that has one of them.
+    """Refuse ``--tcp`` beside ``--serial``, for a controller that has only one of them.
 
     Where it has the serial line, the usual address is none: several cells may be without one.
 
@@ -207,7 +207,7 @@ def one_place(context: click.Context, given: click.Parameter, value: Any) -> Any
 
 
 class ModbusPlaces(NamedTuple):
-    """Where a PLC is served, by the names of today or those that they had."""
+    """Where a PLC is served, by present or former option names."""
 
     address: Annotated[
         str | None,
@@ -226,7 +226,7 @@ class ModbusPlaces(NamedTuple):
     modbus_rtu: Annotated[Literal["pty"] | None, CliOption(hidden=True)] = None
 
     def by_name_of_today(self) -> dict[str, str | None]:
-        """Return them; whoever used an old name is told the new one on a terminal.
+        """Return them by present names; a terminal shows the new name of a former one.
 
         Raises:
             click.UsageError: One was given by both names.
@@ -238,7 +238,7 @@ class ModbusPlaces(NamedTuple):
 
 
 def _renamed(before: str, old: str | None, now: str, new: str | None) -> str | None:
-    """Return what was given by either name; say on a terminal which one it has now."""
+    """Return the value under either name; show the present name on a terminal."""
     if old is None:
         return new
     if new is not None:
@@ -251,7 +251,7 @@ def _renamed(before: str, old: str | None, now: str, new: str | None) -> str | N
 
 
 class ProjectOptions(NamedTuple):
-    """What goes with programs.
+    """The options that go with programs.
 
     Attributes:
         encoding: Code page of the files.

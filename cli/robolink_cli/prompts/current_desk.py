@@ -1,4 +1,4 @@
-"""The desk at which the person of this process sits, while a wizard shows it."""
+"""The desk of this process's person, while a wizard shows it."""
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -21,13 +21,13 @@ class AskingDesk(Protocol):
         """Show something that needs no answer."""
 
     def regard(self, subject: object) -> None:
-        """Take what comes next to be about ``subject``."""
+        """Note ``subject`` as the subject of what comes next."""
 
     def ask(self, question: str, kind: "Question") -> None:
         """Ask."""
 
     def following(self, look: Callable[[], Any]) -> AbstractContextManager[None]:
-        """Look at the controller while it moves, for the block."""
+        """Read the controller while it moves, for the block."""
 
     def poll(self, wait_s: float) -> str | None:
         """Return the answer, ``None`` if none came within ``wait_s``."""
@@ -37,13 +37,13 @@ _desk: AskingDesk | None = None
 
 
 def current_desk() -> AskingDesk | None:
-    """Return the desk, ``None`` where questions are plain lines."""
+    """Return the desk, ``None`` if questions are plain lines."""
     return _desk
 
 
 @contextmanager
 def sitting_at(desk: AskingDesk) -> Iterator[None]:
-    """Have every question of this process asked at ``desk``, for the block."""
+    """Ask every question of this process at ``desk``, for the block."""
     global _desk  # noqa: PLW0603 - a process has one terminal, and one person at it
     before, _desk = _desk, desk
     try:

@@ -1,4 +1,4 @@
-"""Jogging through the runner, so that its limits and its watch hold."""
+"""Jogs through the runner, so that its limits and its watch apply."""
 
 from robolink.errors import ConfigError
 from robolink.messages import tr
@@ -76,7 +76,7 @@ def plan_turn(
 def require_turn(
     controller: Controller, turn_deg: float, *, lift_mm: float, box_mm: float, tip: int | None
 ) -> None:
-    """Refuse a turn on whose way the flange or a tip leaves the area; reads only.
+    """Refuse a turn during which the flange or a tip leaves the area; reads only.
 
     Where a tool is selected, it turns about its tip, and the flange swings. Where none is, the
     tips swing: that of the tool that was named, else of all that are defined.

@@ -1,4 +1,4 @@
-"""Lines that a person types, and forgetting those typed before there was anything to answer.
+"""Lines that a person types, without those typed before there was a question.
 
 A barcode scanner ends with CR and LF, a key stays down, a line is pasted, a file is fed in: what
 waits in the input when a question is shown was never meant for it, and is dropped. A program that
@@ -55,7 +55,7 @@ class ConsoleLines:
             time.sleep(min(left_s, _LOOK_S))
 
     def forget(self, quiet_s: float) -> list[str]:
-        """Drop what was typed; see :class:`~robolink_cli.prompts.lines.Lines`."""
+        """Discard what was typed; see :class:`~robolink_cli.prompts.lines.Lines`."""
         dropped, self._typed = self._typed, ""
         if dropped:
             self._show(_ENDS)
@@ -116,7 +116,7 @@ QUIET_S: Final = 0.035
 
 
 class Lines(Protocol):
-    """Where typed lines come from."""
+    """The source of typed lines."""
 
     def next(self, wait_s: float) -> str | None:
         """Return the next line, ``None`` if none comes within ``wait_s``.
@@ -126,7 +126,7 @@ class Lines(Protocol):
         """
 
     def forget(self, quiet_s: float) -> list[str]:
-        """Drop what was typed so far, and return the lines among it that were complete.
+        """Discard what was typed so far, and return its complete lines.
 
         Args:
             quiet_s: How long nothing may come until the input counts as empty; 0 drops what is
@@ -150,7 +150,7 @@ def open_lines() -> Lines:
 
 
 class TerminalLines:
-    """Lines of a POSIX terminal, read without a thread, so that none is taken behind our back."""
+    """Lines of a POSIX terminal, read without a thread, so that none is lost to one."""
 
     def __init__(self, descriptor: int, termios: Any) -> None:  # noqa: ANN401 - not on Windows
         self._descriptor = descriptor
@@ -171,7 +171,7 @@ class TerminalLines:
         return _text(line)
 
     def forget(self, quiet_s: float) -> list[str]:
-        """Drop what was typed; see :class:`Lines`."""
+        """Discard what was typed; see :class:`Lines`."""
         dropped, self._held = self._held, b""
         end_s = time.monotonic() + BURST_S
         while (data := self._read(quiet_s)) and time.monotonic() < end_s:
@@ -216,7 +216,7 @@ class StreamLines:
         return line
 
     def forget(self, quiet_s: float) -> list[str]:
-        """Drop what was written; see :class:`Lines`."""
+        """Discard what was written; see :class:`Lines`."""
         self._start()
         dropped: list[str] = []
         end_s = time.monotonic() + BURST_S

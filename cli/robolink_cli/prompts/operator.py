@@ -1,4 +1,4 @@
-"""The person at the terminal, and the simulator's stand-in for one."""
+"""The person at the terminal, and the simulator's substitute for one."""
 
 import math
 from collections.abc import Callable, Iterator
@@ -109,7 +109,7 @@ def _plain_terminal() -> TerminalOperator:
 
 
 class AssistedOperator:
-    """Stands in for the person on a simulator: looks at the tip and types jog steps.
+    """Replaces the person on a simulator: looks at the tip and types jog steps.
 
     The one simulated person of demonstration, tests and ``--assist``; :meth:`with_eyes` makes it.
     Their habits are parameters of the simulated world (docs/reference/simulated-cell.md 2).
@@ -165,7 +165,7 @@ class AssistedOperator:
         clock: "Clock | None" = None,
         way_mm: float = WAY_MM,
     ) -> "AssistedOperator":
-        """Return the person of a simulated cell, with the habits that its world gives them.
+        """Return the person of a simulated cell, with the habits in its world.
 
         Args:
             eyes: Theirs.
@@ -192,7 +192,7 @@ class AssistedOperator:
         self._show(text)
 
     def ask(self, question: str, kind: Question) -> None:
-        """Echo the question, and take it in the way that this person has."""
+        """Echo the question, and handle it in this person's way."""
         self._kind = kind
         self._answers = 0
         self._stays, self._thinking_s, turns = False, 0.0, list[str]()
@@ -239,7 +239,7 @@ class AssistedOperator:
         return steps or "done"
 
     def _thinks(self, wait_s: float) -> bool:
-        """Let the person think, for ``wait_s`` at most; tell whether they go on thinking."""
+        """Let the person think, for ``wait_s`` at most; return whether they think on."""
         if self._clock is None:
             return False
         pause_s = min(wait_s, self._thinking_s)
@@ -259,7 +259,7 @@ class AssistedOperator:
         return steps or (f"z{FINEST_STEP:+.3f}" if self._coarse else "")
 
     def _steps_along(self, kind: Question) -> Iterator[str]:
-        """Yield the steps of a way along an axis, or up to where both ways have room."""
+        """Yield the steps of a move along an axis, or up to where both moves have room."""
         if kind is Question.ROOM:
             lowest_mm = min(self._way("x")[2], self._way("z")[2])
             way_mm = (0.0, 0.0, max(0.0, -lowest_mm))
@@ -289,7 +289,7 @@ class AssistedOperator:
 def operator_at(
     assist_url: str | None, tool: Callable[[], int], clock: "Clock"
 ) -> Iterator[Operator]:
-    """Yield the person at the terminal, or a simulator's stand-in for one.
+    """Yield the person at the terminal, or a simulator's substitute for one.
 
     Args:
         assist_url: The simulator's assist URL, ``None`` for a real person.

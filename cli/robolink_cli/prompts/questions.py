@@ -28,7 +28,7 @@ WATCHED: Final = "robolink.watched"
 
 
 def on_terminal() -> bool:
-    """Tell whether a person can be asked."""
+    """Return whether a person can be asked."""
     return is_terminal(sys.stdin) and is_terminal(sys.stderr)
 
 
@@ -37,7 +37,7 @@ def agree(question: str, *, yes: bool, asks: bool = True) -> None:
 
     Args:
         question: What a yes agrees to.
-        yes: Whether it was answered beforehand.
+        yes: Whether it was answered in advance.
         asks: Whether a person may be asked where there is a terminal.
 
     Raises:
@@ -107,7 +107,7 @@ def asked_for_text(question: str) -> str:
 
 
 def _answer() -> str:
-    """Return the next line; the controller's status is read meanwhile, where one is connected."""
+    """Return the next line; read the controller's status meanwhile, if one is connected."""
     from robolink.runner import awaited_line
     from robolink_cli.prompts.operator import terminal
 
@@ -155,7 +155,7 @@ def accepted_jump(
     accepted_mm: float | None,
     accepted_deg: float | None,
 ) -> Iterator[None]:
-    """Have a jump beyond the limits of the cell accepted, for the block, by who may accept it.
+    """Let a permitted person accept a jump beyond the cell's limits, for the block.
 
     ``--yes`` does not answer this question: it was typed before the figure was known.
 
@@ -163,8 +163,8 @@ def accepted_jump(
         controller: The controller, connected.
         tool: Number of the tool.
         jump: How far its tip would be taken.
-        accepted_mm: The length that was accepted beforehand.
-        accepted_deg: The angle that was accepted beforehand.
+        accepted_mm: The length that was accepted in advance.
+        accepted_deg: The angle that was accepted in advance.
 
     Raises:
         NotAllowedError: It takes an engineer; nobody was asked.

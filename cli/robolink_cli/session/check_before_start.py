@@ -31,7 +31,7 @@ def agree_to_procedure(
     at: "StationKind | None",
     tools: "Sequence[int]" = (),
 ) -> None:
-    """Have a person agree to a procedure in which the robot moves by itself.
+    """Let a person agree to a procedure in which the robot moves by itself.
 
     Args:
         controller: The controller, connected.
@@ -39,7 +39,7 @@ def agree_to_procedure(
         moves: How many movements are foreseen.
         speed_mm_s: How fast at most.
         box_mm: How far at most.
-        yes: Whether the answer was given beforehand.
+        yes: Whether the answer was given in advance.
         at: At what it measures, which has to be clean too; ``None`` where nobody knows.
         tools: Numbers of the tools that are measured: the list says how they were left.
 
@@ -72,7 +72,7 @@ def check_before_start(
     at: "StationKind | None",
     tools: "Sequence[int]" = (),
 ) -> None:
-    """Have the person at the desk go through the list; arguments as above.
+    """Let the person at the desk go through the list; arguments as above.
 
     Raises:
         NotReadyError: Nothing can move now, and no key of the list changes that.
@@ -103,7 +103,7 @@ def check_before_start(
 def name_the_needle(
     controller: "Controller", ids: "Callable[[Callable[[str], str]], Iterator[str]]"
 ) -> None:
-    """Have the person at the desk name what is mounted, before anything moves.
+    """Let the person at the desk name what is mounted, before anything moves.
 
     Args:
         controller: Looked at meanwhile.
@@ -190,7 +190,7 @@ def _answer_to_list(
 
 
 def _motors_are_off(controller: "Controller", purpose: str, *, tried: bool) -> bool:
-    """Tell whether the motors are off, which a key of the list changes.
+    """Return whether the motors are off, which a key of the list changes.
 
     Raises:
         NotReadyError: Something else stands in the way, or that key was pressed before.
@@ -206,7 +206,7 @@ def _motors_are_off(controller: "Controller", purpose: str, *, tried: bool) -> b
 
 
 def saved_tools(controller: "Controller") -> "CheckPoint":
-    """Return the point that says which backup of the tools there is on this computer.
+    """Return the point that names the backup of the tools on this computer.
 
     What it says is read from that file. A missing one keeps nobody from measuring: whatever writes
     makes it first.
@@ -241,7 +241,7 @@ def _as_left(controller: "Controller", tools: "Sequence[int]") -> "Iterator[Chec
 
 
 def tools_as_left(controller: "Controller", tools: "Sequence[int]") -> tuple[str, ...]:
-    """Return a sentence of each tool that holds what was proved to be in it last.
+    """Return a sentence for each tool that still holds its last confirmed value.
 
     One that holds something else was told of already, one without a record says nothing.
 

@@ -1,4 +1,4 @@
-"""What TAB offers for tools, stations and recipes: from files and the journal, never a controller.
+"""TAB completion of tools, stations and recipes: from files and the journal, no controller.
 
 Nothing heavy is loaded for it and nothing is checked: whoever presses TAB waits for the answer.
 """
@@ -24,7 +24,7 @@ _LOOKED_AT: Final = 64 * 1024
 
 
 def complete_tool(context: click.Context, parameter: click.Parameter, start: str) -> list[str]:  # noqa: ARG001 - click's form
-    """Return the tools on record for the cell that is named, or all numbers where none is."""
+    """Return the recorded tools of the named cell, or all numbers without one."""
     from robolink.journal import names_on_record
 
     known = names_on_record(address_of(_cell(context).url)).tools or _TOOLS
@@ -45,7 +45,7 @@ def complete_recipe(
     parameter: click.Parameter,  # noqa: ARG001 - click's form
     start: str,
 ) -> list[CompletionItem]:
-    """Return the recipes of the folder that is typed; where it has none, files in general."""
+    """Return the recipes of the typed folder; if it has none, files in general."""
     folder, typed = os.path.split(start)
     try:
         found = sorted(path.name for path in Path(folder or ".").iterdir() if is_recipe(path))
@@ -64,7 +64,7 @@ def is_recipe(path: Path) -> bool:
 
 
 def _cell(context: click.Context) -> "CellGlimpse":
-    """Return what is known of the cell or URL that the line names; nothing where it names none."""
+    """Return what is known of the line's cell or URL; nothing if it names none."""
     from robolink.config import CellGlimpse, glimpse_of_cell
 
     named = str(context.meta.get(GIVEN, {}).get("url") or "")
@@ -72,7 +72,7 @@ def _cell(context: click.Context) -> "CellGlimpse":
 
 
 def address_of(url: str | None) -> str:
-    """Return under which address the journal knows a URL; empty where that cannot be told."""
+    """Return the address under which the journal knows a URL; empty if unknown."""
     from robolink.errors import ConfigError
     from robolink.transport import parse_url
 

@@ -1,4 +1,4 @@
-"""One controller for one command: connected, what others left said, closed in order."""
+"""One controller for one command: connected, warnings shown, closed in order."""
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -44,7 +44,7 @@ def open_controller(
     usual_change_mm: float | None = None,
     job: str = "",
 ) -> "Iterator[Controller]":
-    """Connect to the controller and, unless ``quiet``, say what was left unfinished there.
+    """Connect to the controller and, unless ``quiet``, show what was left unfinished there.
 
     Args:
         context: What the command was told.
@@ -59,14 +59,14 @@ def open_controller(
         usual_change_mm: How far a write may take a tip where the cell file does not say it; by
             default what is usual.
         job: What is to be done, where a person would look, measure or answer for it before
-            anything is sent: refused at once while something earlier is unsettled.
+            anything is sent: refused at once while an earlier job is unfinished.
 
     Raises:
         ConfigError: No controller is named, the URL or password file is wrong, or the robot is
             not the cell's.
         ConnectError: It is not reached.
         LoginRefusedError: Wrong or missing password.
-        OutcomeUnknownError: Something earlier is unsettled, and there is a ``job``.
+        OutcomeUnknownError: An earlier job is unfinished, and there is a ``job``.
         StoppedError: A stop came, at the end or before.
     """
     url = context.require_url()
@@ -118,7 +118,7 @@ def open_controller(
 
 
 def _limits_of(context: CliContext, usual_change_mm: float | None) -> "ChangeLimits | None":
-    """Return how far a write may take a tip, by the cell file; a URL alone says nothing."""
+    """Return how far a write may move a tip, by the cell file; a URL alone has no limits."""
     if context.cell is None:
         return None
     if usual_change_mm is None:
@@ -136,7 +136,7 @@ def _saying_what_is_left(
     calms: bool,
     leaves: bool,
 ) -> Iterator[None]:
-    """Say before the work what others left on the controller, and after it what this left.
+    """Show before the work what others left on the controller, and after it what this left.
 
     Raises:
         RobolinkError: The journal or the robot is not as the command needs it.
@@ -176,7 +176,7 @@ def _saying_what_is_left(
 
 
 def _record_for_nobody(controller: "Controller") -> None:
-    """Put what stands on record where a command was ended because nobody reads it any more."""
+    """Record what stands if a command ended because nobody reads its output any more."""
     from robolink.model import EntryKind, NewEntry, describe_outcome
 
     by, outcome = ended_by(), controller.ledger.outcome()
@@ -191,7 +191,7 @@ def _record_for_nobody(controller: "Controller") -> None:
 
 @contextmanager
 def _only_what_was_touched(*, always: bool) -> Iterator[None]:
-    """Let an error tell what stands on the controller, if the command might have changed it.
+    """Let an error report what stands, if the command might have changed the controller.
 
     Whoever ended a command is told in any case; but not that nobody reads what it only showed.
     """
@@ -244,7 +244,7 @@ def _unrecorded() -> str:
 
 
 def _open_markers(controller: "Controller", *, lenient: bool) -> "tuple[Marker, ...]":
-    """Return what is unsettled; a journal that broke meanwhile keeps nobody from looking."""
+    """Return the unfinished jobs; a journal that broke meanwhile does not prevent reading."""
     from robolink.errors import JournalError
 
     try:
@@ -257,7 +257,7 @@ def _open_markers(controller: "Controller", *, lenient: bool) -> "tuple[Marker, 
 
 
 def _offer_to_restore(controller: "Controller", markers: "Iterable[Marker]") -> None:
-    """Ask whether a tool that an unfinished procedure left selected is to be changed back.
+    """Ask whether to restore the tool of an unfinished procedure.
 
     That comes before anything else is done. A no changes nothing and the command goes on. Nothing
     is asked of a script, nor where the controller is not in a state to be told anything.

@@ -80,7 +80,7 @@ class CliContext(NamedTuple):
 
     @property
     def expected(self) -> "Expected | None":
-        """What the cell file says that even a look has to heed; ``None`` without a cell."""
+        """The cell file's requirements even for reading; ``None`` without a cell."""
         if self.cell is not None:
             return self.cell.expected
         return self.reach.expected if self.reach is not None else None
@@ -91,7 +91,7 @@ Command = Callable[..., int | None]
 
 
 def stop_request() -> StopRequest:
-    """Return what a command that must not depend on any file was told."""
+    """Return the request of a command that must not depend on any file."""
     given = click.get_current_context().meta.get(GIVEN, {})
     log_file, log_level = log_wanted()
     return StopRequest(
@@ -116,14 +116,14 @@ def controller_options(command: Command) -> Command:
 
 
 def optional_controller(command: Command) -> Command:
-    """As :func:`controller_options`, for a command that means something without a controller."""
+    """As :func:`controller_options`, for a command that can also run without a controller."""
     return _with_options(
         command, lambda _: _context_from(click.get_current_context().meta.get(GIVEN, {}))
     )
 
 
 def calming_options(command: Command) -> Command:
-    """As :func:`controller_options`, for a command that looks or calms.
+    """As :func:`controller_options`, for a command that reads or stops.
 
     It is not kept from a person by a cell file: where that is wrong, the address is taken from
     it, or from the last connection, and what is wrong is said.
@@ -132,7 +132,7 @@ def calming_options(command: Command) -> Command:
 
 
 def looking_options(command: Command) -> Command:
-    """As :func:`calming_options`, for a command that only looks.
+    """As :func:`calming_options`, for a command that only reads.
 
     Cell files that were right at the last connection, and are the same, are not checked anew.
     """
@@ -142,7 +142,7 @@ def looking_options(command: Command) -> Command:
 def _with_options(
     command: Command, context_of: Callable[[Mapping[str, object]], CliContext]
 ) -> Command:
-    """Add what a command declares and the shared options; pass it the context of what was given."""
+    """Add a command's declared and shared options; pass it the context of what was given."""
     call = packed(command)
 
     @wraps(command)
@@ -154,7 +154,7 @@ def _with_options(
 
 
 def context_of_cell(name: str, *, anew: bool = False) -> CliContext:
-    """Return what a command was told, for another cell than the one that ``-c`` names.
+    """Return a command's context for another cell than the one that ``-c`` names.
 
     Args:
         name: A cell of the cell files, or a URL.
@@ -171,7 +171,7 @@ def context_of_cell(name: str, *, anew: bool = False) -> CliContext:
 
 
 def _with_only_cell(options: Mapping[str, object]) -> Mapping[str, Any]:
-    """Return what stands beside the command, with the only cell where none is named.
+    """Return the common options, with the only cell if none is named.
 
     The cell that is taken is said first. A command that may move or write takes none where
     nobody is asked before: off a terminal, and with ``--yes``.
@@ -242,7 +242,7 @@ def guided_if_alone(
     following: Callable[[], T] | None = None,
     steps: int = 0,
 ) -> T:
-    """Do the work of a command; as a wizard where a person sits at the terminal.
+    """Do the work of a command; as a wizard if a person is at the terminal.
 
     Args:
         context: What the command was told.
@@ -302,7 +302,7 @@ def header_of(
 
 
 def _typed_again(context: CliContext, chosen: tuple[str, ...], *, anew: bool) -> str:
-    """Return the command line that begins the same job, with what was chosen meanwhile."""
+    """Return the command line that starts the same job, with the choices made meanwhile."""
     typed = () if anew else click.get_current_context().meta.get(TYPED, ())
     words = [*typed, *chosen]
     if anew and context.cell is None and context.url is not None:
@@ -320,7 +320,7 @@ def _typed_again(context: CliContext, chosen: tuple[str, ...], *, anew: bool) ->
 
 
 def find_tools(controller: Controller, *, published: bool) -> "ToolState":
-    """Return all tools and the one in force.
+    """Return all tools and the selected one.
 
     Args:
         controller: A connected controller.

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def doubt_about(selected: int | None, controller: "Controller", cell: "Expected | None") -> str:
-    """Return why the selected tool may be a wrong one, one sentence; empty for no doubt.
+    """Return why the selected tool may be the wrong one, one sentence; empty for no doubt.
 
     Args:
         selected: The selected tool, ``None`` where the controller does not tell.
@@ -49,7 +49,7 @@ def doubt_about(selected: int | None, controller: "Controller", cell: "Expected 
 
 
 def heed_selection(controller: "Controller", cell: "Expected | None", *, yes: bool) -> None:
-    """Ask before something moves in a tool that may be a wrong one.
+    """Ask before something moves with a tool that may be the wrong one.
 
     ``--yes`` was given before anybody could know of it, so it is no answer.
 
@@ -77,7 +77,7 @@ def heed_selection(controller: "Controller", cell: "Expected | None", *, yes: bo
 def note_doubts(
     payload: "Mapping[str, object]", controller: "Controller", cell: "Expected | None"
 ) -> None:
-    """Say, beside the state of a controller, what other programs seem to have left on it.
+    """Show, beside a controller's state, what other programs seem to have left on it.
 
     Args:
         payload: The state, as ``status`` shows it.
@@ -101,7 +101,7 @@ def note_doubts(
 
 
 def _of_the_last_procedure(controller: "Controller") -> int:
-    """Return the tool that was selected before the last procedure on record, 0 for none."""
+    """Return the tool selected before the last recorded procedure, 0 for none."""
     with suppress(JournalError):
         for entry in controller.outcomes.recorded(kinds=(EntryKind.SELECTION,)):
             return entry.tool or 0
@@ -120,7 +120,7 @@ def agree_to_motion(question: str, *, yes: bool, in_tool: bool = True) -> None:
 
     Args:
         question: What will happen.
-        yes: Whether the answer was given beforehand.
+        yes: Whether the answer was given in advance.
         in_tool: Whether it matters which tool is selected.
 
     Raises:

@@ -1,4 +1,4 @@
-"""Who works at the cell, and with which nozzle: what goes with every entry of the journal."""
+"""Who works at the cell, and with which nozzle: part of every journal entry."""
 
 from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated
@@ -24,7 +24,7 @@ Lot = Annotated[str | None, LINE, CliOption(metavar="LOT", help="Its lot, for th
 
 
 def signature_of(operator: str | None, cell: "Expected | None", *, changes: bool) -> "Signature":
-    """Return who works here, with the role that the cell file gives.
+    """Return who works here, with the role from the cell file.
 
     Where the cell names people, a change asks for a badge on a terminal; who is not known
     counts as an operator.

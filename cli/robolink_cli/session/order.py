@@ -58,7 +58,7 @@ OrderId = Annotated[
 
 
 def require_no_dry_run(order: str | None, *, dry_run: bool) -> None:
-    """Refuse an order that nothing would be done for.
+    """Refuse an order for a dry run, which does nothing.
 
     Raises:
         ConfigError: There is an order, and nothing is to be written.
@@ -73,7 +73,7 @@ def require_no_dry_run(order: str | None, *, dry_run: bool) -> None:
 def ordered(
     controller: "Controller", order: str | None, command: str, **of_job: object
 ) -> "Iterator[Order | None]":
-    """Keep the lease and look an order up; without one nothing is done.
+    """Keep the lease and look an order up; without one do nothing.
 
     Args:
         controller: The controller, connected.
@@ -101,7 +101,7 @@ def with_order(payload: Mapping[str, object], order: "Order | None") -> dict[str
 
 
 def show_done(order: "Order") -> None:
-    """Say that an order was carried out before."""
+    """Show that an order was carried out before."""
     assert order.done is not None  # noqa: S101 - the caller looked
     say(
         tr(

@@ -1,4 +1,4 @@
-"""A command that has a controller lets a second terminal stop it, and leaves its address."""
+"""Lets a second terminal stop the controller of a command, and leaves its address."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -66,7 +66,7 @@ def _last_seen(controller: "Controller") -> "tuple[ControllerStatus, int] | None
 
 
 def remember_address(context: "CliContext") -> None:
-    """Keep how the cell was reached, for a stop on the day when its file cannot be read."""
+    """Store how the cell was reached, for a stop when its file cannot be read."""
     if context.cell is None or "+sim://" in context.cell.url:
         return
     from robolink.config import Reach, proof_of_files, remember_reach
@@ -112,7 +112,7 @@ _SEVERAL_CLIENTS = "+modbus-tcp://"
 
 
 def seen_by_another(url: str) -> dict[str, object] | None:
-    """Return the document of what the holder of a controller saw last.
+    """Return the document of what the controller's holder last read.
 
     ``None`` where nobody on this computer has it, where its holder lets nobody look, and where
     the controller serves several clients. The controller is not asked: it serves one client, and
@@ -149,7 +149,7 @@ def seen_by_another(url: str) -> dict[str, object] | None:
 
 @contextmanager
 def watched_at_desk(controller: "Controller") -> Iterator[None]:
-    """Let the desk of a wizard look at ``controller`` while a person is asked, for the block."""
+    """Let the desk of a wizard read ``controller`` while a person is asked, for the block."""
     desk = current_desk()
     if desk is None:
         yield

@@ -1,4 +1,4 @@
-"""The note of a stop: shown before anything moves again, and taken away by a person."""
+"""The note of a stop: shown before anything moves again, and removed by a person."""
 
 from typing import TYPE_CHECKING
 
@@ -15,12 +15,12 @@ if TYPE_CHECKING:
 
 
 def heed_stop(url: str, controller: "Controller", *, yes: bool) -> None:
-    """Show who stopped this controller, before anything moves; ask, and take the note away.
+    """Show who stopped this controller, before anything moves; ask, and remove the note.
 
     Args:
         url: How it was reached.
         controller: The controller, connected; it is asked who it is.
-        yes: Whether the answer was given beforehand.
+        yes: Whether the answer was given in advance.
 
     Raises:
         StoppedError: There is a note, and nobody is asked: ``--yes`` was given for a cell that
@@ -49,7 +49,7 @@ def heed_stop(url: str, controller: "Controller", *, yes: bool) -> None:
 
 
 def forget_stop(url: str, name: str) -> None:
-    """Take the note away after a reset, which a person asked for.
+    """Remove the note after a reset at a person's request.
 
     Args:
         url: How the controller was reached.
@@ -59,7 +59,7 @@ def forget_stop(url: str, name: str) -> None:
 
 
 def own_name_of(controller: "Controller") -> str:
-    """Return what a controller calls itself; empty where it does not, or nobody can tell."""
+    """Return a controller's own name; empty if it has none, or nobody knows it."""
     try:
         name = controller.outcomes.identity
     except RobolinkError:
@@ -68,7 +68,7 @@ def own_name_of(controller: "Controller") -> str:
 
 
 def last_known(url: str) -> str:
-    """Return who was met last at the address of a URL, as far as the journal says."""
+    """Return who was last reached at the address of a URL, by the journal."""
     from robolink.journal import default_location, may_exist, open_journal
     from robolink.transport import parse_url
 
@@ -82,7 +82,7 @@ def last_known(url: str) -> str:
 
 
 def release_stop(request: "StopRequest", *, yes: bool) -> dict[str, object]:
-    """Show the note of a stop and take it away when a person agrees.
+    """Show the note of a stop and remove it when a person agrees.
 
     Raises:
         ConfigError: No controller is named, or the note cannot be taken away.
@@ -101,7 +101,7 @@ def release_stop(request: "StopRequest", *, yes: bool) -> dict[str, object]:
 
 
 def url_of(request: "StopRequest") -> str:
-    """Return the URL that a request means.
+    """Return the URL of a request.
 
     Raises:
         ConfigError: No controller is named, or no cell file has it.

@@ -1,4 +1,4 @@
-"""What is told, noted and looked at once the robot stands, or once it is known that it may not."""
+"""What is shown, noted and read once the robot has stopped, or may not have."""
 
 from contextlib import suppress
 
@@ -13,7 +13,7 @@ from robolink_cli.stopping.stop_first import StopOutcome, is_beside_another, who
 
 
 class Telling:
-    """Says how a stop ended, then what stood in its way and did not hold it back.
+    """Shows how a stop ended, then what was in its way without delaying it.
 
     Args:
         request: What was asked for.
@@ -26,7 +26,7 @@ class Telling:
         self._named = request.named or outcome.only
 
     def payload(self) -> dict[str, object]:
-        """Return what the document of a stop that ended well holds."""
+        """Return the document of a stop that ended well."""
         outcome = self._outcome
         return {
             "stopped": True,
@@ -36,7 +36,7 @@ class Telling:
         }
 
     def sentence(self) -> str:
-        """Return what a person is told of a stop that ended well."""
+        """Return the sentence about a stop that ended well."""
         outcome = self._outcome
         named, state = _shown(outcome.url), state_word(outcome.state)
         if outcome.holder:
@@ -54,7 +54,7 @@ class Telling:
         )
 
     def remarks(self) -> list[str]:
-        """Leave the note, look at what was not looked at before, and return what is to be said."""
+        """Leave the note, read what was not read before, and return the remarks."""
         outcome = self._outcome
         told = [*outcome.doubts]
         taken = [which_cell(outcome.only)] if outcome.only else []
@@ -75,7 +75,7 @@ class Telling:
         return [*taken, *told]
 
     def explain_the_holder(self) -> None:
-        """Add to the error of a login that is taken who has it, as far as the record knows."""
+        """Add to the error of a refused login who is logged in, as far as recorded."""
         error = self._outcome.error
         if not isinstance(error, RobolinkError) or not is_beside_another(error):
             return
@@ -151,7 +151,7 @@ class Telling:
         return [missed] if missed else []
 
     def _journal(self) -> list[str]:
-        """Return what the journal has to say: that it is damaged, or what was left unfinished."""
+        """Return the journal's remarks: that it is damaged, or what was left unfinished."""
         from robolink.journal import default_location, may_exist, open_journal
 
         try:

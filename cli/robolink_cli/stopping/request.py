@@ -1,4 +1,4 @@
-"""A ``stop`` on the command line, read by hand: click takes longer to load than a stop takes."""
+"""A ``stop`` on the command line, parsed by hand: click takes longer to load than a stop takes."""
 
 import os
 from collections.abc import Sequence
@@ -25,7 +25,7 @@ FLAGS: Final = {"--json": "json"}
 
 
 class StopRequest(NamedTuple):
-    """What a stop was told.
+    """The arguments of a stop.
 
     Attributes:
         named: A cell's name or a URL; empty for none.
@@ -49,7 +49,7 @@ class StopRequest(NamedTuple):
 
 
 def read_stop(arguments: Sequence[str]) -> StopRequest | None:
-    """Return what the arguments ask for; ``None`` where click has to say what they mean."""
+    """Return the request in the arguments; ``None`` if click has to explain them."""
     if "_ROBOLINK_COMPLETE" in os.environ:
         return None
     found: dict[str, str] = {}

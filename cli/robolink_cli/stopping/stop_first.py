@@ -1,4 +1,4 @@
-"""Stopping before anything else is looked at.
+"""Stops before anything else is read.
 
 No journal, no lease, no question, no click: what these have to say is said afterwards. Of the
 cell file only the address and the place of the password are read. A process of this computer
@@ -32,7 +32,7 @@ _SEVERAL_CLIENTS: Final = "+modbus-tcp://"
 
 @dataclass
 class StopOutcome:
-    """What became of a stop.
+    """How a stop ended.
 
     Attributes:
         url: Whom it was for; empty when that is not known.
@@ -59,12 +59,12 @@ class StopOutcome:
 
     @property
     def may_stand(self) -> bool:
-        """Whether a stop left this computer, so that the next one who moves must hear of it."""
+        """Whether a stop left this computer, so that the next user must know of it."""
         return self.error is None or _left(self.error)
 
 
 def stop_first(request: StopRequest) -> StopOutcome:
-    """Stop what the request names; whatever fails stands in the outcome."""
+    """Stop the controller in the request; the outcome holds any failure."""
     outcome = StopOutcome()
     try:
         _stop(request, outcome)
@@ -79,7 +79,7 @@ def stop_first(request: StopRequest) -> StopOutcome:
 
 
 def who_asks(request: StopRequest) -> str:
-    """Return who stops, as the person at another terminal is told."""
+    """Return who stops, for the person at another terminal."""
     import getpass  # here, because a stop without anybody to tell does without it
 
     try:
@@ -129,12 +129,12 @@ def _stop(request: StopRequest, outcome: StopOutcome) -> None:
 
 
 def _left(error: BaseException) -> bool:
-    """Tell whether a stop may have left a computer, although it ended in ``error``."""
+    """Return whether a stop may have left a computer, although it ended in ``error``."""
     return not isinstance(error, (ConfigError, ConnectError, LoginRefusedError))
 
 
 def _most_telling(error: RobolinkError, refusals: list[RobolinkError]) -> RobolinkError:
-    """Return how a stop ended that nobody confirms: one that may have left goes before all.
+    """Return how an unconfirmed stop ended: one that may have left takes precedence.
 
     Args:
         error: What the attempt from here ended in.
@@ -148,7 +148,7 @@ def _most_telling(error: RobolinkError, refusals: list[RobolinkError]) -> Roboli
 
 
 def _last_known(url: str) -> str:
-    """Return who was met last at an address that does not answer; the journal is read for that.
+    """Return who was last reached at a silent address, from the journal.
 
     Nothing is kept back by it: the stop was tried at the address itself before.
     """
@@ -164,7 +164,7 @@ def _through_holder(
     *,
     also: str = "",
 ) -> bool:
-    """Let whoever has the controller on this computer stop it; False when nobody did.
+    """Let the process that has the controller on this computer stop it; False if none did.
 
     Args:
         request: What was asked for.
@@ -214,7 +214,7 @@ def _directly(request: StopRequest, outcome: StopOutcome, file: str, variable: s
 
 
 def _passwords(outcome: StopOutcome, file: str, variable: str) -> Iterator[str]:
-    """Yield what may open the controller; the keyring last, because it is slow, or asks."""
+    """Yield passwords to try; the keyring last, because it is slow, or asks."""
     if not outcome.url.startswith("epson+"):
         yield ""
         return

@@ -1,4 +1,4 @@
-"""What a cell knows of its accuracy, as ``cell accuracy`` shows it."""
+"""A cell's knowledge of its accuracy, as ``cell accuracy`` shows it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ class RowsOfRobot:
 
 
 def known_rows(context: CliContext, *, robot: str | None = None) -> list[RowsOfRobot]:
-    """Return what cell file and journal know of the rows, without asking the controller.
+    """Return the rows in cell file and journal, without asking the controller.
 
     Args:
         context: The command.
@@ -98,7 +98,7 @@ def _row_payload(place: RowsAt, row: KnownRow) -> dict[str, Any]:
 
 
 def show_accuracy(known: Sequence[RowsOfRobot]) -> None:
-    """Print the rows, place by place, and below them what measures each default."""
+    """Print the rows, place by place, and below them how to measure each default."""
     steps: dict[str, None] = {}
     for one in known:
         place = one.place
@@ -126,11 +126,11 @@ def show_accuracy(known: Sequence[RowsOfRobot]) -> None:
         for step in steps:
             say(step)
     else:
-        say(tr("Every row is stated or on record."))
+        say(tr("Every row is stated or recorded."))
 
 
 def _step(place: RowsAt, row: KnownRow) -> str:
-    """Return how a row is measured there."""
+    """Return how to measure a row there."""
     if place.station is None:
         return measuring_step(row.key)
     return measuring_step(row.key, station=place.station.id, kind=place.station.kind)
@@ -169,7 +169,7 @@ def _known_from(place: RowsAt, row: KnownRow) -> str:
 
 
 def show_tips(tips: Sequence[MeasuredTip], known_mm: tuple[float, float] | None = None) -> None:
-    """Print measurements that a row rests on, with how far beside the known place each is."""
+    """Print the measurements behind a row, with the distance of each from the known place."""
     columns = [tr("entry"), tr("when"), tr("who"), tr("method"), tr("nozzle"), "X mm", "Y mm"]
     if known_mm is not None:
         columns += ["dX mm", "dY mm"]

@@ -31,7 +31,7 @@ _OF_TOUCHES = ("lift_mm", "clearance_mm")
 
 
 def refused_by_methods(settings: "CellSettings") -> Iterator[Problem]:
-    """Yield what methods would refuse of the limits of a cell, in the words of that refusal.
+    """Yield what methods would refuse in the limits of a cell, in the words of that refusal.
 
     A method takes what is usual for it in place of what the cell does not say. Where the cell says
     nothing about touches at all, nothing is refused.
@@ -75,7 +75,7 @@ def _refusals(method: AnyMethod, settings: "CellSettings") -> Iterator[Problem]:
 
 
 def files_payload() -> list[dict[str, object]]:
-    """Return the places looked at, the one that wins first."""
+    """Return the places searched, the one with precedence first."""
     return [
         {"source": file.source, "path": str(file.path), "exists": file.path.is_file()}
         for file in config_files()
@@ -96,7 +96,7 @@ def show_files(files: Sequence[Mapping[str, object]]) -> None:
 
 
 def check_payload(file: Path | None) -> dict[str, Any]:
-    """Return what is wrong in one file, or in all that are in use and in how they agree.
+    """Return the errors of one file, or of all in use and between them.
 
     Where there is none, nothing was checked, and that is wrong too: a pipeline in another folder
     than it should be would go on.
@@ -157,7 +157,7 @@ def show_cells(payload: Mapping[str, Any]) -> None:
 
 
 def people_payload(cells: Iterable[Cell]) -> dict[str, Any]:
-    """Return who works at each cell; ``None`` where its file names nobody."""
+    """Return the people of each cell; ``None`` if its file names nobody."""
     named = {
         cell.name: None
         if cell.settings.people is None
@@ -187,7 +187,7 @@ def show_people(payload: Mapping[str, Any]) -> None:
 
 
 def cell_payload(cell: Cell, context: CliContext, *, origin: bool) -> dict[str, Any]:
-    """Return what is in force for a cell, and with ``origin`` where each value came from."""
+    """Return a cell's active values, and with ``origin`` where each came from."""
     values = cell.settings.model_dump(exclude_none=True)
     origins = {key: str(path) for key, path in cell.origins.items()}
     said = link_options(cell)
@@ -222,7 +222,7 @@ def show_cell(payload: Mapping[str, Any]) -> None:
 
 
 def _add_refusals(files: Sequence[Mapping[str, Any]], alone: Path | None) -> None:
-    """Add to each file that is right what methods refuse of its limits.
+    """Add to each correct file what methods refuse of its limits.
 
     Args:
         files: The files, as the document has them.
@@ -245,7 +245,7 @@ def _add_refusals(files: Sequence[Mapping[str, Any]], alone: Path | None) -> Non
 
 
 def _first_origin(origins: Mapping[str, Path]) -> Path:
-    """Return a file that says something about touches."""
+    """Return a file with keys about touches."""
     keys = ("lift_mm", "clearance_mm", "max_change_mm")
     return next(origins[key] for key in keys if key in origins)
 

@@ -29,7 +29,7 @@ def pose_payload(pose: "Pose") -> dict[str, object]:
 
 
 def receipt_payload(receipt: "ToolReceipt") -> dict[str, object]:
-    """Return what a write or clear did."""
+    """Return the result of a write or clear."""
     offsets = ("before", "requested", "read_back")
     return json_fields(receipt, "tool", *offsets, "skipped", "unconditional")
 
@@ -56,14 +56,14 @@ def proposal_payload(proposal: "Proposal") -> dict[str, object]:
 
 
 def _touches_payload(poses: "Sequence[Pose]") -> dict[str, object]:
-    """Return how each touch was made, as the journal has it; ``None`` where nobody touched."""
+    """Return how each touch was made, as in the journal; ``None`` if nobody touched."""
     from robolink.calibration_run import touches_made  # here, because a status needs no numpy
 
     return {"touches": None, "standoff_seed": None, **touches_made(poses)}
 
 
 def length_payload(proposal: "Proposal") -> dict[str, object] | None:
-    """Return what the heights of the touches tell about the length, ``None`` for nothing."""
+    """Return what the heights of the touches show about the length, ``None`` for nothing."""
     told = proposal.length
     if told is None:
         return None
@@ -73,7 +73,7 @@ def length_payload(proposal: "Proposal") -> dict[str, object] | None:
 
 
 def fit_payload(result: "CalibrationResult") -> dict[str, object]:
-    """Return what a measurement is repeatable to and accurate to; what nothing tells is ``None``.
+    """Return a measurement's repeatability and accuracy; ``None`` for the unknown.
 
     ``half_width95``, ``interval_from``, ``region95_radius_mm`` and ``budget`` are what it is
     repeatable to, as before there was a statement of accuracy.
@@ -127,7 +127,7 @@ def status_payload(controller: "Controller") -> dict[str, object]:
 
 
 def offset_difference(before: "ToolOffset", after: "ToolOffset") -> dict[str, float]:
-    """Return how far each component of an offset moved, angles by the shorter way."""
+    """Return the change of each component of an offset, angles by the shorter way."""
     pairs = zip(COMPONENTS, after.components(), before.components(), strict=True)
     return {
         name: angle_difference_deg(new, old) if name.endswith("_deg") else new - old
@@ -167,7 +167,7 @@ def show_status(payload: Mapping[str, object]) -> None:
 
 
 def show_seen(payload: Mapping[str, object], named: str) -> None:
-    """Print what the process that has the controller saw of it last, and how old that is.
+    """Print the last reading by the process that has the controller, and its age.
 
     Args:
         payload: The document of it.
@@ -216,7 +216,7 @@ def _show_epson(payload: Mapping[str, object]) -> None:
 
 
 def _unread(payload: Mapping[str, object]) -> list[str]:
-    """Return what the controller, or its line, did not tell in its present state."""
+    """Return what the controller, or its line, does not report in its present state."""
     known = dict(payload)
     if known["selected_tool"] is None:
         known["selected_tool"] = known["published_selected_tool"]
@@ -244,7 +244,7 @@ def _show_preferences(told: object) -> None:
 
 
 def show_pose(payload: Mapping[str, object]) -> None:
-    """Print a pose and the joints; what this kind of controller has not is not spoken of."""
+    """Print a pose and the joints, as far as this kind of controller has them."""
     if payload["tool"] is None:
         title = tr("this controller does not report the tool")
     elif payload["hand"] is None:
@@ -266,7 +266,7 @@ def show_pose(payload: Mapping[str, object]) -> None:
 
 
 def show_tools(tools: Mapping[str, Mapping[str, object] | None], selected: int | None) -> None:
-    """Print the defined tools; the one in force is marked."""
+    """Print the defined tools; the selected one is marked."""
     rows = []
     for tool, offset in tools.items():
         if offset is not None:
@@ -283,7 +283,7 @@ def show_tools(tools: Mapping[str, Mapping[str, object] | None], selected: int |
 
 
 def _of_no_tool(offset: Mapping[str, object]) -> bool:
-    """Whether a number in a document's offset is one that no tool has."""
+    """Return whether a number in a document's offset is one that no tool has."""
     return of_no_tool([float(str(value)) for value in offset.values()])
 
 

@@ -49,7 +49,7 @@ from robolink_cli.views.documents import (
 
 
 def steps_payload(controller: Controller, steps: Sequence[PlannedStep]) -> list[dict[str, object]]:
-    """Return foreseen steps with their requests and limit checks."""
+    """Return previewed steps with their requests and limit checks."""
     group = controller.groups[0]
     return [
         {
@@ -63,7 +63,7 @@ def steps_payload(controller: Controller, steps: Sequence[PlannedStep]) -> list[
 
 
 def remarks(result: CalibrationResult) -> Iterator[str]:
-    """Yield what there is to say about a measurement beside its numbers, a sentence each."""
+    """Yield the remarks about a measurement besides its numbers, a sentence each."""
     for said in (_fit, _order):
         yield from filter(None, (said(result),))
     yield from statement_sentences(result)
@@ -77,7 +77,7 @@ _SAID_OTHERWISE: Final = ("length_not_observable",)
 
 
 def _fit(result: CalibrationResult) -> str:
-    """Return how well the poses agree, in one sentence; empty where a statement says why not."""
+    """Return how well the poses agree, in one sentence; empty if a statement says why not."""
     if result.rms_mm is None:
         if result.repeatable_to_mm is None and measured_axes(result):
             return ""
@@ -95,13 +95,13 @@ def _fit(result: CalibrationResult) -> str:
 
 
 def _order(result: CalibrationResult) -> str:
-    """Return what moved while the poses were taken, by how much; empty where nothing did."""
+    """Return what moved while the poses were taken, and how far; empty if nothing did."""
     order = result.evidence.run_order if result.evidence is not None else None
     return order_in_words(order) if order is not None else ""
 
 
 def _each_axis(result: CalibrationResult) -> str:
-    """Return the 95 % interval of each measured component alone; empty when nothing tells it."""
+    """Return the 95 % interval of each measured component alone; empty if unknown."""
     if len(result.half_width95) < 2:
         return ""
     parts = (
@@ -122,7 +122,7 @@ def _each_axis(result: CalibrationResult) -> str:
 
 
 def _change(result: CalibrationResult) -> str:
-    """Return by how much Z changed, and what is known of Z itself; empty for other methods."""
+    """Return the change of Z, and what is known of Z itself; empty for other methods."""
     details = result.details()
     by_mm, half_mm = details.get("change_z_mm"), details.get("change_z_half95_mm")
     stored = details.get("stored_z")
@@ -139,7 +139,7 @@ def _change(result: CalibrationResult) -> str:
 
 
 def _ways(result: CalibrationResult) -> str:
-    """Return how square the ways along a tool's axes were; empty for other methods."""
+    """Return the angle between the moves along a tool's axes; empty for other methods."""
     off_deg = result.details().get("off_square_deg")
     if not isinstance(off_deg, float):
         return ""
@@ -147,7 +147,7 @@ def _ways(result: CalibrationResult) -> str:
 
 
 def _needle(result: CalibrationResult) -> str:
-    """Return how a needle leans, and what that changed; empty where that shows in no digit."""
+    """Return how a needle leans, and the effect; empty if no digit shows it."""
     if "needle" not in result.details():
         return ""
     from robolink.calibration import BeamsResult  # numpy, loaded by then
@@ -165,7 +165,7 @@ def _needle(result: CalibrationResult) -> str:
 
 
 def _camera(result: CalibrationResult) -> str:
-    """Return what a measurement says about its camera; empty where it says nothing."""
+    """Return what a measurement says about its camera; empty for nothing."""
     if not result.details():
         return ""
     from robolink.calibration import CameraCalibration, CameraRound  # numpy, loaded by then
@@ -212,7 +212,7 @@ def _runout(result: CalibrationResult) -> str:
 
 
 def _chain(result: CalibrationResult) -> str:
-    """Return where in a chain of differences this one stands; empty for other methods."""
+    """Return the place of this difference in its chain; empty for other methods."""
     chain = chain_of(result)
     if chain is None:
         return ""
@@ -243,7 +243,7 @@ def show_residuals(result: CalibrationResult) -> None:
 
 
 def show_accuracy_rows(accuracy: Accuracy) -> None:
-    """Show what makes up the statement of accuracy, a row each, the largest first."""
+    """Show the parts of the accuracy statement, a row each, the largest first."""
     columns = (tr("row"), tr("half width"), tr("known from"), tr("share %"))
     rows = [
         [row.title, f"+-{row.half_width}" if row.half_width else "", row.basis, _share(row)]
@@ -257,7 +257,7 @@ def _share(row: RowInWords) -> str:
 
 
 def show_proposal(proposal: Proposal) -> None:
-    """Show what was measured next to what is stored, how accurate it is, and what is in doubt."""
+    """Show measured and stored values, the accuracy, and the doubts."""
     show_change(
         proposal.tool,
         proposal.before,
@@ -279,7 +279,7 @@ def show_proposal(proposal: Proposal) -> None:
 
 
 def tell_written(receipt: ToolReceipt) -> None:
-    """Tell whoever is guided what the controller reads back, before the turn test is made."""
+    """Show a guided person what the controller reads back, before the turn test."""
     if current_desk() is None:
         return
     value = describe_offset(receipt.read_back or ToolOffset())
@@ -305,7 +305,7 @@ def show_verdicts(verdicts: Sequence[LimitVerdict]) -> None:
 
 
 def show_report(report: ToolReport) -> None:
-    """Say what was written and how the verification ended."""
+    """Show what was written and how the turn test ended."""
     tool, receipt = report.proposal.tool, report.receipt
     if receipt is None:
         return
@@ -361,7 +361,7 @@ def _following(report: ToolReport) -> dict[str, object]:
 
 
 def show_course(steps: Sequence[PlannedStep]) -> None:
-    """Say how a measurement will go, before anybody is asked."""
+    """Show the course of a measurement, before anybody is asked."""
     moves = sum(step.target is not None for step in steps)
     asks = sum(step.shown is TeachPrompt.PIN for step in steps)
     ways = sum(step.shown in (TeachPrompt.ALONG_X, TeachPrompt.ALONG_Z) for step in steps)

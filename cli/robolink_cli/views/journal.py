@@ -110,7 +110,7 @@ def show_list(entries: Sequence[Recorded], *, all_controllers: bool) -> None:
 
 
 def show_entry(entry: Recorded) -> None:
-    """Print all that an entry says."""
+    """Print all fields of an entry."""
     shown: dict[str, object] = {
         tr("time (UTC)"): short_time(entry.at),
         tr("controller"): entry.controller,
@@ -144,7 +144,7 @@ def show_entry(entry: Recorded) -> None:
 
 
 def _statements(entry: Recorded) -> list[str]:
-    """Return what a measurement is repeatable and accurate to; nothing of another entry."""
+    """Return a measurement's repeatability and accuracy; nothing for another entry."""
     if entry.kind not in (EntryKind.CALIBRATION, EntryKind.VERIFY):
         return []
     from robolink.calibration import (
@@ -179,7 +179,7 @@ def _show_accuracy(found: object) -> None:
 
 
 def detail_rows(name: str, value: object) -> Iterator[tuple[str, str]]:
-    """Yield what was recorded under ``name`` as rows: what it is, and its value with its unit.
+    """Yield the recorded ``name`` as rows: what it is, and its value with its unit.
 
     What has parts has a row for each, named after the whole: ``facts firmware``, ``rows 2 name``.
     What is empty has none.
@@ -225,7 +225,7 @@ def short_time(at: str) -> str:
 
 
 def pose_rows(poses: object) -> list[list[str]]:
-    """Return recorded poses as rows of a table; what is damaged is left out."""
+    """Return recorded poses as rows of a table, without damaged ones."""
     if not isinstance(poses, list):
         return []
     rows = []
@@ -311,7 +311,7 @@ _Offsets: TypeAlias = dict[str, ToolOffset | None]
 
 
 class _Side:
-    """One of the two, put together from its entries in the order in which they were stored."""
+    """One side of the comparison, from its entries in the order in which they were stored."""
 
     def __init__(self, entries: Sequence[Recorded]) -> None:
         first = entries[0]
@@ -413,7 +413,7 @@ def _show_tools(
 
 
 def _pairs(one: _Side, other: _Side) -> Iterator[tuple[tuple[int, int], tuple[_Offsets, _Offsets]]]:
-    """Yield the tools that are compared: those of the same number, or the only one of each."""
+    """Yield the tools to compare: those of the same number, or the only one of each."""
     if len(one.values) == len(other.values) == 1:
         (tool,), (other_tool,) = one.values, other.values
         yield (tool, other_tool), (one.values[tool], other.values[other_tool])

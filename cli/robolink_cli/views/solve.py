@@ -84,7 +84,7 @@ def _show_quality(document: Mapping[str, object]) -> None:
 
 
 def _show_statements(document: Mapping[str, object]) -> None:
-    """Print what the case is repeatable to and accurate to, together and each component alone."""
+    """Print the repeatability and accuracy of a case, together and each component alone."""
     repeatable, accurate = _repeatable_to_mm(document), document.get("accurate_to_mm")
     if repeatable is not None:
         say(tr("  repeatable to +-{mm} mm (95 %)", mm=stated_mm(repeatable, 4)))
@@ -117,7 +117,7 @@ def _show_statements(document: Mapping[str, object]) -> None:
 
 
 def _repeatable_to_mm(document: Mapping[str, object]) -> float | None:
-    """Return what a case is repeatable to: the region of its lengths, else the worst of them."""
+    """Return the repeatability of a case: the region of its lengths, else the worst of them."""
     told = document.get("repeatable_to_mm", document.get("region95_radius_mm"))
     intervals = document["interval95"]
     if isinstance(told, float) or not isinstance(intervals, dict):
@@ -127,7 +127,7 @@ def _repeatable_to_mm(document: Mapping[str, object]) -> float | None:
 
 
 def _show_rows(accuracy: object) -> None:
-    """Print what makes up the statement of accuracy; nothing where there is none."""
+    """Print the parts of the accuracy statement; nothing without one."""
     if not isinstance(accuracy, dict):
         return
     for row in rows_in_words(Accuracy.from_json(accuracy)):

@@ -29,7 +29,7 @@ class StationOfRobot:
 
 
 def known_stations(context: CliContext, *, robot: str | None = None) -> list[StationOfRobot]:
-    """Return the stations that cell file and journal know, without asking the controller.
+    """Return the stations in cell file and journal, without asking the controller.
 
     Each robot of a controller has places of its own; what the cell file declares is each one's.
 
@@ -183,7 +183,7 @@ def _found(station: Station) -> str:
 def records_of_robots(
     context: CliContext, robot: str | None, *, kinds: Collection[EntryKind], nobodys: bool
 ) -> list[tuple[str, list[Recorded]]]:
-    """Return what is on record for each robot, newest first, by its name; no controller is asked.
+    """Return the records of each robot, newest first, by its name; asks no controller.
 
     What stands under a controller of several robots tells none of them, and is one more record
     where ``nobodys``.

@@ -1,1 +1,1 @@
-"""The guided dialogue at a terminal: one flow, drawn on a full screen or told line by line."""
+"""The guided dialogue at a terminal: one flow, on a full screen or line by line."""

@@ -1,4 +1,4 @@
-"""The flow: a state and what happened give the next state, and what is to be done. Pure.
+"""The flow: from a state and a happening to the next state and an action. Pure.
 
 Nothing here decides whether a touch counts: the runner does, for every face and every script. What
 is refused here is what the runner would refuse too, said before it is sent.
@@ -65,7 +65,7 @@ _FREE_STOPS = frozenset({"main", "5", "0", "q"})
 
 
 def advance(state: WizardState, happening: Happening) -> Advanced:
-    """Return the next state, and what is to be done."""
+    """Return the next state, and the action."""
     match happening:
         case WasTold(text=text):
             remarks = (*state.remarks, text)[-_MOST_REMARKS:]
@@ -91,7 +91,7 @@ def advance(state: WizardState, happening: Happening) -> Advanced:
 
 
 def not_yet(state: WizardState, at_s: float) -> str:
-    """Return why the place is not taken yet, as far as it shows here; empty for nothing."""
+    """Return why the place is refused so far, as known here; empty for nothing."""
     touch, jogging = state.touch, state.jogging
     if touch is None:
         return ""
@@ -99,7 +99,7 @@ def not_yet(state: WizardState, at_s: float) -> str:
         return tr("Wait: the robot is still moving.")
     arrived = touch.arrival is not None or state.carried
     if touch.contact is None and arrived and not _brought(state):
-        return tr("Not yet: the tip still stands where the robot put it. Jog it onto the pin.")
+        return tr("Not yet: the tip is still where the robot stopped. Jog it onto the pin.")
     if touch.contact is None and jogging.coarse:
         return tr(
             "Not yet: the last step was {mm} mm. Finish with 0.10 mm or less.",
@@ -112,7 +112,7 @@ def not_yet(state: WizardState, at_s: float) -> str:
 
 
 def _brought(state: WizardState) -> bool:
-    """Tell whether the tip was brought away from where the robot stopped."""
+    """Return whether the tip was moved from where the robot stopped."""
     way = state.way_mm()
     if way is None:
         return state.jogging.steps > 0
@@ -159,7 +159,7 @@ def _regarding(state: WizardState, subject: object) -> WizardState:
 
 
 def _as_far_as_known(state: WizardState, reading: Reading) -> Reading:
-    """Return a reading during a movement with the pose at which that began, where none is read."""
+    """Return a reading during a movement, with the pose of its start if none was read."""
     before = state.reading
     moving = state.question is None and isinstance(state.subject, MoveSubject)
     if reading.pose is not None or before is None or not moving or reading.halted:
@@ -208,7 +208,7 @@ def _asked(state: WizardState, asked: WasAsked) -> WizardState:
 
 
 def _answer(state: WizardState, text: str) -> Advanced:
-    """Send an answer; until the work waits again nothing else is taken."""
+    """Send an answer; nothing else is accepted until the work waits again."""
     assert state.question is not None  # noqa: S101 - looked at by whoever calls
     accepted = state.accepted or (state.writing is not None and text == "y")
     sent = replace(state, waits=False, message="", accepted=accepted)
@@ -216,7 +216,7 @@ def _answer(state: WizardState, text: str) -> Advanced:
 
 
 def _stop(state: WizardState) -> Advanced:
-    """End: by the answer that ends, where there is one, else as Ctrl-C does."""
+    """End: by the answer that ends, if there is one, else like Ctrl-C."""
     if state.ending:
         return state, []
     ending = replace(state, ending=True, message=tr("Stopping."))
@@ -233,7 +233,7 @@ def _stop(state: WizardState) -> Advanced:
 
 
 def armed_anew(state: WizardState, at_s: float) -> WizardState:
-    """Return a state whose question is shown anew: no key from before answers it.
+    """Return a state whose question is shown anew: earlier keys do not answer it.
 
     Args:
         state: The state.
@@ -249,7 +249,7 @@ def _armed(state: WizardState, at_s: float) -> bool:
 
 
 def _too_early(state: WizardState, key: KeyPressed) -> bool:
-    """Tell whether a key belongs to something that began before the field could be seen.
+    """Return whether a key belongs to something that began before the field was visible.
 
     What is left of a code whose beginning was dropped would be another code.
     """
@@ -259,7 +259,7 @@ def _too_early(state: WizardState, key: KeyPressed) -> bool:
 
 
 def _last(state: WizardState, wanted: WizardCommand | None) -> Advanced:
-    """Leave the last screen, for good or for what was chosen there."""
+    """Leave the last screen, for good or for a choice on it."""
     return (state, []) if wanted is None else (replace(state, wants=wanted), [wanted])
 
 
@@ -283,7 +283,7 @@ def _key(state: WizardState, key: KeyPressed) -> Advanced:
 
 
 def stops_at_once(state: WizardState, name: str) -> bool:
-    """Tell whether a key stops, however fast it follows another one.
+    """Return whether a key stops, however fast it follows another one.
 
     Who jogs for its own sake has nothing to record, so the largest key stops too.
     """
@@ -314,21 +314,21 @@ def _key_at_place(state: WizardState, key: KeyPressed) -> Advanced:
 
 
 def _begin_pose(state: WizardState) -> Advanced:
-    """Open the field into which a pose is typed."""
+    """Open the field for typing a pose."""
     if state.touch is None or not state.touch.types:
         return state.says(tr("You cannot type a pose here.")), []
     return replace(state, typing=True, typed="", pose_typed="", message=""), []
 
 
 def _key_in_pose(state: WizardState, key: KeyPressed) -> Advanced:
-    """Fill the field; ENTER closes it, and takes nothing."""
+    """Fill the field; ENTER closes it, and accepts nothing."""
     if key.name != "enter":
         return into_field(state, key), []
     return _pose_typed(replace(state, typing=False), state.typed)
 
 
 def _pose_typed(state: WizardState, text: str) -> Advanced:
-    """Keep a typed pose until it is taken."""
+    """Keep a typed pose until it is accepted."""
     numbers = folded(text).replace(";", " ").split()
     if not numbers:
         return replace(state, pose_typed="", message=""), []
@@ -351,7 +351,7 @@ def _take(state: WizardState, at_s: float) -> Advanced:
 
 
 def _again(state: WizardState, number: int | None = None) -> Advanced:
-    """Have an earlier touch made again: the one before, where no other is named."""
+    """Repeat an earlier touch: the last one, unless another is named."""
     touch = state.touch
     if touch is None or touch.number < 2 or touch.proof:
         return state.says(tr("There is no earlier touch to repeat.")), []
@@ -406,7 +406,7 @@ def _line_at_place(state: WizardState, line: LineTyped, meaning: str) -> Advance
 
 
 def help_at_place(*, free: bool) -> str:
-    """Return what can be typed at a place, or while somebody jogs for its own sake."""
+    """Return what can be typed at a place, or while jogging only."""
     if free:
         return tr(
             "Steps: x+0.1 moves 0.1 mm to +X; x y z in mm, u in degrees; several at once: "
@@ -419,12 +419,12 @@ def help_at_place(*, free: bool) -> str:
 
 
 def _taken(state: WizardState, said: "WizardState | str") -> Advanced:
-    """Send what a question was answered with, or only show what became of it."""
+    """Send the answer to a question, or only show what happened to it."""
     return _answer(state, said) if isinstance(said, str) else (said, [])
 
 
 def confirms(state: WizardState) -> CheckSubject | None:
-    """Return the check list that is asked about, ``None`` for none."""
+    """Return the check list in question, ``None`` for none."""
     subject = state.subject
     asks = state.question is not None and state.question.kind is Question.YES_NO
     return subject if asks and isinstance(subject, CheckSubject) else None

@@ -1,4 +1,4 @@
-"""Looks at the controller, at rest and on the way: what the second row of a screen shows."""
+"""Reads the controller, at rest and in motion, for the second row of a screen."""
 
 import time
 from typing import Final
@@ -12,7 +12,7 @@ _SELDOM_S: Final = 3.0
 
 
 class ControllerGlance:
-    """Looks at one controller, and says what it saw; what was not read is not said.
+    """Reads one controller, and shows what it read, and nothing else.
 
     A broken link is not swallowed: whoever asks is told of it, as by any other exchange.
 
@@ -29,7 +29,7 @@ class ControllerGlance:
         self._seldom_s = -_SELDOM_S
 
     def at_rest(self) -> Reading | None:
-        """Look while a person is asked."""
+        """Read while a person is asked."""
         status = self._controller.status()
         halted = status.emergency_stop or status.guard_open or status.fault or status.serious_fault
         # What comes next tells why: a position is no more of interest then.
@@ -52,7 +52,7 @@ class ControllerGlance:
         )
 
     def on_the_way(self) -> Reading | None:
-        """Look while a movement is under way, beside whoever waits for it.
+        """Read during a movement, beside its waiter.
 
         Status can be asked meanwhile on every kind; the position only where the kind says so. The
         driver has proved the power mode before the movement began.

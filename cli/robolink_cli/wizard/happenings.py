@@ -1,4 +1,4 @@
-"""What happens in a wizard, and what it has done about it: plain values, no terminal."""
+"""Events of a wizard, and its actions: plain values, no terminal."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -13,13 +13,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """What the controller said of itself a moment ago.
+    """What the controller reported a moment ago.
 
     Attributes:
         at_s: When it was read, by the monotonic clock of this computer.
         state: The one word for what it is doing.
         halted: Whether an emergency stop, an open guard or an error shows.
-        pose: Where the frame in force is, ``None`` where it was not read.
+        pose: Where the selected frame is, ``None`` where it was not read.
         axes: Joint angles, in degrees, where they were read.
         follows: Whether the pose is that of now; else it is where a movement began.
         motors: Whether the motors are on, ``None`` where that was not read.
@@ -39,7 +39,7 @@ class Reading:
 
 @dataclass(frozen=True, slots=True)
 class CellIs:
-    """What became known of the cell or the job, for the first row of every screen.
+    """News about the cell or the job, for the first row of every screen.
 
     Attributes:
         simulated: Whether the controller says of itself that nothing real moves.
@@ -52,7 +52,7 @@ class CellIs:
 
 @dataclass(frozen=True, slots=True)
 class TaughtPoints:
-    """The taught points that a person named, and what the new value does there.
+    """The taught points that a person named, and the effect of the new value there.
 
     Attributes:
         impact: That.
@@ -63,21 +63,21 @@ class TaughtPoints:
 
 @dataclass(frozen=True, slots=True)
 class WasTold:
-    """The work said something."""
+    """The work showed a message."""
 
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class WasRegarded:
-    """What comes next is about this."""
+    """The subject of what comes next."""
 
     subject: object
 
 
 @dataclass(frozen=True, slots=True)
 class WasAsked:
-    """The work asks; answers to an earlier question count for nothing from now on.
+    """The work asks; answers to an earlier question no longer count.
 
     Attributes:
         number: Of the question; it grows.
@@ -94,7 +94,7 @@ class WasAsked:
 
 @dataclass(frozen=True, slots=True)
 class WaitsForAnswer:
-    """The work has taken the last answer and waits for the next one.
+    """The work has read the last answer and waits for the next one.
 
     Attributes:
         number: Of the question.
@@ -107,14 +107,14 @@ class WaitsForAnswer:
 
 @dataclass(frozen=True, slots=True)
 class WasRead:
-    """The controller was looked at."""
+    """The controller was read."""
 
     reading: Reading
 
 
 @dataclass(frozen=True, slots=True)
 class KeyPressed:
-    """One key, alone: what came in a burst is no key.
+    """One key, alone: input in a burst is no key.
 
     Attributes:
         name: ``0`` to ``9`` for the keypad with and without NumLock, ``main``, ``stop``, ``+``,
@@ -138,7 +138,7 @@ class LineTyped:
 
 @dataclass(frozen=True, slots=True)
 class TooFast:
-    """A burst of characters, as from a scanner or a paste, was dropped."""
+    """A burst of characters, as from a scanner or a paste, was ignored."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,7 +174,7 @@ class SendAnswer:
 
 
 class WizardCommand(Enum):
-    """What the flow wants besides an answer."""
+    """What the flow requests besides an answer."""
 
     END_WORK = "end"
     """End what is under way, as Ctrl-C would."""

@@ -1,4 +1,4 @@
-"""Runs the work of a command in a thread of its own, while a face shows it in the main one."""
+"""Runs the work of a command in a thread of its own, while the main one shows it."""
 
 import os
 import sys
@@ -23,7 +23,7 @@ _POOR: Final = frozenset({"", "dumb", "unknown"})
 
 
 def face_here() -> "Face":
-    """Return the face for this process's terminal: the full screen where it can be drawn.
+    """Return the face for this process's terminal: the full screen if possible.
 
     In a small window that one begins with lines.
     """
@@ -37,7 +37,7 @@ def face_here() -> "Face":
 
 
 def draws_whole_screens() -> bool:
-    """Tell whether the terminal, and the person at it, take full screens, once there is room."""
+    """Return whether terminal and person accept full screens, once there is room."""
     context = click.get_current_context(silent=True)
     plain = context is not None and bool(context.meta.get(PLAIN))
     if plain or os.environ.get("ROBOLINK_PLAIN") == "1":
@@ -100,10 +100,10 @@ def guided(
 
 
 def _shown(face: Face, desk: Desk, state: WizardState, work: "Work[T]") -> WizardState:
-    """Show the work until it has ended, also where that cannot be shown any more.
+    """Show the work until it has ended, also when it cannot be shown any more.
 
     The work is in a thread that would end with the process in the middle of a measurement. So it
-    is told that nobody answers, and awaited: tool, power and speed are put back then, and the
+    is told that nobody answers, and awaited: tool, power and speed are restored then, and the
     controller is logged out.
     """
     try:
@@ -117,7 +117,7 @@ def _shown(face: Face, desk: Desk, state: WizardState, work: "Work[T]") -> Wizar
 
 
 def _reported(state: WizardState, report: Callable[[str], tuple[str, ...]]) -> WizardState:
-    """Return the last screen with where the page is; or with why there is none, and the offer."""
+    """Return the last screen with the place of the page; or why there is none, and the offer."""
     ended = state.ended
     assert ended is not None and state.report is not None  # noqa: S101, PT018 - it was offered there
     again = replace(state, wants=None, message="")

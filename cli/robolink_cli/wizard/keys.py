@@ -54,7 +54,7 @@ def folded(text: str) -> str:
 
 
 def meaning_of(text: str) -> str:
-    """Return which command a typed line is: ``take``, ``stop`` ..; empty for none.
+    """Return the command of a typed line: ``take``, ``stop`` ..; empty for none.
 
     The number after ``again 1`` is read by :func:`number_in`.
     """
@@ -71,13 +71,13 @@ def number_in(text: str) -> int | None:
 
 
 def pose_in(text: str) -> str | None:
-    """Return the numbers behind ``pose``, ``None`` where the line is none."""
+    """Return the numbers behind ``pose``, ``None`` if the line has none."""
     word, _, rest = folded(text).partition(" ")
     return rest if word in ("pose", "位姿") else None
 
 
 def step_of(key: str, size: float, quarters: int) -> str | None:
-    """Return the jog step of a key, ``None`` where it is none.
+    """Return the jog step of a key, ``None`` if it is none.
 
     Args:
         key: Its name.
@@ -118,14 +118,14 @@ def name_of(key: str) -> str:
 
 
 class CountedKey(NamedTuple):
-    """A key, and by when it had come."""
+    """A key, and the latest time at which it came."""
 
     key: str
     at_s: float
 
 
 class KeyGate:
-    """Lets single keys through, and drops bursts. Times are those of one monotonic clock."""
+    """Passes single keys, and ignores bursts. Times are those of one monotonic clock."""
 
     def __init__(self) -> None:
         self._held: CountedKey | None = None
@@ -135,7 +135,7 @@ class KeyGate:
     def press(
         self, key: str, at_s: float, quiet_s: float | None = None, *, stops: bool = False
     ) -> list[CountedKey]:
-        """Take a key; return those that count by now, in their order.
+        """Accept a key; return those that count by now, in order.
 
         Args:
             key: The key.
@@ -163,7 +163,7 @@ class KeyGate:
         return done
 
     def burst(self, at_s: float, quiet_s: float | None = None) -> list[CountedKey]:
-        """Take several keys that came in one piece, of which none counts.
+        """Accept several keys that came in one piece, of which none counts.
 
         Args:
             at_s: They had come by then.
@@ -177,14 +177,14 @@ class KeyGate:
         return done
 
     def due(self, at_s: float) -> list[CountedKey]:
-        """Return the key that counts because nothing had followed it by a time."""
+        """Return the key that counts because nothing followed it for a time."""
         if self._held is None or at_s - self._held.at_s < ALONE_S:
             return []
         held, self._held = self._held, None
         return [held]
 
     def burst_ended(self, at_s: float) -> bool:
-        """Tell once that a burst was dropped, when it is over."""
+        """Report once, at its end, that a burst was ignored."""
         if self._burst_s is None or at_s - self._burst_s < ALONE_S:
             return False
         self._burst_s = None

@@ -1,4 +1,4 @@
-"""Answers to questions that are no places: check lists, offers, writes, yes or no, texts. Pure.
+"""Answers to other questions: check lists, offers, writes, yes or no, texts. Pure.
 
 Each returns the answer to be sent, or the state that only shows what became of a key or a line.
 """
@@ -41,19 +41,19 @@ _LEAST_SHARE: Final = 1 / 3
 
 
 def expected_number(subject: WriteSubject) -> str:
-    """Return what has to be typed before a write: the numbers of its tools, one after the other."""
+    """Return what must be typed before a write: the numbers of its tools, in order."""
     return "".join(map(str, subject.tools))
 
 
 def offered_words(subject: WriteSubject) -> tuple[str, ...]:
-    """Return the words by which a person may go back to the touches before a write."""
+    """Return the words by which a person may return to the touches before a write."""
     if subject.again is None:
         return ()
     return (BACK, MORE) if subject.can_add_touch else (BACK,)
 
 
 def answered_by_key(state: WizardState, key: KeyPressed) -> Answered:
-    """Return what a key answers."""
+    """Return the answer of a key."""
     question, subject = state.question, state.subject
     if question is None:
         return state
@@ -71,7 +71,7 @@ def answered_by_key(state: WizardState, key: KeyPressed) -> Answered:
 
 
 def answered_by_line(state: WizardState, line: str) -> Answered:
-    """Return what a line answers."""
+    """Return the answer of a line."""
     question, subject = state.question, state.subject
     if question is None:
         return state
@@ -103,7 +103,7 @@ def answered_by_line(state: WizardState, line: str) -> Answered:
 
 
 def chosen_by_key(state: WizardState, ended: LastScreen, key: KeyPressed) -> WizardCommand | None:
-    """Return what a key chooses on the last screen, ``None`` for nothing; ENTER is none.
+    """Return the choice of a key on the last screen, ``None`` for nothing; ENTER is none.
 
     A key that is still held down chooses nothing either.
     """
@@ -120,7 +120,7 @@ def chosen_by_key(state: WizardState, ended: LastScreen, key: KeyPressed) -> Wiz
 
 
 def chosen_by_line(state: WizardState, line: str) -> WizardCommand | None:
-    """Return what a line chooses at the end of a job; an empty one chooses nothing."""
+    """Return the choice of a line at the end of a job; an empty one chooses nothing."""
     meaning = meaning_of(line)
     if meaning in ("stop", "finish"):
         return WizardCommand.LEAVE
@@ -129,7 +129,7 @@ def chosen_by_line(state: WizardState, line: str) -> WizardCommand | None:
 
 
 def worst_first(fit: FitSubject) -> bool:
-    """Tell whether the worst one stands out so much that touching it again comes first."""
+    """Return whether the worst touch is so far off that repeating it comes first."""
     if fit.worst is None:
         return False
     away = [sum(part * part for part in row.off_mm) ** 0.5 for row in fit.rows]
@@ -138,7 +138,7 @@ def worst_first(fit: FitSubject) -> bool:
 
 
 def _fit_key(fit: FitSubject, key: KeyPressed) -> str:
-    """Return what a key answers; empty for nothing. The key that goes on moves nothing."""
+    """Return the answer of a key; empty for nothing. The key that continues moves nothing."""
     if key.name in ("5", "main", "n"):
         return "n"
     if key.name in ("/", "y"):
@@ -166,7 +166,7 @@ def _marked(state: WizardState, key: KeyPressed, rows: int, first: int = 0) -> W
 
 
 def _row_done(state: WizardState, key: KeyPressed, *, enters: bool = False) -> WizardState | None:
-    """Return what only says why a key does nothing on a list; ``None`` where it does its row."""
+    """Return why a key does nothing on a list; ``None`` if it carries out its row."""
     if key.name == "enter" and not enters:
         return state.says(tr("ENTER does nothing here. [5] does what the marked row says."))
     if key.name not in ("5", "main", "enter"):
@@ -175,7 +175,7 @@ def _row_done(state: WizardState, key: KeyPressed, *, enters: bool = False) -> W
 
 
 def _choice_key(state: WizardState, subject: ChoiceSubject, key: KeyPressed) -> Answered:
-    """Mark a row with the arrows; take the marked one."""
+    """Mark a row with the arrows; choose the marked one."""
     moved = _marked(state, key, len(subject.options))
     if moved is not None:
         return moved
@@ -187,7 +187,7 @@ def _choice_key(state: WizardState, subject: ChoiceSubject, key: KeyPressed) -> 
 
 
 def _yes_no_key(state: WizardState, key: KeyPressed) -> Answered:
-    """Mark yes or no with the arrows, and take it; a letter answers too."""
+    """Mark yes or no with the arrows, and choose it; a letter answers too."""
     said = {"y": "y", "j": "y", "n": "n"}.get(key.name)
     if said is not None:
         return said
@@ -227,7 +227,7 @@ def _write_key(state: WizardState, subject: WriteSubject, key: KeyPressed) -> An
 
 
 def _write(state: WizardState, subject: WriteSubject, typed: str, *, said_no: bool) -> Answered:
-    """Write only where the number of the tool was typed."""
+    """Write only if the number of the tool was typed."""
     if said_no:
         return "n"
     numbers = "".join(part for part in typed if part not in " ,;")
@@ -273,7 +273,7 @@ def _check_line(state: WizardState, subject: CheckSubject, meaning: str, word: s
 
 
 def _confirmed(state: WizardState, subject: CheckSubject, index: int) -> Answered:
-    """Do what a row says, or confirm it; a row that was confirmed is taken back."""
+    """Carry out a row, or confirm it; a confirmed row is withdrawn."""
     point = subject.rows[index]
     if point.mark is Mark.TO_DO:
         return SWITCH_ON

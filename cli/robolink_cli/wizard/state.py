@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class ChoiceSubject:
-    """A list of which one is chosen.
+    """A list from which one row is chosen.
 
     Attributes:
         step: What stands at the right of the first row.
@@ -59,7 +59,7 @@ class ChoiceSubject:
 
 
 def subject_of(offered: OfferedChoice) -> ChoiceSubject:
-    """Return the list of what the work lets a person choose; its first row is safe."""
+    """Return the list of a person's choices in the work; its first row is safe."""
     return ChoiceSubject(
         offered.title,
         (),
@@ -79,7 +79,7 @@ CHANGE_LANGUAGE: Final = "language"
 def choose_in_either_language(
     desk: AskingDesk, make: Callable[[], tuple[str, ChoiceSubject]], watch: Callable[[], object]
 ) -> int:
-    """Have one chosen by a person who may change the language first; return its index.
+    """Let a person choose, who may switch the language first; return the index.
 
     Args:
         desk: Where.
@@ -100,7 +100,7 @@ def choose_in_either_language(
 def choose(
     desk: AskingDesk, question: str, subject: ChoiceSubject, watch: Callable[[], object]
 ) -> int:
-    """Have one chosen; return its index.
+    """Let a person choose; return the index.
 
     Args:
         desk: Where.
@@ -175,7 +175,7 @@ class Jogging:
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """What stands in the first row of every screen.
+    """The first row of every screen.
 
     Attributes:
         cell: Name of the cell, or how the controller is reached.
@@ -218,7 +218,7 @@ class LastScreen:
 
 @dataclass(frozen=True, slots=True)
 class WizardState:
-    """All that a screen is drawn from.
+    """Everything that a screen shows.
 
     Attributes:
         header: The first row.
@@ -283,31 +283,31 @@ class WizardState:
 
     @property
     def at_place(self) -> bool:
-        """Whether a person brings the tip somewhere."""
+        """Whether a person is moving the tip somewhere."""
         return self.question is not None and self.question.kind in _PLACES
 
     @property
     def touch(self) -> TouchSubject | None:
-        """The touch that is asked for."""
+        """The requested touch."""
         subject = self.subject
         return subject if self.at_place and isinstance(subject, TouchSubject) else None
 
     @property
     def free_jog(self) -> JogRange | None:
-        """The limits of jogging for its own sake."""
+        """The limits of jogging only."""
         subject = self.subject
         return subject if self.at_place and isinstance(subject, JogRange) else None
 
     @property
     def writing(self) -> WriteSubject | None:
-        """The write that is asked about."""
+        """The write in question."""
         subject, question = self.subject, self.question
         asks = question is not None and question.kind is Question.YES_NO
         return subject if asks and isinstance(subject, WriteSubject) else None
 
     @property
     def has_field(self) -> bool:
-        """Whether characters are written into a field."""
+        """Whether characters go into a field."""
         question = self.question
         if isinstance(self.subject, ChoiceSubject):
             return False
@@ -317,18 +317,18 @@ class WizardState:
 
     @property
     def pose(self) -> Pose | None:
-        """Where the frame in force is."""
+        """Where the selected frame is."""
         return None if self.reading is None else self.reading.pose
 
     @property
     def arrival(self) -> Pose | None:
-        """Where the robot stood before the person jogged, as far as that says something."""
+        """Where the robot was before the person jogged, if that is informative."""
         if self.free_jog is not None:
             return self.free_jog.start
         return None if self.touch is None else self.touch.arrival
 
     def way_mm(self) -> tuple[float, float, float] | None:
-        """Return how far the tip was brought since the robot arrived, base axes."""
+        """Return how far the tip was moved since the robot arrived, base axes."""
         arrival, pose = self.arrival, self.pose
         if arrival is None or pose is None:
             return None
@@ -337,7 +337,7 @@ class WizardState:
 
 
 class Mark(StrEnum):
-    """How a point of the list stands."""
+    """The state of a point of the list."""
 
     OK = "ok"
     TO_DO = "to do"
@@ -363,13 +363,13 @@ class CheckPoint:
     does: str = ""
 
     def is_open(self, confirmed: Collection[str]) -> bool:
-        """Tell whether something is still to be done or confirmed."""
+        """Return whether something is still to be done or confirmed."""
         return self.mark is Mark.TO_DO or (self.mark is Mark.YOU and self.name not in confirmed)
 
 
 @dataclass(frozen=True, slots=True)
 class CheckSubject:
-    """What is looked at before the robot starts.
+    """What is checked before the robot starts.
 
     Attributes:
         points: The list.
@@ -381,11 +381,11 @@ class CheckSubject:
 
     @property
     def rows(self) -> tuple[CheckPoint, ...]:
-        """The points that a person goes through; after them comes the row that starts."""
+        """The points that a person goes through; the starting row comes after them."""
         return tuple(point for point in self.points if point.name)
 
     def open_rows(self, confirmed: Collection[str]) -> tuple[int, ...]:
-        """Return the indices of the rows that are not settled yet."""
+        """Return the indices of the rows that are still open."""
         return tuple(i for i, point in enumerate(self.rows) if point.is_open(confirmed))
 
 

@@ -56,20 +56,20 @@ class Desk:
         self._happened.put(WasTold(text))
 
     def regard(self, subject: object) -> None:
-        """Take what comes next to be about ``subject``."""
+        """Note ``subject`` as the subject of what comes next."""
         if isinstance(subject, MoveSubject):
             self._moves.set()
         self._happened.put(WasRegarded(subject))
 
     def ask(self, question: str, kind: Question) -> None:
-        """Ask; what was answered before counts for nothing."""
+        """Ask; earlier answers no longer count."""
         self._moves.clear()
         self._number += 1
         self._told_waiting = False
         self._happened.put(WasAsked(self._number, question, kind, self._now_s()))
 
     def poll(self, wait_s: float) -> str | None:
-        """Return the answer, ``None`` when none came; the controller is looked at meanwhile.
+        """Return the answer, ``None`` when none came; read the controller meanwhile.
 
         Raises:
             DeclinedError: There is nobody to answer any more.
@@ -102,7 +102,7 @@ class Desk:
 
     @contextmanager
     def following(self, look: Callable[[], Reading | None]) -> Iterator[None]:
-        """Look at the controller while it moves, from a thread of its own, for the block.
+        """Read the controller while it moves, from a thread of its own, for the block.
 
         A look that fails ends this alone: whoever waits for the movement is told of it.
         """
@@ -138,7 +138,7 @@ class Desk:
                 return found
 
     def leave(self) -> None:
-        """Say that there is nobody to answer any more; for the face."""
+        """Report that there is nobody to answer any more; for the face."""
         self._gone = True
 
     def answer(self, answer: SendAnswer) -> None:
@@ -177,7 +177,7 @@ class Work(Generic[T]):
         return self._ended.is_set()
 
     def start(self) -> None:
-        """Begin; return when whatever ends the command reaches it."""
+        """Start; return when whatever ends the command reaches it."""
         here = contextvars.copy_context()
         threading.Thread(target=here.run, args=(self._run,), name="work", daemon=True).start()
         self._begun.wait()

@@ -156,7 +156,7 @@ def mean_by_height(sightings: Sequence[Sighting]) -> tuple[float, float]:
 
 
 def check_spacing(spacing_mm: float, nominal_mm: float | None) -> None:
-    """Refuse fiducials that cannot be the ones that were meant.
+    """Refuse fiducials that cannot be the intended ones.
 
     Raises:
         CalibrationError: ``coincident_fiducials`` or ``spacing_mismatch``.
@@ -184,7 +184,7 @@ def check_spacing(spacing_mm: float, nominal_mm: float | None) -> None:
 
 @dataclass(frozen=True, slots=True)
 class BoardDrawing:
-    """Fiducials of a board, in the axes that its tool is to have.
+    """Fiducials of a board, in the axes of its tool.
 
     Attributes:
         fiducials_mm: X and Y of each, in the order of their numbers.
@@ -199,12 +199,12 @@ class BoardDrawing:
 
     @property
     def is_pair(self) -> bool:
-        """Whether it is such a board."""
+        """Whether it is EPSON's board of two fiducials."""
         spacing_mm = math.dist(self.fiducials_mm[0], self.fiducials_mm[1])
         return self == BoardDrawing.of_two(spacing_mm)
 
     def require_apart(self) -> None:
-        """Refuse a drawing in which fiducials lie on each other.
+        """Refuse a drawing in which fiducials coincide.
 
         Raises:
             CalibrationError: ``too_few_poses``, ``non_finite`` or ``coincident_fiducials``.

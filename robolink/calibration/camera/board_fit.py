@@ -1,4 +1,4 @@
-"""A board with several fiducials: its drawing laid over them, turned and moved, not stretched.
+"""A board with several fiducials: its drawing fitted by turning and moving, not stretching.
 
 With d the drawing and f what was seen, both as x + iy and with their means taken off, the
 turn of the least squares is the direction of sum(conj(d) f).

@@ -1,4 +1,4 @@
-"""Camera and tool offset together, from pixels, with a camera whose place is unknown.
+"""Camera and tool offset together, from the pixels of a camera whose place is unknown.
 
 Every picture says ``M px + b = p + Rz(U) t``: linear in the matrix M, the origin b and the
 offset t, eight unknowns in all (docs/reference/calibration.md 2.5). Moving without turning shows M,
@@ -53,7 +53,7 @@ scatter alone, of a spot that stands still, spreads too, and has a scale and a s
 
 @dataclass(frozen=True, slots=True)
 class PixelSighting:
-    """The tip in a picture: the flange pose (Tool 0) then, and the pixel."""
+    """The tip in a picture: its pixel, and the flange pose (Tool 0) at that moment."""
 
     flange: Pose
     px: float
@@ -174,7 +174,7 @@ def solve_camera_affine(
 def _with_spread(
     camera: CameraModel, fit: LinearFit, offset_mm: float | None, mean_pixel: Sequence[float]
 ) -> CameraModel:
-    """Return the camera with how sure its place and its scale are; as it is without a scatter."""
+    """Return the camera with the uncertainty of place and scale; unchanged without a scatter."""
     if offset_mm is None:
         return camera
     variances = fit.unit_covariance.diagonal()
@@ -222,7 +222,7 @@ def _rms_px(camera: CameraModel, residuals_mm: Floats) -> float:
 
 
 def _require_spread(pixels: Floats) -> None:
-    """Refuse pixels that all lie in one point or on one line, but for the finder's scatter."""
+    """Refuse pixels that all lie at one point or on one line, within the finder's scatter."""
     spread = np.linalg.svd(pixels - pixels.mean(axis=0), compute_uv=False)
     rms_px = float(spread[-1]) / math.sqrt(len(pixels))
     if rms_px >= LEAST_SPREAD_PX:

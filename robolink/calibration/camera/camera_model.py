@@ -1,4 +1,4 @@
-"""What a fixed camera does to the plane of the tips: a linear map from pixels to the base.
+"""How a fixed camera maps the plane of the tips: linearly, from pixels to the base.
 
 What a camera saw on the tool, and where the flange was then.
 """
@@ -42,7 +42,7 @@ class CameraModel:
     scale_sigma: float = field(default=0.0, compare=False)
 
     def sigma_at_mm(self, x_mm: float, y_mm: float) -> float:
-        """Return how uncertain it is where a thing is that is seen at a place of the base.
+        """Return the uncertainty of the place of something seen at a place of the base.
 
         u^2 = u_place^2 + (u_scale times the distance from the centre)^2
         (docs/reference/evidence.md 7).
@@ -52,12 +52,12 @@ class CameraModel:
         return math.hypot(self.place_sigma_mm, self.scale_sigma * away_mm)
 
     def base_mm(self, px: float, py: float) -> tuple[float, float]:
-        """Return where in the base a pixel looks."""
+        """Return the place in the base that a pixel sees."""
         (a, b), (c, d) = self.mm_per_px
         return (a * px + b * py + self.origin_mm[0], c * px + d * py + self.origin_mm[1])
 
     def pixel(self, x_mm: float, y_mm: float) -> tuple[float, float]:
-        """Return the pixel that looks at a place of the base."""
+        """Return the pixel that sees a place of the base."""
         (a, b), (c, d) = self.mm_per_px
         dx, dy, area = x_mm - self.origin_mm[0], y_mm - self.origin_mm[1], self.determinant
         return (d * dx - b * dy) / area, (a * dy - c * dx) / area
@@ -81,7 +81,7 @@ class CameraModel:
 
     @property
     def largest_mm_per_px(self) -> float:
-        """What a pixel is at most, in whichever direction: the larger singular value."""
+        """Largest size of a pixel in any direction: the larger singular value."""
         (a, b), (c, d) = self.mm_per_px
         half = (a * a + b * b + c * c + d * d) / 2
         return math.sqrt(half + math.sqrt(max(half * half - self.determinant**2, 0.0)))
@@ -94,14 +94,14 @@ class CameraModel:
 
     @property
     def shear_deg(self) -> float:
-        """By how much the image's axes are off a right angle."""
+        """How far the image's axes deviate from a right angle."""
         sx, sy = self.scale_mm_per_px
         return math.degrees(math.acos(min(abs(self.determinant) / (sx * sy), 1.0)))
 
 
 @dataclass(frozen=True, slots=True)
 class CameraLimits:
-    """What is still the same camera, and what is still a good one.
+    """Limits of an unchanged camera, and of a good one.
 
     Attributes:
         unequal_scale: Largest |scale_x / scale_y - 1| without a warning.
@@ -145,7 +145,7 @@ class CameraLimits:
         return self.exceeded(camera, rms_px)
 
     def require_camera(self, camera: CameraModel) -> None:
-        """Refuse what no camera that looks at tips is like.
+        """Refuse values that no camera looking at tips can have.
 
         Raises:
             CalibrationError: ``camera_implausible``.
@@ -175,7 +175,7 @@ class CameraLimits:
         raise CalibrationError("camera_implausible", what, remedy=_seen_wrongly())
 
     def require_fit(self, rms_px: float | None, half_width95_mm: float | None) -> None:
-        """Refuse looks that agree too badly with any camera, or tell too little.
+        """Refuse looks that no camera fits well enough, or that determine too little.
 
         Args:
             rms_px: Root mean square of the residuals, ``None`` without a degree of freedom.
@@ -213,7 +213,7 @@ USUAL_CAMERA = CameraLimits()
 def require_same_camera(
     now: CameraModel, before: CameraModel, limits: CameraLimits = USUAL_CAMERA
 ) -> None:
-    """Refuse a camera that is not as it was; where it looks may have moved.
+    """Refuse a camera that has changed; only where it looks may have moved.
 
     Args:
         now: The camera as it was found.
@@ -278,7 +278,7 @@ class Sighting:
 def check_sightings(
     sightings: tuple[Sighting, ...], *, allow_mixed_hand: bool = False
 ) -> tuple[str, ...]:
-    """Refuse sightings that are no numbers or do not belong together, or not to the base.
+    """Refuse sightings that are not numbers, do not belong together, or are not of the base.
 
     Raises:
         CalibrationError: ``non_finite``, ``suspect_units``, ``mixed_hand``, ``mixed_local``,

@@ -46,7 +46,7 @@ _UNKNOWNS = 4
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CameraRound(CalibrationResult):
-    """A tool offset seen by a camera.
+    """A tool offset measured by a camera.
 
     Attributes:
         camera_error_mm: By how much the camera sees things beside where they are, base X and Y;
@@ -56,7 +56,7 @@ class CameraRound(CalibrationResult):
     camera_error_mm: tuple[float, float] | None = None
 
     def details(self) -> dict[str, object]:
-        """Return what the camera is off by."""
+        """Return the camera's error."""
         error_mm = self.camera_error_mm
         return {"camera_error_mm": None if error_mm is None else list(error_mm)}
 
@@ -204,7 +204,7 @@ def _leaning(
 def as_round(
     result: CalibrationResult, *, camera_error_mm: tuple[float, float] | None = None
 ) -> CameraRound:
-    """Return a result with what the camera is off by, doubted when that is much."""
+    """Return a result with the camera's error, and a doubt if that is large."""
     values = {field.name: getattr(result, field.name) for field in fields(CalibrationResult)}
     if camera_error_mm is not None and max(map(abs, camera_error_mm)) > CAMERA_MOVED_MM:
         values["warnings"] = (*result.warnings, "camera_moved")

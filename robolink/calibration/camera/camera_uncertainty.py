@@ -1,4 +1,4 @@
-"""What a camera that is not known exactly adds to what it measured.
+"""Uncertainty that an imperfectly known camera adds to its measurements.
 
 Where it sees a thing is off by the same vector b everywhere, and by e (s - c) besides, s being
 where the thing is seen and c the point that it knows best: the real part of the complex number e
@@ -48,7 +48,7 @@ def camera_part(
     *,
     angles: Sequence[int] = (),
 ) -> StationPart:
-    """Return the part of a camera's error in what was found from several marks.
+    """Return the part of a camera's error in a result from several marks.
 
     Args:
         camera: The camera, and how sure it is of its place and scale.
@@ -146,7 +146,7 @@ def camera_sources(
 def _from_middle(
     sightings: Sequence[Sighting], camera: CameraModel | None, *, finds_place: bool
 ) -> list[_Shifts]:
-    """Return how far from the place that a turn of the camera leaves alone marks were seen.
+    """Return how far marks were seen from the point that a turn of the camera leaves alone.
 
     Where nobody knows that place, it may lie in either direction.
     """
@@ -167,7 +167,7 @@ def print_source(
     gains: Sequence[Sequence[float]],
     marks: Sequence[tuple[float, float]],
 ) -> ErrorSource:
-    """Return how a board whose fiducials lie beside their drawing enters: each in any direction.
+    """Return the error of fiducials that lie beside their drawing, each in any direction.
 
     Args:
         sightings: What was seen.

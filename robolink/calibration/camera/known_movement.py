@@ -1,4 +1,4 @@
-"""Whether what a camera sees moves as the robot moved it.
+"""Checks that a camera sees a mark move as the robot moved it.
 
 With the tool held in one orientation, every point of it moves by the vector by which the robot
 moved, so a spot that is the tip moves by that vector too, whatever the offset is. A spot that
@@ -34,16 +34,16 @@ ROBOT_SIGMA_MM: Final = 0.005
 """Standard deviation of how far the robot really moves between two places, each axis."""
 
 RADIUS_WITHIN: Final = 0.03
-"""By which share the radius of a spot may differ from that of the other looks of a run."""
+"""Share by which the radius of a spot may differ from the other looks of a run."""
 
 LEAST_RADIUS_PX: Final = 0.3
 """No closer limit than this is held against a radius: a finder scatters by 0.1 px."""
 
 _FACTOR: Final = 3.0
-"""How many standard uncertainties are taken for chance."""
+"""Number of standard uncertainties that count as chance."""
 
 _PLAY_AGAIN: Final = 1.5
-"""By what play that was found once may differ at another place."""
+"""How much a measured backlash may differ at another place."""
 
 _SAME_DIRECTION_DEG: Final = 5.0
 """Movements whose directions differ by less are of one direction."""
@@ -54,7 +54,7 @@ _DULLEST: Final = 0.1
 
 @dataclass(frozen=True, slots=True)
 class CameraChangeRows:
-    """How much a camera may differ from its calibration unseen; rectangular half widths.
+    """Possible undetected change of a camera since its calibration; rectangular half widths.
 
     Attributes:
         scale: Relative change of its scale since it was calibrated.
@@ -81,7 +81,7 @@ class CameraChangeRows:
 
 
 class MovementVerdict(Enum):
-    """What a seen movement says."""
+    """What a seen movement shows."""
 
     AS_KNOWN = auto()
     """The spot moved as the robot did."""
@@ -95,7 +95,7 @@ class MovementVerdict(Enum):
 
 @dataclass(frozen=True, slots=True)
 class SeenMovement:
-    """By what the robot moved a mark, and by what the camera saw it move.
+    """A movement of a mark by the robot, and as the camera saw it.
 
     Attributes:
         known_mm: The robot's movement, base X and Y.
@@ -119,12 +119,12 @@ class SeenMovement:
 
     @property
     def ratio(self) -> complex:
-        """By what the camera multiplied the movement: scale, and turn as its argument."""
+        """Seen movement divided by the robot's: scale, and turn as its argument."""
         return complex(*self.seen) / complex(*self.known_mm)
 
     @property
     def turn_deg(self) -> float:
-        """By what the camera turned it."""
+        """The angle by which the camera turned it."""
         return math.degrees(cmath.phase(self.ratio)) if self.seen_length else 0.0
 
     def along(self, other: "SeenMovement") -> bool:
@@ -134,11 +134,11 @@ class SeenMovement:
 
     @property
     def tells(self) -> bool:
-        """Whether the movement is long enough to tell anything beside its scatter; in mm."""
+        """Return whether the movement is long enough to stand out from its scatter; in mm."""
         return self.noise <= _DULLEST * self.known_length_mm
 
     def judged(self, rows: CameraChangeRows, *, play_mm: float = 0.0) -> MovementVerdict:
-        """Return what it says of a camera that is calibrated.
+        """Return the verdict on a calibrated camera.
 
         Args:
             rows: How much the camera may differ from its calibration.

@@ -1,4 +1,4 @@
-"""How a tip moves when the tool turns on the spot: offset, and what is no offset.
+"""How a tip moves when the tool turns on the spot: the offset, and what is not offset.
 
 With z = exp(iU), what a camera sees of the tip about the flange is
 
@@ -219,7 +219,7 @@ def _distinct(angles_deg: Sequence[float]) -> list[float]:
 
 
 def _told_apart(angles_deg: Sequence[float]) -> tuple[int, bool]:
-    """Return how many of the four terms some angles tell apart, and whether all of them well."""
+    """Return how many of the four terms some angles separate, and whether all of them well."""
     z = np.exp(1j * np.radians(angles_deg))
     columns = np.column_stack((np.ones_like(z), z, z.conj(), z**2))
     sizes = np.linalg.svd(columns, compute_uv=False)
@@ -267,7 +267,7 @@ class RunoutTable:
 
     @classmethod
     def of(cls, rows: Iterable[RunoutRow]) -> "RunoutTable":
-        """Return the table of some rows; several of one angle become their mean."""
+        """Return the table of some rows; rows of one angle are averaged."""
         groups: list[list[RunoutRow]] = []
         for row in sorted(rows, key=lambda row: row.u_deg % 360.0):
             if groups and row.u_deg % 360.0 - groups[-1][0].u_deg % 360.0 <= _SAME_ANGLE_DEG:
@@ -285,11 +285,11 @@ class RunoutTable:
 
     @property
     def peak_mm(self) -> float:
-        """The farthest that the tip is from where the tool's X and Y put it."""
+        """The largest distance of the tip from where the tool's X and Y put it."""
         return max(math.hypot(row.dx_mm, row.dy_mm) for row in self.rows)
 
     def at(self, u_deg: float) -> tuple[float, float]:
-        """Return how far the tip is beside at an angle, base X and Y in mm.
+        """Return how far off the tip is at an angle, base X and Y in mm.
 
         A flange that goes by the opposite has the tip where X and Y of the tool say.
         """
@@ -312,7 +312,7 @@ class RunoutTable:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RunoutTableResult(CameraRound):
-    """A tool offset, and what it leaves at each angle.
+    """A tool offset, and the runout that is left at each angle.
 
     Attributes:
         table: That.
@@ -330,7 +330,7 @@ class RunoutTableResult(CameraRound):
         return self.between_mm
 
     def details(self) -> dict[str, object]:
-        """Return the table, and what the camera is off by."""
+        """Return the table, and the camera's error."""
         return {
             **CameraRound.details(self),
             "runout_table": self.table.plain(),
@@ -347,7 +347,7 @@ def solve_runout_table(
     sigma_mm: float | None = None,
     camera: CameraModel | None = None,
 ) -> RunoutTableResult:
-    """Return the constant offset of a tip and the table of what it leaves.
+    """Return the constant offset of a tip and the table of its runout.
 
     Args:
         sightings: Eight and more, all round, in steps of 60 degrees at most; the flange may stand

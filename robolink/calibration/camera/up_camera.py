@@ -85,7 +85,7 @@ def _with_camera(
     camera: CameraModel | None,
     gains: Sequence[Sequence[float]],
 ) -> CalibrationResult:
-    """Return a result with what its camera is unsure of: as much in every direction."""
+    """Return a result with its camera's uncertainty, equal in every direction."""
     sources = camera_sources((sighting,), gains, camera=camera, finds_place=False)
     result = replace(result, sources=sources)
     if camera is None:

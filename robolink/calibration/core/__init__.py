@@ -1,1 +1,1 @@
-"""Poses, rotations, least squares and statistics: what every solver stands on."""
+"""Poses, rotations, least squares and statistics: the basis of every solver."""

@@ -1,4 +1,4 @@
-"""What a result is accurate to: its scatter, and what its scatter cannot show.
+"""What a result is accurate to: its scatter, and the errors that scatter does not show.
 
 A fit that agrees with itself to a hundredth says nothing about a station that was moved, a camera
 that was turned, or a person who always sees contact on the same side. Each of these is a row of
@@ -28,7 +28,7 @@ DIVISORS: Final = {
     "arcsine": math.sqrt(2),
     "normal": 1.0,
 }
-"""By what a half width is divided to be a standard uncertainty, by its distribution."""
+"""Divisors from a half width to a standard uncertainty, by distribution."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,13 +53,13 @@ class BudgetRow:
 
     @property
     def part_mm(self) -> float:
-        """What it brings to the result."""
+        """Its contribution to the result."""
         return abs(self.sensitivity) * self.u_mm
 
 
 @dataclass(frozen=True, slots=True)
 class UncertaintyBudget:
-    """Rows and what they come to.
+    """Rows and their combined uncertainty.
 
     Attributes:
         rows: The sources that were counted.
@@ -108,7 +108,7 @@ class UncertaintyBudget:
         return from_fields(cls, {**document, "rows": rows})
 
     def with_row(self, row: BudgetRow) -> "UncertaintyBudget":
-        """Return the budget with one row more, which then counts as assessed."""
+        """Return the budget with one more row, which then counts as assessed."""
         left = tuple(name for name in self.not_assessed if name != row.name)
         return UncertaintyBudget((*self.rows, row), left, self.probability)
 
@@ -119,12 +119,12 @@ class UncertaintyBudget:
 
     @property
     def type_a_mm(self) -> float:
-        """What statistics found, as one standard uncertainty."""
+        """Contribution of statistics, as one standard uncertainty."""
         return math.hypot(*(row.part_mm for row in self.rows if row.kind == "A"))
 
     @property
     def type_b_mm(self) -> float:
-        """What is known otherwise, as one standard uncertainty."""
+        """Contribution of everything else, as one standard uncertainty."""
         return math.hypot(*(row.part_mm for row in self.rows if row.kind == "B"))
 
     @property
@@ -139,7 +139,7 @@ class UncertaintyBudget:
 
     @property
     def expanded_mm(self) -> float:
-        """Half the interval that holds the truth with ``probability``."""
+        """Half the interval that contains the truth with ``probability``."""
         return self.k * self.u_c_mm
 
     def as_json(self) -> dict[str, object]:
@@ -181,7 +181,7 @@ def coverage_factor(nu_eff: float, probability: float = 0.95) -> float:
 
 
 Basis = Literal["stated", "record", "default"]
-"""What tells how large a row is: the cell, its record, or nobody."""
+"""The source of a row's size: the cell file, the record, or the default."""
 
 Turning = Literal["with_tool", "in_base", "as_offset"]
 """What becomes of an error when the tool turns about the tip that was found.
@@ -230,7 +230,7 @@ ACCURACY_ROWS: Final[Mapping[str, AccuracyRow]] = {
 
 @dataclass(frozen=True, slots=True)
 class ErrorSource:
-    """How one row enters what a method measured.
+    """How one row affects what a method measured.
 
     Attributes:
         row: Key of the row.
@@ -248,7 +248,7 @@ class ErrorSource:
     def of_lengths(
         cls, row: str, count: int, *, gain: float = 1.0, turning: Turning = "with_tool"
     ) -> Self:
-        """Return a source that is alike in every direction.
+        """Return a source that is the same in every direction.
 
         Args:
             row: Key of the row.
@@ -268,13 +268,13 @@ class ErrorSource:
         return cls(row, lines, turning)
 
     def of_first(self, count: int) -> Self:
-        """Return the same source for the first measured components alone."""
+        """Return the same source for only the first measured components."""
         return replace(self, gain=self.gain[:count])
 
 
 @dataclass(frozen=True, slots=True)
 class RowFact:
-    """How large one row is in a cell.
+    """The size of one row in a cell.
 
     Attributes:
         half_width: Half its width, in the unit of the row.
@@ -291,7 +291,7 @@ class RowFact:
 
 @dataclass(frozen=True, slots=True)
 class AccuracyFacts:
-    """What a cell knows about the rows of its budgets; what it does not know is the default.
+    """What a cell knows about the rows of its budgets; an unknown row has its default.
 
     Attributes:
         rows: What is stated or learnt, by the key of the row.
@@ -311,7 +311,7 @@ class AccuracyFacts:
     look_nu: float = 0.0
 
     def of(self, key: str) -> RowFact:
-        """Return how large a row is.
+        """Return the size of a row.
 
         A default grows with the time since the station was learnt, and so does what was learnt
         from how well learning repeats; what the cell states is taken as it stands.
@@ -336,7 +336,7 @@ class AccuracyFacts:
 
 @dataclass(frozen=True, slots=True)
 class AssessedRow:
-    """One row of a budget, as it went into a result.
+    """One row of a budget, as a result uses it.
 
     Attributes:
         key: Its key; ``scatter`` for what the measurement shows by itself.
@@ -382,12 +382,12 @@ class Accuracy:
 
     @property
     def largest(self) -> AssessedRow:
-        """The row that brings most."""
+        """The largest row."""
         return self.rows[0]
 
     @property
     def largest_default(self) -> AssessedRow | None:
-        """The row that brings most of those that nobody stated and nothing on record tells."""
+        """The largest row that is neither stated nor recorded."""
         return next((row for row in self.rows if row.basis == "default"), None)
 
     def as_json(self, measured: Sequence[str] = ()) -> dict[str, object]:

@@ -1,4 +1,4 @@
-"""How large the placement errors are, and what follows for an interval.
+"""The size of the placement errors, and the intervals that follow.
 
 Three things can tell it: the residuals, with Student's t; somebody who knows the cell and states
 it; the grid on which the tip was jogged, or a position taken. The one that gives the widest
@@ -48,7 +48,7 @@ class Dispersion:
         stated_mm: float | None,
         grid_mm: float | None = None,
     ) -> Self | None:
-        """Return what gives the widest interval; ``None`` when nothing is known.
+        """Return the dispersion with the widest interval; ``None`` when nothing is known.
 
         Args:
             sum_of_squares: Of all residual coordinates, mm^2.
@@ -94,7 +94,7 @@ class Dispersion:
         return math.sqrt(dimensions * f_quantile(_REGION, dimensions, self.nu))
 
     def region_mm(self, variance_mm2: float, dimensions: int) -> float:
-        """Return the radius of the 95 % region of lengths that are known alike."""
+        """Return the radius of the 95 % region of equally well known lengths."""
         return self.region_factor(dimensions) * math.sqrt(variance_mm2)
 
     def half_widths(self, covariance: Sequence[Sequence[float]]) -> tuple[float, ...]:
@@ -124,7 +124,7 @@ class Dispersion:
 def interval_of(
     scatter: Dispersion | None, variances: Sequence[float], lengths: int
 ) -> dict[str, Any]:
-    """Return what a result says of components that err independently; nothing without a scatter.
+    """Return the intervals of components that err independently; nothing without a scatter.
 
     Args:
         scatter: What tells it.
@@ -145,7 +145,7 @@ def interval_of(
 
 
 def require_positive(value: float, name: str) -> None:
-    """Refuse an option that has to be a positive number.
+    """Refuse an option that is not a positive number.
 
     Raises:
         ConfigError: It is not.

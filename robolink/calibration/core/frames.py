@@ -1,4 +1,4 @@
-"""Where the flange is when a tip is somewhere, and a tip seen from another one."""
+"""Where the flange is for a given tip place, and a tip seen from another one."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -187,5 +187,5 @@ def seen_from(written: ToolOffset, tip: ToolOffset) -> ToolOffset:
 
 
 def toward_zero(u_deg: float, turn_deg: float) -> float:
-    """Return U after a turn that keeps it inside the joint's range: toward zero."""
+    """Return U after a turn toward zero, which keeps it inside the joint's range."""
     return u_deg - turn_deg if u_deg > 0 else u_deg + turn_deg

@@ -1,4 +1,4 @@
-"""Linear least squares with what is needed to trust the answer, and which poses belong together.
+"""Linear least squares with evidence of its quality, and the search for poses that agree.
 
 Of poses the largest set is taken that agrees on one tip. Whole poses are rejected, never single
 coordinates. Every smallest sample that has a solution is tried where there are not too many of
@@ -30,10 +30,10 @@ REJECT_BEYOND: Final = 4.0
 """Residual distance, in standard deviations of a coordinate, beyond which a pose is rejected."""
 
 MOST_SAMPLES: Final = 20_000
-"""Up to so many smallest samples are all tried."""
+"""Up to this many smallest samples are all tried."""
 
 REFINED: Final = 30
-"""So many of the best samples are refined."""
+"""Number of best samples that are refined."""
 
 MOST_REFITS: Final = 20
 
@@ -48,7 +48,7 @@ _MEDIAN_DISTANCE: Final = {2: 1.1774100225, 3: 1.5381722545}
 
 @dataclass(frozen=True, slots=True)
 class Robust:
-    """How outliers are looked for.
+    """How to look for outliers.
 
     Attributes:
         threshold_mm: Residual distance beyond which a pose is rejected; ``None`` takes four
@@ -81,7 +81,7 @@ class Consensus:
 
 @dataclass(frozen=True, slots=True)
 class Agreement:
-    """What the search asks of a method.
+    """What the search needs from a method.
 
     Attributes:
         count: How many poses there are.
@@ -236,7 +236,7 @@ def _estimated(
 def _settled(
     inside: Mask, threshold_mm: float, refit: Callable[[Mask], Floats | None]
 ) -> tuple[Mask, float] | None:
-    """Refine the poses near a sample until their set stays; return it and its sum of squares."""
+    """Refine the poses near a sample until the set is stable; return it and its sum of squares."""
     for step in range(1, MOST_REFITS + 1):
         refined = refit(inside)
         if refined is None:

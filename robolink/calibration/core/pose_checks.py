@@ -1,4 +1,4 @@
-"""What makes poses and other numbers unfit, by name (docs/reference/calibration.md 3)."""
+"""Checks that name what makes poses and other numbers unfit (docs/reference/calibration.md 3)."""
 
 import math
 from collections.abc import Callable, Collection, Sequence
@@ -11,7 +11,7 @@ from robolink.messages import tr
 from robolink.model import COMPONENTS, Hand, Pose, ToolOffset
 
 MAX_OFFSET_MM = 1000.0
-"""A tool longer than this is taken for a mistake (docs/reference/calibration.md 3)."""
+"""A longer tool counts as a mistake (docs/reference/calibration.md 3)."""
 
 METRES_BELOW = 2.0
 """No flange stays so near to its own base axis, in mm; in metres most do."""
@@ -157,7 +157,7 @@ def keep_unmeasured(stored: ToolOffset | None, **measured: float) -> ToolOffset:
 
 
 def components(stored: ToolOffset | None, **measured: float) -> dict[str, Any]:
-    """Return what a result says of the components: the offset, what was measured of it, what not.
+    """Return the components of a result: the offset, which were measured, which not.
 
     Args:
         stored: The offset stored now; what was not measured is kept from it, or 0 without one.
@@ -176,7 +176,7 @@ def components(stored: ToolOffset | None, **measured: float) -> dict[str, Any]:
 
 
 def require_finite_poses(poses: Sequence[Pose]) -> None:
-    """Refuse a coordinate that is no finite number.
+    """Refuse a coordinate that is not finite.
 
     Raises:
         CalibrationError: ``non_finite``, with pose and name.
@@ -216,7 +216,7 @@ def refuse_metres(near_the_axis: bool) -> None:
 
 
 def require_finite(**values: float) -> None:
-    """Refuse what is not a finite number, by its name.
+    """Refuse a value that is not finite, by its name.
 
     Raises:
         CalibrationError: ``non_finite``.
@@ -269,7 +269,7 @@ def heading_deg(pose: Pose) -> float:
 
 
 def require_upright(poses: Sequence[Pose]) -> None:
-    """Refuse a flange that leans, and one that stands on its head in some poses only.
+    """Refuse a leaning flange, and one that is upside down in only some poses.
 
     Raises:
         CalibrationError: ``tilted_pose`` when a pose leans by 0.01 degrees or more, or some stand
@@ -285,12 +285,12 @@ def require_upright(poses: Sequence[Pose]) -> None:
 
 
 def tilted(pose: Pose) -> bool:
-    """Tell whether the tool does not stand along the base's Z, either way up."""
+    """Return whether the tool leans from the base's Z, either way up."""
     return lean_deg(_upward(pose)) >= UPRIGHT_WITHIN_DEG
 
 
 def on_its_head(pose: Pose) -> bool:
-    """Tell whether the flange's Z points down (W or V is 180).
+    """Return whether the flange's Z points down (W or V is 180).
 
     X and Y of the tip can be told as well then; one sign differs (docs/reference/evidence.md 3).
     """
@@ -314,7 +314,7 @@ def lean_deg(upward: float) -> float:
 
 
 def tilted_pose(number: int, pose: Pose) -> CalibrationError:
-    """Return the refusal of a pose that leans."""
+    """Return the error for a pose that leans."""
     return CalibrationError(
         "tilted_pose",
         tr(
@@ -328,7 +328,7 @@ def tilted_pose(number: int, pose: Pose) -> CalibrationError:
 
 
 def some_on_their_head() -> CalibrationError:
-    """Return the refusal of poses of which only some stand on their head."""
+    """Return the error for poses of which only some are upside down."""
     return CalibrationError(
         "tilted_pose",
         tr("In some poses the flange points up and in others down."),
@@ -345,7 +345,7 @@ def angle_spread_deg(angles_deg: Sequence[float]) -> float:
 
 @refuses_by_name
 def planar_sigma_gain(poses: Sequence[Pose]) -> float:
-    """Return by how much a placement error counts in each offset axis; inf if for ever."""
+    """Return how much a placement error counts in each offset axis; inf if undetermined."""
     angles = [math.radians(heading_deg(pose)) for pose in poses]
     cosines, sines = [math.cos(angle) for angle in angles], [math.sin(angle) for angle in angles]
     mean_c, mean_s = sum(cosines) / len(poses), sum(sines) / len(poses)
@@ -372,7 +372,7 @@ def require_poses(count: int, minimum: int) -> None:
 
 
 def refuse_radians(poses: Sequence[Pose], spread_deg: float) -> None:
-    """Refuse angles that would need a giant tool, and a plausible one when read as radians.
+    """Refuse angles that imply a giant tool, and a plausible one when read as radians.
 
     Raises:
         CalibrationError: ``suspect_units``.

@@ -1,4 +1,4 @@
-"""Which poses to take: the plan with the best condition that limits and workspace allow.
+"""Which poses to take: the best-conditioned plan that limits and workspace allow.
 
 How well the tip will be known depends on the orientations alone. With Rm their mean, the tip's
 covariance is sigma^2 (N I - N Rm' Rm)^-1; the choice makes its trace as small as it can
@@ -48,7 +48,7 @@ class PoseLimits:
 
 @dataclass(frozen=True, slots=True)
 class PosePlan:
-    """Poses to take, the most telling first.
+    """Poses to take, the most informative first.
 
     Attributes:
         poses: Flange poses (Tool 0) that bring the guessed tip onto the point.
@@ -113,7 +113,7 @@ def suggest_poses(
 
 
 def precise_enough(result: CalibrationResult, tolerance_mm: float) -> bool:
-    """Tell whether a measurement may stop: every length is known inside the tolerance.
+    """Return whether a measurement may stop: every length is known within the tolerance.
 
     ``tolerance_mm`` is half of what the process can bear (docs/reference/calibration.md 3). A
     result without an interval is never precise enough.
@@ -161,7 +161,7 @@ def _allowed(pose: Pose, box: WorkBox | None) -> bool:
 
 
 def select_poses(turned: Floats, before: Floats, count: int) -> list[int]:
-    """Return indices of ``count`` orientations, the most telling first.
+    """Return indices of ``count`` orientations, the most informative first.
 
     Args:
         turned: What there is to choose from, N x 3 x 3, or N x 2 x 2 in the plane.
@@ -208,7 +208,7 @@ def _greedy(turned: Floats, before: Floats, among: Sequence[int], count: int) ->
 
 
 def _exchanged(turned: Floats, before: Floats, chosen: list[int]) -> list[int]:
-    """Replace one pose after the other while that makes the plan better."""
+    """Replace poses one by one while that improves the plan."""
     for _ in range(_EXCHANGES):
         earlier = list(chosen)
         for place in range(len(chosen)):

@@ -1,4 +1,4 @@
-"""What a calibration proposes, how much of it was measured, and what its fit tells of itself."""
+"""The proposal of a calibration, what was measured of it, and the evidence of its fit."""
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
@@ -23,7 +23,7 @@ NOTICEABLE_MM: Final = 0.002
 
 @dataclass(frozen=True, slots=True)
 class RunOrder:
-    """Whether the touches look as if something moved while they were made.
+    """Whether the touches show that something moved while they were made.
 
     Attributes:
         step_f: The largest F of a step between two touches; ``None`` where nothing can be told.
@@ -45,7 +45,7 @@ class RunOrder:
 
     @property
     def finding(self) -> str:
-        """The name of what was found; empty when chance explains it."""
+        """The name of the finding; empty when chance explains it."""
         step = self.step_f > self.step_f_limit and math.hypot(*self.step_mm) >= NOTICEABLE_MM
         drift = self.drift_f > self.drift_f_limit and math.hypot(*self.drift_mm) >= NOTICEABLE_MM
         if step and (not drift or self.step_f >= self.drift_f):
@@ -88,7 +88,7 @@ class FitEvidence:
     approach_bias_u_mm: float | None = None
 
     def as_json(self) -> dict[str, object]:
-        """Return what is known of it as plain values."""
+        """Return the known figures as plain values."""
         found: dict[str, object] = {
             **json_fields(self, "distinct", "duplicates", "leverage", "high_leverage"),
             **json_fields(self, "chi_square", "chi_square_limit", "birge_ratio", "consensus"),
@@ -100,7 +100,7 @@ class FitEvidence:
 
 
 class ResidualVectors(Sequence[tuple[float, ...]]):
-    """Residual vectors as a fit has them, which become tuples where somebody looks at one.
+    """Residual vectors of a fit, which become tuples when somebody reads one.
 
     To make tuples of the residuals of thousands of poses takes a sixth as long as to solve them.
     It is equal to the tuple of its vectors.
@@ -154,8 +154,9 @@ class ResidualVectors(Sequence[tuple[float, ...]]):
 
 
 LEAST_HALF_WIDTH: Final = 0.0005
-"""No interval is stated narrower: half of the last digit that a controller prints, and that anybody
-reads, in mm and in degrees (docs/reference/evidence.md 6)."""
+"""Least stated half width: half of the last digit that a controller prints, in mm and in degrees
+(docs/reference/evidence.md 6).
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,7 +243,7 @@ class CalibrationResult:
     changed: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Widen what is narrower than anybody can read."""
+        """Widen intervals that are narrower than anybody can read."""
         if self.half_width95 and min(self.half_width95) < LEAST_HALF_WIDTH:
             widths = tuple(max(half, LEAST_HALF_WIDTH) for half in self.half_width95)
             object.__setattr__(self, "half_width95", widths)
@@ -250,12 +251,12 @@ class CalibrationResult:
             object.__setattr__(self, "region95_radius_mm", LEAST_HALF_WIDTH)
 
     def details(self) -> dict[str, object]:
-        """Return what the method tells besides, plain JSON; nothing for most."""
+        """Return further results of the method, plain JSON; usually none."""
         return {}
 
     @property
     def found(self) -> tuple[str, ...]:
-        """Names of the components that are proposed anew: measured themselves, or their change."""
+        """Names of the proposed components: measured themselves, or their change."""
         return (*self.measured, *self.changed)
 
     @property
@@ -270,13 +271,13 @@ class CalibrationResult:
 
     @property
     def half95_mm(self) -> float | None:
-        """Half the 95 % interval of the length that is known worst; ``None`` without one."""
+        """Half the 95 % interval of the worst known length; ``None`` without one."""
         widths = zip(self.measured, self.half_width95, strict=False)
         return max((half for name, half in widths if name.endswith("_mm")), default=None)
 
     @property
     def repeatable_to_mm(self) -> float | None:
-        """Within which the tip would be found again in 95 %: the region, else the worst length.
+        """Radius in which the tip would be found again in 95 %: the region, else the worst length.
 
         That is what scatter and grid say, no more: :attr:`accurate_to_mm` says how far off the
         truth it may be. A nozzle misses in the plane, not along an axis: two intervals of 95 %
@@ -293,7 +294,7 @@ class CalibrationResult:
 
     @property
     def accurate_to_mm(self) -> float | None:
-        """Within which of the truth the tip lies in 95 %, every row of the budget counted.
+        """Distance from the truth that the tip keeps in 95 %, with every row of the budget counted.
 
         ``None`` where nothing tells it, or it was not held to a cell yet.
         """
@@ -301,17 +302,17 @@ class CalibrationResult:
 
     @property
     def inputs_per_look(self) -> int:
-        """How many inputs together tell both coordinates once."""
+        """How many inputs determine both coordinates once."""
         return 1
 
     @property
     def held_to_table_mm(self) -> float | None:
-        """How far off a table may be between its rows, where a proof is held to one as well."""
+        """How far off a table may be between its rows, if the turn test compares with one."""
         return None
 
     @property
     def by_surface(self) -> bool:
-        """Whether a surface was touched, so that no drift is seen but solved for."""
+        """Whether a surface was touched, so that the drift is solved for and not seen."""
         return False
 
     @property
@@ -324,11 +325,11 @@ GUARD_FACTOR: Final = 1.65
 """A one-sided error of 5 % on either side."""
 
 PERSON_U_DRIFT_MM: Final = 0.03
-"""Of a person who brings a tip onto a pin, whether the eye or an input shows the contact."""
+"""Drift in U of a person who touches a pin, whether the eye or an input shows the contact."""
 
 
 class DriftVerdict(Enum):
-    """What a drift says about the tip; the value is its code."""
+    """What a drift shows about the tip; the value is its code."""
 
     PASSED = ""
     UNDECIDED = "drift_undecided"
@@ -346,7 +347,7 @@ _WORST_FIRST: Final = (
 
 
 def judge_drift(drift_mm: float, u_mm: float, tolerance_mm: float) -> DriftVerdict:
-    """Return whether one drift is inside a tolerance, with a guard band for what a touch scatters.
+    """Return whether one drift is within a tolerance, with a guard band for the scatter of a touch.
 
     What passes is inside by the uncertainty, what fails outside by it, after ISO 14253-1
     (docs/reference/evidence.md 1).
@@ -372,7 +373,7 @@ def judge_drift(drift_mm: float, u_mm: float, tolerance_mm: float) -> DriftVerdi
 
 
 def worst_of(verdicts: Iterable[DriftVerdict]) -> DriftVerdict:
-    """Return what drifts at several angles say together."""
+    """Return what drifts at several angles show together."""
     found = set(verdicts)
     for verdict in _WORST_FIRST:
         if verdict in found:
@@ -382,7 +383,7 @@ def worst_of(verdicts: Iterable[DriftVerdict]) -> DriftVerdict:
 
 @dataclass(frozen=True, slots=True)
 class Drift:
-    """How far the tip left the reference point when the tool stood at ``u_deg``.
+    """How far the tip left the reference point with the tool at ``u_deg``.
 
     ``dz_mm`` stays 0 where only the plane is judged. ``u_mm`` is the standard uncertainty of a
     drift that a person showed by touching, 0 where none is counted. It is the mean of ``looks``.
@@ -428,7 +429,7 @@ class VerifyResult:
 
     @property
     def coordinates(self) -> int:
-        """How many coordinates its drifts have."""
+        """The number of coordinates of its drifts."""
         if self.heights_only:
             return 1
         return 3 if self.in_space or any(drift.dz_mm for drift in self.drifts) else 2
@@ -440,7 +441,7 @@ class VerifyResult:
 
     @property
     def verdict(self) -> DriftVerdict:
-        """What the drifts say, each with its guard band."""
+        """What the drifts show, each with its guard band."""
         found = [judge_drift(one.distance_mm, one.u_mm, self.tolerance_mm) for one in self.drifts]
         if self.judgement is not None and self.judgement.fails:
             found.append(DriftVerdict(self.judgement.code))
@@ -448,7 +449,7 @@ class VerifyResult:
 
     @property
     def passed(self) -> bool:
-        """Whether every drift is inside the tolerance, and what is stated explains it.
+        """Whether every drift is within the tolerance, and the statements explain it.
 
         Its touches have to count, too.
         """
@@ -456,7 +457,7 @@ class VerifyResult:
 
 
 def offset_sigma_mm(result: CalibrationResult) -> float | None:
-    """Return how uncertain a measured length is, as a standard deviation; the largest of them.
+    """Return the largest standard deviation of a measured length.
 
     A scatter that was estimated from few poses is itself uncertain, and its 95 % interval is wider
     for that. What is kept is the standard deviation of a normal distribution whose interval is as

@@ -1,4 +1,4 @@
-"""Orientations as matrices, and the angles that two makers read off them.
+"""Orientations as matrices, and the angles that two makers use for them.
 
 EPSON: R = Rz(U) Ry(V) Rx(W). CODESYS SoftMotion: R = Rz(A) Ry(B) Rz(C), intrinsic
 (docs/reference/calibration.md 1.4). Angles are never converted into each other but through the
@@ -64,7 +64,7 @@ def pose_table(poses: Sequence[Pose]) -> Floats:
 def checked_table(
     poses: Sequence[Pose], *, allow_mixed_hand: bool
 ) -> tuple[Floats, tuple[str, ...]]:
-    """Return the table of many poses and the names of doubts; quicker than one by one.
+    """Return the table of many poses and the names of doubts; faster than one by one.
 
     Raises:
         CalibrationError: As ``pose_checks.check_poses``.

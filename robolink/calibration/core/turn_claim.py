@@ -1,4 +1,4 @@
-"""What a turn test is held to, and what it says about it: plain values that a marker can keep."""
+"""What a turn test is compared with, and its verdict: plain values that a marker can keep."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ REPEATED: Final = "turn_test_repeated"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TurnClaim:
-    """What a measurement lets a turn test expect (docs/reference/evidence.md 20).
+    """What a measurement predicts for its turn test (docs/reference/evidence.md 20).
 
     Attributes:
         look_sigma_mm: Standard deviation of one coordinate of one look.
@@ -60,7 +60,7 @@ class TurnClaim:
 
 @dataclass(frozen=True, slots=True)
 class DriftLimits:
-    """What one drift may be.
+    """The limits of one drift.
 
     Attributes:
         repeatable_mm: By scatter alone.
@@ -75,7 +75,7 @@ class DriftLimits:
 
 @dataclass(frozen=True, slots=True)
 class TurnJudgement:
-    """What the drifts of a turn test say about the statements of a measurement.
+    """What the drifts of a turn test show about the statements of a measurement.
 
     Attributes:
         code: ``proof_contradicts_accuracy``, ``proof_contradicts_repeatability`` or empty.
@@ -114,17 +114,17 @@ class TurnJudgement:
 
     @property
     def contradicts_accuracy(self) -> bool:
-        """Whether what the result says it is accurate to is contradicted."""
+        """Whether the test contradicts what the result says it is accurate to."""
         return self.code == CONTRADICTS_ACCURACY
 
     @property
     def contradicts_repeatability(self) -> bool:
-        """Whether only what it says it is repeatable to is contradicted."""
+        """Whether the test contradicts only what the result says it is repeatable to."""
         return self.code == CONTRADICTS_REPEATABILITY
 
     @property
     def fails(self) -> bool:
-        """Whether it is no pass as long as nobody takes a wider statement.
+        """Whether it fails until a person accepts a wider statement.
 
         What contradicts the repeatability alone, and is covered by the accuracy, is a doubt.
         """

@@ -55,7 +55,7 @@ class ToolDifference:
 
 @dataclass(frozen=True, slots=True)
 class JointResult:
-    """What touches of several tools or pins say together.
+    """What touches of several tools or pins show together.
 
     Attributes:
         tools: A result for each tool; residuals and degrees of freedom are the common ones.
@@ -71,7 +71,7 @@ class JointResult:
     factor95: float | None
 
     def difference(self, tool: int, other: int) -> ToolDifference:
-        """Return by how much ``tool`` differs from ``other``; what they share cancels."""
+        """Return the difference between ``tool`` and ``other``; what they share cancels."""
         order = sorted(self.tools)
         measured = self.tools[tool].measured
         size = len(measured)

@@ -1,4 +1,4 @@
-"""What differences add up to since the last full calibration, and how far that is trusted.
+"""The sum of the differences since the last full calibration, and how far it is trusted.
 
 What is known of the Z that a one-touch change is added to.
 
@@ -18,7 +18,7 @@ from robolink.calibration.quality.offset_change import NEEDLE_LIMIT_MM
 
 @dataclass(frozen=True, slots=True)
 class StoredZ:
-    """The stored Z of a tool, with what is on record of it.
+    """The stored Z of a tool, with what the record says about it.
 
     Attributes:
         value_mm: The stored value.
@@ -33,7 +33,7 @@ class StoredZ:
 
     @property
     def on_record(self) -> bool:
-        """Whether an earlier measurement says how well it is known."""
+        """Whether an earlier measurement states its uncertainty."""
         return self.half95_mm is not None
 
     def as_json(self) -> dict[str, object]:
@@ -76,7 +76,7 @@ class NeedleChain:
         return NeedleChain(sigma_mm, self.changes + 1, known if shared_touch else None)
 
     def is_due(self, limits: "NeedleLimits") -> bool:
-        """Tell whether a full calibration is due: too many changes, or too wide an interval.
+        """Return whether a full calibration is due: too many changes, or too wide an interval.
 
         Args:
             limits: How far differences are trusted.
@@ -87,7 +87,7 @@ class NeedleChain:
     def changes_left(
         self, difference_sigma_mm: float, limits: "NeedleLimits", *, shared_touch: bool = False
     ) -> int:
-        """Return after how many more differences a full calibration is due; 0 for now.
+        """Return how many more differences are allowed before a full calibration; 0 for none.
 
         Args:
             difference_sigma_mm: Standard deviation of one difference, as for :meth:`after`.
@@ -153,7 +153,7 @@ def chain_sigma_mm(
 
 
 def chain_of(result: CalibrationResult) -> NeedleChain | None:
-    """Return what the differences up to this result add up to; ``None`` for other methods.
+    """Return the sum of the differences up to this result; ``None`` for other methods.
 
     It asks for the attribute, because the class that has it brings numpy along.
     """

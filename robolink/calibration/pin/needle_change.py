@@ -57,13 +57,13 @@ class NeedleChangeResult(CalibrationResult):
     change_z_half95_mm: float | None = None
 
     def details(self) -> dict[str, object]:
-        """Return the change of Z by name, and what is known of what it is added to."""
+        """Return the change of Z by name, and what is known of the value that it is added to."""
         if self.stored_z is None:
             return {}
         return json_fields(self, "change_z_mm", "change_z_half95_mm", "stored_z")
 
     def added_to(self, stored: StoredZ, *, touch_sigma_mm: float) -> "NeedleChangeResult":
-        """Return the same with Z named for what it is: a change of the stored one.
+        """Return the same with Z named as a change of the stored one.
 
         Where an earlier measurement is on record, Z has an interval of its own: that of then, with
         two touches more, since the touches between cancel (:meth:`NeedleChain.after`).
@@ -138,7 +138,7 @@ def solve_needle_change(
     limits: NeedleLimits = USUAL_LIMITS,
     shared_touch: bool = False,
 ) -> NeedleChangeResult:
-    """Return the offset of a new needle from where the old tip was and the new one is.
+    """Return the offset of a new needle from the places of the old tip and of the new one.
 
     Args:
         flange: The flange pose (Tool 0) of both looks. It may lean where all three coordinates

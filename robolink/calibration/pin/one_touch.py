@@ -46,7 +46,7 @@ class Pin:
     dof: float | None = None
 
     def part(self, flange: Pose) -> StationPart:
-        """Return what the pin adds to a tip that touches it in a flange pose."""
+        """Return the uncertainty that the pin adds to a tip touching it in a flange pose."""
         base = np.array(self.covariance_mm2 or np.eye(3) * self.sigma_mm**2)
         turn = rotation_of(flange)
         return StationPart(
@@ -77,7 +77,7 @@ def pin_touched(flange: Pose, offset: ToolOffset, *, sigma_mm: float = 0.0) -> P
 
 
 def one_touch_sources(count: int) -> tuple[ErrorSource, ...]:
-    """Return the errors of one touch of a pin whose place is relied on.
+    """Return the errors of one touch of a pin whose place is taken as known.
 
     Args:
         count: How many lengths are measured.

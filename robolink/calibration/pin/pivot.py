@@ -68,7 +68,7 @@ _RANK_BELOW = 1e-9
 
 @dataclass(frozen=True, slots=True, eq=False)  # arrays are no values
 class PivotDesign:
-    """What the orientations of the poses allow, before any position is looked at.
+    """What the orientations of the poses allow, before any position is used.
 
     Attributes:
         condition_number: Of the 3N x 6 system.
@@ -97,7 +97,7 @@ class PivotFit:
 
 
 def pivot_design(rotations: Floats) -> PivotDesign:
-    """Return what N x 3 x 3 rotations can tell about a tip."""
+    """Return what N x 3 x 3 rotations can determine about a tip."""
     count = len(rotations)
     # Plain sums and floats: at a few poses, the calls cost more than the arithmetic.
     mean = np.einsum("ijk->jk", rotations) / count  # three times as quick as a sum along an axis

@@ -1,4 +1,4 @@
-"""A whole tool frame: tip by a pivot, orientation by two more points.
+"""A whole tool frame: the tip by a pivot, the orientation by two more points.
 
 After the pivot the tool is moved, without turning, along its own X and then along its own Z
 (or anywhere in its XZ plane). The ways of the flange, seen from the flange, are the axes
@@ -28,14 +28,14 @@ LEAST_WAY_MM: Final = 5.0
 """A shorter way shows no direction."""
 
 GOOD_WAY_MM: Final = 50.0
-"""With a scatter of 0.01 mm at both ends it shows one to 0.02 degrees."""
+"""Length of a good move: with 0.01 mm of scatter at both ends it shows an axis to 0.02 degrees."""
 
 _TURNED_DEG: Final = 0.01
 
 
 @refuses_by_name
 def axis_displacement(start: Pose, end: Pose, *, wanted_mm: float | None = None) -> Floats:
-    """Return the way of the flange in its own axes, mm.
+    """Return the movement of the flange in its own axes, mm.
 
     Args:
         start: Flange pose at its start.
@@ -68,7 +68,7 @@ def axis_displacement(start: Pose, end: Pose, *, wanted_mm: float | None = None)
 
 
 def require_unturned(start: Pose, end: Pose) -> None:
-    """Refuse a way on which the tool turned.
+    """Refuse a movement during which the tool turned.
 
     Raises:
         CalibrationError: ``turned_on_the_way``.
@@ -93,7 +93,7 @@ MOST_OFF_SQUARE_DEG = 2.0
 """Raw axes that are further from a right angle are refused (docs/reference/calibration.md 2.4)."""
 
 FAR_DEG = 45.0
-"""A way that leads further from where its axis is stored is nearer to another axis."""
+"""A move further than this from its stored axis is nearer to another axis."""
 
 _MOST_ASKEW = 2.0
 """How many halves of its 95 % interval the angle between the ways may be off a right angle."""
@@ -119,7 +119,7 @@ class SixPointResult(CalibrationResult):
     off_square_deg: float | None
 
     def details(self) -> dict[str, object]:
-        """Return what the ways say beside the frame."""
+        """Return what the movements show besides the frame."""
         return {"off_square_deg": self.off_square_deg}
 
 
@@ -302,7 +302,7 @@ def _doubted(result: SixPointResult, ways: tuple[Floats, Floats]) -> SixPointRes
 
 
 def _far_from(stored: ToolOffset | None, frame: Floats) -> Iterator[str]:
-    """Yield the doubt that an axis was taken for another one."""
+    """Yield the doubt that one axis was confused with another."""
     if stored is None:
         return
     before = rotation_of(Pose(0.0, 0.0, 0.0, *stored.components()[3:]))

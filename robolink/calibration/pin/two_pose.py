@@ -119,7 +119,7 @@ def _with_interval(result: CalibrationResult, spread: Dispersion | None) -> Cali
 
 
 def two_of(poses: Sequence[Pose]) -> tuple[Pose, Pose]:
-    """Return the two poses that the method takes.
+    """Return the two poses that the method uses.
 
     Raises:
         CalibrationError: ``too_few_poses``.

@@ -18,7 +18,7 @@ from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
 
 LEAST_BASELINE: Final = 20
-"""Limits from fewer calibrations lie: from ten, 2.4 % of all good points lie outside."""
+"""Limits from fewer calibrations are unreliable: from ten, 2.4 % of all good points lie outside."""
 
 USUAL_LAMBDA: Final = 0.2
 
@@ -32,7 +32,7 @@ _SINGLE_WIDTH: Final = 3.0
 
 @dataclass(frozen=True, slots=True)
 class ControlChart:
-    """What a chart of single values says.
+    """Result of a control chart of single values.
 
     Attributes:
         centre: Mean of the baseline, mm.
@@ -66,7 +66,7 @@ def control_chart(
     ewma_width: float = USUAL_WIDTH,
     least_sigma_mm: float = 0.0,
 ) -> ControlChart:
-    """Return what later values say against a baseline, both in the order of time.
+    """Return how later values compare with a baseline, both in the order of time.
 
     Args:
         baseline_mm: The first calibrations, of one coordinate less its nominal change.

@@ -1,4 +1,4 @@
-"""What a measurement is doubted for: the limits, and the named doubts and notes as sentences.
+"""Doubts about a measurement: the limits, and the named doubts and notes as sentences.
 
 Residuals above the limits give a result a warning (docs/reference/calibration.md 3); others tell
 how a touch was made (docs/reference/evidence.md 1). A code is for programs; what a person reads, on
@@ -16,11 +16,11 @@ from robolink.messages import tr
 from robolink.remedy_words import RemedyWord, remedy_word
 
 BEYOND_TOLERANCE: Final = ("large_residual", "large_rms", "large_pixel_residual")
-"""Codes of a result that does not agree with itself, the plainest first: nothing to be written."""
+"""Codes of a result that contradicts itself, the plainest first; it must not be written."""
 
 
 def beyond_tolerance(codes: Sequence[str], *, judged: Sequence[str] = ()) -> tuple[str, ...]:
-    """Return the codes for which a result that nobody watched is refused, the plainest first.
+    """Return the codes for which an unattended result is refused, the plainest first.
 
     Args:
         codes: Those of the result.
@@ -31,7 +31,7 @@ def beyond_tolerance(codes: Sequence[str], *, judged: Sequence[str] = ()) -> tup
 
 @dataclass(frozen=True, slots=True)
 class Tolerance:
-    """What the residuals of a good calibration stay below, mm.
+    """Residual limits of a good calibration, mm.
 
     Attributes:
         rms_mm: For the root mean square of the residual distances.
@@ -65,7 +65,7 @@ TOUCH_TOLERANCE = Tolerance(rms_mm=0.3, max_residual_mm=1.0)
 
 NEAREST_MM: Final = 0.8
 FARTHEST_MM: Final = 1.2
-"""How far beside the pin the tip stops: well above what a person misses it by."""
+"""How far beside the pin the tip stops: well above a person's aiming error."""
 
 LEVELS_MM: Final = (0.0, 0.6, 1.2, 1.8)
 """How much above the clearance it stops: one and the same way down would not end at one height."""
@@ -88,7 +88,7 @@ MOST_RESIDUAL_MM: Final = 0.15
 
 
 def doubt_sentence(code: str) -> str:
-    """Return a sentence for the code of a doubt or a note; the code in words where none is known.
+    """Return the sentence for the code of a doubt or a note; an unknown code in words.
 
     Args:
         code: As it stands in ``CalibrationResult.warnings`` or ``notes``.
@@ -107,7 +107,7 @@ def known_doubts(codes: Iterable[str]) -> tuple[str, ...]:
 
 
 def order_in_words(order: RunOrder) -> str:
-    """Return between which touches something moved, and by how much; empty where nothing did."""
+    """Return between which touches something moved, and how far; empty if nothing did."""
     if order.finding == "step_in_run_order":
         return tr(
             "Between touch {before} and {after} something moved by {shift:.2f} mm.",

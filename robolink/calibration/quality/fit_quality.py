@@ -1,4 +1,4 @@
-"""What the residuals of a least-squares fit say about it: the same for every method."""
+"""What least-squares residuals show about a result: the same for every method."""
 
 import math
 from dataclasses import replace
@@ -72,7 +72,7 @@ def _interval(
     sigma_mm: float | None,
     grid_mm: float | None = None,
 ) -> dict[str, Any]:
-    """Return covariance, interval, region and budget by their names, where anything tells them.
+    """Return covariance, interval, region and budget by name, as far as they are known.
 
     The widest of what residuals, a stated sigma and the grid of the jogs give is taken
     (docs/reference/evidence.md 6).

@@ -1,4 +1,4 @@
-"""Gauge study: how much of the spread of measured offsets the measuring itself brings.
+"""Gauge study: how much of the spread of measured offsets comes from the measuring.
 
 Nozzles are seated, by several persons, several times each, every repeat seated and touched
 anew. Analysis of variance of the crossed plan, all effects random, splits the spread into
@@ -77,7 +77,7 @@ class GaugeStudy:
 
 @dataclass(frozen=True, slots=True)
 class _Variances:
-    """Parts of the variance, mm^2, and what they rest on."""
+    """Parts of the variance, mm^2, and their basis."""
 
     repeat: float
     person: float

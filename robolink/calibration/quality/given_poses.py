@@ -1,4 +1,4 @@
-"""Poses that someone brings along: their unit, are there enough, are they flat, which tool fits.
+"""Checks poses that a person gives: their unit, number and flatness, and which tool fits.
 
 Lengths may look like metres or inches (docs/reference/evidence.md 15).
 
@@ -51,12 +51,12 @@ class RobotReach:
 
     @property
     def least_mm(self) -> float:
-        """The nearest that is believed."""
+        """The nearest distance that is believed."""
         return _INNER_PART * self.reach_mm if self.inner_mm is None else self.inner_mm
 
 
 def require_within_reach(poses: Sequence[Pose], robot: RobotReach) -> None:
-    """Refuse poses that the robot cannot take, as metres and inches are.
+    """Refuse poses out of the robot's reach, such as metres and inches.
 
     Args:
         poses: Flange poses in the base.
@@ -88,7 +88,7 @@ def require_within_reach(poses: Sequence[Pose], robot: RobotReach) -> None:
 
 
 def require_near(poses: Sequence[Pose], live: Pose) -> None:
-    """Refuse poses that lie nearer to where the robot is when they are read in another unit.
+    """Refuse poses that fit the robot's present place better in another unit.
 
     Args:
         poses: Poses as they are taken, in mm.
@@ -115,7 +115,7 @@ def require_near(poses: Sequence[Pose], live: Pose) -> None:
 
 
 def require_stored_scale(result: CalibrationResult, stored: ToolOffset | None) -> None:
-    """Refuse an offset that is the stored one in another unit.
+    """Refuse an offset that equals the stored one in another unit.
 
     Raises:
         CalibrationError: ``suspect_units``.
@@ -158,7 +158,7 @@ MUCH_NEARER = 4.0
 
 @dataclass(frozen=True, slots=True)
 class ToolFit:
-    """How well poses fit to having been taught with ``tool``.
+    """How well poses fit having been taught with ``tool``.
 
     ``change_mm`` is by how much the calibrated tool would then have moved against its stored
     value, ``apart_mm`` how far its offset would be from that by the tool that a person named.
@@ -177,7 +177,7 @@ def tool_fits(
     stored: Mapping[int, ToolOffset],
     calibrated: int,
 ) -> tuple[ToolFit, ...]:
-    """Return every tool the poses may have been taught with, the likeliest first.
+    """Return every tool that the poses may have been taught with, the likeliest first.
 
     Args:
         result: What the poses give when they are taken for tip poses of tool ``taught``.
@@ -241,7 +241,7 @@ def better_fit(fits: Sequence[ToolFit], *, taught: int, plausible_mm: float) -> 
 
 
 def fits_alike(fits: Sequence[ToolFit], *, taught: int, plausible_mm: float) -> tuple[ToolFit, ...]:
-    """Return the other tools that explain the poses as well, and would have another value written.
+    """Return other tools that explain the poses as well, but lead to another value.
 
     A tool whose stored offset is small is near to the flange. Poses of either then mean a change
     that a new nozzle explains, and nothing in them tells which it was; but read as those of the

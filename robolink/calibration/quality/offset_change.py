@@ -1,4 +1,4 @@
-"""What a new offset changes: whether it may replace the stored one, and where it leads.
+"""The effect of a new offset: whether it may replace the stored one, and where the tip goes.
 
 Whether a new offset may replace the stored one.
 
@@ -55,7 +55,7 @@ BIRGE_LIMIT = 3.0
 
 
 def writes_refused_unattended(result: CalibrationResult) -> str:
-    """Return the code of a doubt that only a person may pass over; empty without one.
+    """Return the code of a doubt that only a person may override; empty without one.
 
     Something that moved while the touches were made leaves an offset between two truths, and
     nobody is there to take the run again.
@@ -69,7 +69,7 @@ def writes_refused_unattended(result: CalibrationResult) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Correction:
-    """By how much a new offset differs from the stored one, mm in the flange's axes.
+    """Difference between a new offset and the stored one, mm in the flange's axes.
 
     ``ratio`` is its length over that of the correction before, ``None`` for the first.
     """
@@ -196,7 +196,7 @@ _SAME_MM: Final = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class Impact:
-    """What a change of a tool offset does at taught points.
+    """The effect of a changed tool offset at taught points.
 
     Attributes:
         entries: The points that could be judged.
@@ -210,7 +210,7 @@ class Impact:
 
     @property
     def largest(self) -> PointImpact | None:
-        """The point with the largest displacement, ``None`` when none could be judged.
+        """The point with the largest displacement, ``None`` if none could be judged.
 
         The first of several: on four axes they differ by rounding alone.
         """
@@ -218,7 +218,7 @@ class Impact:
 
     @property
     def alike(self) -> bool:
-        """Whether the tip moves equally far at all of several points: none is the largest."""
+        """Whether the tip moves equally far at all of several points."""
         if len(self.entries) < 2:
             return False
         lengths_mm = [entry.distance_mm for entry in self.entries]
@@ -226,13 +226,13 @@ class Impact:
 
     @property
     def farthest(self) -> PointImpact | None:
-        """The largest, where the points differ; one point is its own. ``None`` where none is."""
+        """The largest if the points differ; a single point itself; ``None`` without points."""
         return None if self.alike else self.largest
 
 
 @refuses_by_name
 def impact_on(points: Mapping[int, Pose | None], *, old: ToolOffset, new: ToolOffset) -> Impact:
-    """Return what replacing ``old`` by ``new`` does at ``points``.
+    """Return the effect at ``points`` of replacing ``old`` by ``new``.
 
     Args:
         points: Taught points by number, ``None`` for one that is not taught.

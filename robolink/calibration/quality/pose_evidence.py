@@ -1,4 +1,4 @@
-"""What poses on one point show about themselves, beyond the offset that they give.
+"""What poses on one point show about themselves, besides the offset.
 
 A touch that a bumped pin, a slipping nozzle or a warming arm displaced lies off by the same vector
 as all touches after it, or by one that grows. The fit gets that vector as further unknowns; by how
@@ -228,7 +228,7 @@ def with_evidence(
     duplicates: tuple[int, ...],
     unknowns: int,
 ) -> ResultT:
-    """Return ``result`` with the evidence of its poses, and the doubts that follow.
+    """Return ``result`` with the evidence of its poses, and the resulting doubts.
 
     Args:
         result: The solution.
@@ -272,7 +272,7 @@ UNSTABLE_BEYOND: Final = 0.1
 
 
 def with_consensus(result: ResultT, kept: Mask, spread_mm: float) -> ResultT:
-    """Return a robust ``result`` with its consensus, or refuse one that the draws decided.
+    """Return a robust ``result`` with its consensus; refuse one that depends on the draws.
 
     Args:
         result: The solution with its interval.
@@ -378,7 +378,7 @@ def with_approach_bias(
 
 
 def _beside(z: Complexes, values: Sequence[complex]) -> Complexes:
-    """Return what offset and point cannot take over of a column, one number a touch."""
+    """Return the part of a column that offset and point cannot absorb, one number a touch."""
     around = np.array(values) - np.mean(values)
     centred = z - z.mean()
     weight = complex(np.vdot(centred, centred)) or 1.0

@@ -1,4 +1,4 @@
-"""A station that tips were measured at: what it adds to each, and whether it moved.
+"""A station where tips were measured: what it adds to each, and whether it moved.
 
 What the uncertainty of a station adds to every tip that is measured there.
 
@@ -61,7 +61,7 @@ ResultT = TypeVar("ResultT", bound=CalibrationResult)
 
 @dataclass(frozen=True, slots=True)
 class StationPart:
-    """What one station adds to a result.
+    """The share of one station in a result.
 
     Attributes:
         name: What it is, in words, for the budget.
@@ -81,7 +81,7 @@ class StationPart:
 
 
 def with_station(result: ResultT, *parts: StationPart) -> ResultT:
-    """Return a result whose covariance, intervals, region and budget hold its stations too.
+    """Return a result whose covariance, intervals, region and budget include its stations.
 
     A result without an interval stays without one: what its own scatter is, nobody knows.
 
@@ -125,7 +125,7 @@ def with_station(result: ResultT, *parts: StationPart) -> ResultT:
 
 
 def _of_all(covariance: Sequence[Sequence[float]], count: int) -> "Floats":
-    """Return a covariance with nothing for the components that it does not reach."""
+    """Return a covariance with zeros for the components that it does not reach."""
     import numpy as np
 
     whole: Floats = np.zeros((count, count))
@@ -135,7 +135,7 @@ def _of_all(covariance: Sequence[Sequence[float]], count: int) -> "Floats":
 
 
 def _by_normal(result: CalibrationResult) -> bool:
-    """Tell whether the interval of the touches rests on a value that is taken as known."""
+    """Return whether the interval of the touches rests on a value taken as known."""
     return result.interval_from in ("stated", "resolution") or (
         not result.interval_from and result.sigma_stated
     )
@@ -199,7 +199,7 @@ class SharedStation:
 
 
 def shared_station(u_station_mm: float, sigma_mm: float) -> SharedStation:
-    """Return what tools have in common that were each touched once at one station.
+    """Return what tools share that were each touched once at one station.
 
     Args:
         u_station_mm: Standard uncertainty of the station, each axis; 0 where nothing is shared.
@@ -231,7 +231,7 @@ _KNOWN = 1e4
 
 @dataclass(frozen=True, slots=True)
 class TipShift:
-    """By how much a station seems to have moved, from one tip.
+    """How far a station seems to have moved, by one tip.
 
     Attributes:
         tool: Number of the tool.
@@ -257,7 +257,7 @@ class TipShift:
 
 @dataclass(frozen=True, slots=True)
 class StationShift:
-    """What the shifts say together.
+    """What the shifts show together.
 
     Attributes:
         tools: The tools that took part.
@@ -286,14 +286,14 @@ class StationShift:
         return self.chi_square > self.chi_square_limit and self.distance_mm > LEAST_SHIFT_MM
 
     def undecided(self, tolerance_mm: float) -> bool:
-        """Tell whether it may have moved by more than is tolerable: ``station_undecided``."""
+        """Return whether it may have moved by more than is tolerable: ``station_undecided``."""
         return not self.moved and self.detectable_mm > tolerance_mm
 
 
 def judge_shifts(
     shifts: Sequence[TipShift], *, seat_changes: int | None = None
 ) -> StationShift | None:
-    """Return what shifts at one station say together; ``None`` without any.
+    """Return what shifts at one station show together; ``None`` without any.
 
     Args:
         shifts: One a tool. Axes that not all of them have are left out.

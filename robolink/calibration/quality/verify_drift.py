@@ -1,4 +1,4 @@
-"""Proof of an offset: with it, the tip stays where it is while the tool turns about it."""
+"""Check of an offset: the tip stays in place while the tool turns about it."""
 
 from collections.abc import Sequence
 

@@ -1,1 +1,1 @@
-"""What a result states of itself, what a turn test says about it, and both in words."""
+"""What a result states, what a turn test shows about it, and both in words."""

@@ -1,4 +1,4 @@
-"""How a result becomes accurate to something: its scatter, together with every row of its budget.
+"""What a result is accurate to: its scatter, together with every row of its budget.
 
     C = C_scatter + sum over the rows of (a^2 / 3) J J'
 
@@ -51,7 +51,7 @@ _PLANE: Final = 2
 def usual_look_sigma_mm(
     result: CalibrationResult, facts: AccuracyFacts | None = None
 ) -> float | None:
-    """Return the standard deviation of one coordinate of one look where nothing else tells it.
+    """Return the default standard deviation of one coordinate of one look.
 
     A person 0.03 mm, a probe or an input 0.005 mm, beams 0.003 mm, a camera 0.1 pixels
     (docs/reference/evidence.md 20). At a pin an input shows that there is contact, and how high; a
@@ -76,7 +76,7 @@ def usual_look_sigma_mm(
 
 
 def _aimed(result: CalibrationResult, facts: AccuracyFacts) -> bool:
-    """Tell whether a person aimed at a pin, though an input showed the contact."""
+    """Return whether a person aimed at a pin, although an input showed the contact."""
     if not facts.by_contact or facts.by_program or result.by_surface:
         return False
     return any(source.row == "touch_mm" for source in result.sources or ())
@@ -152,7 +152,7 @@ def assessed(result: ResultT, facts: AccuracyFacts) -> ResultT:
 
 @dataclass(frozen=True, slots=True)
 class _Part:
-    """What one row brings.
+    """The contribution of one row.
 
     Attributes:
         part: Its covariance.
@@ -169,7 +169,7 @@ class _Part:
     told: str
 
     def row(self, worst: int) -> AssessedRow:
-        """Return it as a row, for the length that is known worst."""
+        """Return it as a row, for the worst known length."""
         kind = ACCURACY_ROWS[self.source.row]
         covariance = self.part.covariance
         variance = float(covariance[worst][worst]) if worst < len(covariance) else 0.0
@@ -292,7 +292,7 @@ def row_covariance(source: ErrorSource, half_width: float) -> "Floats":
 
 
 def _too_sure_of_its_aim(result: CalibrationResult, facts: AccuracyFacts, lengths: int) -> bool:
-    """Tell whether touches agree better than a person can be relied on to aim.
+    """Return whether touches agree better than a person can be relied on to aim.
 
     With a contact input no row holds what the person sees, and that the touches of one run agree
     says nothing of it. So what is usual of a person counts until the cell states its scatter or the

@@ -1,4 +1,4 @@
-"""The two statements of a result, in words: what it is repeatable to, and what it is accurate to.
+"""The two statements of a result in words: what it is repeatable to, and accurate to.
 
 Every face says them in these sentences. The word for what scatter and grid tell alone is
 "repeatable"; "accurate" is said only where every row of the budget is counted
@@ -32,7 +32,7 @@ _DIGITS: Final = 3
 
 
 def stated_mm(half_width: float, digits: int = _DIGITS) -> str:
-    """Return a half width as every face shows it: never as 0, because nothing is known that well.
+    """Return a half width as every screen shows it: never 0, because nothing is known that well.
 
     What is less than half of the last digit is shown as one of it.
 
@@ -55,7 +55,7 @@ def measured_axes(result: "CalibrationResult") -> str:
 
 @without_sign
 def repeatable_sentence(result: "CalibrationResult") -> str:
-    """Return what a result is repeatable to, or why that is not known; empty without a length.
+    """Return what a result is repeatable to, or why that is unknown; empty without a length.
 
     Args:
         result: What was measured.
@@ -115,7 +115,7 @@ def accurate_sentence(result: "CalibrationResult") -> str:
 
 @without_sign
 def largest_row_sentence(accuracy: Accuracy) -> str:
-    """Return which row brings most, how large it is, and what tells that.
+    """Return which row is the largest, its size, and the source of that.
 
     Args:
         accuracy: What a result is accurate to.
@@ -163,7 +163,7 @@ def statement_sentences(result: "CalibrationResult") -> Iterator[str]:
 
 
 def statement_line(result: "CalibrationResult") -> str:
-    """Return both statements in one line, for a screen that has little room; empty without one."""
+    """Return both statements in one line, for a screen with little room; empty without one."""
     within_mm, accuracy = result.repeatable_to_mm, result.accuracy
     if not measured_axes(result):
         return ""
@@ -179,7 +179,7 @@ def statement_line(result: "CalibrationResult") -> str:
 
 @dataclass(frozen=True, slots=True)
 class RowInWords:
-    """One row of what a result is accurate to, as a table shows it.
+    """One row of a result's accuracy, as a table shows it.
 
     Attributes:
         title: What it is.
@@ -212,7 +212,7 @@ def rows_in_words(accuracy: Accuracy) -> tuple[RowInWords, ...]:
 
 
 def row_title(row: AssessedRow) -> str:
-    """Return what a row is, in the language of the day; as it was recorded where it is unknown."""
+    """Return the title of a row in the present language; an unknown one as it was recorded."""
     if row.key == SCATTER:
         return tr("how well it repeats")
     known = ACCURACY_ROWS.get(row.key)
@@ -228,7 +228,7 @@ def half_width_of(row: AssessedRow) -> str:
 
 
 def basis_in_words(row: AssessedRow) -> str:
-    """Return what tells how large a row is, and where it does."""
+    """Return the source of a row's size, and where it is stated."""
     if row.key == SCATTER and not row.basis:
         return tr("this measurement")
     words = basis_words(row.basis)
@@ -236,7 +236,7 @@ def basis_in_words(row: AssessedRow) -> str:
 
 
 def basis_words(basis: str) -> str:
-    """Return what ``stated``, ``record`` or ``default`` means, in words."""
+    """Return ``stated``, ``record`` or ``default`` in words."""
     return {
         "stated": tr("stated for this cell"),
         "record": tr("record of the cell"),
@@ -246,7 +246,7 @@ def basis_words(basis: str) -> str:
 
 @without_sign
 def seating_sentence(within_mm: float | None, changes: int | None) -> str:
-    """Return how far off the tip may be after the next mounting; no part of the accuracy.
+    """Return how far off the tip may be after the next mounting; not part of the accuracy.
 
     Args:
         within_mm: In which distance it lies then, in 95 %; ``None`` where the record is too short.
@@ -303,7 +303,7 @@ def turn_test_headline(result: VerifyResult) -> str:
 def turn_test_sentences(
     judgement: TurnJudgement | None, measured: CalibrationResult | None = None
 ) -> Iterator[str]:
-    """Yield what the drifts say about both statements, what may be the cause, and what would tell.
+    """Yield what the drifts show about both statements, possible causes, and how to tell them.
 
     Args:
         judgement: What the drifts were held to; ``None`` where they were held to the limit of the
@@ -351,7 +351,7 @@ def turn_test_sentences(
 
 
 def _not_shown(judgement: TurnJudgement) -> Iterator[str]:
-    """Yield by how much the tip may have shifted unseen, where that is more than is stated.
+    """Yield how far the tip may have shifted unseen, where that is more than is stated.
 
     No statement is left where the test contradicts it; a wider one covers what was seen.
     """
@@ -433,7 +433,7 @@ def proved_statements(measured: CalibrationResult, result: VerifyResult | None) 
 
 
 def _causes(accuracy: Accuracy | None) -> Iterator[str]:
-    """Yield what may have happened, by what was measured with, and the step that would tell."""
+    """Yield possible causes by instrument, and the step that tells them apart."""
     rows = set() if accuracy is None else {row.key for row in accuracy.rows}
     if "tip_image_px" in rows or "camera_turn_deg" in rows:
         yield tr("Possible causes: the camera was turned or moved, or the nozzle is loose.")

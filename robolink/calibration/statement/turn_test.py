@@ -1,4 +1,4 @@
-"""A turn test is held to what the measurement said, not only to the limit of the process.
+"""Compares a turn test with the measurement's own statements, not only with the process limit.
 
 A drift is a linear function of all looks, of measurement and test, and of the rows of the budget.
 Of two fresh looks at angles that differ by a it has, in each coordinate,
@@ -59,7 +59,7 @@ _HALVINGS: Final = 16
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """What one drift may be, and what scatters in each of its coordinates.
+    """The limit of one drift, and the scatter of each of its coordinates.
 
     Attributes:
         limit_mm: From where on it is contradicted.
@@ -72,7 +72,7 @@ class View:
     shared_mm: float
 
     def limit_along_mm(self, coordinates: int) -> float:
-        """Return the limit of the coordinate along a shift, the others being as on average."""
+        """Return the limit along a shift, with the other coordinates at their average."""
         aside = (coordinates - 1) * (self.own_mm**2 + self.shared_mm**2)
         return math.sqrt(max(self.limit_mm**2 - aside, 0.0))
 
@@ -109,7 +109,7 @@ def shows_from_mm(views: Sequence[View], coordinates: int, nu: float | None) -> 
 
 
 def _missed(shift_mm: float, limits: Sequence[tuple[View, float]]) -> float:
-    """Return how likely no drift shows a shift, whatever part they have in common."""
+    """Return the probability that no drift shows a shift, whatever part they share."""
     missed = whole = 0.0
     for node in _NODES:
         weight = math.exp(-node * node / 2)
@@ -129,7 +129,7 @@ _ENOUGH_NU: Final = 6
 fewer only where that would let too much pass."""
 
 LEAST_TURN_DEG: Final = 90.0
-"""A tool that is turned by less from where it was measured is not called tested."""
+"""Less turn from where the tool was measured does not count as tested."""
 
 _SHOWN: Final = 0.5
 """A drift that shows less than this share of an error tells no wider statement."""
@@ -151,7 +151,7 @@ _REGION95: Final = 2.45
 
 
 def turn_claim(result: CalibrationResult, facts: AccuracyFacts) -> TurnClaim | None:
-    """Return what a turn test of a result is held to; ``None`` where nothing tells a scatter.
+    """Return what a turn test of a result is compared with; ``None`` without a scatter.
 
     Args:
         result: What was measured; :func:`~robolink.calibration.assessed` has judged it.
@@ -206,7 +206,7 @@ def turn_claim(result: CalibrationResult, facts: AccuracyFacts) -> TurnClaim | N
 
 @dataclass(frozen=True, slots=True)
 class _Marks:
-    """What a proof looks at, as it lies on the tool.
+    """The marks that a turn test looks at, as they lie on the tool.
 
     Attributes:
         places: X and Y of each in the axes of the tool.
@@ -221,7 +221,7 @@ class _Marks:
 
     @classmethod
     def of(cls, result: CalibrationResult) -> Self:
-        """Return those of a method's proof."""
+        """Return the marks of a method's turn test."""
         looks = max(len(result.inputs), 1)
         if not result.marks_mm:
             # At a row it is held to one look, in the place of all.
@@ -234,7 +234,7 @@ class _Marks:
         return cls(places, turned, 1 / math.sqrt(looks))
 
     def u_mm(self, source: ErrorSource, facts: AccuracyFacts) -> float:
-        """Return what a row brings to one coordinate of a mark, the worst; without its growth.
+        """Return what a row adds to one coordinate of a mark, the worst; without its growth.
 
         The growth by age is in the statement, but would blunt the test.
         """
@@ -325,7 +325,7 @@ def _look_scatter(
 def _tells_more(
     result: CalibrationResult, own_mm: float, dof: int, usual_mm: float, nu: float | None
 ) -> bool:
-    """Return whether few residuals tell more than what is usual.
+    """Return whether few residuals tell more than the usual value.
 
     They do where a usual scatter would let a drift pass that is larger than what the result, by
     the same residuals, says it is accurate to, and their own F lets less pass. Two fresh looks are
@@ -350,7 +350,7 @@ def _together(own_mm: float, dof: int, expected_mm: float) -> tuple[float, float
 
 
 def held_to_claim(claim: TurnClaim, proof: VerifyResult) -> TurnJudgement:
-    """Return what the drifts of a turn test say about a measurement.
+    """Return what the drifts of a turn test show about a measurement.
 
     Args:
         claim: What the measurement lets expect.

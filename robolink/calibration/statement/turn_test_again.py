@@ -1,4 +1,4 @@
-"""A turn test that was made more than once: all its looks count together, each once.
+"""A repeated turn test: all its looks count together, each once.
 
 Whoever repeats a test until it passes has tested nothing. So the drifts of all of them are one mean
 at each angle, and looks that lie further apart than they scatter are a contradiction themselves,
@@ -22,7 +22,7 @@ from robolink.calibration.statement.turn_test import FALSE_ALARMS, held_to_claim
 from robolink.model import angle_difference_deg
 
 MOST_REPEATS: Final = 2
-"""So often may a turn test that contradicts its measurement be made again."""
+"""How often a turn test that contradicts its measurement may be repeated."""
 
 _SAME_ANGLE_DEG: Final = 1.0
 
@@ -50,7 +50,7 @@ def looks_together(tests: Sequence[VerifyResult]) -> VerifyResult:
 
 
 def held_together(claim: TurnClaim, tests: Sequence[VerifyResult]) -> TurnJudgement:
-    """Return what a turn test says about a measurement, however often it was made.
+    """Return what a turn test shows about a measurement, however often it was repeated.
 
     Args:
         claim: What the measurement lets expect.
@@ -117,7 +117,7 @@ def _mean(group: Sequence[Drift]) -> Drift:
 
 
 def _apart_mm(claim: TurnClaim, tests: Sequence[VerifyResult]) -> float | None:
-    """Return how far looks at one angle lie apart, where that is more than they scatter."""
+    """Return how far looks at one angle differ, if that is more than their scatter."""
     groups = [group for group in _by_place(tests) if len(group) > 1]
     coordinates = max(test.coordinates for test in tests)
     found = [

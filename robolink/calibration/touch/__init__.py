@@ -1,1 +1,1 @@
-"""What touches of a pin prove, beside the tip that they lead to."""
+"""What touches of a pin show, besides the tip."""

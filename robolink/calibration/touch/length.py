@@ -1,4 +1,4 @@
-"""Whether a tip has another length than before, from the heights of its touches on one pin.
+"""Whether a tip has a different length, from the heights of its touches on one pin.
 
 Methods that touch a pin upright measure X and Y; Z is kept. But the same pin, touched in the same
 orientation, puts the flange the higher, the longer the tip is:
@@ -26,7 +26,7 @@ from robolink.errors import CalibrationError
 from robolink.messages import tr
 
 LengthDecision = Literal["difference", "keep", "measure"]
-"""What is done about a length that changed: write Z by difference, keep it, measure it."""
+"""What to do about a changed length: write Z by difference, keep it, measure it."""
 
 LEAST_LENGTH_CHANGE_MM: Final = 0.10
 """Less is what touches of a person differ by, and no other length."""
@@ -38,7 +38,7 @@ _LEAST_HALF_MM: Final = 0.005
 
 @dataclass(frozen=True, slots=True)
 class LengthChange:
-    """How the length of a tip compares with the one that is stored.
+    """The length of a tip compared with the stored one.
 
     Attributes:
         height_change_mm: By how much higher the flange was, mm.
@@ -56,12 +56,12 @@ class LengthChange:
 
     @property
     def changed(self) -> bool:
-        """Whether the length is another: ``length_changed``."""
+        """Whether the length differs: ``length_changed``."""
         return abs(self.height_change_mm) > self.limit_mm
 
     @property
     def half95_mm(self) -> float:
-        """Half the 95 % interval of the change; half of the last digit that is told, at least."""
+        """Half the 95 % interval of the change; at least half of the last digit shown."""
         return max(NORMAL_95 * self.u_mm, _LEAST_HALF_MM)
 
     @property
@@ -70,9 +70,9 @@ class LengthChange:
         return abs(self.z_by_difference_mm) - abs(self.stored_z_mm)
 
     def z_mm(self, decision: LengthDecision | None) -> float | None:
-        """Return Z that a decision writes; ``None`` where it has to be measured, or decided.
+        """Return the Z that a decision writes; ``None`` if it has to be measured or decided.
 
-        A length that did not change is kept, whatever was decided beforehand.
+        A length that did not change is kept, whatever was decided in advance.
         """
         if not self.changed or decision == "keep":
             return self.stored_z_mm
@@ -134,7 +134,7 @@ def length_change(
 
 
 def length_not_observable(why: str) -> CalibrationError:
-    """Return the refusal to tell a length from heights, for a reason in a whole sentence."""
+    """Return the error for a length that heights cannot show; ``reason`` is a whole sentence."""
     return CalibrationError(
         "length_not_observable",
         tr("{why} The heights of the touches do not show the length of the tip.", why=why),

@@ -230,7 +230,7 @@ def _found(p: Floats, r: Floats) -> tuple[_State, LinearFit]:
 
 
 def _start(p: Floats, r: Floats, normal: Floats) -> tuple[float, _State]:
-    """Return the least squares for a normal that is taken as known, and how badly they fit."""
+    """Return the least squares for a normal that is taken as known, and their misfit."""
     rows = np.column_stack((np.einsum("nij,i->nj", r, normal), -np.ones(len(p))))
     fit = linear_fit(rows, -(p @ normal))
     left = float(fit.residuals @ fit.residuals)

@@ -59,7 +59,7 @@ def refined(
     linear: Callable[[State], tuple[Floats, Floats]],
     stepped: Callable[[State, Floats], State],
 ) -> tuple[State, LinearFit] | None:
-    """Return where Gauss-Newton settles and the fit there, ``None`` where it does not.
+    """Return where Gauss-Newton converges and the fit there, ``None`` if it does not.
 
     Args:
         start: First guess.
@@ -80,19 +80,19 @@ def refined(
 
 
 def square_sum(found: tuple[object, LinearFit]) -> float:
-    """Return the sum of the squares that a fit leaves."""
+    """Return the sum of the squared residuals of a fit."""
     return float(found[1].residuals @ found[1].residuals)
 
 
 def tip_is_told(fit: LinearFit, unknowns: int) -> bool:
-    """Tell whether touches tell tip and surface apart; the first three unknowns are the tip."""
+    """Return whether touches separate tip and surface; the first three unknowns are the tip."""
     if fit.rank < unknowns or fit.condition_number > MAX_CONDITION:
         return False
     return float(fit.unit_covariance.diagonal()[:3].max()) <= MAX_GAIN**2
 
 
 def require_told_apart(fit: LinearFit, unknowns: int, remedy: str) -> None:
-    """Refuse touches that do not tell tip and surface apart.
+    """Refuse touches that do not separate tip and surface.
 
     Raises:
         CalibrationError: ``rank_deficient`` or ``insufficient_rotation``.
@@ -105,7 +105,7 @@ def require_told_apart(fit: LinearFit, unknowns: int, remedy: str) -> None:
 
 
 def distinct_touches(poses: Sequence[Pose], least: int) -> tuple[list[Pose], tuple[str, ...]]:
-    """Return the touches that are no copies of others, and lesser doubts.
+    """Return the touches without copies, and lesser doubts.
 
     Raises:
         CalibrationError: ``too_few_poses``, ``tool_pose``, ``local_pose``, and those of
@@ -205,7 +205,7 @@ _FAINT_MM: Final = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class SurfaceEvidence:
-    """What touches of a surface say about how they were made.
+    """What touches of a surface show about how they were made.
 
     Attributes:
         codes: Why they are refused, the most telling first; empty when they count.
@@ -222,7 +222,7 @@ class SurfaceEvidence:
 
     @property
     def most_telling(self) -> str:
-        """The one ground to name; empty where there is none.
+        """The strongest ground; empty without one.
 
         One touch that fits badly makes the share uncertain too; it is then that one that is told.
         """
@@ -235,7 +235,7 @@ class SurfaceEvidence:
 def judge_surface_touches(
     columns: Floats, misses_mm: Floats, standoffs_mm: Sequence[float]
 ) -> SurfaceEvidence:
-    """Return whether touches of one surface were made.
+    """Return whether touches of one surface were really made.
 
     Args:
         columns: Derivatives of the distances from the surface by tip and surface, one row a touch.
@@ -268,7 +268,7 @@ def judge_surface_touches(
 
 
 def unexplained_mm2(columns: Floats, standoffs_mm: Sequence[float]) -> float:
-    """Return the sum of squares of what tip and surface leave of the distances.
+    """Return the sum of squares of the distances that tip and surface do not explain.
 
     Args:
         columns: As for :func:`judge_surface_touches`.
@@ -293,7 +293,7 @@ def _left(columns: Floats, misses_mm: Floats, standing_mm: Floats) -> tuple[floa
 
 
 class SurfaceStandoffs:
-    """Draws the distances of one measurement, one after the other.
+    """Draws the distances of one measurement, one by one.
 
     Args:
         seed: Of the run; the same one gives the same distances.

@@ -1,4 +1,4 @@
-"""Whether touches of one pin were made: jogs, answers in time, heights, and standoffs undone.
+"""Whether touches of a pin were really made: jogs, answer times, heights, undone standoffs.
 
 The robot stops before each touch beside and above the pin, by a distance that is drawn. A person
 who brings the tip onto the pin undoes that distance; who only presses ENTER does not, and no other
@@ -61,7 +61,7 @@ NO_STANDOFF: Final = Standoff()
 
 
 class StandoffSeries:
-    """Draws the standoffs of one measurement, one after the other.
+    """Draws the standoffs of one measurement, one by one.
 
     Args:
         seed: Of the run; the same one gives the same standoffs.
@@ -124,7 +124,7 @@ class StandoffSeries:
         return Standoff(rho_mm * math.cos(way), rho_mm * math.sin(way), height_mm)
 
     def _next_level(self) -> float:
-        """Return one of the levels: each once before any comes again, and never twice in a row."""
+        """Return one of the levels: each once before any repeats, and never twice in a row."""
         if not self._levels:
             self._levels = self._random.sample(LEVELS_MM, len(LEVELS_MM))
             if self._levels[-1] == self._last_mm:
@@ -199,7 +199,7 @@ REFUSING: Final = (
 
 @dataclass(frozen=True, slots=True)
 class WitnessedTouch:
-    """One touch, and what is known of how it was made.
+    """One touch, and the evidence of how it was made.
 
     Attributes:
         captured: Flange pose with the tip on the pin.
@@ -224,7 +224,7 @@ class WitnessedTouch:
         return math.dist(self.captured.coordinates()[:3], self.arrival.coordinates()[:3])
 
     def made(self, resolution_mm: float) -> bool:
-        """Tell whether anything was done between arrival and answer.
+        """Return whether the person did anything between arrival and answer.
 
         Args:
             resolution_mm: Last digit that the controller prints.
@@ -234,13 +234,13 @@ class WitnessedTouch:
 
     @property
     def in_time(self) -> bool:
-        """Whether the answer came after somebody could have read the question."""
+        """Whether the answer came after a person could have read the question."""
         return self.seconds is None or self.seconds >= FASTEST_ANSWER_S
 
 
 @dataclass(frozen=True, slots=True)
 class TouchEvidence:
-    """What a set of touches of one pin says about how they were made.
+    """What touches of one pin show about how they were made.
 
     Attributes:
         codes: Why they are refused, the most telling first; empty when they count.
@@ -267,7 +267,7 @@ class TouchEvidence:
 
     @property
     def most_telling(self) -> str:
-        """The one ground to name; empty where there is none.
+        """The strongest ground; empty without one.
 
         One touch that fits badly makes the share of the standoffs uncertain too; it is then that
         touch that is to be named.
@@ -285,7 +285,7 @@ def judge_touches(
     resolution_mm: float = 0.001,
     sigma_z_mm: float = PERSON_SIGMA_Z_MM,
 ) -> TouchEvidence:
-    """Return whether touches of one pin were made.
+    """Return whether touches of one pin were really made.
 
     Args:
         touches: In the order in which they were made.
@@ -330,7 +330,7 @@ def judge_touches(
 
 
 def least_jog_mm(resolution_mm: float) -> float:
-    """Return the shortest jog that is one."""
+    """Return the shortest jog that counts as one."""
     return max(LEAST_JOG_MM, PRINT_STEPS * resolution_mm)
 
 
@@ -340,13 +340,13 @@ def height_limit_mm(count: int, sigma_z_mm: float) -> float:
 
 
 def height_shows_from_mm(count: int, sigma_z_mm: float) -> float:
-    """Return by how much one height of so many has to differ to be beyond that limit in 95 %."""
+    """Return by how much one height must differ to exceed that limit in 95 %."""
     scatter_mm = math.sqrt(2) * sigma_z_mm
     return height_limit_mm(count, sigma_z_mm) + normal_quantile(0.95) * scatter_mm
 
 
 def stand_upright(poses: Sequence[Pose]) -> bool:
-    """Tell whether the tool stands along the base's Z in all poses, either way up."""
+    """Return whether the tool is along the base's Z in all poses, either way up."""
     leans = [
         math.hypot(
             math.sin(math.radians(pose.v_deg)),

@@ -57,7 +57,7 @@ _ROUNDING_MM = 1e-9
 
 @dataclass(frozen=True, slots=True)
 class TouchFit:
-    """What touches at several speeds say.
+    """The fit of touches at several speeds.
 
     Attributes:
         fit: Unknowns: z, then the latency unless it was given, then the overshoot if it counts.
@@ -139,7 +139,7 @@ def _braking(columns: list[Floats], v: Floats) -> float:
 def require_plausible(
     found: TouchFit, sigma_mm: float | None, *, step_mm: float | None = None
 ) -> None:
-    """Refuse a latency or braking that no machine has: speeds or touches are wrong then.
+    """Refuse an impossible latency or braking: the speeds or the touches are wrong.
 
     Args:
         found: The fit.
@@ -204,7 +204,7 @@ PROBE_TOLERANCE = Tolerance(rms_mm=0.05, max_residual_mm=0.15)
 RECOMMENDED_TOUCHES = 3
 
 USUAL_DECELERATION_MM_S2 = 300.0
-"""How hard a robot brakes at least where nobody knows it; see docs/reference/evidence.md 13."""
+"""Assumed least deceleration of a robot; see docs/reference/evidence.md 13."""
 
 _SPEEDS_APART = 1.5
 """Speeds that differ by less than this factor do not tell the latency."""
@@ -378,7 +378,7 @@ def _budget(result: ZTouchResult) -> UncertaintyBudget:
 
 
 def _with_braking(result: ZTouchResult, shift_mm: float, origin: str) -> ZTouchResult:
-    """Return the result with what braking may have shifted Z by, in interval and budget.
+    """Return the result with the Z shift that braking may cause, in interval and budget.
 
     A robot that brakes is shifted by the same at every touch, and perhaps by all of it.
     """

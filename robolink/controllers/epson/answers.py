@@ -1,4 +1,4 @@
-"""What the controller's answers mean: refusals, status flags, held-back commands."""
+"""The meaning of the controller's answers: refusals, status flags, commands not sent."""
 
 from robolink.errors import (
     NotReadyError,
@@ -15,7 +15,7 @@ say so."""
 
 
 def rejected(refusal: Refusal, *, controller: str, request: str = "") -> RejectedError:
-    """Return the error for a refusal, in words, with what to do about it."""
+    """Return the error for a refusal, in words, with its remedy."""
     try:
         meaning = ErrorCode(refusal.code).meaning
     except ValueError:
@@ -69,7 +69,7 @@ def status_from_flags(flags: StatusFlags, code: int) -> ControllerStatus:
 
 
 def may_log_out(status: ControllerStatus) -> bool:
-    """Whether logging out does no harm.
+    """Return whether logging out is harmless.
 
     While a task runs it raises an error on the controller (docs/reference/epson.md 1.1), so the
     connection is just closed then. So it is when another device starts the cell: a task could
@@ -79,7 +79,7 @@ def may_log_out(status: ControllerStatus) -> bool:
 
 
 def require_ready(status: ControllerStatus, *, controller: str, request: str) -> None:
-    """Hold back an Execute that the controller would refuse, naming the state.
+    """Refuse an Execute that the controller would refuse, naming the state.
 
     Raises:
         NotReadyError: The worst condition that stands in the way (docs/reference/epson.md 1.2:

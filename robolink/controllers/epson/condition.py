@@ -1,4 +1,4 @@
-"""What is true of an EPSON controller beyond its flags, as far as it can be asked now.
+"""The state of an EPSON controller beyond its flags, as far as it can be read now.
 
 Alarms: what the controller wants looked after, apart from errors.
 
@@ -29,7 +29,7 @@ _HIGHEST = 99_999
 
 
 class EpsonAlarms(DriverPart):
-    """The alarms that stand. GetAlm exists from RC+ 7 on; older firmware refuses it (11)."""
+    """The active alarms. GetAlm exists from RC+ 7 on; older firmware refuses it (11)."""
 
     def __init__(self, link: EpsonLink) -> None:
         super().__init__(link)
@@ -57,7 +57,7 @@ class EpsonAlarms(DriverPart):
         return tuple(spel.parse_integer(number) for number in numbers)
 
     def reset(self, number: int) -> None:
-        """Reset one alarm because a person asked for it, and prove that it is gone.
+        """Reset one alarm at a person's request, and confirm that it is gone.
 
         Raises:
             NotReadyError: The state forbids it, monitoring only and a running program
@@ -92,7 +92,7 @@ _TOLD: Final = (
 
 
 class ConditionReader:
-    """Reads the text of an error, the alarms, the tool in force, motors and power."""
+    """Reads the text of an error, the alarms, the selected tool, motors and power."""
 
     def __init__(
         self, link: EpsonLink, alarms: EpsonAlarms, tools: EpsonToolTable, group: EpsonGroup
@@ -104,7 +104,7 @@ class ConditionReader:
         self._group = group
 
     def read(self, *, published: Callable[[], PublishedTools | None]) -> dict[str, object]:
-        """Return plain JSON; what this line, firmware or state does not tell is ``None``.
+        """Return plain JSON; ``None`` for what this line, firmware or state does not show.
 
         While production runs only the flags and the alarms are read (docs/reference/epson.md 1.2,
         1.3).

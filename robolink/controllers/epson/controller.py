@@ -115,7 +115,7 @@ class EpsonController(ControllerCore):
 
     @cached_property
     def points(self) -> EpsonPoints:
-        """The taught points of the robot in force; read only."""
+        """The taught points of the current robot; read only."""
         return EpsonPoints(self._link.window)
 
     @cached_property
@@ -125,12 +125,12 @@ class EpsonController(ControllerCore):
 
     @cached_property
     def alarms(self) -> EpsonAlarms:
-        """The alarms that stand."""
+        """The active alarms."""
         return EpsonAlarms(self._link)
 
     @cached_property
     def resolver(self) -> EpsonResolver:
-        """Settles what was begun here and not proved finished."""
+        """Finishes or undoes interrupted jobs."""
         values = PendingValues(self.io, self.variables)
         group = self.groups[0]
         return EpsonResolver(self._link, self.tools, self._preserver, group=group, values=values)
@@ -149,7 +149,7 @@ class EpsonController(ControllerCore):
         return self._link.session.exchanges
 
     def published_tools(self) -> PublishedTools | None:
-        """Read the tools as the companion program published them; legal while production runs.
+        """Read the tools as the companion program published them; allowed while production runs.
 
         Returns:
             ``None`` where the project publishes none.
@@ -160,7 +160,7 @@ class EpsonController(ControllerCore):
         return read_published(self.variables)
 
     def require_looks(self) -> None:
-        """Find out whether the project publishes looks of its vision system; reads only.
+        """Check that the project publishes looks of its vision system; reads only.
 
         Raises:
             ConfigError: It does not hold robolink_vision.prg.
@@ -168,7 +168,7 @@ class EpsonController(ControllerCore):
         self._looks.require_program()
 
     def look(self, mark: int, *, program: int) -> tuple[Spot, ...]:
-        """Start the vision program and return what it saw, X and Y of the base in mm.
+        """Run the vision program and return what it saw, X and Y of the base in mm.
 
         Args:
             mark: The tip (0), or the number of a fiducial.
@@ -184,7 +184,7 @@ class EpsonController(ControllerCore):
         return self._looks.look(mark, program=program)
 
     def facts(self) -> ControllerFacts:
-        """Read which controller and robots these are; legal while production runs."""
+        """Read which controller and robots these are; allowed while production runs."""
         return FactReader(self._link.session, self._link.window).read()
 
     def error_text(self, code: int) -> str:
@@ -192,7 +192,7 @@ class EpsonController(ControllerCore):
         return self._link.window.error_text(code)
 
     def reset_fault(self) -> None:
-        """Send Reset because a person asked for it; it may switch outputs off.
+        """Send Reset at a person's request; it may switch outputs off.
 
         Raises:
             NotReadyError: A reset cannot help now (serious error, guard open, a program is
@@ -220,7 +220,7 @@ class EpsonController(ControllerCore):
                 self.groups[0].settings.slow_down(MotionProfile())
 
     def motors(self, on: bool) -> None:
-        """Switch the motors of the robot in force, and prove it.
+        """Switch the motors of the current robot, and confirm it.
 
         Raises:
             NotReadyError: The state forbids it.
@@ -244,7 +244,7 @@ class EpsonController(ControllerCore):
         return spel.parse_integer(number)
 
     def preview(self, act: Act) -> tuple[str, ...]:
-        """Return the requests of an act, as they stand on the wire."""
+        """Return the requests of an action, as sent on the wire."""
         if act is Act.STOP:
             return tuple(as_sent(Request(request)) for request in ("Abort", "Stop"))
         if act is Act.RESET:
@@ -253,7 +253,7 @@ class EpsonController(ControllerCore):
         return (as_sent(Request(name, (str(self.robot_number()),))),)
 
     def execute_raw(self, statement: str) -> str:
-        """Run a SPEL+ statement as it was typed, and put it on record.
+        """Run a SPEL+ statement as typed, and record it.
 
         Only here does text that a person typed reach the controller, past the typed builders
         (docs/reference/rules.md 8): marked before, and on record after. It
@@ -294,7 +294,7 @@ class EpsonController(ControllerCore):
         return printed
 
     def preferences(self) -> frozenset[Preference] | None:
-        """Read the preferences that are on; asked once a connection.
+        """Read the active preferences; asked once a connection.
 
         Returns:
             ``None`` where the firmware does not tell them.
@@ -302,7 +302,7 @@ class EpsonController(ControllerCore):
         return self._link.preferences.read()
 
     def condition(self) -> dict[str, object]:
-        """Read error text, alarms, preferences, the tool in force, motors and power."""
+        """Read error text, alarms, preferences, the selected tool, motors and power."""
         reader = ConditionReader(self._link, self.alarms, self.tools, self.groups[0])
         return reader.read(published=self.published_tools)
 
@@ -319,7 +319,7 @@ class EpsonController(ControllerCore):
             )
 
     def _require_run(self, statement: Statement, answer: Reply | Refusal, marker: Marker) -> None:
-        """Raise unless it ran; a plain refusal settles the marker."""
+        """Raise unless it ran; a plain refusal closes the marker."""
         if isinstance(answer, Reply) and (answer.text is not None or answer.fields == ("0",)):
             return
         try:
@@ -333,7 +333,7 @@ class EpsonController(ControllerCore):
         return self._link.window.status()
 
     def _take_leave(self) -> None:
-        """Abort what nobody waited on, and log out where that does no harm."""
+        """Abort what nobody waited on, and log out if that is harmless."""
         if self._link.session.alive:
             self.groups[0].abort_unfinished()
             if may_log_out(self.status()):

@@ -1,4 +1,4 @@
-"""The robot arm of an EPSON controller: where it is, and how it is told to go elsewhere."""
+"""The robot arm of an EPSON controller: where it is, and how to move it."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -56,11 +56,11 @@ class EpsonGroup(MotionGroupCore):
 
     @property
     def name(self) -> str:
-        """``robot``: the one in force on the controller."""
+        """``robot``: the current one of the controller."""
         return "robot"
 
     def pose(self) -> Pose:
-        """Read the measured position of the tool in force (RealPos)."""
+        """Read the measured position of the selected tool (RealPos)."""
         window = self._link.window
         window.require_ready("Print RealPos")
         return read_position(window, spel.print_real_position())
@@ -105,11 +105,11 @@ class EpsonGroup(MotionGroupCore):
         return executes((*self.settings.statements(profile), self._statement_until(target, edge)))
 
     def requests_for(self, target: Pose, profile: MotionProfile) -> tuple[str, ...]:
-        """Return what :meth:`move_to` would send besides its reads, as it stands on the wire."""
+        """Return what :meth:`move_to` would send besides its reads, as sent on the wire."""
         return executes((*self.settings.statements(profile), self._statement_for(target, profile)))
 
     def obstacle(self, target: Pose, path: Path, *, start: Pose | None = None) -> str:
-        """Return why six axes, or an RS, could not go there so; other arms are not asked."""
+        """Return why six axes, or an RS, cannot make this move; other arms are not asked."""
         singular = self._singular
         if singular is None:
             return ""
@@ -131,7 +131,7 @@ class EpsonGroup(MotionGroupCore):
         return _PRINTED_MM
 
     def require_able(self, purpose: str) -> None:
-        """Refuse what no movement could begin in now; see :class:`robolink.model.MotionGroup`."""
+        """Refuse if no movement could start now; see :class:`robolink.model.MotionGroup`."""
         with self._link.asked(purpose):
             self._require_supervision()
             self._link.window.require_ready(purpose)
@@ -159,11 +159,11 @@ class EpsonGroup(MotionGroupCore):
         )
 
     def low_power(self) -> bool:
-        """Read whether the controller is in Power Low, as it is for each movement from here."""
+        """Read whether the controller is in Power Low, as for every movement of robolink."""
         return not self.settings.power_high()
 
     def base(self) -> tuple[float, ...] | None:
-        """Read where the base stands that positions count from.
+        """Read the place of the base, from which positions count.
 
         Returns:
             X, Y, Z in mm and U, V, W in degrees, seen from the robot; ``None`` where the
@@ -180,7 +180,7 @@ class EpsonGroup(MotionGroupCore):
         return {"joints": tuple(printed.joints), "pulses": tuple(printed.pulses)}
 
     def stop(self) -> None:
-        """Bring everything to rest; from here on nothing acts before ``release_stop``.
+        """Stop everything; from here on nothing acts before ``release_stop``.
 
         Raises:
             RejectedError: The controller takes no Stop from here.
@@ -191,7 +191,7 @@ class EpsonGroup(MotionGroupCore):
             bring_to_rest(link.session.exchange, link.clock, controller=link.identity)
 
     def abort_unfinished(self) -> None:
-        """Abort the last movement if nobody has seen its end."""
+        """Abort the last movement unless its end was seen."""
         if self._current is not None and not self._current.settled:
             self._current.abort()
 
@@ -253,14 +253,14 @@ class EpsonGroup(MotionGroupCore):
 
     @property
     def _singular(self) -> SingularPlaces | None:
-        """What the arm has to keep clear of, ``None`` for one without singular places."""
+        """The singular places to avoid, ``None`` for an arm without any."""
         robot = self._link.robot.read()
         if not robot.six_axes and not robot.folds:
             return None
         return SingularPlaces(self._link.window, robot.six_axes)
 
     def _flagged(self, target: Pose) -> Pose:
-        """Return a target of six axes with the present hand, elbow and wrist where it has none.
+        """Return a target of six axes with the present hand, elbow and wrist where it names none.
 
         Left out, the controller would take its own defaults and might turn the wrist over.
         """

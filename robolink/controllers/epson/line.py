@@ -1,4 +1,4 @@
-"""The line to a controller, and the one conversation that is held on it.
+"""The line to a controller, and its one conversation.
 
 Over TCP, and in process, that is Remote Ethernet; on a serial line Remote RS232, whose frames are
 loaded only there, since a stop is timed (docs/decisions/0017). For the same reason a refusal is
@@ -163,11 +163,11 @@ _PASSWORD_REFUSALS: Final = (13, 98)
 """The password is wrong, or one is demanded (docs/reference/epson.md 1.6)."""
 
 _STRAYS: Final = 16
-"""As many answers to questions that nobody asked are no controller's."""
+"""A controller never sends this many unrequested answers."""
 
 
 class EpsonConversation:
-    """Requests and answers on one line, one after the other, until one of them is in doubt.
+    """Requests and answers on one line, one by one, until one of them is in doubt.
 
     Attributes:
         identity: Which controller this is.
@@ -190,7 +190,7 @@ class EpsonConversation:
 
     @property
     def alive(self) -> bool:
-        """Whether it can still be used."""
+        """Whether it is still usable."""
         return self._ended_by is None
 
     def login(self, password: str) -> None:
@@ -318,7 +318,7 @@ class EpsonConversation:
         return name == wanted or (isinstance(event, Refusal) and not name)
 
     def _take_aside(self, event: object, *, hidden: bool = False) -> None:  # noqa: ARG002 - not shown
-        """Pass over what is no answer to the request that is out.
+        """Skip what does not answer the pending request.
 
         Args:
             event: What it is.
@@ -360,7 +360,7 @@ class EpsonConversation:
 
 
 def as_shown(request: Request) -> str:
-    """Return a request as a person may read it. Never the parameters of a login."""
+    """Return a request for display, without the parameters of a login."""
     return request.parameters[0] if request.name == "Execute" else request.name
 
 

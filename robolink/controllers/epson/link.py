@@ -1,6 +1,6 @@
-"""What every part of this driver works with: a session, its command window, and its markers.
+"""What every part of this driver uses: a session, its command window, and its markers.
 
-What is asked once a connection: the robot in force, and what is set in the controller.
+What is asked once a connection: the current robot, and what is set in the controller.
 
 Neither changes meanwhile: one client at a time is served, and a change of the preferences restarts
 the controller.
@@ -38,7 +38,7 @@ from robolink.protocols.epson_text import Preference, parse_preferences
 
 @dataclass(frozen=True, slots=True)
 class Robot:
-    """The robot in force: its number on the controller and its type code."""
+    """The current robot: its number on the controller and its type code."""
 
     number: int
     type_code: int
@@ -55,7 +55,7 @@ class Robot:
 
 
 class RobotFacts:
-    """Reads which robot is in force, when that is needed first.
+    """Reads which robot is current, when that is first needed.
 
     Execute acts on the robot chosen with SetCurRobot (docs/reference/epson.md 1.5); robolink never
     changes that choice, but a statement that a person typed may.
@@ -66,11 +66,11 @@ class RobotFacts:
         self._robot: Robot | None = None
 
     def forget(self) -> None:
-        """Ask again when it is needed next: another robot may be in force."""
+        """Ask again at the next use: another robot may be current."""
         self._robot = None
 
     def read(self, request: str = "Print Robot") -> Robot:
-        """Return the robot in force.
+        """Return the current robot.
 
         Args:
             request: What needs to know it.
@@ -87,7 +87,7 @@ class RobotFacts:
 
 
 class Preferences:
-    """What is set in one controller.
+    """The preferences of one controller.
 
     Args:
         session: Asks for it, when it is needed first.
@@ -99,7 +99,7 @@ class Preferences:
         self._told: frozenset[Preference] | None = None
 
     def read(self) -> frozenset[Preference] | None:
-        """Return the preferences that are on, ``None`` where the firmware does not tell.
+        """Return the active preferences, ``None`` if the firmware does not show them.
 
         Raises:
             TransportError, RemoteProtocolError: The session is over.
@@ -121,7 +121,7 @@ class Preferences:
         return None
 
     def require_real_motion(self, request: str) -> None:
-        """Hold ``request`` back while the robot would only seem to move.
+        """Refuse ``request`` while the robot would only seem to move.
 
         Raises:
             NotReadyError: The controller is set to dry run.
@@ -139,7 +139,7 @@ class Preferences:
             )
 
     def require_real_inputs(self, request: str) -> None:
-        """Hold ``request`` back while no input is a real one.
+        """Refuse ``request`` while no input is a real one.
 
         Raises:
             NotReadyError: The controller is set to virtual I/O.
@@ -157,7 +157,7 @@ class Preferences:
             )
 
     def require_real(self, request: str) -> None:
-        """Hold a measurement, or the writing of one, back while the cell is not the real one.
+        """Refuse a measurement, or the writing of one, while the cell is not the real one.
 
         Putting an old value back is let through: left alone, an unproved one would stay in force.
 
@@ -181,7 +181,7 @@ _NOT_NOW: Final = frozenset({20, 21})
 
 
 def name_from(number: Sequence[str], robots: Sequence[str]) -> str:
-    """Return the name of a controller, empty where nobody has set any number.
+    """Return the name of a controller, empty if no number is set.
 
     Args:
         number: The answer to GetContNo.
@@ -192,7 +192,7 @@ def name_from(number: Sequence[str], robots: Sequence[str]) -> str:
 
 
 def robot_names(name: str, number: Sequence[str], robots: Sequence[str]) -> tuple[str, ...]:
-    """Return the name of each robot of a controller with several, nothing where there is one.
+    """Return the name of each robot of a controller with several, nothing if there is one.
 
     A robot is called as its controller would be with that robot alone, so what was on record
     before a second one came stays its own. One without a number of its own is counted.
@@ -214,7 +214,7 @@ def robot_names(name: str, number: Sequence[str], robots: Sequence[str]) -> tupl
 
 
 class IdentityReader:
-    """Asks with two requests, with three where there are several robots; they change nothing.
+    """Asks with two requests, with three if there are several robots; they change nothing.
 
     Newer firmware tells the serial numbers of controller and robots at any time, to a client
     that only monitors too (docs/reference/epson.md 1.8). Older firmware refuses the first query;
@@ -257,7 +257,7 @@ class IdentityReader:
         return tuple(field.strip() for field in fields)
 
     def _in_force(self, robots: Sequence[str]) -> str:
-        """Return the name of the robot that Execute acts on, empty where there is one."""
+        """Return the name of the robot that Execute acts on, empty if there is only one."""
         if not robots:
             return ""
         fields = self._asked("GetCurRobot") or ("",)
@@ -278,7 +278,7 @@ class IdentityReader:
 
 
 class _BusyNow(Exception):
-    """The controller cannot tell just now."""
+    """The controller cannot answer just now."""
 
 
 class FactReader:
@@ -328,7 +328,7 @@ class FactReader:
         return None if text in _UNSET else text
 
     def _per_robot(self, name: str, *parameters: str, fields_each: int) -> tuple[str, ...]:
-        """Return the last field of each robot; nothing when the answer is not so arranged."""
+        """Return the last field of each robot; nothing if the answer has another form."""
         fields = self._fields(name, *parameters)
         if fields is None or not fields[0].isdecimal():
             return ()
@@ -353,7 +353,7 @@ class FactReader:
 
 
 class EpsonLink(DriverLink):
-    """One controller that somebody has logged in to.
+    """One controller after the login.
 
     Attributes:
         session: Requests and answers.
@@ -378,10 +378,10 @@ class EpsonLink(DriverLink):
         )
 
     def forget_robot(self) -> None:
-        """Ask anew which robot is in force, and whose record it is, when that is needed next."""
+        """Ask anew, at the next use, which robot is current, and whose record it is."""
         self.robot.forget()
         self.markers.outcomes.ask(self._reader.read)
 
     def was_not_executed(self, refusal: RejectedError) -> bool:
-        """Whether a refusal proves that nothing was done (docs/reference/epson.md 1.6)."""
+        """Whether a refusal confirms that nothing was done (docs/reference/epson.md 1.6)."""
         return refusal.code in NOT_EXECUTED

@@ -32,7 +32,7 @@ from robolink.protocols.epson_text import ErrorCode, Refusal
 from robolink.timing import Deadline
 
 POLL_S = 0.1
-"""How often the status is read while the robot moves."""
+"""Interval between status reads while the robot moves."""
 
 
 class EpsonMotion:
@@ -59,7 +59,7 @@ class EpsonMotion:
 
     @property
     def settled(self) -> bool:
-        """Whether its end was seen and taken."""
+        """Whether its end was seen and handled."""
         return self._link.session.pending is not self._pending
 
     def wait(self, *, timeout_s: float) -> MotionOutcome:
@@ -216,7 +216,7 @@ class Settings:
         self._window = link.window
 
     def read(self) -> PowerAndSpeed:
-        """Read what is in force."""
+        """Read the present power and speed."""
         speed = (self._speed_percent(1), self._speed_percent(2), self._speed_percent(3))
         speed_s = (self._speed_s_mm_s(1), self._speed_s_mm_s(2), self._speed_s_mm_s(3))
         return PowerAndSpeed(self.power_high(), speed, speed_s)
@@ -230,7 +230,7 @@ class Settings:
         )
 
     def slow_down(self, profile: MotionProfile) -> None:
-        """Set Power Low and the profile's speeds, and prove it.
+        """Set Power Low and the profile's speeds, and confirm it.
 
         Motor On and Reset put them back, a login and Abort perhaps too (docs/reference/spel.md
         6.3), so this is done anew before each move. What the moves of this driver go by is read
@@ -256,7 +256,7 @@ class Settings:
             )
 
     def restore(self, before: PowerAndSpeed) -> None:
-        """Put ``before`` back and prove it; nothing is sent when it is in force already.
+        """Restore ``before`` and confirm it; nothing is sent if it is set already.
 
         Raises:
             NotReadyError: Another value is read back.

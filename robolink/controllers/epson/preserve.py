@@ -1,4 +1,4 @@
-"""Puts back what a procedure changed: the tool, the power mode and the speed.
+"""Restores what a procedure changed: the tool, the power mode and the speed.
 
 Settles what an earlier process left open on an EPSON controller.
 
@@ -24,7 +24,7 @@ from robolink.timing import local_label
 
 @dataclass(frozen=True, slots=True)
 class InForce:
-    """What a procedure must leave as it found it."""
+    """What a procedure must leave as it was."""
 
     tool: int
     settings: PowerAndSpeed
@@ -48,7 +48,7 @@ class InForce:
 
     @classmethod
     def from_marker(cls, marker: Marker) -> "InForce":
-        """Return what ``marker`` says is to be put back.
+        """Return what ``marker`` says to restore.
 
         Raises:
             ConfigError: The marker was written by something else.
@@ -69,7 +69,7 @@ class InForce:
 
 
 class EpsonPreserver(Preserver):
-    """Puts back the selected tool, and power and speed with it."""
+    """Restores the selected tool, and power and speed with it."""
 
     def __init__(self, link: EpsonLink, tools: EpsonToolTable, group: EpsonGroup) -> None:
         super().__init__(link, tools, (group,))
@@ -78,10 +78,10 @@ class EpsonPreserver(Preserver):
         self._settings = group.settings
 
     def _in_force(self, reason: str) -> Mapping[str, object]:
-        """Read what is to be put back, twice.
+        """Read twice what to restore.
 
         Every other value here is proved by what was sent; these have nothing to be compared
-        with. One bent digit would be put back at the end as the cell's own speed or tool, and
+        with. One bent digit would be restored at the end as the cell's own speed or tool, and
         be proved by reading.
 
         Raises:
@@ -133,7 +133,7 @@ class PendingValues:
         self._variables = variables
 
     def examine(self, marker: Marker) -> Finding:
-        """Return what became of the request.
+        """Return what happened to the request.
 
         Raises:
             ConfigError: The marker was written by something else.
@@ -184,7 +184,7 @@ def _finding(marker: Marker, now: Value, kind: str) -> Finding:
 
 
 class EpsonResolver(MarkerResolver):
-    """Examines and settles the open markers that this driver begins."""
+    """Examines and recovers the open markers that this driver begins."""
 
     def __init__(
         self,

@@ -1,4 +1,4 @@
-"""Bringing an EPSON controller to rest, and knowing that it rests.
+"""Stops an EPSON controller and confirms that it has stopped.
 
 Abort ends what Execute runs, whoever began it: also the Execute of a client that has died,
 which goes on without it where the controller's remote time-out is long
@@ -20,7 +20,7 @@ from robolink.protocols.epson_text import ErrorCode, Reply, StatusFlags, parse_s
 from robolink.timing import Clock, Deadline
 
 REST_S: Final = 5.0
-"""Longest time from the first Abort to a state that shows rest (docs/reference/rules.md 5)."""
+"""Longest time from the first Abort to a confirmed stop (docs/reference/rules.md 5)."""
 
 _POLL_S: Final = 0.02
 _AGAIN_S: Final = 1.0
@@ -31,7 +31,7 @@ Ask = Callable[[str], Reply]
 
 
 def bring_to_rest(ask: Ask, clock: Clock, *, controller: str) -> tuple[StatusFlags, int]:
-    """Send Abort, then Stop, and return the flags and the code that show rest.
+    """Send Abort, then Stop, and return the flags and the code that confirm the stop.
 
     Args:
         ask: Asks the controller.
@@ -76,7 +76,7 @@ def _abort(ask: Ask) -> None:
 
 
 def _stop(ask: Ask) -> bool:
-    """Send Stop; False while an Execute that is being aborted is in its way."""
+    """Send Stop; False while an Execute that is being aborted blocks it."""
     try:
         ask("Stop")
     except BusyError:

@@ -11,7 +11,7 @@ Like every conversation it ends for good with a time-out or a broken link; a ses
 answer that nobody asked for, too.
 
 What a request does is judged from the text that leaves, not from who sends it: one that nobody
-thought of counts as acting, and is held back while a stop is in force.
+thought of counts as acting, and is held back while a stop is active.
 """
 
 import re
@@ -119,7 +119,7 @@ class EpsonSession(EpsonConversation):
     Attributes:
         place: Where it was reached, the same for each spelling of the URL.
         exchanges: Requests sent so far.
-        latch: What holds requests back while a stop is in force.
+        latch: Refuses requests while a stop is active.
 
     Args:
         line: An open line; the session owns it from here on.
@@ -138,7 +138,7 @@ class EpsonSession(EpsonConversation):
 
     @property
     def pending(self) -> PendingExecute | None:
-        """The Execute that has not been taken as finished, if any."""
+        """The Execute that was not yet taken as finished, if any."""
         return self._pending
 
     def carries(self, name: str) -> bool:
@@ -188,16 +188,16 @@ class EpsonSession(EpsonConversation):
         return pending
 
     def uninterrupted(self) -> AbstractContextManager[None]:
-        """Hold Ctrl-C back over exchanges that belong together; it is raised at their end."""
+        """Delay Ctrl-C over exchanges that belong together, then raise it."""
         return self._gate
 
     @property
     def interrupted(self) -> bool:
-        """Whether Ctrl-C is held back just now."""
+        """Whether Ctrl-C is being delayed just now."""
         return self._gate.interrupted
 
     def finish(self, pending: PendingExecute) -> None:
-        """Forget an Execute whose answer was taken."""
+        """Forget an Execute whose answer was read."""
         if self._pending is pending:
             self._pending = None
 
@@ -224,7 +224,7 @@ class EpsonSession(EpsonConversation):
                     raise
 
     def _announced(self, request: Request) -> str:
-        """Return a request that this line can carry as a person may read it, before the lock."""
+        """Return a request that this line can carry, for display, before the lock."""
         what = as_shown(request)
         if not self._codec.carries(request.name, *request.parameters):
             self._line.require_carried(request.name, *request.parameters)
@@ -232,7 +232,7 @@ class EpsonSession(EpsonConversation):
         return what
 
     def _admit(self, request: Request, what: str) -> None:
-        """Refuse, under the lock, what is not legal now or a stop forbids."""
+        """Refuse, under the lock, what is not allowed now or a stop forbids."""
         checkpoint(Checkpoint.HELD, what)
         self._check_usable(request)
         self.latch.admit(command_class_of(request), what)
@@ -261,7 +261,7 @@ class EpsonSession(EpsonConversation):
         return name == wanted or (isinstance(event, Refusal) and not name and self._pending is None)
 
     def _expect_silence(self) -> None:
-        """Read what has arrived unasked; only the pending Execute may answer by itself.
+        """Read what has arrived without a request; only the pending Execute may answer by itself.
 
         Each piece is judged before the next is read. So a far end that never stops sending is
         noticed at its first whole message, or at the codec's limit for one, and not when
@@ -322,7 +322,7 @@ def log_in(line: EpsonLine, password: Secret | None, *, timeout_s: float) -> Eps
 
 
 def _prove_in_step(session: EpsonSession) -> None:
-    """See that an answer belongs to its question, on a line that outlives its sessions.
+    """Check that an answer belongs to its question, on a line that outlives its sessions.
 
     No other request is answered with the letter of GetCurRobot, and nothing else asks for it so
     early; so an answer to it can be no late one. It holds a number too, which shows that both

@@ -1,4 +1,4 @@
-"""What an arm with singular places is held back from: places it cannot reach, and those.
+"""Refuses targets that an arm with singular places cannot reach, and the singular places.
 
 Close to where joint 5 is at 0 a straight movement of the tip asks joints 4 and 6 for speeds that
 they do not have, and close to the axis of joint 1 it asks them of joint 1: the controller leaves
@@ -21,7 +21,7 @@ from robolink.protocols import spel
 
 
 def read_position(window: CommandWindow, query: spel.Statement) -> Pose:
-    """Read the position that ``query`` prints, of the tool in force."""
+    """Read the position that ``query`` prints, of the selected tool."""
     tool = spel.parse_integer(window.printed(spel.print_selected_tool()))
     return _printed_pose(window, query, tool=tool)
 
@@ -116,7 +116,7 @@ class SingularPlaces:
     """Asks a controller what a movement of its arm would meet.
 
     All questions are functions that move nothing and raise no error in the controller. Targets
-    are meant for the tool in force.
+    are meant for the selected tool.
 
     Attributes:
         window: The controller.
@@ -127,7 +127,7 @@ class SingularPlaces:
     six_axes: bool
 
     def obstacle(self, target: Pose, path: Path, start: Pose | None = None) -> str:
-        """Return why the arm cannot go to a target, or not straight; empty where it can.
+        """Return why the arm cannot go to a target, or not straight; empty if it can.
 
         Args:
             target: Where to, with its flags.
@@ -141,7 +141,7 @@ class SingularPlaces:
         return self._swing(start, target, self._joint_at(start, _SWING))
 
     def require_clear(self, target: Pose, path: Path) -> None:
-        """Hold a movement back that would end out of reach, or meet a singular place.
+        """Refuse a movement that would end out of reach, or meet a singular place.
 
         Raises:
             LimitError: Says which of the two, and what to do.
@@ -219,7 +219,7 @@ def _turns(start: Pose, target: Pose) -> bool:
 
 
 def _places(start: Pose | None, target: Pose) -> Iterator[Pose]:
-    """Yield the end of a straight way, and what lies between where the tool does not turn."""
+    """Yield the end of a straight movement, and the points between where the tool does not turn."""
     if start is not None and not _turns(start, target):
         begin, end = start.coordinates()[:3], target.coordinates()[:3]
         count = math.ceil(math.dist(begin, end) / _LOOKED_AT_EVERY_MM)

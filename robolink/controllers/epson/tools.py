@@ -50,7 +50,7 @@ class EpsonToolTable(ToolTableCore):
         return _TOOLS
 
     def same(self, a: ToolOffset | None, b: ToolOffset | None) -> bool:
-        """Tell whether this controller prints both alike; undefined equals undefined only."""
+        """Return whether this controller prints both alike; undefined equals undefined only."""
         if a is None or b is None:
             return a is b
         require_offset("a", a)
@@ -65,7 +65,7 @@ class EpsonToolTable(ToolTableCore):
         return {tool: listed.get(tool) for tool in self.indices()}
 
     def selected(self) -> int | None:
-        """Read which tool is in force; the selection survives power-off.
+        """Read which tool is selected; the selection survives power-off.
 
         Source: docs/reference/epson.md 3.1.
         """
@@ -200,7 +200,7 @@ class PublishedTools:
 
     Attributes:
         tools: Every tool by number; an undefined one is ``None``.
-        selected: The tool in force then, 0 for the flange.
+        selected: The selected tool then, 0 for the flange.
         robot: The robot whose tools they are.
         publication: A count that grows with each publication of something new.
     """
@@ -212,7 +212,7 @@ class PublishedTools:
 
 
 def read_published(variables: EpsonVariables) -> PublishedTools | None:
-    """Read the companion's variables, and a torn table again.
+    """Read the companion's variables; a torn table is read again.
 
     Returns:
         The table, ``None`` where the project publishes none.

@@ -63,7 +63,7 @@ class ValueChange(MarkedCommand[ValueT]):
         return () if self._same(self.read(), self._requested) else (self.request,)
 
     def carry_out(self) -> ValueReceipt[ValueT]:
-        """Set the value and prove it.
+        """Set the value and confirm it.
 
         Raises:
             NotReadyError: The state forbids it, monitoring only included.
@@ -106,7 +106,7 @@ class ValueChange(MarkedCommand[ValueT]):
         return self._read()
 
     def refusal(self, marker: Marker, error: RejectedError) -> Iterable[NewEntry]:  # noqa: ARG002 - see below
-        """Put nothing on record: the old value is there."""
+        """Record nothing: the old value is there."""
         return ()
 
 
@@ -377,7 +377,7 @@ def typed_value(text: str, kind: VariableType | str) -> Value:
 
 
 def equal_values(a: object, b: object, kind: VariableType | str = "") -> bool:
-    """Tell whether two values are equal to a controller that keeps 6 or 14 digits."""
+    """Return whether two values are equal to a controller that keeps 6 or 14 digits."""
     tolerance = _RELATIVE.get(variable_type(kind), 0.0) if kind else 0.0
     if isinstance(a, (int, float)) and isinstance(b, (int, float)):
         return math.isclose(a, b, rel_tol=tolerance, abs_tol=0.0)

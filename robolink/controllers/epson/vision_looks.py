@@ -51,7 +51,7 @@ class EpsonLooks:
         self._variables = variables
 
     def require_program(self) -> None:
-        """Find out whether the project publishes looks; reads only.
+        """Check that the project publishes looks; reads only.
 
         Raises:
             ConfigError: It does not.
@@ -89,7 +89,7 @@ class EpsonLooks:
 
 
 class _Look(MarkedCommand[tuple[int, tuple[Spot, ...]]]):
-    """The start of the program, marked until it is known to be over."""
+    """The start of the program, marked until it is known to have ended."""
 
     def __init__(self, link: EpsonLink, variables: EpsonVariables, start: Request) -> None:
         super().__init__(as_sent(start))

@@ -42,11 +42,11 @@ class CommandWindow:
         self._was_ready = False
 
     def status(self) -> ControllerStatus:
-        """Read the flags; legal at any time after the login."""
+        """Read the flags; allowed at any time after the login."""
         return _status(self._session.exchange("GetStatus"))
 
     def require_ready(self, request: str) -> ControllerStatus:
-        """Read the flags and hold ``request`` back if Execute would be refused.
+        """Read the flags and refuse ``request`` if Execute would be refused.
 
         Raises:
             NotReadyError: Names the condition.
@@ -58,7 +58,7 @@ class CommandWindow:
         return status
 
     def require_abort(self) -> None:
-        """Hold back what could not be ended over this line once it runs.
+        """Refuse what could not be ended over this line once it runs.
 
         While a statement runs, Abort alone ends it (docs/reference/epson.md 1.5), and no manual
         prints its letter on Remote RS232 (docs/reference/epson.md 2.2).
@@ -80,7 +80,7 @@ class CommandWindow:
 
     @contextmanager
     def proving_ready(self, request: str) -> Iterator[None]:
-        """Hold ``request`` back unless the queries of a block are answered.
+        """Refuse ``request`` unless the queries of a block are answered.
 
         Execute needs what :meth:`require_ready` looks for (docs/reference/epson.md 1.2), so an
         answer proves it, and later than the flags could. So they are read first only until they
@@ -142,7 +142,7 @@ class CommandWindow:
     def failure(
         self, statement: Statement, answer: Reply | Refusal, *, asked: bool = False
     ) -> RejectedError | ControllerFaultError | UnclearAnswerError:
-        """Find out what became of ``statement``, which was not answered as it should be.
+        """Find out what happened to ``statement``, which had no proper answer.
 
         Args:
             statement: What was sent.

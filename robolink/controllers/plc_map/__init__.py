@@ -1,4 +1,4 @@
-"""PLCs that keep tool offsets in registers of the machine builder's own."""
+"""PLCs that keep tool offsets in the machine builder's own registers."""
 
 from typing import TYPE_CHECKING
 

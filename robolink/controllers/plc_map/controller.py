@@ -1,4 +1,4 @@
-"""A PLC that keeps its tool offsets in registers of the machine builder's own, and opening one.
+"""A PLC that keeps tool offsets in the machine builder's own registers, and opening one.
 
 The inputs that a map names.
 
@@ -95,7 +95,7 @@ _IN_PROCESS: Final = "sim"
 
 
 class FlangeReader(MotionGroupCore):
-    """The axis group of a PLC with a map: it may tell where it is, and is never moved."""
+    """The axis group of a PLC with a map: it may report its place, and is never moved."""
 
     def __init__(self, plc: MappedPlc) -> None:
         super().__init__(plc)
@@ -132,7 +132,7 @@ class FlangeReader(MotionGroupCore):
         return Pose(*pose, tool=0)
 
     def move_to(self, *_asked: object, **_how: object) -> NoReturn:
-        """Refuse, and so does all that would move or stop the machine.
+        """Refuse, like everything that would move or stop the machine.
 
         Raises:
             RejectedError: Always.
@@ -148,7 +148,7 @@ class FlangeReader(MotionGroupCore):
 
 
 class PlcMapController(ControllerCore):
-    """A PLC that is reached by a map. Use it as a context manager.
+    """A PLC that is reached through a map. Use it as a context manager.
 
     It moves nothing: a calibration takes its poses from a person.
 
@@ -205,7 +205,7 @@ class PlcMapController(ControllerCore):
 
     @cached_property
     def resolver(self) -> RegisterResolver:
-        """Settles what was begun here and not proved finished."""
+        """Finishes or undoes interrupted jobs."""
         return RegisterResolver(self._plc, self.tools, self._preserver)
 
     @cached_property
@@ -218,7 +218,7 @@ class PlcMapController(ControllerCore):
         return self._plc.registers.exchanges
 
     def who(self) -> Identity:
-        """Return which PLC this is: what a person confirms about a map holds for that one.
+        """Return which PLC this is: what a person confirms about a map is valid for that one.
 
         Raises:
             TransportError, RemoteProtocolError: The link failed, or its number does not stand
@@ -236,15 +236,15 @@ class PlcMapController(ControllerCore):
         self._plc.require_probe()
 
     def facts(self) -> ControllerFacts:
-        """Return what the map says about the machine; its PLC says nothing."""
+        """Return what the map says about the machine; its PLC reports nothing."""
         return ControllerFacts(controller_name=self.register_map.name)
 
     def error_text(self, code: int) -> str:
-        """Return what the map says about an error number, empty where it says nothing."""
+        """Return the map's text for an error number, empty if it has none."""
         return self.tools.handshake.error_text(code)
 
     def condition(self) -> dict[str, object]:
-        """Read the tool in force, and the text of an error, as far as the map has them.
+        """Read the selected tool, and the text of an error, as far as the map has them.
 
         ``simulated`` stands there for a simulator's address alone: without it nothing is known.
         """
@@ -262,7 +262,7 @@ class PlcMapController(ControllerCore):
         raise self._plc.no_motion()
 
     def stop(self) -> None:
-        """Write nothing from here on; the machine itself nothing here can stop.
+        """Write nothing from here on; robolink cannot stop the machine itself.
 
         Raises:
             RejectedError: Always; the message says to use the emergency stop.
@@ -279,7 +279,7 @@ class PlcMapController(ControllerCore):
         raise self._plc.no_motion()
 
     def _read_status(self) -> ControllerStatus:
-        """Read permit, busy and error; one that the map lacks never hinders.
+        """Read permit, busy and error; one that the map lacks never blocks.
 
         An answer shows that the PLC is alive.
         """
@@ -299,7 +299,7 @@ class PlcMapController(ControllerCore):
 
 
 class _KeepsOthersOut(Preserver):
-    """Nothing is selected or moved here, so that nothing has to be put back."""
+    """Nothing is selected or moved here, so nothing has to be restored."""
 
     def _in_force(self, reason: str) -> None:  # noqa: ARG002 - alike for all
         return None
@@ -392,7 +392,7 @@ def _with_map(url: LinkUrl) -> tuple[RegisterMap, LinkUrl, bool]:
 
 
 def _require_simulator(url: LinkUrl, said: str) -> None:
-    """Refuse the sign of a simulator where a machine could stand behind the address.
+    """Refuse the mark of a simulator if a machine could be behind the address.
 
     Raises:
         ConfigError: It leads out of this computer, or the sign is another than ``yes``.

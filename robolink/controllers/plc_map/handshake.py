@@ -1,4 +1,4 @@
-"""How a PLC is told to take new values over, and how it answers.
+"""How a PLC is asked to take over new values, and how it answers.
 
 Commit bit: request on, the answer comes, request off, the answer goes. Level: the request
 stays on until the answer comes. None: what is written counts. Each wait has its deadline.
@@ -33,11 +33,11 @@ class Handshake:
 
     @property
     def answers(self) -> bool:
-        """Whether the PLC says that it has taken values over."""
+        """Whether the PLC reports that it has taken over the values."""
         return self._commit.kind is not CommitKind.NONE
 
     def make_ready(self) -> None:
-        """Take an old request back, and refuse while the PLC cannot be asked.
+        """Withdraw an old request, and refuse while the PLC cannot be asked.
 
         A request that stands was left by a client that died; nothing follows from ending it.
 
@@ -55,7 +55,7 @@ class Handshake:
             self._registers.clock.sleep(_POLL_S)
 
     def wait_out(self) -> None:
-        """Wait as long as a request of before may be under way, as far as the map tells.
+        """Wait as long as an earlier request may be in progress, as far as the map says.
 
         Registers have no numbers and no owner: a value that arrives late cannot be told from one
         of now, and what arrives later than this nothing here can keep out (docs/plc-maps.md).
@@ -63,7 +63,7 @@ class Handshake:
         self._registers.clock.sleep(self._commit.timeout_s)
 
     def carry_out(self, tool: int) -> None:
-        """Have the PLC take over what stands in the registers.
+        """Have the PLC take over the values in the registers.
 
         Raises:
             RejectedError: It refused; the request is taken back.
@@ -101,11 +101,11 @@ class Handshake:
         )
 
     def error_text(self, code: int) -> str:
-        """Return what the map says about an error number, empty where it says nothing."""
+        """Return the map's text for an error number, empty if it has none."""
         return self._commit.error_texts.get(code, "")
 
     def fault(self) -> int | None:
-        """Return the number of the error that stands now, 0 for one without a number."""
+        """Return the number of the present error, 0 for one without a number."""
         commit = self._commit
         if commit.error is not None and not self._registers.is_on(commit.error):
             return None
@@ -115,11 +115,11 @@ class Handshake:
         return code if code or commit.error is not None else None
 
     def is_busy(self) -> bool:
-        """Whether the PLC says that it is busy."""
+        """Whether the PLC reports that it is busy."""
         return self._registers.is_on(self._commit.busy)
 
     def _answered(self, asked: Signal) -> int | None:
-        """Wait for the answer and take the request back.
+        """Wait for the answer and withdraw the request.
 
         Returns:
             The number of an error that came instead of the answer, ``None`` for none.

@@ -1,4 +1,4 @@
-"""What every part of this driver works with: registers, the map of them, and when both count.
+"""What every part of this driver uses: registers, their map, and when both are valid.
 
 Reads and writes the places of a map, one exchange at a time.
 
@@ -62,7 +62,7 @@ class RegisterClient(Protocol):
 
     @property
     def most_registers(self) -> int:
-        """How many registers it gives in one read."""
+        """How many registers it returns in one read."""
 
     def read_holding(self, address: int, count: int) -> tuple[int, ...]:
         """Return holding registers."""
@@ -95,7 +95,7 @@ class Registers:
         clock: The clock on which its time passes.
         exchanges: Requests sent so far.
         gate: Holds Ctrl-C back inside an exchange, and inside whatever else enters it.
-        latch: What holds writes back while a stop is in force.
+        latch: Refuses writes while a stop is active.
     """
 
     def __init__(self, client: RegisterClient) -> None:
@@ -108,7 +108,7 @@ class Registers:
         self._writing = runtime.lock()
 
     def read(self, table: RegisterTable, addresses: range) -> tuple[int, ...]:
-        """Return what stands there: in one request, or in parts where the server gives fewer.
+        """Return the registers: in one request, or in parts if the server returns fewer.
 
         Parts may be of different moments: whoever needs them to belong together reads twice.
         """
@@ -128,7 +128,7 @@ class Registers:
         return tuple(found)
 
     def read_twice(self, table: RegisterTable, addresses: range) -> tuple[int, ...]:
-        """Return what stands there as soon as two reads agree.
+        """Return the registers as soon as two reads agree.
 
         A server may change registers between the words of one answer
         (docs/reference/softmotion.md 4.1, docs/reference/faults.md F31).
@@ -157,7 +157,7 @@ class Registers:
         return self.read(word.table, range(word.address, word.address + 1))[0]
 
     def is_on(self, signal: Signal | None) -> bool:
-        """Tell whether a signal is on; one that the map does not have is off."""
+        """Return whether a signal is on; one that the map does not have is off."""
         if signal is None:
             return False
         found = self.read(signal.table, range(signal.address, signal.address + 1))[0]
@@ -239,7 +239,7 @@ def _diagnosis(registers: Registers, probe: MapProbe) -> str:
 
 
 def _found(registers: Registers, probe: MapProbe) -> Number | None:
-    """Look for the constant in every order, nearest first."""
+    """Search for the constant in every order, nearest first."""
     number = probe.number
     count = len(number.registers)
     start = max(0, number.address - _AROUND)
@@ -258,7 +258,7 @@ def _found(registers: Registers, probe: MapProbe) -> Number | None:
 
 
 class MappedPlc(DriverLink):
-    """One PLC that is reached by a map.
+    """One PLC that is reached through a map.
 
     Attributes:
         registers: The PLC's tables.
@@ -289,12 +289,12 @@ class MappedPlc(DriverLink):
 
     @property
     def simulated(self) -> bool:
-        """Whether it is a simulator's address; the registers of a machine say nothing of it."""
+        """Whether it is a simulator's address; the registers of a machine do not show it."""
         return self._simulated
 
     @property
     def permitted(self) -> bool:
-        """Whether the machine permits changes now; one without a permit always does."""
+        """Whether the machine permits changes now; always if it has no permit."""
         permit = self.register_map.permit
         return permit is None or self.registers.is_on(permit)
 
@@ -306,7 +306,7 @@ class MappedPlc(DriverLink):
         )
 
     def read_identity(self) -> Identity:
-        """Return who it is: by its own number, where the map says where that stands.
+        """Return who it is: by its own number, if the map says where that is.
 
         Raises:
             TransportError, RemoteProtocolError: The link failed, or the number does not stand
@@ -325,7 +325,7 @@ class MappedPlc(DriverLink):
         return Identity(f"plc:{''.join(f'{word:04X}' for word in words)}", address, place)
 
     def who(self) -> Identity:
-        """Return which PLC this is: what a person confirms about a map holds for that one.
+        """Return which PLC this is: what a person confirms about a map is valid for that one.
 
         Raises:
             TransportError, RemoteProtocolError: The link failed, or its number does not stand
@@ -368,7 +368,7 @@ class MappedPlc(DriverLink):
         )
 
     def require_ready(self, tool: int) -> None:
-        """Refuse a write where the map is not known to be right, or the machine says no."""
+        """Refuse a write if the map is not confirmed, or the machine refuses."""
         self.require_known_place(tool)
         self.require_probe()
         permit = self.register_map.permit
@@ -380,7 +380,7 @@ class MappedPlc(DriverLink):
             )
 
     def require_known_place(self, tool: int) -> None:
-        """Refuse a change of a tool of which nobody has compared anything; writes nothing.
+        """Refuse a change of a tool whose values were never compared; writes nothing.
 
         Raises:
             NotComparedError: Nobody has, with this map at this PLC.
@@ -390,7 +390,7 @@ class MappedPlc(DriverLink):
             self._refuse(tool, tuple(self.register_map.slots[tool].components))
 
     def require_compared(self, tool: int, components: tuple[str, ...]) -> None:
-        """Refuse a change of components that nobody has compared; writes nothing.
+        """Refuse a change of components that were never compared; writes nothing.
 
         Args:
             tool: Number of the tool.

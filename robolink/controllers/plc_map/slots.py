@@ -1,4 +1,4 @@
-"""What stands in a slot, and how other contents come into force.
+"""The content of a slot, and how other content takes effect.
 
 From registers to tool offsets and back, and when two offsets are alike.
 """
@@ -101,7 +101,7 @@ class OffsetValues:
         return words
 
     def _require_believable(self, slot: MapSlot, words: Words) -> None:
-        """Refuse registers that the map would take for no tool, or for none that can be true."""
+        """Refuse registers that the map reads as no tool, or as an impossible one."""
         if not any(words.values()) and self._map.all_zero is not AllZero.TOOL:
             raise LimitError(
                 tr(
@@ -129,12 +129,12 @@ class OffsetValues:
             ) from error
 
     def rounded(self, slot: MapSlot, offset: ToolOffset) -> ToolOffset:
-        """Return the offset that the registers would hold; raises as :meth:`registers`."""
+        """Return the offset as the registers would store it; raises as :meth:`registers`."""
         words = self.registers(slot, offset)
         return ToolOffset(*self.numbers(slot.components, words, largest_mm=self._map.largest_mm))
 
     def same(self, a: ToolOffset | None, b: ToolOffset | None) -> bool:
-        """Tell whether registers hold both alike; undefined equals undefined only.
+        """Return whether registers store both alike; undefined equals undefined only.
 
         Whole numbers: half a step; REAL: one unit in the last place; LREAL: 1e-9
         (docs/reference/rules.md 3).
@@ -147,7 +147,7 @@ class OffsetValues:
         return all(self._alike(name, first, second) for name, first, second in pairs)
 
     def changed(self, slot: MapSlot, outcome: Words, wanted: Words) -> tuple[str, ...]:
-        """Return the components that ``wanted`` holds otherwise than ``standing``.
+        """Return the components in which ``wanted`` differs from ``standing``.
 
         What is no number is another one.
         """
@@ -247,7 +247,7 @@ def runs(words: Words) -> Iterator[tuple[int, list[int]]]:
 
 @dataclass(frozen=True, slots=True)
 class SlotContent:
-    """What stands in a slot, or is to stand there.
+    """The present or the intended content of a slot.
 
     Attributes:
         words: Registers by address; none when only the flag is to change.
@@ -258,7 +258,7 @@ class SlotContent:
     defined: bool = True
 
     def is_part_of(self, other: "SlotContent") -> bool:
-        """Whether ``other`` holds all of this."""
+        """Whether ``other`` contains all of this."""
         return self.defined == other.defined and self.words.items() <= other.words.items()
 
 
@@ -283,7 +283,7 @@ class Slots:
         return self.values.offset(slot, self._words(slot))
 
     def content(self, slot: MapSlot, offset: ToolOffset | None) -> SlotContent:
-        """Return what stands for an offset, or for no tool.
+        """Return the content for an offset, or for no tool.
 
         Raises:
             ToolError: This slot cannot hold it; nothing was sent.
@@ -324,11 +324,11 @@ class Slots:
         return (*requests, *self.handshake.requests(slot.tool))
 
     def bring_into_force(self, slot: MapSlot, content: SlotContent) -> None:
-        """Write ``content``, then ask the PLC; after a refusal what was there stands there again.
+        """Write ``content``, then ask the PLC; after a refusal the former content is restored.
 
         Raises:
             RejectedError: The PLC refused; nothing has changed.
-            OutcomeUnknownError: It did not answer, or the registers could not be put back.
+            OutcomeUnknownError: It did not answer, or the registers could not be restored.
         """
         before = self._stored(slot)
         kept = SlotContent({a: before.words[a] for a in content.words}, before.defined)
@@ -340,7 +340,7 @@ class Slots:
         self._or_put_back(slot, kept, write_and_ask)
 
     def take_over(self, slot: MapSlot, before: ToolOffset | None) -> None:
-        """Ask the PLC once to take over what stands there; raises as :meth:`bring_into_force`.
+        """Ask the PLC once to take over the registers; raises as :meth:`bring_into_force`.
 
         Args:
             slot: The slot.
@@ -350,7 +350,7 @@ class Slots:
         self._or_put_back(slot, kept, lambda: self.handshake.carry_out(slot.tool))
 
     def _or_put_back(self, slot: MapSlot, kept: SlotContent, act: Callable[[], None]) -> None:
-        """Act; if it is refused or stopped, let the registers show again what is in force."""
+        """Act; if it is refused or stopped, let the registers show the active values again."""
         try:
             act()
         except (RejectedError, StoppedError) as error:
@@ -369,7 +369,7 @@ class Slots:
             raise
 
     def _restored(self, slot: MapSlot, kept: SlotContent) -> bool:
-        """Put ``kept`` back where it does not stand, with one write; tell whether it stands."""
+        """Restore ``kept`` where it is not there, with one write; return whether it is there."""
         if kept.is_part_of(self._stored(slot)):
             return True
         try:

@@ -58,7 +58,7 @@ class RegisterToolTable(ToolTableCore):
 
     @property
     def handshake(self) -> Handshake:
-        """How the PLC is told to take values over."""
+        """How the PLC is asked to take values over."""
         return self._slots.handshake
 
     def indices(self) -> Sequence[int]:
@@ -66,7 +66,7 @@ class RegisterToolTable(ToolTableCore):
         return tuple(sorted(self._map.slots))
 
     def same(self, a: ToolOffset | None, b: ToolOffset | None) -> bool:
-        """Tell whether the registers hold both alike; undefined equals undefined only."""
+        """Return whether the registers store both alike; undefined equals undefined only."""
         return self._slots.values.same(a, b)
 
     def require_writable(self, tool: int) -> None:
@@ -92,7 +92,7 @@ class RegisterToolTable(ToolTableCore):
         return ()
 
     def select(self, tool: int, *, wait_s: float | None = None) -> None:  # noqa: ARG002 - alike
-        """Refuse: which tool is in force is the machine's affair.
+        """Refuse: the machine selects its tool itself.
 
         Raises:
             RejectedError: Always, unless the tool is in force already.
@@ -102,7 +102,7 @@ class RegisterToolTable(ToolTableCore):
             self._send_selection(tool)
 
     def doubts(self, tools: Collection[int]) -> tuple[str, ...]:
-        """Tell of registers that hold another value than the one on record.
+        """Report registers that hold another value than the recorded one.
 
         Somebody changed it at the HMI, or a write ended before the PLC was asked to take it over
         and this PC has lost the record of that. The next request then brings it into force: with
@@ -135,7 +135,7 @@ class RegisterToolTable(ToolTableCore):
         )
 
     def take_over(self, tool: int, before: ToolOffset | None, request: str) -> None:
-        """Ask the PLC once to take over what stands in the registers.
+        """Ask the PLC once to take over the values in the registers.
 
         Args:
             tool: Number of the tool.
@@ -261,7 +261,7 @@ class _RegisterWrite(ToolWrite):
 
 
 class RegisterResolver(MarkerResolver):
-    """Examines and settles the open markers that this driver begins."""
+    """Examines and recovers the open markers that this driver begins."""
 
     def __init__(self, plc: MappedPlc, tools: RegisterToolTable, preserver: Preserver) -> None:
         super().__init__(plc, tools, preserver)
@@ -270,7 +270,7 @@ class RegisterResolver(MarkerResolver):
         self._waited = False
 
     def fence(self) -> None:
-        """Wait until what was sent earlier has arrived, once in a session.
+        """Wait until what was sent earlier has arrived, once a session.
 
         A request that stands then is switched off before the PLC is asked for anything.
         """
@@ -279,7 +279,7 @@ class RegisterResolver(MarkerResolver):
             self._waited = True
 
     def settle(self, finding: Finding) -> None:
-        """Do what ``finding.action`` says and forget the marker."""
+        """Do what ``finding.action`` says and remove the marker."""
         marker = finding.marker
         if finding.verdict is Verdict.NOT_FINISHED:
             tool = int(str(marker.details["tool"]))

@@ -1,4 +1,4 @@
-"""What a PLC's refusals and ends mean, in words, with what to do about them."""
+"""The meaning of a PLC's refusals and ends, in words, with their remedies."""
 
 from functools import lru_cache
 from typing import Final, NamedTuple
@@ -43,7 +43,7 @@ class Ended(NamedTuple):
 
 
 def describe(command: Command) -> str:
-    """Return a command as a person may read it: its number, its name, and what it carries."""
+    """Return a command for display: its number, its name, and its content."""
     opcode = command.opcode
     name = opcode.name if isinstance(opcode, Opcode) else ""
     pose = command.pose if opcode in _POSED else ()

@@ -1,4 +1,4 @@
-"""Telling the PLC something, once, and knowing what became of it.
+"""Sends the PLC a command once, and finds out what happened to it.
 
 Source: docs/reference/mailbox.md, "When a command counts".
 
@@ -91,7 +91,7 @@ def command_class_of(command: Command) -> CommandClass:
 
 
 REST_S: Final = 5.0
-"""Longest time from the stop to a state that shows rest (docs/reference/rules.md 5)."""
+"""Longest time from the stop to a confirmed stop state (docs/reference/rules.md 5)."""
 
 _ALREADY: Final = frozenset({ErrorClass.STOPPING, ErrorClass.DISABLED, ErrorClass.ERRORSTOP})
 _LOOK_S: Final = 0.1
@@ -160,7 +160,7 @@ class CommandSender:
         return done
 
     def bring_to_rest(self) -> Response:
-        """Send 2003 and return a snapshot that shows that the group rests.
+        """Send 2003 and return a snapshot that shows that the group has stopped.
 
         Raises:
             RejectedError: The PLC knows no stop: its program moves nothing.
@@ -195,7 +195,7 @@ class CommandSender:
         return now
 
     def _taken(self, end: Ended) -> Response:
-        """Return the snapshot of a command that is done; raise for one that is not."""
+        """Return the snapshot of a finished command; raise for any other."""
         if end.state == CommandState.ERROR:
             raise self._refusal(end.command, end.now, end.error_class)
         if end.state == CommandState.ABORTED:
@@ -203,7 +203,7 @@ class CommandSender:
         return end.now
 
     def start(self, draft: Command) -> Command:
-        """Send a movement or a jog and return it as it was accepted; raises like the other.
+        """Send a movement or a jog and return it as accepted; raises like the other.
 
         Raises:
             KeyboardInterrupt: Ctrl-C came before a movement was sent; it was not.
@@ -315,7 +315,7 @@ class CommandSender:
             )
 
     def _before(self, draft: Command) -> Response:
-        """Return a snapshot of before a command.
+        """Return a snapshot from before a command.
 
         What ends a movement of ours on a slow line does not wait for one: whoever waited on the
         movement has read the last one, and beats no more.
@@ -326,7 +326,7 @@ class CommandSender:
 
     @contextmanager
     def _exchanging(self, request: str) -> Iterator[None]:
-        """Hold the lock from the look at the latch to the acknowledgement."""
+        """Hold the lock from reading the latch to the acknowledgement."""
         checkpoint(Checkpoint.LOCK, request)
         try:
             with self._lock:
@@ -448,7 +448,7 @@ def _came_too_early(command: Command, before: Response, now: Response) -> bool:
 
 
 def _has_taken(command: Command, now: Response) -> bool:
-    """Whether a take succeeded although the answer to it is gone already.
+    """Whether a take succeeded although the answer to it is already gone.
 
     Another client that asked for the mailbox just after it was refused, and the answer to him
     names the holder and the epoch.

@@ -10,7 +10,7 @@ _MOVING = frozenset({GroupState.MOVING, GroupState.HOMING})
 
 
 def is_moving(now: Response) -> bool:
-    """Whether the group moves, whoever told it to; an interrupted movement stands still."""
+    """Whether the group moves, whatever moves it; an interrupted movement does not move."""
     return now.group_state in _MOVING or bool(now.bits & Bits.JOGGING)
 
 
@@ -37,7 +37,7 @@ def status_of(now: Response) -> ControllerStatus:
 
 
 def condition_of(now: Response) -> dict[str, object]:
-    """Return what a snapshot says beyond the flags, plain JSON."""
+    """Return what a snapshot shows beyond the flags, plain JSON."""
     bits = now.bits
     return {
         "text": error_meaning(now.error_class) if status_of(now).code else "",
@@ -53,7 +53,7 @@ def condition_of(now: Response) -> dict[str, object]:
 
 
 def require_permit(now: Response) -> None:
-    """Hold back what changes something while the machine does not permit it.
+    """Refuse a change while the machine does not permit it.
 
     Raises:
         NotReadyError: The permit (xPermit) is missing.
@@ -69,7 +69,7 @@ def require_permit(now: Response) -> None:
 
 
 def require_beats(whole_look_s: float) -> None:
-    """Hold back what must be kept going on a line that is too slow for it.
+    """Refuse what must be kept going on a line that is too slow for it.
 
     Source: docs/reference/mailbox.md.
 
@@ -96,7 +96,7 @@ def require_beats(whole_look_s: float) -> None:
 
 
 def require_still(now: Response) -> None:
-    """Hold back what may not happen while the group moves (docs/reference/faults.md F42).
+    """Refuse what may not happen while the group moves (docs/reference/faults.md F42).
 
     Raises:
         NotReadyError: It moves, or an interrupted movement waits to go on.
@@ -116,12 +116,12 @@ def require_still(now: Response) -> None:
 
 
 def is_tool_known(now: Response) -> bool:
-    """Whether the axis group works with the tool that the mailbox set last."""
+    """Whether the axis group uses the tool that the mailbox set last."""
     return bool(now.bits & Bits.TOOL_KNOWN)
 
 
 def require_tool_known(now: Response) -> None:
-    """Hold back a movement whose tip the mailbox cannot vouch for (docs/reference/faults.md F44).
+    """Refuse a movement whose tip the mailbox does not know (docs/reference/faults.md F44).
 
     Raises:
         NotReadyError: The machine's own program has set another tool than the selected slot's.
@@ -142,7 +142,7 @@ def require_tool_known(now: Response) -> None:
 
 
 def require_enabled(now: Response) -> None:
-    """Hold back what an axis group in this state would refuse.
+    """Refuse what an axis group in this state would refuse.
 
     Source: docs/reference/softmotion.md 1.1, 2.2.
 
@@ -183,7 +183,7 @@ def _obstacle(now: Response) -> tuple[NotReadyReason, str, str] | None:
 
 
 def require_power(now: Response) -> None:
-    """Hold back a movement while a drive has no power.
+    """Refuse a movement while a drive has no power.
 
     Raises:
         NotReadyError: It has none. Enabling the group does not switch it on

@@ -1,4 +1,4 @@
-"""An axis group of a CODESYS SoftMotion PLC behind its mailbox, and meeting one."""
+"""An axis group of a CODESYS SoftMotion PLC behind its mailbox, and connecting to one."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -69,7 +69,7 @@ _LEAVING_S: Final = 1.0
 
 
 class SoftMotionController(ControllerCore):
-    """A PLC mailbox that was met. Use it as a context manager.
+    """A connected PLC mailbox. Use it as a context manager.
 
     The mailbox is owned from the first command that needs it until :meth:`close`; reading the
     state, the position and the tool slots needs no ownership. A stop holds the group on the PLC
@@ -108,7 +108,7 @@ class SoftMotionController(ControllerCore):
 
     @cached_property
     def resolver(self) -> SoftMotionResolver:
-        """Settles what was begun here and not proved finished."""
+        """Finishes or undoes interrupted jobs."""
         return SoftMotionResolver(self._mailbox, self.tools, self._preserver)
 
     @property
@@ -134,17 +134,17 @@ class SoftMotionController(ControllerCore):
         return MailboxFacts.of(self._mailbox.snapshots.take(), device_id=self.device_id)
 
     def verify(self) -> "tuple[MailboxFinding, ...]":
-        """Look at everything that can be seen without a command; nothing is written."""
+        """Check everything that can be seen without a command; nothing is written."""
         from robolink.controllers.softmotion.facts import verify_mailbox
 
         return verify_mailbox(self._mailbox)
 
     def condition(self) -> dict[str, object]:
-        """Read the meaning of an error, the tool in force, and what the mailbox shows beside."""
+        """Read the meaning of an error, the selected tool, and what else the mailbox shows."""
         return condition_of(self._mailbox.snapshots.take())
 
     def preview(self, act: Act) -> tuple[str, ...]:
-        """Return the commands of an act, in words; those of a reset depend on the state."""
+        """Return the commands of an action, in words; those of a reset depend on the state."""
         if act is Act.RESET:
             state = self._mailbox.snapshots.take().group_state
             return tuple(describe(draft) for wrong, draft in _RESETS if wrong == state)
@@ -172,7 +172,7 @@ class SoftMotionController(ControllerCore):
         self._mailbox.commands.ownership.take(insist=insist, patient=patient)
 
     def take_over(self, reason: str) -> None:
-        """Take record and mailbox over because a person insists; see the model.
+        """Take record and mailbox over at a person's request; see the model.
 
         What the owner of the mailbox has under way is ended by the PLC in that cycle.
         """
@@ -194,7 +194,7 @@ class SoftMotionController(ControllerCore):
             self.take(insist=True)
 
     def reset_fault(self) -> None:
-        """Clear the group's error and release a held stop, because a person asked for it.
+        """Clear the group's error and release a stop, at a person's request.
 
         Nothing is sent where there is nothing to reset: SoftMotion calls that an error
         (docs/reference/softmotion.md 2.2).
@@ -220,7 +220,7 @@ class SoftMotionController(ControllerCore):
                 )
 
     def motors(self, on: bool) -> None:
-        """Enable or disable the group, and prove it; the PLC's program switches the drives."""
+        """Enable or disable the group, and confirm it; the PLC's program switches the drives."""
         if on:
             self.groups[0].enable()
         else:
@@ -229,7 +229,7 @@ class SoftMotionController(ControllerCore):
     def set_kinematics(
         self, position: Kinematics, orientation: Kinematics = Kinematics.NONE
     ) -> None:
-        """Put another kinematics in force (MC_SetKinTransform), and prove it.
+        """Select another kinematics (MC_SetKinTransform), and confirm it.
 
         The tool is identity and no slot is selected afterwards (docs/reference/softmotion.md 1.1).
 
@@ -237,12 +237,12 @@ class SoftMotionController(ControllerCore):
             NotReadyError: The group moves, or the machine does not permit it.
             RejectedError: The PLC refused it.
             ReadBackError: Another kinematics is in force.
-            OutcomeUnknownError: Something earlier is unsettled, or no answer came.
+            OutcomeUnknownError: An earlier job is unfinished, or no answer came.
         """
         set_kinematics(self._mailbox, position, orientation)
 
     def _take_leave(self) -> None:
-        """Halt what nobody waited on, and give the mailbox back.
+        """Halt what nobody waited on, and release the mailbox.
 
         A machine that called takes that for the word that its tool is settled
         (docs/plc-callback.md), so while such a change is open the mailbox stays taken.
@@ -313,7 +313,7 @@ def open_softmotion(
     kinematics: str | tuple[object, ...] = (),
     tell: Callable[[str], None] = lambda _sentence: None,
 ) -> SoftMotionController:
-    """Meet the mailbox and return the controller; the link is closed when that fails.
+    """Connect to the mailbox and return the controller; the link is closed if that fails.
 
     Nothing is written: whoever only reads disturbs nobody.
 

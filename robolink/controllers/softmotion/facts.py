@@ -1,4 +1,4 @@
-"""What a mailbox says about the machine behind it.
+"""What a mailbox reports about the machine behind it.
 
 What a PLC's mailbox shows of itself, reading only: for a person who has just loaded it.
 """
@@ -55,7 +55,7 @@ class MailboxFacts:
 
     @classmethod
     def of(cls, now: Response, *, device_id: int | None) -> "MailboxFacts":
-        """Return what a snapshot says."""
+        """Return the facts in a snapshot."""
         return cls(
             version=f"{now.version >> 8}.{now.version & 0xFF}",
             kinematics=block_name(now.position_kinematics),
@@ -68,7 +68,7 @@ class MailboxFacts:
         )
 
     def shared(self) -> ControllerFacts:
-        """Return the same as far as all kinds of controllers share it."""
+        """Return the part that all kinds of controllers share."""
         blocks = (self.kinematics, self.orientation_kinematics)
         model = " + ".join(name for name in blocks if name)
         return ControllerFacts(
@@ -80,7 +80,7 @@ class MailboxFacts:
 
 
 def set_kinematics(mailbox: Mailbox, position: Kinematics, orientation: Kinematics) -> None:
-    """Put a kinematics in force and prove it; see ``SoftMotionController.set_kinematics``."""
+    """Select a kinematics and confirm it; see ``SoftMotionController.set_kinematics``."""
     draft = Command(0, Opcode.SET_KINEMATICS, operands=(position, orientation, 0, 0))
     request, wanted = describe(draft), kinematics_word(position, orientation)
     with mailbox.lock.held(request):
@@ -138,7 +138,7 @@ class MailboxFinding:
 
 
 def verify_mailbox(mailbox: Mailbox) -> tuple[MailboxFinding, ...]:
-    """Look at everything that can be seen without a command; nothing is written.
+    """Check everything that can be seen without a command; nothing is written.
 
     That the version, the probe and the heartbeat are right was found on connecting, which would
     have failed otherwise.
@@ -163,7 +163,7 @@ def verify_mailbox(mailbox: Mailbox) -> tuple[MailboxFinding, ...]:
 
 
 def _pace(mailbox: Mailbox, now: Response) -> Iterator[MailboxFinding]:
-    """Tell how fast the PLC counts, and how fast it answers."""
+    """Measure how fast the PLC counts, and how fast it answers."""
     clock, wire = mailbox.wire.clock, mailbox.wire
     begun_ns, count, slowest_s = clock.now_ns(), 0, 0.0
     before = now.plc_heartbeat

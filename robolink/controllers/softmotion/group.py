@@ -1,4 +1,4 @@
-"""The axis group behind one mailbox: where its tip is, and how it is told to move."""
+"""The axis group behind one mailbox: where its tip is, and how to move it."""
 
 import math
 
@@ -70,7 +70,7 @@ class SoftMotionGroup(MotionGroupCore):
         return {"axes": now.axes[: now.axis_count]}
 
     def require_able(self, purpose: str) -> None:
-        """Refuse what no movement could begin in now; see :class:`robolink.model.MotionGroup`."""
+        """Refuse if no movement could start now; see :class:`robolink.model.MotionGroup`."""
         with self._mailbox.asked(purpose):
             require_beats(self._mailbox.wire.whole_look_s)
             now = self._mailbox.snapshots.take()
@@ -91,7 +91,7 @@ class SoftMotionGroup(MotionGroupCore):
         return self._mailbox.snapshots.take().group_state != GroupState.DISABLED
 
     def enable(self) -> None:
-        """Enable the group and prove it; the drives are switched by the PLC's program.
+        """Enable the group and confirm it; the drives are switched by the PLC's program.
 
         Raises:
             RejectedError: The PLC refused it.
@@ -100,7 +100,7 @@ class SoftMotionGroup(MotionGroupCore):
         self._switch(Opcode.ENABLE, enabled=True)
 
     def disable(self) -> None:
-        """Disable the group, which must stand still, and prove it; raises like :meth:`enable`."""
+        """Disable the stopped group and confirm it; raises like :meth:`enable`."""
         self._switch(Opcode.DISABLE, enabled=False)
 
     def move_to(self, target: Pose, profile: MotionProfile, *, box: WorkBox) -> SoftMotionMotion:
@@ -136,19 +136,19 @@ class SoftMotionGroup(MotionGroupCore):
         return (describe(self._until_draft(target, edge, speed_mm_s)),)
 
     def run_up_mm(self, speed_mm_s: float) -> float:
-        """Return the way of the acceleration and jerk that such a movement is sent with."""
+        """Return the distance of the acceleration and jerk of such a movement."""
         return run_up_mm(speed_mm_s)
 
     def edge_step_mm(self, speed_mm_s: float) -> float:
-        """Return how far it goes in a cycle: where it sees an edge is noted once a cycle."""
+        """Return how far it goes in a cycle: the PLC notes an edge once a cycle."""
         return speed_mm_s * LATCH_CYCLE_S
 
     def jog(self, jog: Jog, *, duration_s: float, box: WorkBox) -> Pose:
-        """Jog for a time, bring the group to rest, and return where the tip is then.
+        """Jog for a time, stop the group, and return where the tip is then.
 
         Raises:
             LimitError: The tip came out of the box; the jog was ended there.
-            OutcomeUnknownError: Something earlier is unsettled, or no answer came.
+            OutcomeUnknownError: An earlier job is unfinished, or no answer came.
         """
         watch = JogWatch(self._mailbox, jog, box)
         with self._mailbox.lock.held(watch.request):
@@ -156,7 +156,7 @@ class SoftMotionGroup(MotionGroupCore):
             return watch.run(duration_s)
 
     def stop(self) -> None:
-        """Stop and hold; may be called from any thread, at any time, more than once.
+        """Stop and stay stopped; from any thread, at any time, more than once.
 
         Until ``release_stop`` nothing acts from here, and until ``reset_fault`` nothing moves.
 
@@ -167,18 +167,18 @@ class SoftMotionGroup(MotionGroupCore):
             self._mailbox.commands.bring_to_rest()
 
     def halt(self) -> None:
-        """Bring the group to rest, ending every movement; it may be moved again at once."""
+        """Stop the group, ending every movement; it may be moved again at once."""
         self._mailbox.commands.carry_out(Command(0, Opcode.HALT))
 
     def interrupt(self) -> None:
-        """Bring the movement to rest on its path; :meth:`resume` lets it go on."""
+        """Pause the movement on its path; :meth:`resume` continues it."""
         self._mailbox.commands.carry_out(Command(0, Opcode.INTERRUPT))
 
     def resume(self) -> None:
-        """Let the interrupted movement go on; somebody must be waiting on it.
+        """Continue the interrupted movement; somebody must be waiting on it.
 
         Raises:
-            OutcomeUnknownError: Something earlier is unsettled, or no answer came.
+            OutcomeUnknownError: An earlier job is unfinished, or no answer came.
         """
         draft = Command(0, Opcode.CONTINUE)
         request = describe(draft)
@@ -191,13 +191,13 @@ class SoftMotionGroup(MotionGroupCore):
                 mailbox.commands.carry_out(draft)
 
     def abort_unfinished(self) -> None:
-        """Halt what was sent here and not seen to its end."""
+        """Halt what was sent here and whose end was not seen."""
         for motion in self._current:
             if not motion.settled:
                 motion.abort()
 
     def _start(self, target: Pose, draft: Command) -> SoftMotionMotion:
-        """Start a movement that lies inside the limits; see the model."""
+        """Start a movement inside the limits; see the model."""
         mailbox, request = self._mailbox, describe(draft)
         try:
             with mailbox.lock.held(request):
@@ -225,12 +225,12 @@ class SoftMotionGroup(MotionGroupCore):
         return SoftMotionMotion(target, command, marker, mailbox)
 
     def _require_startable(self, draft: Command, request: str) -> Response:
-        """Hold back what may not start now; see the room ``link``.
+        """Refuse what may not start now; see the module ``link``.
 
         Raises:
             ConfigError: The line is too slow for any movement.
             NotReadyError: The group, its drives, the machine or another movement forbid it.
-            OutcomeUnknownError: Something earlier is unsettled.
+            OutcomeUnknownError: An earlier job is unfinished.
             LeaseHeldError, LeaseLostError: Another client owns the mailbox.
         """
         mailbox = self._mailbox
@@ -244,7 +244,7 @@ class SoftMotionGroup(MotionGroupCore):
         return now
 
     def _require_settled(self, request: str) -> None:
-        """Hold ``request`` back, before the mailbox is taken, while something is unsettled."""
+        """Refuse ``request``, before the mailbox is taken, while a job is unfinished."""
         # The markers of our own movements under way do not count; what was open before the
         # first of them would have held that one back.
         if not self._mailbox.wire.motions.unread:

@@ -19,7 +19,7 @@ from robolink.protocols.mailbox import heartbeat_word
 from robolink.timing import NS_PER_S
 
 FROZEN_S: Final = 1.0
-"""A motion task counts every few milliseconds; after this long without a count it is dead."""
+"""A motion task counts every few milliseconds; without a count for this long it is dead."""
 
 BUSY_BEAT_S: Final = 0.05
 """Between beats while something moves: the PLC halts it after 0.5 s without one.
@@ -44,13 +44,13 @@ class PlcHeartbeat:
         self._looks = 0
 
     def note(self, count: int, now_ns: int) -> None:
-        """Take what was read just now."""
+        """Note the value that was just read."""
         if count != self._count:
             self._count, self._since_ns, self._looks = count, now_ns, 0
         self._looks += 1
 
     def frozen(self, now_ns: int) -> bool:
-        """Whether the count has stood still under close observation.
+        """Whether the count has not changed under close observation.
 
         Two equal counts far apart prove nothing: the counter wraps.
         """
@@ -94,7 +94,7 @@ _LONGEST_EXCHANGE_S: Final = 10.0
 
 
 class Turns:
-    """Lets threads onto the wire. That one exchange follows another is the link's own lock.
+    """Orders threads on the wire. The link's own lock orders its exchanges.
 
     A ``with`` block is one exchange.
     """
@@ -114,7 +114,7 @@ class Turns:
 
     @contextmanager
     def kept(self) -> Iterator[None]:
-        """Have the say over who comes in, for as long as this thread waits on a movement."""
+        """Decide who comes in, as long as this thread waits on a movement."""
         counted = False
         try:
             with self._changed:
@@ -131,7 +131,7 @@ class Turns:
                     self._changed.notify_all()
 
     def let_one_in(self) -> bool:
-        """Let another thread have one exchange and wait for its end; False when none wants it."""
+        """Let another thread have one exchange and wait for its end; False if none wants it."""
         with self._changed:
             self._sign_s = _now_s()
             if not self._waiting:

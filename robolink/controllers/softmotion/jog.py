@@ -1,4 +1,4 @@
-"""Jogging: the group moves along chosen axes for a time, watched, and is brought to rest."""
+"""Jogging: the group moves along chosen axes for a time, watched, and is stopped."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -54,7 +54,7 @@ _LENGTHS = frozenset({0, 1, 2})
 
 @dataclass(frozen=True, slots=True)
 class Jog:
-    """Which way to jog, and how fast.
+    """The direction and the speed of a jog.
 
     Axes are 0 to 5: X, Y, Z and turns about the X, Y, Z axis of ``system``, which are not
     Euler angles (docs/reference/softmotion.md 2.3); in ACS the machine's axes.
@@ -101,7 +101,7 @@ class Jog:
 
 
 class JogWatch:
-    """Begins a jog, keeps it going, watches it, and ends it.
+    """Starts a jog, keeps it going, watches it, and ends it.
 
     Args:
         mailbox: Where it is commanded.
@@ -171,7 +171,7 @@ class JogWatch:
                 raise
 
     def _hold(self, duration_s: float) -> LimitError | ControllerError | None:
-        """Keep it going for its time; return what ended it before, if anything did."""
+        """Keep it going for its time; return what ended it early, if anything did."""
         snapshots = self._mailbox.snapshots
         deadline = Deadline.after(self._mailbox.wire.clock, duration_s)
         now = snapshots.take()
@@ -187,7 +187,7 @@ class JogWatch:
         return self._ended_by_plc(now)
 
     def _ended_by_plc(self, now: Response) -> ControllerError | None:
-        """Return why a jog that nobody here ended has ended all the same, ``None`` if it has not.
+        """Return why a jog has ended that nobody here ended, ``None`` if it has not.
 
         Its end stands in the head while it is the last command, and else among the last ends.
         """
@@ -218,7 +218,7 @@ class JogWatch:
         return end is not None and end.error_class in DISPOSSESSED
 
     def _bring_to_rest(self, *, ended: bool = False) -> Response:
-        """End the jog, unless the PLC has, and see the group at rest. No beat goes out any more.
+        """End the jog, unless the PLC has, and see the group stopped. No more beats go out.
 
         Where the PLC does not take the end, the group is halted, and where it does not take that
         either, it is stopped and held; and without a beat it ends every jog by itself.
@@ -244,7 +244,7 @@ class JogWatch:
         return now
 
     def _end(self) -> RobolinkError | None:
-        """Send the end of the jog, or what is stronger; return why the first was not taken."""
+        """Send the end of the jog, or a stronger stop; return why the first was not accepted."""
         refusal: RobolinkError | None = None
         for draft in (self._end_draft, *_STRONGER):
             try:

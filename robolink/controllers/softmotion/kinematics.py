@@ -1,4 +1,4 @@
-"""Whether a tool fits the kinematics of a PLC, said before it is written.
+"""Checks whether a tool fits the kinematics of a PLC, before it is written.
 
 The PLC refuses such a tool by itself, in one word for all of it
 (``SMC_AXIS_GROUP_TOOL_OFFSET_INCOMPATIBLE_WITH_KINEMATICS``); here it is said which part of the
@@ -144,7 +144,7 @@ class OrientationImages:
 
 
 class NoOrientationImageError(Exception):
-    """A kinematics lacks the interface by which tools are judged: no tool fits it."""
+    """A kinematics lacks the interface by which robolink judges tools: no tool fits it."""
 
 
 def _asked(question: Callable[[RotationMatrix], Image]) -> Image | None:
@@ -162,7 +162,7 @@ _AXES: Final = {(1.0, 0.0, 0.0): "X", (0.0, 1.0, 0.0): "Y", (0.0, 0.0, 1.0): "Z"
 
 
 def require_fit(images: OrientationImages, now: Response, offset: ToolOffset) -> None:
-    """Refuse a tool that the kinematics in force cannot carry; one nobody knows is the PLC's.
+    """Refuse a tool that the present kinematics cannot carry; an unknown one is the PLC's.
 
     Args:
         images: What is known of the kinematics.
@@ -187,7 +187,7 @@ def require_fit(images: OrientationImages, now: Response, offset: ToolOffset) ->
 
 
 def require_measurable(images: OrientationImages, now: Response, components: Sequence[str]) -> None:
-    """Refuse to measure components of a shift that the kinematics in force cannot carry.
+    """Refuse to measure components of a shift that the present kinematics cannot carry.
 
     A measured one is never exactly zero, so it would be refused when it is written, with the
     work of a measurement behind it.

@@ -1,4 +1,4 @@
-"""What every part of this driver works with: one mailbox, its commands and its markers.
+"""What every part of this driver uses: one mailbox, its commands and its markers.
 
 Which PLC answers: the number that it drew once, the same on every link.
 
@@ -38,7 +38,7 @@ _READS: Final = 3
 
 
 class DeviceReading(Protocol):
-    """A :class:`robolink.transport.MailboxLink`, as far as it is needed here."""
+    """A :class:`robolink.transport.MailboxLink`, as far as needed here."""
 
     def read_device(self) -> tuple[int, ...]:
         """Return the words of the device block."""
@@ -89,7 +89,7 @@ ROUNDED_TILT_DEG = 1e-6
 
 
 class Mailbox(DriverLink):
-    """One PLC mailbox that was met.
+    """One connected PLC mailbox.
 
     Attributes:
         wire: The session.
@@ -116,7 +116,7 @@ class Mailbox(DriverLink):
         super().__init__(wire.identity, wire.clock, wire.latch, outcomes, gate=wire.uninterrupted())
 
     def _who(self) -> Identity:
-        """Return who it is: as it was read when the mailbox was met, from then on anew."""
+        """Return who it is: first as read at the connection, from then on anew."""
         if not self._just_read:
             self.device_id = read_device_id(self.wire)
         self._just_read = False
@@ -129,7 +129,7 @@ class Mailbox(DriverLink):
 
     @property
     def simulated(self) -> bool:
-        """Whether the last snapshot said that the axes are simulated."""
+        """Whether the last snapshot reported that the axes are simulated."""
         return bool(self.snapshots.latest.bits & Bits.SIMULATED)
 
     def show_life(self) -> None:
@@ -168,7 +168,7 @@ class Mailbox(DriverLink):
             return now
 
     def same(self, a: ToolOffset | None, b: ToolOffset | None) -> bool:
-        """Tell whether this PLC holds both alike; rotations are compared as matrices."""
+        """Return whether this PLC stores both alike; rotations are compared as matrices."""
         if a is None or b is None:
             return a is b
         require_offset("a", a)
@@ -184,7 +184,7 @@ class Mailbox(DriverLink):
         return ToolOffset(*self.coordinates(frame))
 
     def tool_in(self, slot: Slot) -> ToolOffset | None:
-        """Return what a slot holds, ``None`` when it is empty.
+        """Return the content of a slot, ``None`` when it is empty.
 
         Values of no tool come as they are: an angle of 1e200 degrees made a rotation would look
         like one that somebody meant.
@@ -195,7 +195,7 @@ class Mailbox(DriverLink):
         return ToolOffset(*slot.tool) if of_no_tool(slot.tool) else tool
 
     def pose(self, frame: Six, *, tool: int | None) -> Pose:
-        """Return where a frame that the PLC tells is, without the tilt that is mere rounding.
+        """Return the place of a frame from the PLC, without tilt that is mere rounding.
 
         A kinematics that cannot tilt works out its orientation all the same, and not every one
         ends at exactly 0; what only serves an upright flange asks for exactly that.
@@ -238,7 +238,7 @@ class MarkedDraft(MarkedCommand[T]):
     Args:
         mailbox: Where it is sent.
         draft: The command.
-        details: Plain JSON values needed to settle it later.
+        details: Plain JSON values needed to recover it later.
         read: Reads what it changes.
     """
 
@@ -255,7 +255,7 @@ class MarkedDraft(MarkedCommand[T]):
 
     @property
     def details(self) -> Mapping[str, object]:
-        """Plain JSON values needed to settle it later."""
+        """Plain JSON values needed to recover it later."""
         return self._details
 
     def send(self) -> None:

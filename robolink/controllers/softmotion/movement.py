@@ -1,4 +1,4 @@
-"""A movement of an axis group: accepted by the PLC, waited on here with a beating heart.
+"""A movement of an axis group: the PLC accepts it, and heartbeats keep it going.
 
 How fast: the four numbers that go with a movement or a jog.
 
@@ -57,7 +57,7 @@ class SoftMotionMotion:
 
     @property
     def settled(self) -> bool:
-        """Whether its end was seen and taken."""
+        """Whether its end was seen and handled."""
         return self._end is not None
 
     def wait(self, *, timeout_s: float) -> MotionOutcome:
@@ -102,7 +102,7 @@ class SoftMotionMotion:
         self._await_rest()
 
     def await_end(self, timeout_s: float) -> Finished:
-        """Wait for the end, whatever it is; raises like :meth:`wait` but for how it ended."""
+        """Wait for the end, whatever it is; raises like :meth:`wait` except for how it ended."""
         mailbox = self._mailbox
         if self._end is not None:
             return self._end
@@ -153,7 +153,7 @@ class SoftMotionMotion:
         return True
 
     def _patience_s(self, deadline: Deadline) -> float:
-        """Return how long the head alone is looked at while it shows nothing new.
+        """Return how long to read the head alone while it shows nothing new.
 
         Of a single movement it shows the end (it is the last command), and whatever else ends it:
         so on a slow line the whole block, which keeps the beat waiting, is read rarely.
@@ -174,7 +174,7 @@ class SoftMotionMotion:
         return self._end
 
     def _await_rest(self) -> None:
-        """Let the group come to rest unless more is under way.
+        """Let the group stop unless more is in progress.
 
         It counts as moving for a cycle longer than its last movement
         (docs/reference/softmotion.md 2.2), and a program that watches an input may call that
@@ -290,7 +290,7 @@ def up_to_an_edge(speed_mm_s: float, *, unit_um: float) -> Four:
 
 
 def run_up_mm(speed_mm_s: float) -> float:
-    """Return in what way a movement that an input stops reaches its speed, and comes to rest.
+    """Return the distance in which such a movement reaches its speed, and stops.
 
     With acceleration a and jerk j the speed v takes v/a + a/j, or 2 sqrt(v/j) where a is never
     reached, and half of v times that is the way.

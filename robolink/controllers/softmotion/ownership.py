@@ -1,4 +1,4 @@
-"""Who may command the mailbox: one client at a time, known by a token and an epoch.
+"""Who may command the mailbox: one client at a time, identified by a token and an epoch.
 
 The PLC gives the mailbox to whoever asks when nobody owns it, when its owner has been silent
 for 10 s with nothing moving, or when a person insists; each time under a new epoch, so that a
@@ -48,7 +48,7 @@ def take_command(*, insist: bool) -> Command:
 
 @dataclass(frozen=True, slots=True)
 class Bystanders:
-    """Who has to do with the ownership besides the PLC.
+    """Who is involved in the ownership besides the PLC.
 
     Attributes:
         outcomes: Knows which run a token belongs to; ``None`` where nothing is ever taken.
@@ -60,7 +60,7 @@ class Bystanders:
 
 
 class Ownership:
-    """Takes the mailbox, once, and gives it back.
+    """Takes the mailbox, once, and releases it.
 
     Args:
         wire: The session; its ``epoch`` is 0 while we own nothing.
@@ -90,7 +90,7 @@ class Ownership:
             self.take()
 
     def take(self, *, insist: bool = False, patient: bool = True) -> None:
-        """Take the mailbox; from a run of this computer that has ended, when its silence is over.
+        """Take the mailbox; from an ended run of this computer, when its silence is over.
 
         Args:
             insist: A person who sees the cell wants it, whoever owns it now.
@@ -111,7 +111,7 @@ class Ownership:
             self._outwait(held, run)
 
     def _outwait(self, held: LeaseHeldError, run: ClientRun) -> None:
-        """Ask again and again until the PLC gives away what a run left that has ended."""
+        """Ask repeatedly until the PLC releases what an ended run left."""
         self._tell(
             tr(
                 "{who} locked the mailbox of the PLC on {since} and ended without "
@@ -189,13 +189,13 @@ class Ownership:
                 return
 
     def lose(self) -> None:
-        """Note that the PLC says it is not ours any more."""
+        """Note that the PLC reports that it is not ours any more."""
         self._wire.epoch = 0
         self._lost = True
         self._forget()
 
     def release(self) -> None:
-        """Give the mailbox back, if it is ours; what is unfinished is halted first.
+        """Release the mailbox, if it is ours; what is unfinished is halted first.
 
         Ctrl-C waits for that: else the next program would be refused for ten seconds.
 

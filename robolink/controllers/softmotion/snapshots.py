@@ -71,7 +71,7 @@ def read_block(words: Sequence[int], *, controller: str) -> Response:
 
 
 def _require_place(words: Sequence[int], controller: str) -> None:
-    """Refuse words whose probe stands elsewhere, or in another order, and say how."""
+    """Refuse words with their probe in another place, or in another order, and say how."""
     found = find_probe(words)
     if found is None:
         return
@@ -298,7 +298,7 @@ class Snapshots:
         return useless if keep else self._wire.ended(useless)
 
     def _look_back(self, link: MailboxLink) -> RobolinkError | None:
-        """Return that the PLC has started anew, when it is that which ended the session.
+        """Report that the PLC has restarted, if that is what ended the session.
 
         A start cuts TCP connections, and nothing but the next look tells it from a cable.
         """

@@ -66,7 +66,7 @@ class GroupTool:
         return self._mailbox.from_plc(now.answer.pose)
 
     def require(self, offset: ToolOffset | None) -> None:
-        """Prove that the group works with ``offset``.
+        """Confirm that the group works with ``offset``.
 
         Raises:
             ReadBackError: It works with another tool.
@@ -129,7 +129,7 @@ class SlotWrite(ToolWrite):
         self._mailbox.commands.carry_out(self._draft)
 
     def read_back(self) -> ToolOffset | None:
-        """Return what is stored, or what the group works with where that differs."""
+        """Return what is stored, or what the group works with if that differs."""
         found, group_tool = self._slot(), self._group_tool
         if group_tool is not None and self._mailbox.same(found, self.requested):
             found = group_tool.read()
@@ -166,11 +166,11 @@ class SoftMotionToolTable(ToolTableCore):
         return SLOTS
 
     def same(self, a: ToolOffset | None, b: ToolOffset | None) -> bool:
-        """Tell whether the PLC holds both alike: 1e-9, rotations as matrices."""
+        """Return whether the PLC stores both alike: 1e-9, rotations as matrices."""
         return self._mailbox.same(a, b)
 
     def read_all(self) -> dict[int, ToolOffset | None]:
-        """Read every slot, with one proof of the word order behind them all."""
+        """Read every slot, with one check of the word order for all of them."""
         found = {
             tool: self._mailbox.tool_in(slot)
             for tool, slot in self._mailbox.snapshots.slots(SLOTS).items()
@@ -257,11 +257,11 @@ class SoftMotionToolTable(ToolTableCore):
         self._require_carried(offset, self._mailbox.snapshots.take())
 
     def require_measurable(self, components: Sequence[str]) -> None:
-        """Refuse to measure what this kinematics could not be told; see the model."""
+        """Refuse to measure what this kinematics cannot accept; see the model."""
         require_measurable(self._images, self._mailbox.snapshots.take(), components)
 
     def _require_carried(self, offset: ToolOffset | None, now: Response) -> None:
-        """Refuse what the kinematics cannot carry, unless it is put back."""
+        """Refuse what the kinematics cannot carry, unless it is being restored."""
         if offset is not None and not self._mailbox.latch.restores:
             require_fit(self._images, now, offset)
 
@@ -272,7 +272,7 @@ class SoftMotionToolTable(ToolTableCore):
         return tr("The mailbox has tools 0 to 15.")
 
     def _require_changeable(self, tool: int, requested: ToolOffset | None, now: Response) -> None:
-        """Hold back what the PLC would refuse for the slot in force."""
+        """Refuse what the PLC would refuse for the selected slot."""
         if requested is None:
             require_replacement(tool, None)
         require_enabled(now)
@@ -289,14 +289,14 @@ def _select_draft(tool: int) -> Command:
 
 
 class SoftMotionResolver(MarkerResolver):
-    """Examines and settles the open markers that this driver begins."""
+    """Examines and recovers the open markers that this driver begins."""
 
     def __init__(self, mailbox: Mailbox, tools: SoftMotionToolTable, preserver: Preserver) -> None:
         super().__init__(mailbox, tools, preserver)
         self._mailbox = mailbox
 
     def fence(self) -> None:
-        """Take the mailbox: a block that is under way belongs to an epoch of before then."""
+        """Take the mailbox: a block in progress belongs to an earlier epoch."""
         self._mailbox.commands.ownership.fence()
 
     def _require_rest(self) -> None:

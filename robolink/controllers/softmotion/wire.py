@@ -1,4 +1,4 @@
-"""One session on a mailbox link: requests, beats in between, and an end that is final.
+"""One session on a mailbox link: requests, beats in between, and a final end.
 
 A read that gets no answer may be asked again as long as the link says that it can still be
 used: a serial line finds its place again, TCP and CAN do not. A write is never repeated here.
@@ -59,12 +59,12 @@ class MotionTracker:
 
     @property
     def alone(self) -> bool:
-        """Whether there is one movement and no more, so that the head shows how it fares."""
+        """Whether there is exactly one movement, so that the head shows how it goes."""
         return len(self._ends) == 1
 
     @property
     def unread(self) -> bool:
-        """Whether there are movements whose end nobody has taken."""
+        """Whether there are movements whose end nobody has read."""
         return bool(self._ends)
 
     def require_room(self, request: str) -> None:
@@ -84,19 +84,19 @@ class MotionTracker:
         self._ends[sequence] = None
 
     def forget(self, sequence: int) -> None:
-        """Expect it no longer: it was refused, or its end was taken."""
+        """Expect it no longer: it was refused, or its end was read."""
         self._ends.pop(sequence, None)
 
     def holds(self, sequence: int) -> bool:
-        """Whether its end is awaited, or was not taken."""
+        """Whether its end is awaited, or was not read."""
         return sequence in self._ends
 
     def end_of(self, sequence: int) -> Finished | None:
-        """Return how it ended, ``None`` while that is not known."""
+        """Return how it ended, ``None`` while that is unknown."""
         return self._ends.get(sequence)
 
     def note(self, now: Response) -> None:
-        """Look through a snapshot for ends."""
+        """Search a snapshot for ends."""
         if None not in self._ends.values():
             return
         ends = [end for end in now.finished if end.sequence]
@@ -133,7 +133,7 @@ ErrorT = TypeVar("ErrorT", bound=RobolinkError)
 
 
 class _ThisThread(threading.local):
-    """What the thread that asks is doing."""
+    """What the requesting thread is doing."""
 
     attends = False
     goes_first = False
@@ -149,7 +149,7 @@ class MailboxWire:
         owner: This client's token, never 0.
         epoch: The epoch of our ownership, 0 while we have none.
         motions: The movements of this client.
-        latch: What holds commands back while a stop is in force.
+        latch: Refuses commands while a stop is active.
         timeout_s: Longest wait for the PLC to acknowledge a command.
         exchanges: Requests sent so far.
         look_back: Looks over another link at what ended the session; ``None`` before the
@@ -184,12 +184,12 @@ class MailboxWire:
         return self._ended_by is None
 
     def uninterrupted(self) -> AbstractContextManager[None]:
-        """Hold Ctrl-C back over exchanges that belong together; it is raised at their end."""
+        """Delay Ctrl-C over exchanges that belong together, then raise it."""
         return self._gate
 
     @property
     def interrupted(self) -> bool:
-        """Whether Ctrl-C is held back just now."""
+        """Whether Ctrl-C is being delayed just now."""
         return self._gate.interrupted
 
     def read_head(self) -> MailboxHead:
@@ -249,7 +249,7 @@ class MailboxWire:
 
     @contextmanager
     def ahead(self) -> Iterator[None]:
-        """Let the exchanges of this thread wait for no other's turn: it stops a movement."""
+        """Let the exchanges of this thread go before all others: it stops a movement."""
         before = self._goes_first
         self._here.goes_first = True
         try:
@@ -350,14 +350,14 @@ class MailboxWire:
         raise self._over(lost[0])
 
     def _over(self, error: RobolinkError) -> RobolinkError:
-        """End the session because of ``error``, and return what is to be said about it."""
+        """End the session because of ``error``, and return the error to report."""
         told = self._explained(error)
         if told is not error:
             told.__cause__ = error
         return self.ended(told)
 
     def _explained(self, error: RobolinkError) -> RobolinkError:
-        """Return why the link ended, if another look tells more; it only reads."""
+        """Return why the link ended, if another read shows more."""
         if self.look_back is None or isinstance(error, RemoteProtocolError):
             return error
         if self.whole_look_s and isinstance(error, TransportTimeoutError):

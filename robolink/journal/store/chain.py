@@ -58,7 +58,7 @@ class ChainCheck:
 
     @classmethod
     def before(cls, row: Mapping[str, Any]) -> "ChainCheck":
-        """Return a check that begins at an entry, and believes what that says of the one before."""
+        """Return a check that starts at an entry and trusts its link to the one before."""
         check = cls()
         check.number, check.hash = row["number"] - 1, str(row["previous"])
         return check
@@ -95,7 +95,7 @@ class ChainCheck:
 
 
 def head_is_missing() -> str:
-    """Return what is said where the note of the last entry is not there."""
+    """Return the sentence for a missing note of the last entry."""
     return tr("The note that says which entry was stored last is missing.")
 
 

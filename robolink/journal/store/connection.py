@@ -1,4 +1,4 @@
-"""One connection to the journal's database, and the words in which the two databases differ.
+"""One connection to the journal's database, and how the two databases differ.
 
 Statements (``statements``) name their values as ``:name``, which SQLite takes as it is. They go to
 the driver's own cursor, so that a commit costs what the disk takes.
@@ -328,7 +328,7 @@ def _postgresql(place: JournalPlace, *, read_only: bool) -> Backend:
 
 
 def parameters_of(url: str) -> dict[str, str]:
-    """Return what libpq is told of a server by the URL of a journal.
+    """Return libpq's parameters for the URL of a journal.
 
     User, password and database may have %-escapes; of the query all parameters of libpq are known
     (https://www.postgresql.org/docs/current/libpq-connect.html). Several hosts stand there, as

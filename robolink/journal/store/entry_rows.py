@@ -1,4 +1,4 @@
-"""Statements about entries: what is asked for, and what is given back."""
+"""Statements about entries: the queries, and their results."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
@@ -65,7 +65,7 @@ _PLACES: Final = dict.fromkeys(sorted(name for name in COLUMNS if name != "hash"
 
 
 class DamagedHeadError(Exception):
-    """The note of the entry that was stored last is not there, or holds nothing."""
+    """The note of the last stored entry is missing or empty."""
 
 
 class EntryRows:
@@ -84,7 +84,7 @@ class EntryRows:
             controller: Identity of the controller.
             signature: Who does it.
             change: Id of the tool change, for the entries that name none.
-            entries: What is put on record.
+            entries: What is recorded.
 
         Raises:
             TypeError: Details are no plain JSON.
@@ -148,7 +148,7 @@ class EntryRows:
         return None if row is None or None in row else (row[0], row[1])
 
     def settled(self, read: Callable[[], T]) -> tuple[T, _Head | None]:
-        """Read something together with the head, as both were at one instant.
+        """Read something together with the head, both at one instant.
 
         Other processes may add entries between two statements, and every entry changes the head:
         so what was read between two equal heads belongs to them. A durable commit takes longer

@@ -36,7 +36,7 @@ _POSTGRESQL: Final = {
 
 
 def journal_error(error: Exception, name: str, consequence: str) -> JournalError:
-    """Return what a person is told about an error of the database.
+    """Return the error to show for an error of the database.
 
     Args:
         error: As the driver or the system raised it.
@@ -51,7 +51,7 @@ def journal_error(error: Exception, name: str, consequence: str) -> JournalError
 
 
 def damaged_error(found: str, name: str, consequence: str) -> JournalError:
-    """Return what a person is told about damage that the database itself did not notice.
+    """Return the error to show for damage that the database itself did not notice.
 
     Args:
         found: What was found, one sentence.

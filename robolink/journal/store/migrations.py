@@ -70,7 +70,7 @@ def _first_tables(connection: DatabaseConnection) -> None:
 
 
 def _names(connection: DatabaseConnection) -> None:
-    """Let a controller be known by what it says of itself, not by how its URL is spelled.
+    """Identify a controller by its own answer, not by the spelling of its URL.
 
     Entries are chained and stay as they are: whose they are stands in ``former_names``.
     """
@@ -78,9 +78,9 @@ def _names(connection: DatabaseConnection) -> None:
 
 
 def _robots(connection: DatabaseConnection) -> None:
-    """Let each robot of a controller with several have its own record.
+    """Give each robot of a controller with several its own record.
 
-    Entries of before tell only the controller. They are chained and stay as they are: listed,
+    Earlier entries tell only the controller. They are chained and stay as they are: listed,
     exported and verified under its name, and taken for none of its robots
     (docs/decisions/0025-each-robot-of-a-controller-has-its-record.md).
     """

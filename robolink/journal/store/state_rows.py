@@ -1,4 +1,4 @@
-"""Statements about what stands now: leases, markers, and the names of controllers.
+"""Statements about the present: leases, markers, and the names of controllers.
 
 Each carries a checksum among its details, over the name of its controller too. Entries are chained
 by their hashes; a marker stands alone, and recovery writes the old value that it names. Under a
@@ -57,7 +57,7 @@ class LeaseRows:
         return seen.epoch + 1 if self._connection.run(statements.TAKE_LEASE, values) else 0
 
     def end(self, controller: str, claim: Mapping[str, object]) -> None:
-        """Free the lease whoever holds it, so that he notices, and note who did that and why."""
+        """Free the lease, whoever holds it, so that the holder notices; note who did it and why."""
         values = {"of_controller": storable(controller), **claim, "token": FREE}
         self._connection.run(statements.END_LEASE, values)
 
@@ -78,12 +78,12 @@ class _Stored(NamedTuple):
 
 
 _SUM: Final = "_sum"
-"""Where the checksum stands. Markers of before have none, and nothing tells that one is bent; or
+"""Where the checksum stands. Earlier markers have none, and nothing tells that one is bent; or
 one that leaves the name of their controller out."""
 
 
 class MarkerRows:
-    """What is not settled, over one connection."""
+    """The unfinished jobs, over one connection."""
 
     def __init__(self, connection: DatabaseConnection) -> None:
         self._connection = connection
@@ -117,7 +117,7 @@ class MarkerRows:
         return False
 
     def remove(self, controller: str, operation: str) -> bool:
-        """Forget a marker; return whether it was there."""
+        """Remove a marker; return whether it was there."""
         return self._connection.run(statements.REMOVE_MARKER, _same(controller, operation)) == 1
 
     def rename(self, controller: str, to: str) -> None:
@@ -194,7 +194,7 @@ def _same(controller: str, operation: str) -> dict[str, str]:
 
 
 class NameRows:
-    """Who is meant by a name or an address, over one connection.
+    """Who a name or an address means, over one connection.
 
     Args:
         connection: To the database.
@@ -209,11 +209,11 @@ class NameRows:
         self._robots_known = robots_known
 
     def at(self, address: str) -> str:
-        """Return who was met last at an address, empty for nobody."""
+        """Return who was last reached at an address, empty for nobody."""
         return self._one(statements.MET_AT, address)
 
     def addresses_of(self, controller: str) -> tuple[str, ...]:
-        """Return the addresses at which a controller was met last, the latest first."""
+        """Return the addresses at which a controller was last reached, the latest first."""
         return self._all(statements.PLACES_OF, controller)
 
     def meant(self, name: str) -> str:
@@ -249,7 +249,7 @@ class NameRows:
         )
 
     def meet(self, address: str, controller: str, met_at: str) -> None:
-        """Note who was met at an address."""
+        """Note who was reached at an address."""
         values = {**_pair(address, controller), "met_at": met_at}
         if not self._connection.run(statements.MEET_FIRST, values):
             self._connection.run(statements.MEET_AGAIN, values)

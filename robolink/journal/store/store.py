@@ -55,7 +55,7 @@ class Tables:
         self.newer = version > len(migrations.MIGRATIONS)
 
     def in_order(self, address: str, location: str) -> bool:
-        """Tell whether there is nothing to say about a look at what is reached at an address.
+        """Return whether there is nothing to report about a look at an address.
 
         Nothing is unfinished and nobody at work, on any controller; who is there was met before,
         and nothing shows that what was done to it is on record elsewhere, or lost.
@@ -73,7 +73,7 @@ class Tables:
         return traces.journal in ("", location) and self.entries.history(self.names.all_of(name))
 
     def damage(self, names: tuple[str, ...]) -> Iterator[str]:
-        """Yield what is wrong with what a change of a controller would rest on, in sentences.
+        """Yield damage in what a change of a controller would rely on, in sentences.
 
         Args:
             names: Of the controller.
@@ -152,7 +152,7 @@ class Store:
         return self._use(consequence, writing=False)
 
     def require_sound(self, names: tuple[str, ...]) -> None:
-        """Make sure that what a change of a controller rests on is as it was stored.
+        """Check that what a change of a controller relies on is as it was stored.
 
         Args:
             names: Of the controller.

@@ -59,7 +59,7 @@ class BeamLine:
 
 @dataclass(frozen=True, kw_only=True)
 class BeamsParameters(SampledParameters):
-    """How a tip is driven through two crossed light beams."""
+    """How a tip is moved through two crossed light beams."""
 
     beams: Annotated[
         tuple[BeamLine, ...] | None,
@@ -89,7 +89,8 @@ class BeamsParameters(SampledParameters):
         Option(metavar="DEG"),
         Help(
             declared(
-                "Turn of U for a second measurement, so that moved beams do no harm; 0 for none."
+                "Turn of U for a second measurement, so that moved beams cause no error; 0 for "
+                "none."
             )
         ),
     ] = 0.0
@@ -104,7 +105,11 @@ class BeamsParameters(SampledParameters):
         Ge(0.5),
         Le(20),
         MM,
-        Help(declared("How far beside the beam the tip starts; the new tip may be off by less.")),
+        Help(
+            declared(
+                "How far beside the beam the tip starts; the new tip must be off by less than this."
+            )
+        ),
     ] = 2.0
     aside_mm: Annotated[
         float,
@@ -164,7 +169,7 @@ class BeamsParameters(SampledParameters):
     ] = False
 
     def may_end_early(self, *, sigma_stated: bool) -> bool:
-        """Tell whether the tip can be known well enough before the last crossing.
+        """Return whether the tip can be known well enough before the last crossing.
 
         Args:
             sigma_stated: Whether somebody stated the standard deviation of a crossing.
@@ -193,7 +198,7 @@ class BeamsParameters(SampledParameters):
         return self.lift_mm + self.dip_mm + self.shaft_mm
 
     def no_residual(self) -> str:
-        """Return why residuals cannot be judged, empty when they can."""
+        """Return why residuals cannot be judged, empty if they can."""
         if self.repeats > 1 or self.turn_deg:
             return ""
         return tr(
@@ -203,11 +208,11 @@ class BeamsParameters(SampledParameters):
         )
 
     def states_station(self) -> bool:
-        """Tell whether the beams are stated here, so that the station need not be known."""
+        """Return whether the beams are stated here, so that the station need not be known."""
         return self.beams is not None
 
     def nothing_to_leave_out(self, check: Check) -> str:
-        """Return why it cannot end early, and what to give."""
+        """Return why it cannot end early, and which values to give."""
         return tr(
             "has nothing to leave out; give 3 {repeats}, or 2 with {sigma} or {turn}",
             repeats=check.spell("repeats"),
@@ -262,7 +267,7 @@ def farthest_from(first_deg: float, last_deg: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class BeamsSource(InputSource[BeamsParameters]):
-    """Measures X and Y by driving the tip through two beams, from wherever the flange is.
+    """Measures X and Y by moving the tip through two beams, from wherever the flange is.
 
     Attributes:
         station: Where the beams are, from the reference record.
@@ -299,7 +304,7 @@ class BeamsSource(InputSource[BeamsParameters]):
         )
 
     def require_able(self, group: MotionGroup, change_mm: float) -> None:
-        """Refuse crossings that are too fast for their way.
+        """Refuse crossings that are too fast for their distance.
 
         See :class:`~robolink.procedures.RequiresMotion`.
 
@@ -317,7 +322,7 @@ class BeamsSource(InputSource[BeamsParameters]):
         return cross_beams(self, stored, here)
 
     def proof_of(self, basis: ProofBasis) -> "CrossingTest":
-        """Return the proof at another U; see :meth:`~robolink.procedures.ProvesAgain.proof_of`.
+        """Return the test at another U; see :meth:`~robolink.procedures.ProvesAgain.proof_of`.
 
         Its crossings are others than those that were measured, and as far from them as a turn goes:
         90 degrees and more from each. Where the beams were found too it is about those places: with

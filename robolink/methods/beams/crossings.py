@@ -1,4 +1,4 @@
-"""Crossings of two beams: how they are solved, each told about, and the worst made again.
+"""Crossings of two beams: how they are solved, how each is reported, and the worst repeated.
 
 They are solved at the height at which the beams see the needle.
 """
@@ -103,7 +103,7 @@ class CrossingSolver:
         return replace(found, seen_above_mm=self.dip_mm)
 
     def foreseen_shaft(self, crossings: Sequence[Crossing], deeper_mm: float) -> ShaftSeen:
-        """Return what will be seen of the shaft, as far as it counts for how sure the tip is.
+        """Return what will be seen of the shaft, as far as it affects the uncertainty of the tip.
 
         Args:
             crossings: Those that are planned for it.
@@ -113,7 +113,7 @@ class CrossingSolver:
         return ShaftSeen(crossings, self.dip_mm / up, deeper_mm / up)
 
     def seen_mm(self, tip: ToolOffset, lean: "Lean") -> tuple[float, float]:
-        """Return X and Y of the place at which the beams see a needle that leans, flange.
+        """Return X and Y of the place where the beams see a leaning needle, flange.
 
         Args:
             tip: Where its end is.
@@ -138,7 +138,7 @@ class CrossingSolver:
 
 
 def require_straight(result: BeamsResult, max_lean_deg: float) -> None:
-    """Refuse a needle that leans so far that nobody knows where its end is.
+    """Refuse a needle that leans so far that the place of its end is unknown.
 
     Args:
         result: What was measured, with its shaft.
@@ -232,7 +232,7 @@ class CrossingSampler:
         return result if self.shaft or not plan.shaft_mm else self._widened(result, crossings)
 
     def _widened(self, result: BeamsResult, crossings: Sequence[Crossing]) -> BeamsResult:
-        """Return a result as sure as it will be once the shaft has been looked at."""
+        """Return a result with the uncertainty that it will have once the shaft was crossed."""
         times = self.gain(crossings) / result.sigma_gain
         region_mm = result.region95_radius_mm
         return replace(

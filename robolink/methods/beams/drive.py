@@ -1,4 +1,4 @@
-"""The drive of a tip through two crossed beams: places, scans, ways between them, and run-up.
+"""The movement of a tip through two crossed beams: places, scans, paths between them, run-up.
 
 A tip that comes to a beam more slowly stops less far past its edge. On the way there and on the way
 back it starts equally far from where the tip is expected, so a new tip that is beside that has more
@@ -50,28 +50,28 @@ class RunUp:
 
     @classmethod
     def at(cls, speed_mm_s: float, told_mm: float | None) -> "RunUp":
-        """Return that of a speed; where a controller did not tell it, of a low acceleration."""
+        """Return the run-up for a speed; for a low acceleration if the controller reported none."""
         if told_mm is None:
             told_mm = speed_mm_s**2 / (2 * LEAST_ACCELERATION_MM_S2)
         return cls(speed_mm_s, told_mm)
 
     @classmethod
     def of(cls, group: MotionGroup, plan: BeamsParameters) -> "RunUp":
-        """Read that of a plan from the controller."""
+        """Read the run-up of a plan from the controller."""
         return cls.at(plan.crossing_mm_s, group.run_up_mm(plan.crossing_mm_s))
 
     @property
     def before_edge_mm(self) -> float:
-        """From the start to where an edge is told: the tip may be at rest past it by then."""
+        """From the start to where an edge is reported: the tip may have stopped past it by then."""
         return 2 * self.way_mm + _LATENCY_S * self.speed_mm_s
 
     def search_mm(self, shift_mm: float) -> float:
-        """Return the least search with which a tip is measured that is so far beside."""
+        """Return the least search that measures a tip so far beside its place."""
         return shift_mm + HALF_THICKNESS_MM + self.way_mm
 
 
 def believed_shift_mm(plan: BeamsParameters, change_mm: float) -> float:
-    """Return how far beside the expected place a tip has to be measured without another thought.
+    """Return how far beside its expected place a tip must be measured without a warning.
 
     A tip that is farther off than half of the search is measured too where its crossings had
     their run-up, which is looked at in each of them.
@@ -84,7 +84,7 @@ def believed_shift_mm(plan: BeamsParameters, change_mm: float) -> float:
 
 
 def require_run_up(group: MotionGroup, plan: BeamsParameters, change_mm: float) -> None:
-    """Refuse a plan in which the tip is not at its speed when it comes to a beam; only reads.
+    """Refuse a plan in which the tip has not reached its speed at a beam; only reads.
 
     Args:
         group: Which moves it.
@@ -206,7 +206,7 @@ def _rounded_up(length_mm: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class BeamDrive:
-    """The places of one frame on its way through the beams.
+    """The places of one frame that moves through the beams.
 
     Attributes:
         station, plan: Where and how.
@@ -243,11 +243,11 @@ class BeamDrive:
         return carrying(self.frame, self.tip, at)
 
     def round(self, first: int = 0) -> "list[BeamScan]":
-        """Return the scans that cross both beams, both ways, beginning with one of them."""
+        """Return the scans that cross both beams, both ways, starting with one of them."""
         return [BeamScan(self, beam, side) for beam in (first, 1 - first) for side in (1, -1)]
 
     def rounds(self) -> "list[BeamScan]":
-        """Return as many rounds as are planned.
+        """Return the planned number of rounds.
 
         Each begins with the beam with which the one before ended. That spares a way, and what
         drifts evenly meanwhile is the same for both beams.
@@ -257,7 +257,7 @@ class BeamDrive:
 
 @dataclass(frozen=True, slots=True)
 class BeamScan:
-    """One way through a beam.
+    """One pass through a beam.
 
     Attributes:
         drive: Where the places of the frame are.

@@ -1,4 +1,4 @@
-"""The drive through two crossed beams, and what it says about the tip. No person takes part.
+"""The movement through two crossed beams, and what it shows about the tip. Nobody takes part.
 
 Each beam is crossed both ways, entry and exit each time: half way between both edges the tip
 is in the beam whatever their thickness, and both ways together are free of latency, braking
@@ -41,7 +41,7 @@ REFERENCE_ASIDES_MM: Final = (-12.0, -6.0, 6.0, 12.0)
 def cross_beams(
     source: BeamsSource, stored: ToolOffset | None, here: Pose
 ) -> Procedure[BeamsResult]:
-    """Measure as a source says, see :func:`~robolink.methods.measure_beams`."""
+    """Measure as a source says; see :func:`~robolink.methods.measure_beams`."""
     solvable_planes([here], height_of(stored))
     plan, tip = source.plan, stored or NO_OFFSET
     drive = BeamDrive(source.station, plan, here, tip, told_run_up_mm=source.run_up_mm)
@@ -126,7 +126,7 @@ def verify_by_crossing(
         here: Where the frame of the new tool is.
         angles_deg: Its angles U at which the tip is measured.
         tolerance_mm: Largest drift that passes.
-        aside: Where the tip is expected, seen from the frame in force; not 0 where a difference
+        aside: Where the tip is expected, seen from the selected frame; not 0 where a difference
             to a reference was written.
         lean: By how much the shaft lies beside the tip, X and Y of the frame in mm per mm above
             it: the beams see the shaft.
@@ -174,7 +174,7 @@ def verify_by_crossing(
 
 
 def _unturned(crossings: Sequence[Crossing]) -> list[Crossing]:
-    """Return crossings from which the way from the frame to the tip follows in base axes.
+    """Return crossings that give the vector from frame to tip in base axes.
 
     The frame is that of the tool, which may lean as it likes: only where it is counts.
     """
@@ -187,7 +187,7 @@ def _unturned(crossings: Sequence[Crossing]) -> list[Crossing]:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CrossingTest(PlacedProof):
-    """All that a proof by two beams needs.
+    """All that a turn test by two beams needs.
 
     Attributes:
         beams, z_mm, inputs, off_when_broken: Where they are and what they switch; see
@@ -226,7 +226,7 @@ class CrossingTest(PlacedProof):
         )
 
     def _lean_in_frame(self, here: Pose) -> tuple[float, float]:
-        """Return the lean in the axes of the frame that was written, which may be turned."""
+        """Return the lean in the axes of the written frame, which may be turned."""
         if self.lean is None:
             return 0.0, 0.0
         up = math.copysign(1.0, FlangePlane.of(flange_of(here, self.written)).r33)

@@ -1,4 +1,4 @@
-"""one-touch: a pin whose place is known, touched once."""
+"""one-touch: a pin at a known place, touched once."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
@@ -170,7 +170,7 @@ HALF_A_TURN_DEG = 180.0
 
 @dataclass(frozen=True, slots=True)
 class OneTouchSource(ProvesAgain):
-    """Measures X, Y and Z by one touch of a pin whose place is known.
+    """Measures X, Y and Z by one touch of a pin at a known place.
 
     Attributes:
         solver: How the touch is used.
@@ -324,10 +324,10 @@ METHOD = Method(
     name="one-touch",
     summary=declared("Touch a known pin once: X, Y and Z, for a change of the needle."),
     description=declared(
-        "Touch a pin once: X, Y and Z of the new tip, for a change of the needle.\n\n"
-        "The tool must have been calibrated on that pin before, for example with n-angle. What is "
-        "written is the stored offset moved by how much the tip differs from the old "
-        "one. The uncertainty adds up over such changes, until a full calibration is due."
+        "Touch a pin once: X, Y and Z of the new tip, for a change of the needle.\n\nThe tool "
+        "must have been calibrated on that pin before, for example with n-angle. robolink "
+        "writes the stored offset plus the difference between the new tip and the old one. The "
+        "uncertainty adds up over such changes, until a full calibration is due."
     ),
     parameters=OneTouchParameters,
     measures=("x_mm", "y_mm", "z_mm"),

@@ -1,4 +1,4 @@
-"""How the one touch of a known pin is solved: as a difference, or against the place of the pin.
+"""How one touch of a known pin is solved: as a difference, or against the pin's place.
 
 The offset that is written and the touches that it came from say together where the pin is,
 ``P = p + R t``. As long as that offset stays stored and the pin stays where it is, a new tip that
@@ -35,12 +35,12 @@ if TYPE_CHECKING:
 
 
 KEPT = (EntryKind.DONE, EntryKind.DECISION)
-"""Entries that say that a value stays, and what it rests on."""
+"""Entries that say that a value stays, and its basis."""
 
 
 @dataclass(frozen=True, slots=True)
 class LastTouch:
-    """The pin as a tool's last calibration on it places it.
+    """Where a tool's last calibration on the pin puts it.
 
     Attributes:
         station: Name of the pin.
@@ -69,7 +69,7 @@ class LastTouch:
 
 
 def find_last_touch(controller: Controller, tool: int, station: str) -> LastTouch:
-    """Return the last calibration of a tool on a pin, if it stands for what is stored.
+    """Return the last calibration of a tool on a pin, if it matches the stored value.
 
     Args:
         controller: The controller, connected; its record is looked at.
@@ -130,7 +130,7 @@ def find_last_touch(controller: Controller, tool: int, station: str) -> LastTouc
 
 
 def newest_touch(kept: Iterable[Recorded], station: str) -> LastTouch | None:
-    """Return the newest touch of a tool on a pin that is on record, ``None`` for none.
+    """Return the newest recorded touch of a tool on a pin, ``None`` for none.
 
     Args:
         kept: Entries of the tool of the kinds :data:`KEPT`, the newest first.
@@ -223,7 +223,7 @@ class Difference:
         return replace(result, warnings=("full_calibration_due",), full_calibration_due=True)
 
     def _one_more(self, result: "NeedleChangeResult") -> bool:
-        """Tell whether the next difference would already be one too many."""
+        """Return whether the next difference would be one too many."""
         later = result.chain.after(math.sqrt(2) * self.sigma_mm, shared_touch=True)
         half95_mm = result.half_width95[0] * later.sigma_mm / result.chain.sigma_mm
         return half95_mm > self.limits.tolerance_mm
@@ -231,7 +231,7 @@ class Difference:
 
 @dataclass(frozen=True, slots=True)
 class Absolute:
-    """Solves one touch against a pin whose place is known.
+    """Solves one touch against a pin at a known place.
 
     Attributes:
         pin: Where it is.
@@ -267,7 +267,7 @@ class Absolute:
 
 
 def left_of(last: LastTouch, sigma_mm: float | None, limits: NeedleLimits) -> int | None:
-    """Return after how many more such changes a full calibration is due.
+    """Return how many more such changes are allowed before a full calibration.
 
     Args:
         last: The last touch.
@@ -371,7 +371,7 @@ _SAME_MM: Final = 0.001
 
 @dataclass(slots=True)
 class _Trace:
-    """Where the trace has got to.
+    """How far the trace has got.
 
     Attributes:
         z_mm: The value whose origin is looked for.
@@ -385,7 +385,7 @@ class _Trace:
 
 
 def find_stored_z(controller: Controller, tool: int, stored: ToolOffset) -> StoredZ:
-    """Return the stored Z of a tool, with the measurement on record that it goes back to.
+    """Return a tool's stored Z, with the recorded measurement that it goes back to.
 
     Args:
         controller: The controller, connected; its record is looked at.
@@ -456,7 +456,7 @@ def _measured(trace: _Trace, kept: Recorded, calibration: Recorded) -> tuple[flo
 
 
 def _goes_on(trace: _Trace, kept: Recorded, calibration: Recorded) -> bool:
-    """Take a trace on past a calibration in which Z was not measured; False where it ends there.
+    """Continue a trace past a calibration that did not measure Z; False where it ends.
 
     A Z that was kept is that of the needle before: it holds for the new one where the heights of
     the touches said so, or where it is the same needle.

@@ -47,11 +47,7 @@ class PivotParameters(PinParameters):
         int,
         Ge(4),
         Le(12),
-        Help(
-            declared(
-                "Number of touches, the first one in the orientation in which the tool stands."
-            )
-        ),
+        Help(declared("Number of touches; the first in the tool's present orientation.")),
     ] = 6
     tilt_deg: Annotated[
         float,
@@ -77,7 +73,7 @@ class PivotParameters(PinParameters):
 
     @property
     def sampling(self) -> SamplingPolicy:
-        """When it ends, and whether a pose is offered to be taken again."""
+        """When it ends, and whether a person is offered to repeat a pose."""
         return SamplingPolicy(self.until_mm, retake=self.retake)
 
 
@@ -132,7 +128,7 @@ class PivotSource(PinSource):
         )
 
     def foreseen(self) -> Self:
-        """Return the source whose steps are only shown."""
+        """Return the source for a preview of its steps."""
         return replace(PinSource.foreseen(self), sampling=TAKE_ALL)
 
     @property
@@ -143,7 +139,7 @@ class PivotSource(PinSource):
     def further_steps(
         self, here: Pose, taken: Sequence[TouchedAt], again: int | None, stored: ToolOffset | None
     ) -> Procedure[CalibrationResult]:
-        """Return the steps that make one touch again."""
+        """Return the steps that repeat one touch."""
         from robolink.methods.pivot.procedure import retake_pivot  # numpy
 
         known = require_known_tip(stored)
@@ -310,11 +306,11 @@ METHOD = Method(
     ),
     description=declared(
         "Touch one pin with the tool tilted and turned: X, Y and Z, on five axes or six.\n\n"
-        "Put the tip some millimetres above a fixed pin first, the tool as it stands in "
-        "production. After the first touch the robot lifts it, tilts and turns it in the air, and "
-        "comes down to a clearance; you do the rest. The tool must be defined already, to a "
-        "millimetre or two. A robot whose tool only turns about Z cannot do this.\n\n"
-        "With poses that exist already nothing moves."
+        "First put the tip some millimetres above a fixed pin, with the tool oriented as in "
+        "production. After the first touch the robot lifts the tool, tilts and turns it in the "
+        "air, and comes down to a clearance; you jog the rest. The tool must be defined "
+        "already, to a millimetre or two. A robot whose tool only turns about Z cannot do "
+        "this.\n\nWith existing poses nothing moves."
     ),
     parameters=PivotParameters,
     measures=("x_mm", "y_mm", "z_mm"),

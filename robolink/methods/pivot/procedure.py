@@ -73,7 +73,7 @@ def retake_pivot(
     taken: Sequence[TouchedAt],
     again: int | None,
 ) -> Procedure[CalibrationResult]:
-    """Make one touch of a measurement again. Runs in Tool 0, ends as it does.
+    """Repeat one touch of a measurement. Runs in Tool 0, ends as it does.
 
     Args:
         source: What was measured, and how.
@@ -115,7 +115,7 @@ def verify_by_tilting(
 
     Args:
         plan: Lift, clearance, contact input.
-        over: The pin, and where the tip is in the frame in force.
+        over: The pin, and where the tip is in the selected frame.
         tilts: Orientations in which the tip is brought back onto the pin.
         tolerance_mm: Largest drift that passes with its guard band, in all three directions
             together.
@@ -170,7 +170,7 @@ def _shown(swing: "_Swing", proof: DriftProof, tilt: Tilt) -> Procedure[None]:
 
 
 class _Swing:
-    """Tilts a lifted tool over a pin, and has the pin touched.
+    """Tilts a lifted tool over a pin, and lets a person touch the pin.
 
     Args:
         plan: Lift and clearance.

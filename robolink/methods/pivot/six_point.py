@@ -1,4 +1,4 @@
-"""six-point: a pin touched in tilted orientations, and two ways along the tool's axes.
+"""six-point: a pin touched in tilted orientations, and two moves along the tool's axes.
 
 The ways start where the person finds room for them. Along +Z from the pin itself a tool that
 points down would be driven into whatever the pin stands on.
@@ -40,7 +40,11 @@ class SixPointParameters(PivotParameters):
         Le(200),
         MM,
         Option(metavar="MM"),
-        Help(declared("Least length of each of the two moves; the longer, the surer the axes.")),
+        Help(
+            declared(
+                "Least length of each of the two moves; longer moves make the axes more accurate."
+            )
+        ),
     ] = USUAL_WAY_MM
     second_is: Annotated[
         Literal["z", "xz"],
@@ -53,13 +57,13 @@ class SixPointParameters(PivotParameters):
     ] = "z"
 
     def height_mm(self) -> float:
-        """Return how much higher than the box the flange goes: a way up."""
+        """Return how far above the box the flange goes: a move up."""
         return self.way_mm
 
 
 @dataclass(frozen=True, slots=True)
 class AxisTeachPlan:
-    """Which ways a person shows, and how long they are.
+    """Which moves a person shows, and how long they are.
 
     Attributes:
         length_mm: Least length of each.
@@ -76,7 +80,7 @@ LEAST_OF_SIX_POINTS = 5
 
 @dataclass(frozen=True, slots=True)
 class SixPointSource(PivotSource):
-    """Measures as a pivot does, and by ways along the axes of the tool.
+    """Measures as a pivot does, and by moves along the axes of the tool.
 
     Attributes:
         ways: How the person shows the axes.
@@ -132,7 +136,7 @@ class SixPointSource(PivotSource):
     def further_steps(
         self, here: Pose, taken: Sequence[TouchedAt], again: int | None, stored: ToolOffset | None
     ) -> Procedure[CalibrationResult]:
-        """Return the steps that make one touch again.
+        """Return the steps that repeat one touch.
 
         The ways along the axes stay as they were shown: they begin and end away from the pin.
         """
@@ -210,7 +214,7 @@ def measure_six_point(
 
 @dataclass(frozen=True, slots=True)
 class SixPoints:
-    """Touches of one pin, then a way along the tool's X and one along its Z, or in its XZ plane.
+    """Touches of one pin, then a move along the tool's X and one along its Z, or in its XZ plane.
 
     Attributes:
         second_is: What the last pose shows: ``z`` the tool's +Z, ``xz`` its XZ plane.
@@ -271,7 +275,7 @@ class _AxisTeaching:
     stored: ToolOffset
 
     def start(self) -> Procedure[Pose]:
-        """Have the tool brought to where both ways start."""
+        """Let a person move the tool to where both moves start."""
         from robolink.calibration import require_unturned
 
         lowest_mm = min(
@@ -289,7 +293,7 @@ class _AxisTeaching:
         return (yield from _shown(ask, lambda pose: require_unturned(self.lifted, pose)))
 
     def along(self, start: Pose, way: TeachPrompt) -> Procedure[Pose]:
-        """Have one way shown; the flange is back at ``start`` then."""
+        """Let a person show one move; the flange is back at ``start`` afterwards."""
         from robolink.calibration import axis_displacement
 
         dx_mm, dy_mm, dz_mm = self._foreseen_mm(way).tolist()
@@ -307,7 +311,7 @@ class _AxisTeaching:
         return end
 
     def _doubted(self, start: Pose, end: Pose, way: TeachPrompt) -> Procedure[bool]:
-        """Return whether a way leads far from its axis as it is stored, and is to be shown again.
+        """Return whether a move deviates far from its stored axis, and must be shown again.
 
         A way in a plane may lead anywhere on its side.
         """
@@ -320,8 +324,7 @@ class _AxisTeaching:
             return False
         again: bool = yield Confirm(
             tr(
-                "This move leads {angle:.0f} degrees away from {axis} as it is "
-                "stored. Show it again?",
+                "This move is {angle:.0f} degrees off the stored {axis}. Show it again?",
                 angle=far_deg,
                 axis="+X" if way is TeachPrompt.ALONG_X else "+Z",
             )
@@ -329,7 +332,7 @@ class _AxisTeaching:
         return again
 
     def _foreseen_mm(self, way: TeachPrompt) -> "Floats":
-        """Return a way in the base, as the stored orientation has it."""
+        """Return a move in the base, by the stored orientation."""
         from robolink.calibration import rotation_of
 
         own = rotation_of(Pose(0.0, 0.0, 0.0, *self.stored.components()[3:]))
@@ -357,7 +360,7 @@ class _AxisTeaching:
 
 
 def _shown(ask: Ask, check: Callable[[Pose], object]) -> Procedure[Pose]:
-    """Ask for a pose until it passes; the person goes on from where the tool stands.
+    """Ask for a pose until it passes; the person continues from where the tool is.
 
     Raises:
         CalibrationError: That of ``check``, the third time.
@@ -376,7 +379,7 @@ def _shown(ask: Ask, check: Callable[[Pose], object]) -> Procedure[Pose]:
 
 
 def _uncertainty(result: "SixPointResult") -> str:
-    """Return how well the ways agree with each other, in one sentence."""
+    """Return how well the moves agree with each other, in one sentence."""
     half_deg = max(result.half_width95[3:], default=None)
     off_deg = result.off_square_deg
     if off_deg is None:
@@ -414,16 +417,14 @@ METHOD = Method(
     name="six-point",
     summary=declared("A pivot and two moves along the tool's axes: all six components."),
     description=declared(
-        "Find all six components: a pivot, then a move along the tool's X and one "
-        "along its Z.\n\n"
-        "The touches go as in 'calibrate pivot'. Then, in the air and without "
-        "turning, you bring the tip to where it has room, and jog it along the tool's "
-        "own +X; the robot goes straight back; and along its own +Z. A move that is "
-        "too short or has turned is told at once. The work box reaches higher by the "
-        "length of a move.\n\n"
-        "With poses that exist already nothing moves: three or more on one pin, "
-        "tilted and turned; the last two, in this order, after a move along +X and "
-        "one along +Z, both from the last pose on the pin."
+        "Find all six components: a pivot, then a move along the tool's X and one along its "
+        "Z.\n\nThe touches go as in 'calibrate pivot'. Then, in the air and without turning, "
+        "you jog the tip to where it has room, and along the tool's own +X. The robot goes "
+        "straight back, and you jog along the tool's own +Z. robolink refuses at once a move "
+        "that is too short or has turned. The work box is higher by the length of a move.\n\n"
+        "With existing poses nothing moves: three or more on one pin, tilted and turned; the "
+        "last two, in this order, after a move along +X and one along +Z, both from the last "
+        "pose on the pin."
     ),
     parameters=SixPointParameters,
     measures=("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg"),

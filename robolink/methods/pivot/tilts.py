@@ -1,4 +1,4 @@
-"""How a tool is tilted over a pin: in which orientations, and on which way between them.
+"""How a tool is tilted over a pin: in which orientations, and on which path between them.
 
 Which of them an arm can take up shows at the first touch; others then replace the rest.
 """
@@ -28,7 +28,7 @@ joints let it sink by L a^2 / 8, with L from the wrist to the tip: by 0.4 % of L
 
 @dataclass(frozen=True, slots=True)
 class Tilt:
-    """How the tool stands against its first orientation.
+    """A tool's orientation against its first one.
 
     Attributes:
         turn_deg: Turned so far about the base's Z.
@@ -50,7 +50,7 @@ _ORIGIN: Final = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True, slots=True)
 class OverPin:
-    """Where a frame has to go for a tip to be above a pin.
+    """Where a frame has to go so that a tip is above a pin.
 
     Attributes:
         first: Pose of the frame in the first orientation, wherever.
@@ -92,7 +92,7 @@ def tip_place(pose: Pose, tip: ToolOffset) -> tuple[float, float, float]:
 
 
 def informative_tilts(count: int, tilt_deg: float) -> tuple[Tilt, ...]:
-    """Return the orientations of ``count`` touches after one that is not tilted, the best first.
+    """Return the orientations of ``count`` touches after one without tilt, the best first.
 
     Args:
         count: How many.
@@ -107,18 +107,18 @@ def tilts_around(tilt_deg: float) -> list[Tilt]:
 
 
 def best_tilts(choice: Sequence[Tilt], count: int) -> tuple[Tilt, ...]:
-    """Return the ``count`` orientations that tell the most beside the first one, the best first."""
+    """Return the ``count`` orientations that tell most besides the first one, the best first."""
     turned = np.array([rotation_of(OverPin(_ANYWHERE, _ORIGIN).pose(one, 0.0)) for one in choice])
     return tuple(choice[index] for index in select_poses(turned, np.eye(3)[np.newaxis], count))
 
 
 def proving_tilts(tilt_deg: float) -> tuple[Tilt, ...]:
-    """Return the orientations that prove a tip: not measured in, and half a turn apart."""
+    """Return the orientations of the test of a tip: not measured in, and half a turn apart."""
     return proving_pairs(tilt_deg)[0]
 
 
 def proving_pairs(tilt_deg: float) -> list[tuple[Tilt, Tilt]]:
-    """Return the pairs among which the proof chooses, the most telling first."""
+    """Return the pairs among which the test chooses, the most informative first."""
     return [
         (Tilt(turn, lean), Tilt(turn - 180.0, lean))
         for lean in (tilt_deg, -tilt_deg, tilt_deg / 2, -tilt_deg / 2)
@@ -127,7 +127,7 @@ def proving_pairs(tilt_deg: float) -> list[tuple[Tilt, Tilt]]:
 
 
 def tilt_path(start: Tilt, goal: Tilt) -> Iterator[Tilt]:
-    """Yield the orientations on the way, the last one too: back, round, and over again.
+    """Yield the orientations of the path, the last one too: back, round, and over again.
 
     It turns where it does not lean, since the arm would else swing a leaning tip.
     """
@@ -162,7 +162,7 @@ def _own_rotation(frame: ToolOffset) -> Floats:
 
 
 class TiltedNames(TouchNames):
-    """What is the same for all samplers whose tool is tilted and turned."""
+    """What all samplers share whose tool is tilted and turned."""
 
     __slots__ = ()
 
@@ -220,7 +220,7 @@ LEAST_TILTS: Final = 3
 def tilts_in_reach(
     over: OverPin, wanted: Sequence[Tilt], lift_mm: float
 ) -> Procedure[tuple[Tilt, ...]]:
-    """Return the wanted orientations, or those that tell the most of what the arm can take up.
+    """Return the wanted orientations, or the most informative of those that the arm can reach.
 
     Where the pin is shows at the first touch, and with it which orientations are in reach: inside
     the limits, and away from a singular wrist. Others lean as far, or half as far.
@@ -260,7 +260,7 @@ def tilts_in_reach(
 def free_tilts(
     over: OverPin, choice: Sequence[Tilt], lift_mm: float
 ) -> Procedure[tuple[Tilt, ...]]:
-    """Return which of many orientations the arm can take up over a place, in their order.
+    """Return which of many orientations the arm can reach over a place, in their order.
 
     Args:
         over: The place as the first touch showed it.
@@ -290,7 +290,7 @@ def free_tilts(
 def proving_in_reach(
     over: OverPin, wanted: Sequence[Tilt], lift_mm: float
 ) -> Procedure[tuple[Tilt, ...]]:
-    """Return the orientations of a proof, or the first pair half a turn apart that can be taken up.
+    """Return the orientations of a test, or the first pair half a turn apart within reach.
 
     Args:
         over: The pin, and the tip as it was measured.
@@ -310,7 +310,7 @@ def proving_in_reach(
 
 
 def _refusals(over: OverPin, tilts: Sequence[Tilt], lift_mm: float) -> Procedure[list[str]]:
-    """Return for each orientation why the arm cannot go there and touch, empty where it can."""
+    """Return for each orientation why the arm cannot go there and touch, empty if it can."""
     ways = [tuple(_way(over, tilt, lift_mm)) for tilt in tilts]
     told: tuple[str, ...] = yield Consider(tuple(move for moves in ways for move in moves))
     left = iter(told)
@@ -318,7 +318,7 @@ def _refusals(over: OverPin, tilts: Sequence[Tilt], lift_mm: float) -> Procedure
 
 
 def _way(over: OverPin, tilt: Tilt, lift_mm: float) -> Iterator[Move]:
-    """Yield the movements that lead to a touch: tilting in the air, down to the pin, up again."""
+    """Yield the movements of a touch: tilting in the air, down to the pin, up again."""
     for between in tilt_path(UPRIGHT, tilt):
         yield Move(over.pose(between, lift_mm), Path.JOINT, "")
     for above_mm in (0.0, lift_mm):

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class SurfaceParameters(PinParameters):
-    """How a tip is taken off a surface and brought back; the surface stands for the pin."""
+    """How a tip is lifted off a surface and returned; the surface stands for the pin."""
 
     lift_mm: Annotated[
         float,
@@ -63,16 +63,16 @@ class SurfaceParameters(PinParameters):
 
     @property
     def sampling(self) -> SamplingPolicy:
-        """Whether a touch is offered to be made again."""
+        """Whether a person is offered to repeat a touch."""
         return SamplingPolicy(retake=self.retake)
 
     def states_station(self) -> bool:
-        """Tell that nothing need be known about the surface: it is found with the tip."""
+        """Return that nothing need be known about the surface: it is found with the tip."""
         return True
 
 
 def told_at(method: AnyMethod, parameters: SurfaceParameters, site: Site) -> dict[str, Any]:
-    """Return what the site tells a source of touches of a surface.
+    """Return what the site says to a source of surface touches.
 
     Raises:
         CalibrationError: ``rank_deficient``: the robot cannot tilt its tool.
@@ -104,7 +104,7 @@ class SurfaceTouchSource(TouchSource, Generic[SurveyT, ResultT]):
     sampling: SamplingPolicy = TAKE_ALL
 
     def foreseen(self) -> Self:
-        """Return the source whose steps are only shown."""
+        """Return the source for a preview of its steps."""
         return replace(TouchSource.foreseen(self), sampling=TAKE_ALL)
 
     def steps(self, stored: ToolOffset | None) -> Procedure[ResultT]:
@@ -125,7 +125,7 @@ class SurfaceTouchSource(TouchSource, Generic[SurveyT, ResultT]):
     def further_steps(
         self, here: Pose, taken: Sequence[TouchedAt], again: int | None, stored: ToolOffset | None
     ) -> Procedure[ResultT]:
-        """Return the steps that make one touch again."""
+        """Return the steps that repeat one touch."""
         from robolink.methods.surface_touch.drive import retake_on_surface  # numpy
 
         return (

@@ -1,4 +1,4 @@
-"""Tilting a tool from touch to touch of a surface, and the proof of a new tip on it."""
+"""Tilting a tool from touch to touch of a surface, and the test of a new tip on it."""
 
 import math
 from abc import ABC, abstractmethod
@@ -47,7 +47,7 @@ FAINT: Final = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class SurfaceSpot:
-    """A place of a surface, and how the tool stands to touch it.
+    """A place of a surface, and how the tool is oriented to touch it.
 
     Attributes:
         tilt: How the tool stands, against its first orientation.
@@ -61,7 +61,7 @@ class SurfaceSpot:
 
 
 class SurfaceDrive:
-    """Takes a lifted tip from spot to spot of a surface.
+    """Moves a lifted tip from spot to spot of a surface.
 
     Args:
         plan: Lift and clearance.
@@ -97,7 +97,7 @@ class SurfaceDrive:
         further_mm: float = 0.0,
         instruction: str = "",
     ) -> Procedure[TouchedAt]:
-        """Tilt in the air, go to a spot, and have it touched; see :class:`SurfaceTouches`.
+        """Tilt in the air, go to a spot, and let a person touch; see :class:`SurfaceTouches`.
 
         Raises:
             CalibrationError: ``not_tilted``, ``not_touched`` or ``typed_ahead``, with the tip
@@ -134,7 +134,7 @@ class SurfaceDrive:
 
 
 def candidates(tilt_deg: float, axes: int, *, turned_deg: float = 0.0) -> tuple[Tilt, ...]:
-    """Return tilts among which to choose.
+    """Return the tilts to choose among.
 
     Args:
         tilt_deg: How far the tool leans.
@@ -152,7 +152,7 @@ def candidates(tilt_deg: float, axes: int, *, turned_deg: float = 0.0) -> tuple[
 
 
 def doubts_with_each(normal: Floats, rows: Floats) -> Floats:
-    """Return for each of many touches how badly the tip would be known with it.
+    """Return for each of many touches how uncertain the tip would be with it.
 
     Args:
         normal: The normal matrix of the touches that are chosen already, the tip first.
@@ -174,7 +174,7 @@ def places_of(touches: Sequence[Pose], tip: ToolOffset) -> list[Vector]:
 
 
 def proving_spots(over: OverPin, possible: Sequence[SurfaceSpot]) -> tuple[SurfaceSpot, ...]:
-    """Return four of the possible spots, whose touches together show all of a drift best."""
+    """Return the four possible spots whose touches together show a drift best."""
     rows = [np.array(spot.normal) @ rotation_of(over.pose(spot.tilt, 0.0)) for spot in possible]
     chosen: list[int] = []
 
@@ -195,7 +195,7 @@ def verify_on_surface(
     tolerance_mm: float,
     u_mm: float,
 ) -> Procedure[VerifyResult]:
-    """Have a known surface touched in tilts that were not measured in. Runs in the new tool.
+    """Let a person touch a known surface in tilts not measured in. Runs in the new tool.
 
     The tip starts lifted and upright. How far the person jogs beyond the place where the surface
     should have been shows, from all touches together, where the tip is beside where it was
@@ -204,7 +204,7 @@ def verify_on_surface(
 
     Args:
         plan: Lift, clearance, contact input.
-        over: Where the tip is, lifted, in the frame in force.
+        over: Where the tip is, lifted, in the selected frame.
         spots: What is touched.
         tolerance_mm: Largest drift that passes with its guard band, all directions together.
         u_mm: Standard uncertainty of what one touch shows.
@@ -270,7 +270,7 @@ class SurfaceSampler(TiltedNames, ABC, Generic[SurveyT, ResultT]):
         self._spots: tuple[SurfaceSpot, ...] = ()
 
     def take(self, place: int) -> Procedure[Pose]:
-        """Go to a spot, and have the surface touched there."""
+        """Go to a spot, and let a person touch the surface there."""
         if place >= self.survey.uprights:
             if not self._spots:
                 self._spots = yield from self._laid_out()
@@ -283,7 +283,7 @@ class SurfaceSampler(TiltedNames, ABC, Generic[SurveyT, ResultT]):
         )
 
     def away(self) -> Procedure[None]:
-        """Stand upright again, lifted: a person may take their time, or nothing follows."""
+        """Move upright again, lifted: a person may take their time, or nothing follows."""
         return self.drive.to(UPRIGHT)
 
     def foreseen(self, place: int) -> Pose:
@@ -297,7 +297,7 @@ class SurfaceSampler(TiltedNames, ABC, Generic[SurveyT, ResultT]):
         return math.sqrt(float(fit.unit_covariance.diagonal()[:_TIP_COLUMNS].max()))
 
     def adopt(self, taken: Sequence[TouchedAt]) -> None:
-        """Take over the touches of a measurement of which one is made again."""
+        """Take over the touches of a measurement of which one is repeated."""
         self.touches.adopt(dict(enumerate(taken)))
         choice = candidates(self.survey.tilt_deg, self.axes)
         tilts = [UPRIGHT] * self.survey.uprights
@@ -308,7 +308,7 @@ class SurfaceSampler(TiltedNames, ABC, Generic[SurveyT, ResultT]):
 
     @abstractmethod
     def solve(self, taken: Sequence[Pose]) -> ResultT:
-        """Return what they say, with their residuals in their order.
+        """Return their result, with their residuals in their order.
 
         Raises:
             CalibrationError: They say nothing that can be trusted.
@@ -328,7 +328,7 @@ class SurfaceSampler(TiltedNames, ABC, Generic[SurveyT, ResultT]):
 
     @abstractmethod
     def aligned(self, spot: SurfaceSpot) -> SurfaceSpot:
-        """Return a spot where the upright touches, as they count now, say that it is.
+        """Return a spot where the upright touches that count now put it.
 
         Raises:
             CalibrationError: They show a surface that is not to be touched so.
@@ -344,7 +344,7 @@ class SurfaceSampler(TiltedNames, ABC, Generic[SurveyT, ResultT]):
 
     @abstractmethod
     def _laid_out(self) -> Procedure[tuple[SurfaceSpot, ...]]:
-        """Return the spots of all touches, when the upright ones are made.
+        """Return the spots of all touches, once the upright ones are made.
 
         Raises:
             CalibrationError: The surface, or the arm, does not let the tip be told.
@@ -412,7 +412,7 @@ def retake_on_surface(
     taken: Sequence[TouchedAt],
     again: int,
 ) -> Procedure[ResultT]:
-    """Make one touch of :func:`measure_surface` again. Runs in Tool 0, ends as it does.
+    """Repeat one touch of :func:`measure_surface`. Runs in Tool 0, ends as it does.
 
     Args:
         source: What was measured, and how.

@@ -39,11 +39,7 @@ class PlaneTouchParameters(SurfaceParameters):
         int,
         Ge(PlaneSurvey.least_count),
         Le(24),
-        Help(
-            declared(
-                "Number of touches; the first three in the orientation in which the tool stands."
-            )
-        ),
+        Help(declared("Number of touches; the first three in the tool's present orientation.")),
     ] = 10
     spread_mm: Annotated[
         float,
@@ -97,7 +93,7 @@ class PlaneTouchSource(SurfaceTouchSource[PlaneSurvey, "PlaneTouchResult"]):
         return tr("Check that all touches were on the same flat surface, and that it is fixed.")
 
     def proof_of(self, basis: ProofBasis) -> "PlaneTest":
-        """Return the proof in other tilts; see :meth:`~robolink.procedures.ProvesAgain.proof_of`.
+        """Return the test in other tilts; see :meth:`~robolink.procedures.ProvesAgain.proof_of`.
 
         Raises:
             TypeError: The result is not that of a plane.
@@ -196,14 +192,14 @@ METHOD = Method(
     name="plane-touch",
     summary=declared("Touch a flat surface with the tool upright and tilted: X, Y and Z."),
     description=declared(
-        "Touch a flat surface with the tool upright and tilted: X, Y and Z. No pin is needed, and "
-        "nobody has to hit a point.\n\n"
-        "Put the tip some millimetres above the surface first, the tool as it stands in "
-        "production. Three touches tell how the surface lies; then the robot tilts the tool in "
-        "the air, and stops near the surface each time; you do the rest. The tool must be defined "
-        "already, to a millimetre or two. A robot of five axes needs a surface at an angle of 15 "
-        "to 30 degrees; one of six may have it level. Z is known less well than X and Y.\n\n"
-        "With poses that exist already nothing moves."
+        "Touch a flat surface with the tool upright and tilted: X, Y and Z. No pin is needed, "
+        "and nobody has to hit a point.\n\nFirst put the tip some millimetres above the "
+        "surface, with the tool oriented as in production. Three touches show how the surface "
+        "lies. Then the robot tilts the tool in the air and stops near the surface each time; "
+        "you jog the rest. The tool must be defined already, to a millimetre or two. A "
+        "five-axis robot needs a surface at an angle of 15 to 30 degrees; for a six-axis robot "
+        "it may be level. Z is less accurate than X and Y.\n\nWith existing poses nothing "
+        "moves."
     ),
     parameters=PlaneTouchParameters,
     measures=("x_mm", "y_mm", "z_mm"),

@@ -1,4 +1,4 @@
-"""A tip touched onto a plane, upright and tilted: X, Y and Z, and how the plane lies; its proof.
+"""A tip that touches a plane, upright and tilted: X, Y and Z, the plane, and the test.
 
 The first three touches are made in one orientation and tell how the plane lies. Then the tilts are
 chosen that tell most about the tip, and touched at places round the first one.
@@ -79,7 +79,7 @@ def normal_of(places_mm: Sequence[Vector]) -> Vector:
 
 
 def require_lean(normal: Vector, survey: PlaneSurvey) -> None:
-    """Refuse a plane that leans by more than the robot kept away from it.
+    """Refuse a plane that leans more than the clearance of the robot allowed for.
 
     Raises:
         CalibrationError: ``surface_leans``.
@@ -142,20 +142,20 @@ def informative_spots(
 
 
 def _leans(drive: SurfaceDrive, spot: SurfaceSpot, tilts: Sequence[Tilt]) -> Floats:
-    """Return how the plane's normal lies on the flange in each tilt, one a row."""
+    """Return the plane's normal in the flange in each tilt, one a row."""
     turned = [rotation_of(drive.pose(replace(spot, tilt=tilt))) for tilt in tilts]
     leans: Floats = np.array(turned).transpose(0, 2, 1) @ np.array(spot.normal)
     return leans
 
 
 def _row(lean: Floats, survey: PlaneSurvey, number: int) -> Floats:
-    """Return the derivatives at one touch: the tip, how the plane leans, its distance."""
+    """Return the derivatives at one touch: the tip, the plane's lean, its distance."""
     beside = np.array(survey.beside_mm(number)) / survey.spread_mm
     return np.concatenate((lean, beside, [-1.0]))
 
 
 def require_observable(columns: Floats) -> None:
-    """Refuse a plan whose touches could not tell the tip, before any of them is made.
+    """Refuse a plan whose touches could not determine the tip, before any of them is made.
 
     Args:
         columns: The derivatives at all spots.
@@ -229,7 +229,7 @@ class _PlaneSampler(SurfaceSampler[PlaneSurvey, PlaneTouchResult]):
         return spots
 
     def _normal(self) -> Vector:
-        """Return how the plane lies by the upright touches.
+        """Return the plane's orientation by the upright touches.
 
         Raises:
             CalibrationError: ``rank_deficient`` or ``surface_leans``.
@@ -256,7 +256,7 @@ def _under(here: Pose, tip: ToolOffset, plane: TouchedPlane) -> tuple[Vector, Ve
 
 
 def _first_touch() -> str:
-    """Return what the person is asked for at first, before anything is known of the plane."""
+    """Return the first request to the person, before anything is known of the plane."""
     return tr("Jog the tip onto the surface.")
 
 
@@ -265,7 +265,7 @@ PLANE: Final = SurfaceKind(_PlaneSampler, _first_touch)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PlaneTest(TiltingProof):
-    """All that the proof on a plane needs.
+    """All that the test on a plane needs.
 
     Attributes:
         plane: The plane as the measurement found it.

@@ -42,11 +42,7 @@ class SphereTouchParameters(SurfaceParameters):
         int,
         Ge(SphereSurvey.least_count),
         Le(24),
-        Help(
-            declared(
-                "Number of touches; the first four in the orientation in which the tool stands."
-            )
-        ),
+        Help(declared("Number of touches; the first four in the tool's present orientation.")),
     ] = 12
     radius_mm: Annotated[
         float,
@@ -104,7 +100,7 @@ class SphereTouchSource(SurfaceTouchSource[SphereSurvey, "SphereTouchResult"]):
         return tr("Check that all touches were on the same sphere, and that it is fixed.")
 
     def proof_of(self, basis: ProofBasis) -> "SphereTest":
-        """Return the proof in other tilts; see :meth:`~robolink.procedures.ProvesAgain.proof_of`.
+        """Return the test in other tilts; see :meth:`~robolink.procedures.ProvesAgain.proof_of`.
 
         Raises:
             TypeError: The result is not that of a sphere.
@@ -210,14 +206,14 @@ METHOD = Method(
     name="sphere-touch",
     summary=declared("Touch a sphere from several sides, the tool upright and tilted: X, Y and Z."),
     description=declared(
-        "Touch a sphere from several sides, the tool upright and tilted: X, Y and Z. A ball of a "
-        "bearing or of a gauge will do; nobody has to hit a point.\n\n"
-        "Put the tip some millimetres above the top of the sphere first, the tool as it stands in "
-        "production. Four touches tell where the sphere is; then the robot tilts the tool in the "
-        "air, and stops near one side each time; you do the rest. The tool must be defined "
-        "already, to a millimetre or two. Where the sphere is and its true radius are found. A "
-        "robot whose tool only turns about Z cannot do this.\n\n"
-        "With poses that exist already nothing moves."
+        "Touch a sphere from several sides, the tool upright and tilted: X, Y and Z. The ball "
+        "of a bearing or of a gauge is enough; nobody has to hit a point.\n\nFirst put the tip "
+        "some millimetres above the top of the sphere, with the tool oriented as in "
+        "production. Four touches show where the sphere is. Then the robot tilts the tool in "
+        "the air and stops near one side each time; you jog the rest. The tool must be defined "
+        "already, to a millimetre or two. The result includes the place of the sphere and its "
+        "true radius. A robot whose tool only turns about Z cannot do this.\n\nWith existing "
+        "poses nothing moves."
     ),
     parameters=SphereTouchParameters,
     measures=("x_mm", "y_mm", "z_mm"),

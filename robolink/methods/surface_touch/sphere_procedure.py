@@ -1,4 +1,4 @@
-"""A tip touched onto a sphere from several sides: X, Y and Z, and the sphere; and its proof.
+"""A tip that touches a sphere from several sides: X, Y and Z, the sphere, and the test.
 
 The first four touches are made in one orientation and tell where the sphere is, but for the error
 of the tip. Then the sides and tilts are chosen that tell most about the tip.
@@ -224,7 +224,7 @@ class TouchedSphere:
 
 
 def _first_touch() -> str:
-    """Return what the person is asked for at first, before anything is known of the sphere."""
+    """Return the first request to the person, before anything is known of the sphere."""
     return tr("Jog the tip onto the top of the sphere.")
 
 
@@ -233,7 +233,7 @@ SPHERE: Final = SurfaceKind(_SphereSampler, _first_touch)
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SphereTest(TiltingProof):
-    """All that the proof on a sphere needs.
+    """All that the test on a sphere needs.
 
     Attributes:
         survey: From which sides it may be touched.

@@ -42,7 +42,7 @@ class PlaneSurvey:
 
     @property
     def rise_mm(self) -> float:
-        """How much higher than the first touch such a plane may be where it is touched next."""
+        """How far above the first touch the plane may be at the next one."""
         return self.spread_mm * math.tan(math.radians(self.most_lean_deg))
 
     def beside_mm(self, number: int) -> tuple[float, float]:
@@ -84,16 +84,16 @@ class SphereSurvey:
 
     @property
     def aside_mm(self) -> float:
-        """How far from the top the first touch may be; so much more the tip keeps away at first."""
+        """How far from the top the first touch may be; at first the tip keeps away as much more."""
         return self.most_aside * self.radius_mm
 
     @property
     def drop_mm(self) -> float:
-        """How much lower than its top the sphere is touched."""
+        """How far below its top the sphere is touched."""
         return self.radius_mm * (1.0 - math.cos(math.radians(self.side_deg)))
 
     def sides(self) -> Iterator[Vector]:
-        """Yield the outward directions among which to choose, the top first."""
+        """Yield the outward directions to choose among, the top first."""
         yield (0.0, 0.0, 1.0)
         for polar_deg in (self.side_deg / 2, self.side_deg):
             for number in range(_AZIMUTHS):

@@ -46,7 +46,7 @@ _SPEEDS_APART: Final = 1.5
 
 @dataclass(frozen=True, kw_only=True)
 class ZTouchParameters(SampledParameters):
-    """How a tip is brought down on a surface that switches an input."""
+    """How a tip comes down on a surface that switches an input."""
 
     input: Annotated[
         InputNumber | None,
@@ -83,8 +83,8 @@ class ZTouchParameters(SampledParameters):
         MM,
         Help(
             declared(
-                "How far below the expected touch the search ends; "
-                "a new tip can be shorter by less."
+                "How far below the expected touch the search ends; the new tip must be shorter "
+                "by less than this."
             )
         ),
     ] = 2.0
@@ -106,8 +106,8 @@ class ZTouchParameters(SampledParameters):
         Option(metavar="DEG"),
         Help(
             declared(
-                "By how much U differs at the touch that proves the new value; 0 on a machine that "
-                "cannot turn, such as a gantry."
+                "Turn of U to the touch that tests the new value; 0 on a machine that cannot "
+                "turn, such as a gantry."
             )
         ),
     ] = 180.0
@@ -123,7 +123,7 @@ class ZTouchParameters(SampledParameters):
     ] = False
 
     def may_end_early(self, *, sigma_stated: bool) -> bool:
-        """Tell whether the tip can be known well enough before the last touch.
+        """Return whether the tip can be known well enough before the last touch.
 
         Args:
             sigma_stated: Whether somebody stated the standard deviation of a touch.
@@ -132,7 +132,7 @@ class ZTouchParameters(SampledParameters):
         return may_end_early(len(self.speeds_mm_s), unknowns=2, sigma_stated=sigma_stated)
 
     def problems(self, check: Check) -> Iterator[Problem]:
-        """Check speeds and heights, and that an early end and a retake can do something."""
+        """Check speeds and heights, and that an early end and a retake can have an effect."""
         yield from super().problems(check)
         if max(self.speeds_mm_s) < _SPEEDS_APART * min(self.speeds_mm_s):
             yield Problem(
@@ -142,7 +142,7 @@ class ZTouchParameters(SampledParameters):
         yield from clearance_below_lift(self.clearance_mm, self.lift_mm, check)
 
     def nothing_to_leave_out(self, check: Check) -> str:
-        """Return why it cannot end early, and what to give."""
+        """Return why it cannot end early, and which values to give."""
         return tr(
             "has nothing to leave out; give 7 {speeds}, or 4 with {sigma}",
             speeds=check.spell("speeds_mm_s"),
@@ -154,7 +154,7 @@ class ZTouchParameters(SampledParameters):
         return self.lift_mm
 
     def no_residual(self) -> str:
-        """Return why residuals cannot be judged, empty when they can."""
+        """Return why residuals cannot be judged, empty if they can."""
         if len(self.speeds_mm_s) > 2:
             return ""
         return tr(
@@ -192,7 +192,7 @@ class ZTouchSource(InputSource[ZTouchParameters]):
         return tr("Clean tip and surface, and check that the nozzle is tight.")
 
     def told_by(self, context: MeasurementContext) -> Self:
-        """Return the source with how the robot brakes and how finely an edge is told."""
+        """Return the source with the robot's braking and the step of reported edges."""
         return replace(
             self, deceleration_mm_s2=_told_braking(context), step_mm=_told_step(context, self.plan)
         )
@@ -204,7 +204,7 @@ class ZTouchSource(InputSource[ZTouchParameters]):
         return touch_surface(self, stored, here)
 
     def proof_of(self, basis: ProofBasis) -> "ProbeTest":
-        """Return the proof at another U; see :meth:`~robolink.procedures.ProvesAgain.proof_of`."""
+        """Return the test at another U; see :meth:`~robolink.procedures.ProvesAgain.proof_of`."""
         from robolink.calibration import toward_zero
         from robolink.methods.z_touch.procedure import ProbeTest  # numpy
 
@@ -267,12 +267,12 @@ def measure_z_touch(
 
 
 def _told_braking(context: MeasurementContext) -> float | None:
-    """Return how the robot brakes, ``None`` where its controller does not tell."""
+    """Return how the robot brakes, ``None`` if its controller does not report it."""
     return context.controller.groups[0].deceleration_mm_s2() or None
 
 
 def _told_step(context: MeasurementContext, plan: ZTouchParameters) -> float | None:
-    """Return how finely the place of the fastest touch is told, ``None`` where nobody knows it."""
+    """Return the step in which the place of the fastest touch is reported, ``None`` if unknown."""
     return context.controller.groups[0].edge_step_mm(max(plan.speeds_mm_s))
 
 
@@ -296,10 +296,10 @@ METHOD = Method(
     name="z-touch",
     summary=declared("Touch a surface that switches an input: Z."),
     description=declared(
-        "Touch a surface that switches an input: Z; nobody touches anything.\n\n"
-        "X and Y are kept. The tip stops at the touch and retreats; two speeds tell the latency. "
-        "After each touch from the third on it says how well they agree and what Z is repeatable "
-        "to; at the end the one that fits worst is named and may be made again."
+        "Touch a surface that switches an input: Z; nobody touches anything.\n\nX and Y stay. "
+        "The tip stops at the touch and retreats; two speeds show the latency. From the third "
+        "touch on, it shows how well they agree and what Z is repeatable to. At the end it "
+        "names the touch that fits worst, and you can repeat it."
     ),
     parameters=ZTouchParameters,
     measures=("z_mm",),

@@ -37,7 +37,7 @@ from robolink.stations import TouchStation
 def touch_surface(
     source: ZTouchSource, stored: ToolOffset | None, here: Pose
 ) -> Procedure[ZTouchResult]:
-    """Measure as a source says, see :func:`~robolink.methods.measure_z_touch`."""
+    """Measure as a source says; see :func:`~robolink.methods.measure_z_touch`."""
     solvable_planes([here], height_of(stored))
     probing = _ZTouchSampler(source, here, stored or NO_OFFSET, here, stored, here)
     speeds_mm_s = source.plan.speeds_mm_s
@@ -65,7 +65,7 @@ def verify_by_touching(
         here: Where the frame of the new tool is.
         angles_deg: Its angles U at which the surface is touched.
         tolerance_mm: Largest drift that passes.
-        aside: Where the tip is expected, seen from the frame in force; not 0 where a difference
+        aside: Where the tip is expected, seen from the selected frame; not 0 where a difference
             to a reference was written.
         deceleration_mm_s2: As for :func:`~robolink.methods.measure_z_touch`.
         step_mm: Likewise.
@@ -170,7 +170,7 @@ class _ZTouchSampler(TouchNames):
 
     @property
     def _above(self) -> Pose:
-        """The frame's pose with the tip where it begins to seek."""
+        """The frame's pose with the tip where the search starts."""
         station = self.source.station
         at = (station.x_mm, station.y_mm, station.z_mm + self.source.plan.clearance_mm)
         return carrying(self.frame, self.tip, at)
@@ -183,7 +183,7 @@ class _ZTouchSampler(TouchNames):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ProbeTest(PlacedProof):
-    """All that a proof on a surface that switches an input needs.
+    """All that the test on a switching surface needs.
 
     Attributes:
         station: Where the surface is.

@@ -1,1 +1,1 @@
-"""The files of makers and programs, each by what nothing else begins with."""
+"""The files of makers and programs, each recognised by its own beginning."""

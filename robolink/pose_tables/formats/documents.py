@@ -1,4 +1,4 @@
-"""Poses in JSON and in messages of ROS: objects wherever they stand in the document.
+"""Poses in JSON and in messages of ROS: objects anywhere in the document.
 
 An object is a pose when it has X and Y, by the names that the columns of tables have, or a position
 and an orientation as ``geometry_msgs/Pose`` (metres, and a quaternion x, y, z, w:
@@ -41,7 +41,7 @@ Found = dict[str, object] | list[list[float]]
 """An object that is a pose, its values by their names; or the rows of a matrix."""
 
 COMPONENTS: Final = frozenset({*LENGTHS, *ANGLES, *QUATERNION, *MATRIX})
-"""What columns or keys are called that say where a pose is and how it turns."""
+"""Names of columns or keys for the place of a pose and its orientation."""
 
 _PARTS: Final = ("position", "orientation", "translation", "rotation")
 _LISTED: Final = {"position": "xyz", "translation": "xyz"}
@@ -53,7 +53,7 @@ _FEWEST_COMPONENTS: Final = 2
 
 
 def as_number(value: object) -> float:
-    """Return a number, ``nan`` for what is none; a text may hold one."""
+    """Return a number, ``nan`` for anything else; a text may hold one."""
     if isinstance(value, bool):
         return math.nan
     if isinstance(value, str):
@@ -89,7 +89,7 @@ def poses_in(node: object, name: str, depth: int) -> Iterator[Found]:
 
 
 def has_joints(node: object, depth: int = 0) -> bool:
-    """Tell whether a document holds values of joints somewhere."""
+    """Return whether a document holds values of joints somewhere."""
     if depth > _DEEPEST or not isinstance(node, (dict, list)):
         return False
     if isinstance(node, dict):
@@ -142,7 +142,7 @@ def _refuse_damaged(flat: dict[str, object]) -> None:
 
 
 def _flat(node: dict[str, object]) -> dict[str, object]:
-    """Return the plain values of an object, those of a position and an orientation too."""
+    """Return the plain values of an object, also those of a position and an orientation."""
     flat: dict[str, object] = {}
     for key, value in node.items():
         part = str(key).lower()
@@ -161,7 +161,7 @@ def _flat(node: dict[str, object]) -> dict[str, object]:
 
 
 def as_matrix(node: list[object]) -> list[list[float]]:
-    """Return three or four rows of four numbers, nothing where a list is anything else."""
+    """Return three or four rows of four numbers, nothing for any other list."""
     if len(node) not in (3, 4) or not all(isinstance(row, list) and len(row) == 4 for row in node):
         return []
     rows = [[as_number(value) for value in row] for row in node if isinstance(row, list)]
@@ -234,7 +234,7 @@ def read_document(document: object, choices: ReadingChoices, *, layout: str) -> 
 
 
 class _Made:
-    """Makes poses of objects; those with the same keys are understood in the same way."""
+    """Makes poses of objects; objects with the same keys are read in the same way."""
 
     def __init__(self, choices: ReadingChoices) -> None:
         self._choices = choices
@@ -351,7 +351,7 @@ class _Made:
 
 
 def _rows_of_numbers(document: object, choices: ReadingChoices) -> list[list[object]]:
-    """Return the rows of a list of lists of numbers, none where it is anything else."""
+    """Return the rows of a list of lists of numbers, none for anything else."""
     if not isinstance(document, list) or not document:
         return []
     if choices.columns is None and is_matrix(as_matrix(document)):

@@ -175,7 +175,7 @@ def _pose(fields: Mapping[str, float]) -> Pose | None:
 
 
 def _posture(fields: Mapping[str, float]) -> Posture | None:
-    """Return the flags of a point, ``None`` where they are those of any point of a SCARA.
+    """Return the flags of a point, ``None`` if they are those of any point of a SCARA.
 
     An angle of a singular place is 0 in every point that has none.
     """

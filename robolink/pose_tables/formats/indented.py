@@ -24,7 +24,7 @@ Entry = tuple[int, int, str]
 
 
 def looks_indented(lines: Sequence[str]) -> bool:
-    """Tell whether lines are keys with colons of which one at least opens a block."""
+    """Return whether lines are keys with colons of which one at least opens a block."""
     texts = [text for text in (_COMMENT.sub("", line).strip() for line in lines[:60]) if text]
     opens = any(text.endswith(":") for text in texts)
     keys = [_KEY.fullmatch(text.lstrip("- ")) or text[:3] in ("---", "...") for text in texts]
@@ -115,7 +115,7 @@ def _mapping(entries: list[Entry], start: int, indent: int, depth: int) -> tuple
 
 
 def _opens(entry: Entry, indent: int) -> bool:
-    """Tell whether a line belongs to the key above; lists may stand as far left as their key."""
+    """Return whether a line belongs to the key above; lists may stand as far left as their key."""
     _, here, text = entry
     return here > indent or (here == indent and (text == "-" or text.startswith("- ")))
 

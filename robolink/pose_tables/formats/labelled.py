@@ -37,7 +37,7 @@ _COMPONENTS: Final = frozenset({*LENGTHS, *ANGLES})
 
 
 def read_labelled(lines: Sequence[str], choices: ReadingChoices) -> RawTable | None:
-    """Return the poses of values with names; ``None`` where lines are laid out otherwise.
+    """Return the poses of values with names; ``None`` for another layout.
 
     Raises:
         UnclearText: Unit or rule have to be named by a person.
@@ -86,7 +86,7 @@ def read_labelled(lines: Sequence[str], choices: ReadingChoices) -> RawTable | N
 
 
 def of_joints_only(lines: Sequence[str]) -> bool:
-    """Tell whether values are those of joints: ``J1: 0.0 J2: -90.0 ..``, or one a line."""
+    """Return whether values are those of joints: ``J1: 0.0 J2: -90.0 ..``, or one a line."""
     text = "\n".join(lines)
     if {"x", "y"} <= {found[1].lower() for found in _LABEL.finditer(text)}:
         return False
@@ -129,7 +129,7 @@ def _refuse_pieces(text: str, found: Sequence[re.Match[str]]) -> None:
 
 
 def _is_label(pair: re.Match[str]) -> bool:
-    """Tell a name of a value from other words; without a sign between only known names count."""
+    """Return whether a word names a value; without a sign between only known names count."""
     return bool(pair[2].strip()) or pair[1].lower() in MEANINGS
 
 

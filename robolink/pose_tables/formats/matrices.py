@@ -53,7 +53,7 @@ def read_matrices(lines: Sequence[str]) -> RawTable | None:
 
 
 def pose_of_rows(rows: Sequence[Sequence[float]], line: int) -> RawPose | None:
-    """Return the pose of a 4 x 4 or 3 x 4 matrix, ``None`` where it cannot be told what it is.
+    """Return the pose of a 4 x 4 or 3 x 4 matrix, ``None`` if it is unclear what it is.
 
     Raises:
         UnusableText: It is no rotation.
@@ -64,7 +64,7 @@ def pose_of_rows(rows: Sequence[Sequence[float]], line: int) -> RawPose | None:
 
 
 def is_matrix(rows: Sequence[Sequence[float]]) -> bool:
-    """Tell whether rows are a matrix of a pose for certain: 0 0 0 1 and a rotation."""
+    """Return whether rows are a matrix of a pose for certain: 0 0 0 1 and a rotation."""
     if len(rows) != 4 or any(len(row) != 4 for row in rows):
         return False
     last_row, last_column = _is_last(rows[3]), _is_last([row[3] for row in rows])
@@ -73,7 +73,7 @@ def is_matrix(rows: Sequence[Sequence[float]]) -> bool:
 
 
 def _refuse_damaged(blocks: Sequence[Block], damaged: Sequence[int]) -> None:
-    """Refuse what is no matrix among matrices.
+    """Refuse a block among matrices that is none.
 
     Raises:
         UnusableText: A line holds other numbers than four, or a block other lines.
@@ -133,7 +133,7 @@ def _one_shape(blocks: Sequence[Block]) -> bool:
 
 
 def _stored_by_columns(blocks: Sequence[Block]) -> bool | None:
-    """Tell whether blocks were written column by column; ``None`` where they are no matrices."""
+    """Return whether blocks were written column by column; ``None`` if they are no matrices."""
     shape = (len(blocks[0][2]), len(blocks[0][2][0]))
     if shape == (4, 3):
         return None  # rows and a place below, or columns: nothing in it tells

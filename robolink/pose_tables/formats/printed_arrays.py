@@ -38,7 +38,7 @@ Row = tuple[int, list[float]]
 
 
 def read_arrays(text: str, choices: ReadingChoices) -> RawTable | None:
-    """Return the poses of printed arrays; ``None`` where the text is laid out otherwise.
+    """Return the poses of printed arrays; ``None`` for another layout.
 
     Raises:
         UnclearText: Columns, unit or rule have to be named by a person.
@@ -88,7 +88,7 @@ class _Rows:
         self._parent: int | None = None
 
     def open(self, place: int) -> None:
-        """Begin a row, or what holds rows."""
+        """Begin a row, or a list of rows."""
         if self._row:
             raise UnusableText(tr("its brackets do not match"))
         self.opened.append(place)

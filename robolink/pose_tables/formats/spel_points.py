@@ -116,7 +116,7 @@ def _refuse_other_flags(poses: Sequence[RawPose]) -> None:
 
 
 def _is_piece(text: str) -> bool:
-    """Tell whether a line that is no statement may be the rest of a point."""
+    """Return whether a line that is no statement may be the rest of a point."""
     if not text.strip() or _STATEMENT.match(text):
         return False
     return bool(_PIECE.search(text) or _SEVERAL.search(text))

@@ -1,1 +1,1 @@
-"""Poses in programs of robots, a grammar for each maker."""
+"""Poses in robot programs, with a grammar for each maker."""

@@ -63,7 +63,7 @@ _QUATERNION: Final = ("Q1", "Q2", "Q3", "Q4")
 
 
 def read_abb(text: str) -> RawTable | None:
-    """Return the poses of a RAPID module; ``None`` where there is none of its sort.
+    """Return the poses of a RAPID module; ``None`` if it has none.
 
     Raises:
         UnusableText: What looks like a target is none; says the line.

@@ -96,7 +96,7 @@ class _Points:
         self._seen: set[tuple[str, str]] = set()
 
     def add(self, found: re.Match[str], line: int) -> None:
-        """Add one point; joints and what is not taught are counted.
+        """Add one point; joints and untaught points are counted.
 
         Raises:
             UnusableText: It is not whole.
@@ -130,7 +130,7 @@ class _Points:
 
 
 def _body(body: str, line: int) -> tuple[dict[str, str], dict[str, str]]:
-    """Return frames and values of the first group of axes, all of whose items are understood."""
+    """Return frames and values of the first axis group, if all of its items are known."""
     frames: dict[str, str] = {}
     values: dict[str, str] = {}
     group, place = "1", 0

@@ -91,7 +91,7 @@ class _Reader:
         self.skipped = 0
 
     def read(self) -> None:
-        """Read all aggregates, and refuse what looks like one and is none."""
+        """Read all aggregates, and refuse what only looks like one."""
         before, taken = 0, list[tuple[int, int]]()
         for group in groups_of(_STRING.sub(blanked, self._text), "{", self._line_at):
             begin = max(before, self._text.rfind("\n", 0, group.start) + 1)
@@ -210,7 +210,7 @@ class _Reader:
 
 
 def read_kuka(text: str) -> RawTable | None:
-    """Return the poses of a KUKA ``.dat`` or ``.src``; ``None`` where there is none of its sort.
+    """Return the poses of a KUKA ``.dat`` or ``.src``; ``None`` if it has none.
 
     Raises:
         UnusableText: What looks like a pose is none; says the line.

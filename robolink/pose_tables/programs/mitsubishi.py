@@ -89,7 +89,7 @@ def read_mitsubishi(text: str) -> RawTable | None:
 
 
 def _is_cut(code: str) -> bool:
-    """Tell whether a line is the beginning of a position and no more."""
+    """Return whether a line is the beginning of a position and no more."""
     code = code.strip()
     return bool(_NUMBERED.fullmatch(code) or _END.search(code)) or code.upper() == "P"
 

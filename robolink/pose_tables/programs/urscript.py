@@ -120,7 +120,7 @@ def read_urscript(text: str) -> RawTable | None:
 
 
 def _lists(text: str) -> Iterator[tuple[int, int, tuple[str, ...], int]]:
-    """Yield start and end of each list, the calls around it, and where its writing begins.
+    """Yield start and end of each list, the calls around it, and where it starts in the text.
 
     Raises:
         UnusableText: A bracket has no partner.
@@ -151,7 +151,7 @@ def _lists(text: str) -> Iterator[tuple[int, int, tuple[str, ...], int]]:
 
 
 def _joints(parts: list[str], name: str, calls: tuple[str, ...], line: int) -> int:
-    """Return 1 for a list of joint angles, 0 for one that says nothing of a place.
+    """Return 1 for a list of joint angles, 0 for one without a place.
 
     Raises:
         UnusableText: Six numbers that nothing says to be joints may be a pose without its p.

@@ -233,7 +233,7 @@ class PoseColumns:
 
     @property
     def length(self) -> LengthUnit | None:
-        """The unit that the columns say.
+        """The unit that the columns state.
 
         Raises:
             UnusableText: They say more than one.
@@ -261,7 +261,7 @@ class PoseColumns:
         return list(self.questions)
 
     def _numeric(self, rows: Sequence[tuple[int, Sequence[object]]]) -> list[bool]:
-        """Tell for each column whether it holds numbers throughout."""
+        """Return for each column whether it holds numbers throughout."""
         return [
             bool(rows) and all(math.isfinite(self._number(row[place])) for _, row in rows)
             for place in range(len(self._heads))
@@ -407,7 +407,7 @@ class PoseColumns:
 
 
 def _refuse_misspelt(heads: Sequence[ColumnHead]) -> None:
-    """Refuse a column that says nothing, but is one letter away from one that would.
+    """Refuse a column without a meaning whose name is one letter away from a known one.
 
     Raises:
         UnusableText: There is one.

@@ -76,7 +76,7 @@ _UNIT_BEHIND: Final = re.compile(r"\s*[(\[].*[)\]]\s*$")
 
 
 def column_head(text: str) -> ColumnHead:
-    """Return what a column called ``text`` holds; an unknown name holds nothing.
+    """Return the content of a column called ``text``; an unknown name has none.
 
     Raises:
         UnusableText: The name says a unit that is none of X's, or one that is not known.
@@ -97,7 +97,7 @@ def column_head(text: str) -> ColumnHead:
 
 
 def column_heads(texts: Iterable[str]) -> tuple[ColumnHead, ...]:
-    """Return what the columns of a file hold; of two names or numbers one only is kept.
+    """Return the content of a file's columns; of two names or numbers only one is kept.
 
     Raises:
         UnusableText: As of :func:`column_head`.
@@ -113,7 +113,7 @@ def column_heads(texts: Iterable[str]) -> tuple[ColumnHead, ...]:
 
 
 def is_unit(text: str) -> bool:
-    """Tell whether a cell is a unit and nothing else, as in a line of units below a header."""
+    """Return whether a cell is only a unit, as in a line of units below a header."""
     return text.strip().lower().strip("()[]") in _UNITS
 
 
@@ -189,18 +189,18 @@ def _one_slip(text: str, name: str) -> bool:
 
 
 def names_place(heads: Sequence[ColumnHead]) -> bool:
-    """Tell whether columns hold X and Y: then they are a header."""
+    """Return whether columns hold X and Y: then they are a header."""
     return {"x", "y"} <= {head.meaning for head in heads}
 
 
 def are_joints(names: Sequence[str]) -> bool:
-    """Tell whether most columns are called like joints."""
+    """Return whether most columns have names of joints."""
     called = [name for name in names if is_joint(name)]
     return len(called) >= 3 and len(called) * 2 >= len(names)
 
 
 def is_joint(name: str) -> bool:
-    """Tell whether something is called like a joint, with a unit behind it or without."""
+    """Return whether a name is that of a joint, with a unit behind it or without."""
     return _JOINT.fullmatch(_UNIT_BEHIND.sub("", name).strip()) is not None
 
 

@@ -141,7 +141,7 @@ def _turned(
 
 
 def _labelled(kept: Sequence[tuple[int, str]], separator: str) -> tuple[str, list[_Line]] | None:
-    """Return the lines by a separator; ``None`` where they do not begin with components."""
+    """Return the lines by a separator; ``None`` if they do not begin with components."""
     form = TableForm(separator, ".")
     rows: list[_Line] = []
     components: list[str] = []
@@ -169,7 +169,7 @@ def _labelled(kept: Sequence[tuple[int, str]], separator: str) -> tuple[str, lis
 
 
 def _names_more(cells: Sequence[str]) -> bool:
-    """Tell whether a line names columns instead of one component."""
+    """Return whether a line names columns instead of one component."""
     try:
         return names_place([column_head(cell) for cell in cells])
     except UnusableText:
@@ -177,7 +177,7 @@ def _names_more(cells: Sequence[str]) -> bool:
 
 
 def _meaning(label: str) -> str:
-    """Return the component that a line is called by, empty for none."""
+    """Return the component that a line's name means, empty for none."""
     try:
         meaning = column_head(label).meaning
     except UnusableText:
@@ -186,7 +186,7 @@ def _meaning(label: str) -> str:
 
 
 def _with_units(rows: list[_Line]) -> list[_Line]:
-    """Put a unit that stands behind each component to its name."""
+    """Add a unit that stands behind each component to its name."""
     named = [row for row in rows if _meaning(row.label)]
     if not all(row.cells and is_unit(row.cells[0]) for row in named):
         return rows
@@ -199,7 +199,7 @@ def _with_units(rows: list[_Line]) -> list[_Line]:
 
 
 def _of_words(row: _Line, form: TableForm) -> ColumnHead:
-    """Return what a line is whose name is none of a component: names of the poses, or a remark.
+    """Return the meaning of a line with another name: names of the poses, or a remark.
 
     Raises:
         UnusableText: It holds numbers: it may be a component whose name is damaged.

@@ -1,4 +1,4 @@
-"""From lines to cells: what stands between columns, and which sign is the decimal one.
+"""From lines to cells: which separator, and which decimal sign.
 
 The separator is the one by which all lines have as many cells, of which at least two are numbers
 throughout. A comma is the decimal sign only where something else separates or quotes surround the
@@ -39,7 +39,7 @@ FEWEST: Final = 2
 
 @dataclass(frozen=True, slots=True)
 class TableForm:
-    """How the lines of a table are taken apart.
+    """How the lines of a table are split.
 
     Attributes:
         separator: What stands between cells; a blank is any number of blanks and tabs.
@@ -59,7 +59,7 @@ class TableForm:
         return number_of(text)
 
     def cells(self, lines: Sequence[Line]) -> Iterator[tuple[int, list[str]]]:
-        """Yield the cells of each line; empty ones at the end of a line are left to the caller.
+        """Yield the cells of each line; the caller handles empty ones at the end of a line.
 
         Raises:
             UnusableText: A quote is not closed.
@@ -100,7 +100,7 @@ def table_lines(lines: Sequence[str]) -> tuple[list[Line], list[str]]:
 
 
 def rows_in_comments(lines: Sequence[str], form: TableForm, width: int) -> int:
-    """Return how many rows stand behind the sign of a comment and a blank: left out on purpose.
+    """Return how many rows are commented out: left out on purpose.
 
     Raises:
         UnusableText: A row follows such a sign at once: it may be a digit that was typed with
@@ -127,7 +127,7 @@ def rows_in_comments(lines: Sequence[str], form: TableForm, width: int) -> int:
 
 
 def form_of(lines: Sequence[Line]) -> TableForm:
-    """Return how the lines are taken apart.
+    """Return how the lines are split.
 
     Raises:
         UnusableText: In no way that all of them agree with.
@@ -155,7 +155,7 @@ def without_trailing(rows: Sequence[list[str]]) -> int:
 
 
 def is_number(cell: str) -> bool:
-    """Tell whether a cell is a number, with either decimal sign, or claims to be one."""
+    """Return whether a cell is a number, with either decimal sign, or looks like one."""
     text = plain(cell.strip())
     if any(form.fullmatch(text) for form in _THOUSANDS.values()):
         return True
@@ -164,7 +164,7 @@ def is_number(cell: str) -> bool:
 
 
 def decimal_sign(cell: str) -> str:
-    """Return the decimal sign of a number, empty where it has none: of two signs the last one."""
+    """Return the decimal sign of a number, empty if it has none: of two signs the last one."""
     return max(",.", key=cell.rfind) if "," in cell or "." in cell else ""
 
 
@@ -201,7 +201,7 @@ def _mostly_numbers(cells: Sequence[str]) -> bool:
 
 
 def _cells_of(form: TableForm, line: Line) -> list[str] | None:
-    """Return the cells of one line, ``None`` where a quote is open; the line is refused later."""
+    """Return the cells of one line, ``None`` if a quote is open; the line is refused later."""
     try:
         ((_, cells),) = form.cells([line])
     except UnusableText:

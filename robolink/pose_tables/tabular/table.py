@@ -101,7 +101,7 @@ def read_table(lines: Sequence[str], choices: ReadingChoices) -> RawTable:
 def _ask(
     columns: PoseColumns, body: Sequence[Row], choices: ReadingChoices, comments: Sequence[str]
 ) -> None:
-    """Ask all that the columns leave open at once."""
+    """Ask everything that the columns leave open at once."""
     questions = columns.asked(body)
     turns = columns.turns
     if turns and turns.angle and not turns.unit_said and unit_in(comments, angle=True):
@@ -118,7 +118,7 @@ def _ask(
 def _headed(
     rows: list[Row], comments: Sequence[str], form: TableForm, choices: ReadingChoices
 ) -> tuple[tuple[ColumnHead, ...], list[Row], int]:
-    """Return what the columns hold, the rows of values, and the line of the names, 0 for none."""
+    """Return the columns' content, the rows of values, and the line of the names, 0 for none."""
     first = next(
         (place for place, (_, cells) in enumerate(rows) if sum(map(is_number, cells)) >= FEWEST),
         len(rows),
@@ -212,7 +212,7 @@ def _one_matrix(rows: Sequence[Row], form: TableForm, width: int) -> tuple[Colum
 
 
 def _refuse_rows(above: Sequence[Row]) -> None:
-    """Refuse lines above the values that may be values too, where no header stands among them.
+    """Refuse lines above the values that may be values too, unless a header is among them.
 
     Raises:
         UnusableText: A line holds several numbers, or what may be damaged ones.

@@ -100,7 +100,7 @@ def write_answer(answer: Reply | Refusal, dialect: Dialect) -> bytes:
 
 
 def read_answer(frame: SerialFrame, dialect: Dialect) -> Reply | Refusal:
-    """Return what a device says.
+    """Return the message of a device.
 
     Raises:
         RemoteProtocolError: The check sum is wrong, or it makes no sense.
@@ -137,7 +137,7 @@ def read_answer(frame: SerialFrame, dialect: Dialect) -> Reply | Refusal:
 
 
 def read_request(frame: SerialFrame, dialect: Dialect) -> Request | BadRequest:
-    """Return what a host asks; what makes no sense becomes the refusal it deserves."""
+    """Return the request of a host; a senseless one becomes the refusal that it deserves."""
     letter = BY_BYTE.get(frame.letter)
     name = "" if letter is None else letter.name
     if not frame.intact:
@@ -356,7 +356,7 @@ class EpsonBinaryCodec(EpsonCodec):
 
     @property
     def dialect(self) -> Dialect:
-        """What it takes the manuals to mean."""
+        """Its reading of the manuals."""
         return self._dialect
 
     def carries(self, name: str, *parameters: str) -> bool:
@@ -388,7 +388,7 @@ class EpsonBinaryCodec(EpsonCodec):
         raise self._not_sent(event)
 
     def end_of_request(self) -> Event | None:
-        """Take what is held for all that will come of a request, since the line went silent.
+        """Treat what is held as a complete request, since the line went silent.
 
         Returns:
             The refusal that a broken request deserves; ``None`` where nothing is held.

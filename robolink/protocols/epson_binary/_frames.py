@@ -84,7 +84,7 @@ class Dialect:
 
 
 class Data(Enum):
-    """What one part of a message is."""
+    """The kind of one part of a message."""
 
     BYTE = auto()
     """A number of one byte."""
@@ -214,7 +214,7 @@ def framed(first: int, letter: int, data: bytes) -> bytes:
 
 @dataclass(frozen=True, slots=True)
 class SerialFrame:
-    """What was received as one.
+    """One received frame.
 
     Attributes:
         first: STX, ACK, NAK, or EOT, which stands alone.
@@ -328,7 +328,7 @@ class FrameBuffer:
             )
 
     def _length(self) -> int | None:
-        """Return how long the frame at the start is, ``None`` while that cannot be told."""
+        """Return how long the frame at the start is, ``None`` while that is unknown."""
         if self._data[0] == NAK:
             return _LEAD + _CODE_BYTES + _TAIL
         letter = BY_BYTE.get(self._data[1])

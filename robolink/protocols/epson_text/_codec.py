@@ -195,7 +195,7 @@ _ENCODINGS: Final = frozenset(
 
 
 class _Held(Protocol):
-    """What has arrived, until it is an event."""
+    """What has arrived, until it becomes an event."""
 
     @property
     def held(self) -> bytes:
@@ -230,11 +230,11 @@ class EpsonCodec(ABC):
 
     @property
     def bytes_held(self) -> bytes:
-        """What has arrived and is part of no event yet, for messages about half a reply."""
+        """What has arrived and is part of no event yet, for errors about half a reply."""
         return self._arrived.held
 
     def receive_data(self, data: bytes) -> None:
-        """Take what was received; ``b""`` means that the far side closed.
+        """Accept received data; ``b""`` means that the far side closed.
 
         Raises:
             LocalProtocolError: Bytes after the end of the stream.
@@ -291,7 +291,7 @@ class EpsonCodec(ABC):
         """Cut the next event out of what has arrived."""
 
     def _at_the_end(self) -> EndOfStream | Literal[Need.DATA]:
-        """Return what it means that no whole message is left."""
+        """Return the event for the end of data without a whole message."""
         if not self._ended:
             return NEED_DATA
         if held := self._arrived.held:
@@ -314,7 +314,7 @@ class EpsonCodec(ABC):
 
     @staticmethod
     def _failed_again(failure: RemoteProtocolError) -> RemoteProtocolError:
-        """Return the error of a codec that is dead."""
+        """Return the error of a codec that has failed."""
         return RemoteProtocolError(failure.what, remedy=failure.remedy, raw=failure.raw)
 
 
@@ -392,7 +392,7 @@ class EpsonTextCodec(EpsonCodec):
         self._blank_allowed = False
 
     def carries(self, name: str, *parameters: str) -> bool:  # noqa: ARG002 - here all alike
-        """Whether a command can be sent: here all, known or not to the firmware."""
+        """Return whether a command can be sent: here all, known or not to the firmware."""
         return bool(name)
 
     def send(self, event: Event) -> bytes:
@@ -413,7 +413,7 @@ class EpsonTextCodec(EpsonCodec):
         raise self._not_sent(event)
 
     def end_of_request(self) -> None:
-        """Take what is held for a complete request, since nothing has followed for a while.
+        """Treat what is held as a complete request, since nothing has followed for a while.
 
         A line end that follows all the same belongs to that request.
 

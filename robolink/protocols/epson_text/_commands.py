@@ -86,7 +86,7 @@ class RemoteCommand:
     bare: bool = False
 
     def allowed_during_execute(self, rc_plus: int) -> bool:
-        """Tell whether RC+ version ``rc_plus`` serves it while an Execute runs."""
+        """Return whether RC+ version ``rc_plus`` serves it while an Execute runs."""
         return self.during_execute is not None and rc_plus >= self.during_execute
 
 

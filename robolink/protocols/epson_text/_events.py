@@ -28,7 +28,7 @@ class Request:
 
 @dataclass(frozen=True, slots=True)
 class BadRequest:
-    """A line that a device cannot take for a request, with the refusal it deserves.
+    """A line that a device cannot read as a request, with the refusal it deserves.
 
     ``name`` is what to echo: the name if one could be read, else the received text
     (assumed; docs/reference/epson.md 1.6 marks it unverified).
@@ -72,7 +72,7 @@ class Opening:
 
 
 Event = Request | BadRequest | Reply | Refusal | Opening | EndOfStream
-"""Whatever a codec can hand out."""
+"""Any event of a codec."""
 
 
 class ErrorCode(IntEnum):

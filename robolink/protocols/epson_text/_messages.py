@@ -42,7 +42,7 @@ _BEHIND_STATEMENT: Final = re.compile(rb'"' + _A_REQUEST, re.IGNORECASE)
 
 @lru_cache(maxsize=256)
 def read_answer(line: bytes, encoding: str) -> Reply | Refusal:
-    """Read what a device sends; a poll sees the same few answers over and over.
+    """Read a device's message; a poll sees the same few answers over and over.
 
     Raises:
         RemoteProtocolError: It is neither a reply nor a refusal.
@@ -71,7 +71,7 @@ def read_answer(line: bytes, encoding: str) -> Reply | Refusal:
 
 
 def read_request(line: bytes, encoding: str) -> Request | BadRequest:
-    """Read what a host sends; what makes no sense becomes the refusal it deserves."""
+    """Read a host's message; a senseless one becomes the refusal that it deserves."""
     if len(line) <= _SHORT and b"," not in line:
         return _read_bare_request(line, encoding)
     return _read_request(line, encoding)

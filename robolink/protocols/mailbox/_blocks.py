@@ -86,7 +86,7 @@ class Command:
 
     @property
     def only_ends(self) -> bool:
-        """Whether it can do nothing but bring something to rest; that is always allowed."""
+        """Whether it can only stop something; that is always allowed."""
         if self.opcode == Opcode.JOG:
             return not any(self.operands[:2])
         if self.opcode == Opcode.STOP:
@@ -95,7 +95,7 @@ class Command:
 
     @property
     def needs_owner(self) -> bool:
-        """Whether only the owner of the mailbox may send it; whoever wants a jog to end may."""
+        """Whether only the owner of the mailbox may send it; anybody may end a jog."""
         if self.opcode in (Opcode.STOP, Opcode.JOG):
             return not self.only_ends
         return OPCODES[Opcode(self.opcode)].needs_owner
@@ -106,7 +106,7 @@ class Command:
         return OPCODES[Opcode(self.opcode)].needs_permit and not self.only_ends
 
     def refusal(self) -> ErrorClass:
-        """Return what a PLC answers to this block whatever the opcode, NONE when it is fit.
+        """Return a PLC's answer to this block whatever the opcode, NONE if it is valid.
 
         Such a block is acknowledged and executes nothing.
         """
@@ -241,7 +241,7 @@ _UNABLE: Final = Capability(0)
 
 
 class Finished(NamedTuple):
-    """The end of a movement, or of another command that a stop ended or that came too early."""
+    """The end of a movement, or of another command that was stopped or came too early."""
 
     sequence: int = 0
     state: int = CommandState.EMPTY

@@ -53,7 +53,7 @@ def from_frame(frame: Six, *, unit_um: float) -> Six:
 
 
 def frames_match(one: Six, other: Six, *, tolerance: float) -> bool:
-    """Tell whether two frames of a PLC are the same.
+    """Return whether two frames of a PLC are the same.
 
     Args:
         one: User units and degrees.

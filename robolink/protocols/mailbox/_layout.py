@@ -62,12 +62,12 @@ def heartbeat_word(epoch: int, count: int) -> int:
 
 
 def beats_for(word: int, epoch: int) -> bool:
-    """Tell whether a heartbeat word is one of the owner of ``epoch``."""
+    """Return whether a heartbeat word is one of the owner of ``epoch``."""
     return word >> 8 == epoch & 0xFF and word & 0xFF != 0
 
 
 Words = tuple[int, ...]
-"""16-bit words, each 0..65535, as they stand in registers."""
+"""16-bit words, each 0..65535, as in registers."""
 
 Six = tuple[float, float, float, float, float, float]
 """X, Y, Z in the PLC's user units and A, B, C in degrees; or six axes."""
@@ -77,7 +77,7 @@ Four = tuple[float, float, float, float]
 
 
 class WordType(Enum):
-    """How a value lies in words; the names are those of IEC 61131-3, but for ``CHARS``."""
+    """How a value is stored in words; the names are those of IEC 61131-3, except ``CHARS``."""
 
     UINT = "H"
     INT = "h"
@@ -196,7 +196,7 @@ class Layout:
         return {name: parts[place] for name, place in self._places.items()}
 
     def intact(self, words: Sequence[int]) -> bool:
-        """Tell whether the checksum in ``words`` is that of the words before it."""
+        """Return whether the checksum in ``words`` is that of the words before it."""
         place = self._by_name["crc"].word
         return words[place] == crc16(words[:place])
 
@@ -226,7 +226,7 @@ class BlockFault(StrEnum):
 
 
 class BlockError(ValueError):
-    """A block cannot be read or made; who talks to a person turns it into a RobolinkError.
+    """A block cannot be read or made; the caller turns this into a RobolinkError.
 
     Attributes:
         fault: The named reason.
@@ -261,7 +261,7 @@ VERSION: Final = 0x0100
 """Major version in the high byte, minor in the low one."""
 
 PROBE: Final = 12.3456
-"""What the probe holds when words stand in the right order at the right place."""
+"""The value of the probe when words are in the right order at the right place."""
 
 SLOTS: Final = range(1, 16)
 """The tool slots."""
@@ -360,7 +360,7 @@ DEVICE: Final = Layout(
     Field(0, "device_id", UDINT, note="retained, drawn once, never 0; 0 in a program without it"),
     Field(2, "device_id_complement", UDINT, note="its one's complement: every bit the other way"),
 )
-"""PLC to client, behind the last slot: which PLC this is, on whatever link it is reached."""
+"""PLC to client, behind the last slot: which PLC this is, on any link."""
 
 COMMAND_WORDS: Final = COMMAND.words
 RESPONSE_WORDS: Final = RESPONSE.words

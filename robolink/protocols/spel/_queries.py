@@ -34,7 +34,7 @@ _LAST_POINT = 999
 
 
 def print_selected_tool() -> Statement:
-    """The number of the tool in force."""
+    """The number of the selected tool."""
     return Statement("Print Tool")
 
 
@@ -54,12 +54,12 @@ def list_tools() -> Statement:
 
 
 def print_real_position() -> Statement:
-    """The measured position of the tool in force, as a point."""
+    """The measured position of the selected tool, as a point."""
     return Statement("Print RealPos")
 
 
 def print_here() -> Statement:
-    """The commanded position of the tool in force, as a point."""
+    """The commanded position of the selected tool, as a point."""
     return Statement("Print Here")
 
 
@@ -77,7 +77,7 @@ def print_point(number: int) -> Statement:
 
 
 def print_robot() -> Statement:
-    """The number of the robot in force."""
+    """The number of the current robot."""
     return Statement("Print Robot")
 
 
@@ -107,7 +107,7 @@ _NAMES_OF_TYPES: Final = {
 
 
 def tilts_tool(kind: int) -> bool:
-    """Tell whether a robot of that type has V and W."""
+    """Return whether a robot of that type has V and W."""
     return kind in _SIX_JOINTS
 
 
@@ -122,17 +122,17 @@ def parse_robot_type(text: str) -> int:
 
 
 def print_robot_type() -> Statement:
-    """The kind of the robot in force; :func:`parse_robot_type` reads it."""
+    """The kind of the current robot; :func:`parse_robot_type` reads it."""
     return Statement("Print RobotType")
 
 
 def print_robot_model() -> Statement:
-    """The model of the robot in force, a text (docs/reference/spel.md 9)."""
+    """The model of the current robot, a text (docs/reference/spel.md 9)."""
     return Statement("Print RobotModel$")
 
 
 def print_robot_serial() -> Statement:
-    """The serial number of the robot in force, a text (docs/reference/spel.md 9)."""
+    """The serial number of the current robot, a text (docs/reference/spel.md 9)."""
     return Statement("Print RobotSerial$")
 
 
@@ -190,7 +190,7 @@ def where() -> Statement:
 
 
 def show_base() -> Statement:
-    """Where the base stands that positions count from (docs/reference/spel.md 5.4)."""
+    """The place of the base, from which positions count (docs/reference/spel.md 5.4)."""
     return Statement("Base")
 
 
@@ -232,7 +232,7 @@ def print_tool_x(tool: int) -> Statement:
 
 
 def wait_half_a_second() -> Statement:
-    """Nothing, for half a second; legal in the command window (docs/reference/spel.md 4.6)."""
+    """Nothing, for half a second; allowed in the command window (docs/reference/spel.md 4.6)."""
     return Statement("Wait 0.5")
 
 
@@ -353,7 +353,7 @@ def _is_numbered(entries: list[_Entry]) -> bool:
 
 
 def parse_base(text: str) -> tuple[float, ...] | None:
-    """Read where the base stands that positions count from: X, Y, Z in mm and U, V, W in degrees.
+    """Read the place of the base, from which positions count: X, Y, Z in mm, U, V, W in degrees.
 
     No page shows how a controller lists it (docs/reference/spel.md 5.4), so six numbers alone are
     taken for it, or four for a base that does not lean; ``None`` for anything else.

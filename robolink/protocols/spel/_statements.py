@@ -1,4 +1,4 @@
-"""Statements, built from typed values; nothing a person typed passes through unseen.
+"""Statements, built from typed values; nothing that a person typed passes unchecked.
 
 A :data:`Statement` is made by a function of this package, which writes strict ASCII numbers into a
 fixed form, so that no value can turn into another statement. The one door past them is
@@ -69,7 +69,7 @@ def clear_tool(tool: int) -> Statement:
 
 
 def select_tool(tool: int) -> Statement:
-    """``Tool 1``: put a tool in force; 0 is the flange (docs/reference/epson.md 3.1).
+    """``Tool 1``: select a tool; 0 is the flange (docs/reference/epson.md 3.1).
 
     Raises:
         LocalProtocolError: No such tool.
@@ -291,7 +291,7 @@ def move_till(target: Pose, bit: int, *, on: bool, six_axes: bool) -> Statement:
 
 
 def move_find(target: Pose, bit: int, *, on: bool, six_axes: bool) -> Statement:
-    """``Move XY(...) Find Sw(3) = On``: note where the input switches, and go on.
+    """``Move XY(...) Find Sw(3) = On``: note where the input switches, and continue.
 
     Args:
         target: Where the movement ends.

@@ -17,7 +17,7 @@ _LEAST_REACH_MM: Final = 0.005
 
 
 def chart_drawing(chart: Chart) -> Drawing:
-    """Return the control chart of one coordinate, with what its lines are."""
+    """Return the control chart of one coordinate, with a legend."""
     plot = _ControlPlot(chart)
     svg = element(
         "svg",
@@ -61,7 +61,7 @@ def _caption(chart: Chart) -> str:
 
 
 class _ControlPlot:
-    """A level line a millimetre value, an upright place a change."""
+    """A horizontal line for each millimetre value, a vertical position for each change."""
 
     def __init__(self, chart: Chart) -> None:
         self._chart = chart

@@ -1,4 +1,4 @@
-"""Where a name can stand beside a point without covering anything."""
+"""Finds room for a name beside a point without covering anything."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -17,7 +17,7 @@ _DIRECTIONS: Final = ((1, -1), (1, 0), (1, 1), (0, -1), (0, 1), (-1, -1), (-1, 0
 
 
 class Paper:
-    """Remembers, in small squares, what is drawn on already.
+    """Remembers, in small squares, what is already drawn on.
 
     Args:
         width, height: Size of the paper; nothing may stand outside.
@@ -77,7 +77,7 @@ _FINE_STEPS: Final = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
 
 @dataclass(frozen=True, slots=True)
 class Plane:
-    """How millimetres become paper. X goes right and Y up: seen from above.
+    """Maps millimetres to paper. X goes right and Y up: seen from above.
 
     Attributes:
         left_mm, bottom_mm: What lies at the lower left corner.
@@ -100,11 +100,11 @@ class Plane:
         return step_up(58.0 / self.per_mm)
 
     def grid_x_mm(self) -> Iterator[float]:
-        """Yield where the upright grid lines stand."""
+        """Yield the positions of the vertical grid lines."""
         return _multiples(self.left_mm, WIDTH / self.per_mm, self.step_mm())
 
     def grid_y_mm(self) -> Iterator[float]:
-        """Yield where the level grid lines lie."""
+        """Yield the positions of the horizontal grid lines."""
         return _multiples(self.bottom_mm, self.height / self.per_mm, self.step_mm())
 
 
@@ -163,7 +163,7 @@ _HEAD: Final = 7.0
 
 
 def arrow(start: Place, end: Place) -> tuple[Element, ...]:
-    """Return shaft and head, or nothing where there is no length to see."""
+    """Return shaft and head, or nothing if the length is too small to see."""
     length = math.dist(start, end)
     if length < 0.5:
         return ()
@@ -219,7 +219,7 @@ _BELOW: Final = 26.0
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """A drawing with what stands below it.
+    """A drawing and its caption.
 
     Attributes:
         svg: The drawing.

@@ -1,4 +1,4 @@
-"""Where the flange stood at each pose, from above, and how it was turned."""
+"""Where the flange was at each pose, from above, and how it was turned."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -117,7 +117,7 @@ def draw(impact: Impact) -> Drawing:
 
 
 def _caption(factor: float | None, unnamed: int, *, ringed: bool) -> str:
-    """Return what must be said beside it.
+    """Return the text that belongs beside it.
 
     Args:
         factor: How many times longer than true the arrows are, ``None`` without arrows.
@@ -238,7 +238,7 @@ _LOWEST_SCALE_MM: Final = 0.05
 
 
 def tip_drawings(report: Report) -> Iterator[Drawing]:
-    """Yield the drawings of a change on record that measured or turned something."""
+    """Yield the drawings of a recorded change that measured or turned something."""
     if report.record is None or not report.compared:
         return
     if report.before is not None and report.after is not None:
@@ -248,7 +248,7 @@ def tip_drawings(report: Report) -> Iterator[Drawing]:
 
 
 def _change(before: ToolOffset, after: ToolOffset) -> Drawing:
-    """Draw the movement of the tip in the flange's XY plane, from above, both axes alike."""
+    """Draw the movement of the tip in the flange's XY plane, from above, both axes to one scale."""
     dx_mm, dy_mm = after.x_mm - before.x_mm, after.y_mm - before.y_mm
     panel = PlotPanel(max(math.hypot(dx_mm, dy_mm), _LOWEST_SCALE_MM) * 1.35)
     start, end = panel.at(0, 0), panel.at(dx_mm, dy_mm)
@@ -266,7 +266,7 @@ def _change(before: ToolOffset, after: ToolOffset) -> Drawing:
 
 
 def _drift(result: VerifyResult) -> Drawing:
-    """Draw where the tip stood at each angle, and the circle that is allowed."""
+    """Draw where the tip was at each angle, and the circle of its limit."""
     largest_mm = max(result.max_drift_mm, result.tolerance_mm, _LOWEST_SCALE_MM)
     panel = PlotPanel(largest_mm * 1.2)
     middle = panel.at(0, 0)

@@ -1,4 +1,4 @@
-"""How far each pose is from agreement, and how uncertain that leaves the offset."""
+"""How far each pose is from agreement, and how uncertain the offset therefore is."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -47,7 +47,7 @@ def fit_drawings(
 
 
 def interval_ellipse(result: CalibrationResult) -> Axes | None:
-    """Return the ellipse that reaches along X and Y just as far as their 95 % intervals.
+    """Return the ellipse that reaches along X and Y as far as their 95 % intervals.
 
     Its shape is that of the covariance of X and Y: where it is long, the poses tell little.
     ``None`` where X and Y were not both measured, or nothing tells how large the errors are.
@@ -65,7 +65,7 @@ def interval_ellipse(result: CalibrationResult) -> Axes | None:
 
 
 def _in_the_plane(result: CalibrationResult) -> tuple[tuple[float, ...], ...]:
-    """Return the residuals, none where they are heights only."""
+    """Return the residuals, none if they are heights only."""
     return tuple(residual for residual in result.residuals_mm if len(residual) > 1)
 
 
@@ -198,7 +198,7 @@ def _said(result: CalibrationResult, evidence: Mapping[str, Any]) -> str:
 
 
 class _Plot:
-    """A level line a millimetre value, an upright place a pose."""
+    """A horizontal line for each millimetre value, a vertical position for each pose."""
 
     def __init__(self, count: int, largest_mm: float) -> None:
         self._count = count
@@ -208,7 +208,7 @@ class _Plot:
         self._step_mm = step_up(self._reach_mm / 3)
 
     def at(self, number: int, value_mm: float) -> Place:
-        """Return where a value of a pose stands; poses count from 0."""
+        """Return the position of a pose's value; poses count from 0."""
         across = self._width * (number + 0.5) / self._count
         return across, _HEIGHT / 2 * (1 - value_mm / self._reach_mm)
 

@@ -1,4 +1,4 @@
-"""What the result is repeatable to and accurate to, what that rests on, and the budget."""
+"""What the result is repeatable to and accurate to, the basis of that, and the budget."""
 
 import math
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ from robolink.report._values import Outcome, Report
 
 
 def statements(report: Report) -> tuple[str, ...]:
-    """Return what the result is repeatable and accurate to, what brings most, and the seating."""
+    """Return what the result is repeatable and accurate to, its largest row, and the seating."""
     fit, seating = report.fit, report.seating
     if fit is None:
         return ()
@@ -31,7 +31,7 @@ def statements(report: Report) -> tuple[str, ...]:
 
 
 def interval_sentences(fit: CalibrationResult) -> tuple[str, ...]:
-    """Return what the statement of repeatability rests on; notes alone where there is none."""
+    """Return the basis of the repeatability statement; only notes without one."""
     notes = tuple(map(doubt_sentence, fit.notes))
     if not fit.half_width95:
         return notes
@@ -41,10 +41,10 @@ def interval_sentences(fit: CalibrationResult) -> tuple[str, ...]:
 
 
 def change_of_z() -> str:
-    """Return what a change of Z does not say."""
+    """Return what a change of Z does not show."""
     return tr(
-        "Z is a change: only by how much the new tip is longer or shorter was measured. The stored "
-        "Z was never measured, so nothing is stated of how long the tip is."
+        "Z: only the change from the old tip was measured. The stored Z was never measured, so "
+        "the length of the tip is not known."
     )
 
 
@@ -82,13 +82,13 @@ def _what_it_rests_on(fit: CalibrationResult) -> str:
 
 
 def resolution_sentence(poses: tuple[Pose, ...]) -> str:
-    """Return the finest step in which the poses are written, empty without poses."""
+    """Return the resolution of the written poses, empty without poses."""
     digits = max((_digits(value) for pose in poses for value in pose.coordinates()[:3]), default=-1)
     return "" if digits < 0 else tr("Positions as they were read: {step:g} mm.", step=10**-digits)
 
 
 def _digits(value: float) -> int:
-    """Return after how many decimals a number ends, 9 at most."""
+    """Return the number of decimals of a number, 9 at most."""
     for digits in range(9):
         if math.isclose(round(value, digits), value, abs_tol=1e-10):
             return digits
@@ -97,7 +97,7 @@ def _digits(value: float) -> int:
 
 @dataclass(frozen=True, slots=True)
 class Proof:
-    """The proof by turning about the new tip.
+    """The turn test: turning about the new tip.
 
     Attributes:
         result: What came of it.
@@ -117,7 +117,7 @@ class Proof:
 
 
 def proof(report: Report) -> Proof | None:
-    """Return the proof, ``None`` where nothing was turned."""
+    """Return the turn test, ``None`` if nothing was turned."""
     result = report.verification
     if result is None:
         return None
@@ -156,28 +156,28 @@ def _rule(*, guarded: bool) -> str:
 
 
 def was_not_proved(report: Report) -> bool:
-    """Tell whether a value stands in the controller that nothing proved."""
+    """Return whether the controller holds a value that no turn test confirmed."""
     return report.verification is None and report.outcome in (Outcome.WRITTEN, Outcome.SKIPPED)
 
 
 def turn_test_doubted(report: Report) -> bool:
-    """Tell whether a value was kept although its turn test does not fit what was measured."""
+    """Return whether a value was kept although its turn test contradicts the measurement."""
     judgement = None if report.verification is None else report.verification.judgement
     return report.outcome is Outcome.VERIFIED and judgement is not None and not judgement.good
 
 
 def limits_rule(report: Report) -> str:
-    """Return by which rule the limits were judged, empty where nothing was."""
+    """Return the rule by which the limits were judged, empty without any."""
     if not report.judgements:
         return ""
     return tr(
-        "Decision rule of the limits: what is found is compared directly with what is "
-        "allowed; the measurement is refused when one of them is exceeded."
+        "Decision rule of the limits: each value is compared directly with its limit; the "
+        "measurement is refused if one limit is exceeded."
     )
 
 
 def conformity(report: Report) -> Iterator[str]:
-    """Yield what may be stated of the tool now, in sentences."""
+    """Yield what may be stated about the tool now, in sentences."""
     result = report.verification
     if turn_test_doubted(report):
         yield tr("Conformity is not stated: the turn test leaves a doubt.")

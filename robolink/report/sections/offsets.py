@@ -1,4 +1,4 @@
-"""The offset before and after: what was measured apart from what was kept."""
+"""The offset before and after: measured components apart from kept ones."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ AXES: Final = ("X mm", "Y mm", "Z mm", "U deg", "V deg", "W deg")
 
 @dataclass(frozen=True, slots=True)
 class OffsetComponent:
-    """One component of the offset; ``None`` stands for what is not known.
+    """One component of the offset; ``None`` is unknown.
 
     Attributes:
         axis: Its name and unit.
@@ -51,17 +51,17 @@ class OffsetTables:
 
     @property
     def intervals(self) -> bool:
-        """Whether any of them is known to be repeatable to something."""
+        """Whether the repeatability of any of them is known."""
         return any(one.half95 is not None for one in self.own)
 
     @property
     def accurate(self) -> bool:
-        """Whether any of them is known to be accurate to something."""
+        """Whether the accuracy of any of them is known."""
         return any(one.accurate95 is not None for one in self.own)
 
 
 def offsets(report: Report) -> OffsetTables | None:
-    """Return the tables of the offset, ``None`` where the values are not on record."""
+    """Return the tables of the offset, ``None`` if the values are not recorded."""
     if not report.compared:
         return None
     components = tuple(_components(report))
@@ -108,12 +108,12 @@ def absence(report: Report) -> str:
 
 
 def moves_nothing(impact: Impact) -> bool:
-    """Tell whether the tip stays where it is at every point."""
+    """Return whether the tip does not move at any point."""
     return impact.largest is not None and impact.largest.distance_mm < _SAME_MM
 
 
 def is_alike(impact: Impact) -> bool:
-    """Tell whether the tip moves equally far at every point, and sideways."""
+    """Return whether the tip moves equally far at every point, and sideways."""
     largest = impact.largest
     if largest is None or not impact.alike:
         return False

@@ -1,4 +1,4 @@
-"""The poses that went in, in the order in which they were taken, with their residuals."""
+"""The poses of the measurement, in the order in which they were taken, with their residuals."""
 
 import math
 from collections.abc import Sequence
@@ -52,7 +52,7 @@ class PoseRows:
 
 
 def pose_tables(report: Report) -> list[PoseRows]:
-    """Return the poses that went in, and those of measurements that were refused."""
+    """Return the poses of the measurement, and those of refused measurements."""
     tables = []
     if report.poses:
         # What does not determine Z was never asked for a height; typed poses have none.
@@ -95,7 +95,7 @@ def _table(
 
 
 def _named(number: int, count: int, fit: CalibrationResult | None, *, left_out: bool) -> str:
-    """Return what stands before a pose: its number from 1, and what it is beside a touch."""
+    """Return the label of a pose: its number from 1, and what it is besides a touch."""
     if left_out:
         return tr("{number} (left out)", number=number + 1)
     six_point = fit is not None and fit.method in ("six-point", "six_point")

@@ -1,4 +1,4 @@
-"""The head of the page: what became of the change, which machine, who, when and with what."""
+"""The head of the page: how the change ended, which machine, who, when and with what."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -48,7 +48,7 @@ class Heading:
 
 
 def heading(reports: Sequence[Report]) -> Heading:
-    """Return the title and the one thing that must not be missed."""
+    """Return the title and the most important fact."""
     worst = max(reports, key=lambda report: list(_TONES).index(report.outcome))
     if len(reports) == 1:
         title = tr("Tool {tool}: change of the offset", tool=worst.tool)
@@ -68,14 +68,14 @@ def heading(reports: Sequence[Report]) -> Heading:
 
 
 def simulated_band(simulated: bool) -> str:
-    """Return the band at the top of a page about a simulated controller; empty for another."""
+    """Return the banner of a page about a simulated controller; empty for another."""
     if not simulated:
         return ""
     return tr("SIMULATED: these results come from a simulator. No real robot moved.")
 
 
 def simulated_verdict(verdict: str) -> str:
-    """Return a verdict that says of itself that it is about a simulation."""
+    """Return a verdict that says it is about a simulation."""
     return tr("Simulated: {verdict}", verdict=verdict)
 
 
@@ -97,7 +97,7 @@ def facts(reports: Sequence[Report]) -> list[tuple[str, str]]:
 
 
 def _machine(about: ControllerFacts, *, asked: bool) -> list[tuple[str, str]]:
-    """Return what the controller said of itself; that it said nothing, where it was asked."""
+    """Return the controller's own answers, or that it gave none when asked."""
     serials = ", ".join(about.robot_serials)
     robot = _joined(
         ", ".join(about.robot_models), serials and tr("serial {serials}", serials=serials)
@@ -117,7 +117,7 @@ def _machine(about: ControllerFacts, *, asked: bool) -> list[tuple[str, str]]:
 
 
 def _time(report: Report) -> list[tuple[str, str]]:
-    """Return when it was, in the time of the place and in UTC."""
+    """Return the time, locally and in UTC."""
     if report.record is None:
         return [(tr("time"), report.made_at)]
     first, last = (report.record.entries[index].at for index in (0, -1))
@@ -151,7 +151,7 @@ def _circumstances(record: Record) -> list[tuple[str, str]]:
 
 
 def _gauges(reports: Sequence[Report]) -> Iterator[tuple[str, str]]:
-    """Yield the gauges that were measured against, and until when each is calibrated."""
+    """Yield the gauges of the measurement, and until when each is calibrated."""
     for gauge in dict.fromkeys(gauge for report in reports for gauge in report.gauges):
         due = gauge.due and tr("calibration due {date}", date=gauge.due)
         late = gauge.overdue and tr("OVERDUE")

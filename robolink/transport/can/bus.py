@@ -107,7 +107,7 @@ def _settings(url: LinkUrl, options: UrlOptions, interface: str) -> dict[str, An
 
 
 class CanLine:
-    """A bus that whoever waits reads. Owns it; :meth:`close` may come from any thread.
+    """A bus that its waiting caller reads. Owns it; :meth:`close` may come from any thread.
 
     A frame is told to a trace as its identifier, two bytes, the high one first, and its data.
     """
@@ -201,12 +201,12 @@ _MOST_ANSWERS: Final = 64
 
 
 def identifiers(node: int) -> tuple[int, ...]:
-    """Return what has to be heard from ``node``."""
+    """Return the identifiers to receive from ``node``."""
     return (TPDO1 + node, SDO_ANSWER + node, HEARTBEAT + node)
 
 
 class NodeWatch:
-    """Sorts what one node sends, and notices when it falls silent or starts anew.
+    """Sorts what one node sends, and notices when it falls silent or restarts.
 
     Args:
         line: The bus, owned by the caller.
@@ -232,12 +232,12 @@ class NodeWatch:
         self._note_heartbeat()
 
     def take_head(self) -> MailboxHead | None:
-        """Return the newest head that was not taken yet."""
+        """Return the newest head that was not yet read."""
         head, self._head = self._head, None
         return head
 
     def drain(self) -> None:
-        """Sort what has arrived while nobody listened; a node that was silent is listened for.
+        """Sort what has arrived meanwhile; wait for a node that was silent.
 
         Raises:
             RemoteProtocolError: It does not end.
@@ -316,7 +316,7 @@ class NodeWatch:
                 self._require_heartbeat()
 
     def _limit_s(self) -> float:
-        """Return for how long the node may be silent; 0 for as long as it likes."""
+        """Return how long the node may be silent; 0 for no limit."""
         return max(_MISSED * self._period_s, _SHORTEST_LOSS_S) if self._period_s else 0.0
 
     def _silent_s(self) -> float:

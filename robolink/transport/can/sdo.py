@@ -52,11 +52,11 @@ class SdoLine(Protocol):
         """Send a frame to the node's SDO server."""
 
     def pump(self, deadline: Deadline) -> None:
-        """Hand on what arrives within a short slice of time; raise when the link has ended."""
+        """Pass on what arrives within a short slice of time; raise when the link has ended."""
 
 
 class SdoTransfer:
-    """One transfer of one object. Made anew for each; the caller holds the lock.
+    """One transfer of one object. Made anew for each; the caller has the lock.
 
     ``upload`` and ``download`` raise:
         RejectedError: The node aborted; a download was not done.
@@ -153,7 +153,7 @@ class SdoTransfer:
         return answer[1:4] == self._object
 
     def _abort(self, code: int) -> None:
-        """Leave no server half-way; a bus that does not take even this says so to the next."""
+        """Leave no server half-way; a bus that refuses even this reports it to the next one."""
         with contextlib.suppress(TransportError):
             self._line.ask(bytes([_ABORTED]) + self._object + code.to_bytes(4, "little"))
 

@@ -42,7 +42,7 @@ class Exchange(Protocol):
 
     @property
     def recovers(self) -> bool:
-        """Whether it can be used on after a time-out or an answer that makes no sense."""
+        """Whether it can be used again after a time-out or an invalid answer."""
 
     @property
     def units(self) -> range:
@@ -213,7 +213,7 @@ class ModbusClient:
             return reply
 
     def _deadline(self) -> Deadline:
-        """Return when the next question is given up.
+        """Return when to give up the next question.
 
         On a line that answered nothing, repeats share one short deadline: a PLC that lost its
         power is noticed soon after the first, and one lost answer ends nothing.

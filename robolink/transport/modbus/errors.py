@@ -1,4 +1,4 @@
-"""Puts what goes wrong between this computer and a Modbus server into words.
+"""Sentences for what goes wrong between this computer and a Modbus server.
 
 Addresses are always given both ways, as the number that manuals print and as the one on the
 wire, because tools disagree about which one they mean. Exception codes:
@@ -26,7 +26,7 @@ _NOT_DONE: Final = frozenset({1, 2, 3, 6})
 
 
 def describe(request: ModbusRequest) -> str:
-    """Return a request as it is shown to a person."""
+    """Return a request for display."""
     where = tr(
         "{reference} (address {address}) of unit {unit}",
         reference=request.area.reference(request.address),
@@ -71,7 +71,7 @@ def unanswered(
 
 
 def flooding(identity: str, request: ModbusRequest, count: int, raw: bytes) -> RemoteProtocolError:
-    """Return the error for a far end that goes on sending what was not asked for."""
+    """Return the error for a far end that keeps sending unrequested data."""
     return RemoteProtocolError(
         tr(
             "{identity} sends without an end: {count} bytes, and no answer to: {request}.",
@@ -89,7 +89,7 @@ def flooding(identity: str, request: ModbusRequest, count: int, raw: bytes) -> R
 
 
 def restless(identity: str, count: int, raw: bytes) -> RemoteProtocolError:
-    """Return the error for a serial line on which no pause comes."""
+    """Return the error for a serial line without a pause."""
     return RemoteProtocolError(
         tr(
             "The line of {identity} is never quiet: {count} bytes without a pause.",
@@ -126,7 +126,7 @@ def _noise(raw: bytes) -> str:
 def unintelligible(
     identity: str, request: ModbusRequest, raw: bytes, *, serial: bool
 ) -> RemoteProtocolError:
-    """Return the error for bytes that are no Modbus."""
+    """Return the error for bytes that are not Modbus."""
     remedy = tr("Check that this is the PLC's Modbus port.")
     if serial:
         remedy = _noise(raw) or tr("Check the baud rate, the parity and the cable.")

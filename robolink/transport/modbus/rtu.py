@@ -30,7 +30,7 @@ _AROUND: Final = 3
 
 @dataclass(frozen=True, slots=True)
 class RtuLine:
-    """What is special about one serial line.
+    """The special settings of one serial line.
 
     Attributes:
         character_s: How long one character takes.
@@ -51,7 +51,7 @@ class RtuLine:
 
 
 class RtuExchange:
-    """Takes the first answer that fits, from a unit known to be in step.
+    """Accepts the first answer that fits, from a unit known to be in step.
 
     In step is a unit, not the line: units answer in their own time.
     """

@@ -14,7 +14,7 @@ sends more between a question and its answer does not stop."""
 
 
 class TcpExchange:
-    """Takes the answer that carries the number of the request; what comes late is dropped."""
+    """Accepts the answer that carries the number of the request; late ones are ignored."""
 
     recovers: Final = False
     units: Final = range(256)
@@ -53,7 +53,7 @@ class TcpExchange:
             return reply
 
     def _leave_out_old(self, request: ModbusRequest) -> bool:
-        """Drop whole frames that came before the request; return whether one more has begun.
+        """Ignore whole frames that came before the request; return whether one more has begun.
 
         Each connection numbers from 1, so what a gateway has kept from an earlier one may carry
         the very number (docs/reference/faults.md F03).
@@ -84,7 +84,7 @@ class TcpExchange:
                 raise errors.unanswered(self._identity, request, held, serial=False) from error
 
     def _keep(self, data: bytes, request: ModbusRequest) -> None:
-        """Take what came; the longest answer is far shorter than what is taken for one request.
+        """Keep what came; the longest answer is far shorter than what one request accepts.
 
         Raises:
             TransportBrokenError: It was the end of the stream.

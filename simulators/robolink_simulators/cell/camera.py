@@ -1,4 +1,4 @@
-"""An up-looking camera as it really stands, and what its picture shows.
+"""An up-looking camera as it really is, and what its picture shows.
 
 A pinhole: lengths at the height of focus have the stated scale, and things above it look
 smaller. A lens that leans sees the plane askew, and things above or below it beside where they
@@ -127,7 +127,7 @@ class FinderFaults:
 
 
 class Finder:
-    """What the finder of one camera answers, picture by picture.
+    """The answers of one camera's finder, picture by picture.
 
     Args:
         rng: Source of its errors; nothing is drawn while there are none.
@@ -150,7 +150,7 @@ class Finder:
         noise_px: float,
         exposes: bool = True,
     ) -> tuple[Pixel | None, ...]:
-        """Return what it answers in place of what it found of each mark.
+        """Return its answers in place of what it found of each mark.
 
         Args:
             found: Where each mark is, ``None`` for one that is not in the picture.
@@ -171,7 +171,7 @@ class Finder:
         return ((x, y), *(None for _ in found[1:]))
 
     def radius_px(self) -> float | None:
-        """Return how wide a spot is found in the last picture, ``None`` where it is not told."""
+        """Return the spot width found in the last picture, ``None`` if it is not reported."""
         faults = self.faults
         if not faults.spot_radius_px:
             return None
@@ -205,11 +205,11 @@ class CameraTruth:
     finder: Finder = field(init=False)
 
     def __post_init__(self) -> None:
-        """Let the finder err by the same source."""
+        """Let the finder's errors come from the same source."""
         self.finder = Finder(self.rng)
 
     def picture(self, places: Iterable[XyzMm]) -> tuple[Pixel, ...]:
-        """Return where the finder finds each of some places that are in the image."""
+        """Return where the finder finds each of some places in the image."""
         return tuple(pixel for pixel in self.finds(places) if pixel is not None)
 
     def finds(self, places: Iterable[XyzMm], *, exposes: bool = True) -> tuple[Pixel | None, ...]:

@@ -1,4 +1,4 @@
-"""Clocks for simulated time: one that a test steps, and one that runs at a factor of real time."""
+"""Clocks for simulated time: one that a test steps, and one at a factor of real time."""
 
 import threading
 from typing import Final
@@ -33,7 +33,7 @@ class ManualClock:
         return self._now_ns
 
     def exchanged(self) -> None:
-        """Be told that a request has come in; time passes where somebody waits for it."""
+        """Learn that a request has come in; time passes if somebody waits for it."""
 
     def sleep(self, seconds: float) -> None:
         """Let ``seconds`` pass at once."""
@@ -90,7 +90,7 @@ class ScaledClock:
         self._hastened = factor > 1
 
     def exchanged(self) -> None:
-        """Be told that a request has come in; time goes on all the same."""
+        """Learn that a request has come in; time passes anyway."""
 
     def now_ns(self) -> int:
         """Return the simulated time in nanoseconds."""
@@ -112,11 +112,11 @@ class ScaledClock:
         return left_ns / NS_PER_S / self._factor if left_ns > 0 else 0.0
 
     def really_takes_s(self, seconds: float) -> float:
-        """Return how many seconds of the base clock so many simulated ones are."""
+        """Return how many seconds of the base clock these simulated ones take."""
         return seconds / self._factor
 
     def wire_at(self, now_ns: int) -> int:
-        """Return the time on the wire, which is never hastened, at a simulated instant, in ns.
+        """Return the wire time, which is never sped up, at a simulated instant, in ns.
 
         See :class:`~robolink_simulators.device.wire_time.WireClock`. Right for an instant since
         the pace was changed last.
@@ -127,14 +127,14 @@ class ScaledClock:
         return wire_ns + int((now_ns - there_ns) / max(1.0, self._factor))
 
     def simulated_at(self, wire_ns: int) -> int:
-        """Return the simulated instant of a time on the wire, as things are; see above."""
+        """Return the simulated instant of a wire time, at the present pace; see above."""
         if not self._hastened:
             return wire_ns
         passed_ns, there_ns = self._both_now()
         return there_ns + int((wire_ns - passed_ns) * max(1.0, self._factor))
 
     def _both_now(self) -> tuple[int, int]:
-        """Return the time on the wire and the simulated time, both of this instant."""
+        """Return the wire time and the simulated time, both of this instant."""
         now_ns = self.now_ns()
         passed_ns = (now_ns - self._origin_ns) / max(1.0, self._factor)
         return self._origin_ns + int(passed_ns), now_ns
@@ -174,7 +174,7 @@ class SteeredClock(ScaledClock):
         return self._factor
 
     def run(self, factor: float) -> None:
-        """Go on at another factor; 0 pauses.
+        """Continue at another factor; 0 pauses.
 
         Raises:
             ConfigError: It is negative, or not finite.
@@ -213,12 +213,12 @@ class SteeredClock(ScaledClock):
             self._base.sleep(min(left_s, _LOOK_S))
 
     def real_seconds(self, until_ns: int, now_ns: int | None = None) -> float:
-        """Return how long it really takes until an instant, as things are; a day in a pause."""
+        """Return how long it really takes until an instant, at this pace; a day if paused."""
         left_s = max(0, until_ns - (self.now_ns() if now_ns is None else now_ns)) / NS_PER_S
         return left_s / self._factor if self._factor else left_s and _PAUSED_S
 
     def really_takes_s(self, seconds: float) -> float:
-        """Return how many seconds of the base clock so many simulated ones are, as things are."""
+        """Return how many seconds of the base clock these simulated ones take, at this pace."""
         return seconds / self._factor if self._factor else seconds and _PAUSED_S
 
     def _at(self, base_ns: int) -> int:

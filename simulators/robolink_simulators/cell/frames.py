@@ -180,7 +180,7 @@ def axis_and_angle(rotation: Matrix) -> tuple[Vector, float]:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """Where one frame stands in another: shift in mm, and rotation."""
+    """The place of one frame in another: shift in mm, and rotation."""
 
     shift_mm: Vector = (0.0, 0.0, 0.0)
     rotation: Matrix = NO_TURN

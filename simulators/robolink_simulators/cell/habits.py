@@ -1,4 +1,4 @@
-"""What a person at a simulated cell does otherwise than they should, touch by touch.
+"""The mistakes of a person at a simulated cell, touch by touch.
 
 Assumed, all of it: these are habits that people have, and nothing was measured.
 """
@@ -69,7 +69,7 @@ class PinBump:
 
 @dataclass(frozen=True, slots=True)
 class PersonManner:
-    """How a person takes one question.
+    """How a person handles one question.
 
     Attributes:
         thinks_s: Seconds, of the clock by which they are asked, before the first answer.
@@ -103,7 +103,7 @@ class TouchCourse:
         self._came_from: Direction = (0.0, 0.0, 0.0)
 
     def begin(self, gap_mm: XyzMm, *, asked: bool) -> PersonManner:
-        """Begin the next touch, and return how it is taken.
+        """Begin the next touch, and return how it is made.
 
         Args:
             gap_mm: From the tip to the pin.
@@ -123,7 +123,7 @@ class TouchCourse:
         return self._taken(turn_deg)
 
     def resume(self) -> PersonManner:
-        """Take the same touch again, because it was asked for again."""
+        """Repeat the same touch, because it was asked for again."""
         return self._taken(0.0)
 
     def aim_mm(self, flange_x: Direction, flange_y: Direction) -> XyzMm:

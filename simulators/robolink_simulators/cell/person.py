@@ -22,7 +22,7 @@ contact input (assumed)."""
 
 @dataclass(frozen=True, slots=True)
 class PersonLook:
-    """What an eye sees: the vector from the physical tip to the pin, in base axes."""
+    """What a person sees: the vector from the physical tip to the pin, in base axes."""
 
     dx_mm: float
     dy_mm: float
@@ -62,7 +62,7 @@ class SimulatedOperator:
         return self._present_course().touches
 
     def begin_touch(self, tool: int | None = None) -> PersonManner:
-        """Be asked to bring the tip onto the pin, and return how the person takes it.
+        """Receive a request to touch the pin, and return how the person handles it.
 
         It is the next touch, unless the robot stands where the last one left it: then the same
         is asked for again.
@@ -79,7 +79,7 @@ class SimulatedOperator:
         return self._manner
 
     def be_asked(self) -> PersonManner:
-        """Be asked something else, and return how the person takes it."""
+        """Receive another question, and return how the person handles it."""
         return PersonManner(self._workplace.parameters.person_thinks_s)
 
     def look(self, tool: int | None = None) -> PersonLook:
@@ -103,7 +103,7 @@ class SimulatedOperator:
         return PersonLook(*self._gap(tool))
 
     def way_along(self, axis: Axis, length_mm: float, tool: int | None = None) -> XyzMm:
-        """Return, in base axes, a way along an axis of the tool, with the eye's error at its end.
+        """Return, in base axes, a move along an axis of the tool, with the eye's error at its end.
 
         Args:
             axis: Which one; the way goes to its positive side.

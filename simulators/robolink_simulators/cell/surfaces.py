@@ -1,4 +1,4 @@
-"""Surfaces that a person brings a tip onto, where it is near them: a plane and a sphere."""
+"""Surfaces that a person touches with a tip, as they are near it: a plane and a sphere."""
 
 import math
 from collections.abc import Callable
@@ -38,7 +38,7 @@ class FlatPlate:
         return dot(subtract(tip_mm, self.point_mm), self.normal)
 
     def way_mm(self, tip_mm: XyzMm) -> XyzMm:
-        """Return the way from a tip onto it: straight down, or up from inside."""
+        """Return the vector from a tip onto it: straight down, or up from inside."""
         return (0.0, 0.0, -self.height_mm(tip_mm) / self.normal[2])
 
 
@@ -64,7 +64,7 @@ class RoundBall:
         return math.dist(tip_mm, self.centre_mm) - self.radius_mm
 
     def way_mm(self, tip_mm: XyzMm) -> XyzMm:
-        """Return the shortest way from a tip onto it."""
+        """Return the shortest vector from a tip onto it."""
         out = subtract(tip_mm, self.centre_mm)
         apart_mm = math.hypot(*out)
         if not apart_mm:
@@ -88,7 +88,7 @@ class SurfaceContact:
     surface: Callable[[], Surface]
 
     def trips(self, tip_mm: XyzMm, shaft: Direction = STANDING) -> bool:  # noqa: ARG002 - the tip touches
-        """Tell whether the tip is on the surface or inside."""
+        """Return whether the tip is on the surface or inside."""
         return self.surface().height_mm(tip_mm) <= 0.0
 
 

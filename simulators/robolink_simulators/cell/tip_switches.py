@@ -1,4 +1,4 @@
-"""What a nozzle can trip: a beam, a touch plate, the pin. Fed with the true place of its tip."""
+"""What a nozzle can trip: a beam, a touch plate, the pin. Uses the true place of its tip."""
 
 import math
 import random
@@ -10,7 +10,7 @@ from robolink_simulators.cell.frames import cross, dot, subtract
 from robolink_simulators.cell.places import Direction, XyzMm
 
 Lean = tuple[float, float]
-"""By how much a bent nozzle's shaft lies beside its tip, X and Y in mm per mm above the tip."""
+"""How far a bent nozzle's shaft is beside its tip, X and Y in mm per mm above the tip."""
 
 UPRIGHT: Final[Lean] = (0.0, 0.0)
 
@@ -35,7 +35,7 @@ class Shaft:
 
 
 class Shake:
-    """By how much a sensor switches beside its place: drawn anew for each motion.
+    """How far from its place a sensor switches: drawn anew for each motion.
 
     Args:
         sigma_mm: Standard deviation, per axis.
@@ -58,10 +58,10 @@ class Shake:
 
 
 class TipSwitch(Protocol):
-    """Something that is on or off, depending on where a tip is."""
+    """A sensor that is on or off, depending on where a tip is."""
 
     def trips(self, tip_mm: XyzMm, shaft: Direction = STANDING) -> bool:
-        """Tell whether a nozzle switches it on.
+        """Return whether a nozzle switches it on.
 
         Args:
             tip_mm: Where its tip is.
@@ -77,7 +77,7 @@ def meets(
     bent_up_to_mm: float,
     upright: Callable[[], Direction],
 ) -> bool:
-    """Tell whether a nozzle switches it on whose shaft leans, all the way or up to a height.
+    """Return whether a nozzle whose shaft leans switches it on, all the way or up to a height.
 
     Args:
         switch: What it meets.
@@ -123,7 +123,7 @@ class LightBeam:
         object.__setattr__(self, "_way", way)
 
     def trips(self, tip_mm: XyzMm, shaft: Direction = STANDING) -> bool:
-        """Tell whether the nozzle breaks the beam: two lines that pass each other closely."""
+        """Return whether the nozzle breaks the beam: two lines that pass each other closely."""
         beam = self._way
         to_beam, across = subtract(self.through_mm, tip_mm), cross(shaft, beam)
         area = dot(across, across)
@@ -153,7 +153,7 @@ class TouchPlate:
     z_mm: float
 
     def trips(self, tip_mm: XyzMm, shaft: Direction = STANDING) -> bool:  # noqa: ARG002 - the tip touches
-        """Tell whether the tip touches it, or is below it."""
+        """Return whether the tip touches it, or is below it."""
         return tip_mm[2] <= self.z_mm
 
 
@@ -173,7 +173,7 @@ class PinContact:
     radius_mm: float
 
     def trips(self, tip_mm: XyzMm, shaft: Direction = STANDING) -> bool:  # noqa: ARG002 - the tip touches
-        """Tell whether the tip is within the pin's radius, at its top or below."""
+        """Return whether the tip is within the pin's radius, at its top or below."""
         x, y, z = self.pin_mm()
         beside_mm = math.hypot(tip_mm[0] - x, tip_mm[1] - y)
         return tip_mm[2] <= z and beside_mm <= self.radius_mm

@@ -43,7 +43,7 @@ MOUNTED_TOOL: Final = 1
 
 
 class Handled(Protocol):
-    """A robot as a person at the cell meets it."""
+    """A robot as a person at the cell handles it."""
 
     def placement(self) -> Hashable:
         """Return a value that stays equal as long as the robot stands still."""
@@ -67,11 +67,11 @@ class Handled(Protocol):
         """Turn the flange about the base's Z where it stands; where it cannot, it stays."""
 
     def loosen(self, parameters: WorldParameters) -> None:
-        """Give the axes the play that the parameters say."""
+        """Give the axes the backlash in the parameters."""
 
 
 class Workplace(ABC):
-    """What is true around a robot.
+    """The truth around a robot.
 
     Args:
         robot: Who works here.
@@ -116,7 +116,7 @@ class Workplace(ABC):
         self.set_up(parameters)
 
     def set_up(self, parameters: WorldParameters) -> None:
-        """Give the cell other imperfections; tips, pin and camera stay where they are.
+        """Give the cell other imperfections; tips, pin and camera stay in place.
 
         Raises:
             NotNowError: The contact is to switch an input that the controller does not have.
@@ -138,7 +138,7 @@ class Workplace(ABC):
             self.board = SimulatedBoard.grasped(random.Random(f"board {self._seed}"))
 
     def gap_mm(self, tool: int = MOUNTED_TOOL) -> XyzMm:
-        """Return the way from a physical tip to the pin, or to the surface that is touched."""
+        """Return the vector from a physical tip to the pin, or to the touched surface."""
         tip, surface = self.tip_mm(tool), self.surface
         if surface is not None:
             return surface.way_mm(tip)
@@ -156,7 +156,7 @@ class Workplace(ABC):
         return None
 
     def touch_begins(self, done: int) -> None:
-        """Let happen what happens between two touches: somebody bumps the pin.
+        """Do what happens between two touches: somebody bumps the pin.
 
         Args:
             done: How many touches came before.
@@ -170,7 +170,7 @@ class Workplace(ABC):
     def connect(
         self, number: int, switch: TipSwitch, tool: int = MOUNTED_TOOL, *, noise_mm: float = 0.0
     ) -> None:
-        """Let something that the tip meets switch an input of the controller.
+        """Connect an input of the controller to something that the tip trips.
 
         Args:
             number: The input.
@@ -182,7 +182,7 @@ class Workplace(ABC):
 
     @abstractmethod
     def disconnect(self, number: int) -> None:
-        """Take off what an input is connected to; it is off then."""
+        """Disconnect an input, which is then off."""
 
     def _wire_contact(self, parameters: WorldParameters) -> None:
         number = parameters.contact_input
@@ -210,7 +210,7 @@ class Workplace(ABC):
         return SurfaceContact(touched)
 
     def resistance_n(self, tip_mm: XyzMm) -> XyzMm:
-        """Return the force, N, of what is touched on a tip at a place; see :mod:`.surfaces`."""
+        """Return the force, N, of the touched object on a tip at a place; see :mod:`.surfaces`."""
         return resistance_n(tip_mm, self.pin_mm, self.parameters.pin_radius_mm, self.surface)
 
     def lean_of(self, tool: int) -> Lean:
@@ -224,7 +224,7 @@ class Workplace(ABC):
         return Shaft(lean, bent_up_to_mm) if bent_up_to_mm or lean != UPRIGHT else _STRAIGHT
 
     def beside(self, switch: TipSwitch, tip_mm: XyzMm) -> XyzMm:
-        """Return where a switch meets a tip, seen from where it was mounted: beams may be moved."""
+        """Return where a switch meets a tip, relative to its mounting place: beams may be moved."""
         if not isinstance(switch, LightBeam):
             return tip_mm
         (dx, dy), (x_mm, y_mm, z_mm) = self.parameters.beams_moved, tip_mm
@@ -253,14 +253,14 @@ class Workplace(ABC):
         return [(self.robot.tip_mm(p), self.robot.turned(axis_of(p, "x"))) for p in seen]
 
     def _seen_tip_mm(self, tool: int) -> XyzMm:
-        """Return where a camera sees a physical tip: beside it, on a side fixed in the tool."""
+        """Return where a camera sees a physical tip: off by a vector that is fixed in the tool."""
         x_mm, y_mm = self.parameters.tip_seen_beside_mm
         if not x_mm and not y_mm:
             return self.tip_mm(tool)
         return add(self.tip_mm(tool), self.robot.turned((x_mm, y_mm, 0.0)))
 
     def tip_mm(self, tool: int = MOUNTED_TOOL) -> XyzMm:
-        """Return where a physical tip is now; the mounted one as its spindle wobbles."""
+        """Return where a physical tip is now; the mounted one with its spindle's wobble."""
         x_mm, y_mm, z_mm = self.robot.tip_mm(self.tips.get(tool))
         if tool != MOUNTED_TOOL or not self.parameters.wobble_mm:
             return x_mm, y_mm, z_mm
@@ -269,7 +269,7 @@ class Workplace(ABC):
         return x_mm + wobble_mm * math.cos(toward), y_mm + wobble_mm * math.sin(toward), z_mm
 
     def told_flange(self) -> Pose:
-        """Return where the flange is by what the controller tells of it."""
+        """Return where the flange is by the controller's report."""
         return self.robot.flange()
 
     def axis(self, axis: Axis, tool: int = MOUNTED_TOOL) -> Direction:
@@ -298,7 +298,7 @@ class Workplace(ABC):
         }
 
     def moment(self) -> dict[str, Any]:
-        """Return copies of what makes this place what it is now, but for what chance is next."""
+        """Return copies of the present state of this place, except for the next random values."""
         return {
             "tips": dict(self.tips),
             "pin_mm": self.pin_mm,
@@ -309,7 +309,7 @@ class Workplace(ABC):
         }
 
     def put_back(self, moment: Mapping[str, Any]) -> None:
-        """Take over what :meth:`moment` gave; the eye's errors are drawn as at first."""
+        """Restore what :meth:`moment` returned; the eye's errors start again."""
         self.set_up(moment["parameters"])
         self.tips, self.pin_mm = dict(moment["tips"]), moment["pin_mm"]
         self.leans = dict(moment["leans"])

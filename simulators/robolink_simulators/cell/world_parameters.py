@@ -1,4 +1,4 @@
-"""What goes wrong in a simulated cell, and how its camera is built, as named numbers.
+"""The imperfections of a simulated cell, and the build of its camera, as named numbers.
 
 The same for every kind of robot. They are given to a simulator when it is made (``--world``, or
 ``world.NAME`` in a sim URL), or later through the assist act ``set_world``.
@@ -145,7 +145,7 @@ class WorldParameters:
 
     @property
     def beams_moved(self) -> tuple[float, float]:
-        """By how much the light beams have been moved, X and Y of the base, mm."""
+        """How far the light beams have been moved, X and Y of the base, mm."""
         toward = math.radians(self.beams_moved_toward_deg)
         return self.beams_moved_mm * math.cos(toward), self.beams_moved_mm * math.sin(toward)
 
@@ -162,14 +162,14 @@ class WorldParameters:
 
     @property
     def tip_seen_beside_mm(self) -> tuple[float, float]:
-        """How far beside where it is the camera sees a tip, X and Y of the flange."""
+        """How far from its place the camera sees a tip, X and Y of the flange."""
         toward = math.radians(self.camera_tip_beside_toward_deg)
         beside_mm = self.camera_tip_beside_px * self.camera_um_per_px_x / 1000
         return beside_mm * math.cos(toward), beside_mm * math.sin(toward)
 
     @property
     def finder_faults(self) -> FinderFaults:
-        """What the camera's finder does wrong."""
+        """The faults of the camera's finder."""
         names = [field.name for field in fields(FinderFaults)]
         return FinderFaults(**{name: getattr(self, f"camera_{name}") for name in names})
 
@@ -181,7 +181,7 @@ class WorldParameters:
 
     @property
     def contact(self) -> tuple[int | None, float, Touched]:
-        """How nozzle and pin are wired: the input, the pin's radius in mm, and what is touched."""
+        """How nozzle and pin are wired: the input, the pin's radius in mm, the touched object."""
         return self.contact_input, self.pin_radius_mm, self.person_touches
 
     @property

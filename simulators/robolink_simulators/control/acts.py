@@ -39,7 +39,7 @@ def _teach_point(cell: ControlledCell, given: Given) -> Answer:
 
 
 def _push(cell: ControlledCell, given: Given) -> Answer:
-    """Send every client a line that nobody asked for."""
+    """Send every client a line without a request."""
     _epson(cell).push(given["text"].encode("ascii") + b"\r\n")
     return {}
 
@@ -122,7 +122,7 @@ MAPPED_ACTS: Final[tuple[ControlAct, ...]] = (
 
 
 class UnknownActError(ConfigError):
-    """There is no act of that name at this kind of controller."""
+    """This kind of controller has no act of that name."""
 
 
 MACHINE_REFUSALS: Final = (SpelRefusal, BlockRefused)
@@ -130,12 +130,12 @@ MACHINE_REFUSALS: Final = (SpelRefusal, BlockRefused)
 
 
 def machine_refusal(refused: Exception) -> tuple[str, str]:
-    """Return what one of these says, and what to do next."""
+    """Return the sentence of such an error, and what to do next."""
     return str(refused), tr("Nothing was changed. Ask for what this machine can do.")
 
 
 def defect(error: Exception) -> tuple[str, str]:
-    """Return what is said of an act that fails as none should, and what to do next."""
+    """Return the sentence for an unexpected failure of an act, and what to do next."""
     return (
         tr("The simulator failed: {cause}.", cause=f"{type(error).__name__}: {error}"),
         tr("That is a defect of the simulator: please report it."),
@@ -155,7 +155,7 @@ ACTS: Final[Mapping[str, Mapping[str, ControlAct]]] = {
 
 
 def texts_of(name: str) -> frozenset[str]:
-    """Return what of an act are texts, at any kind: a shell cannot tell "007" from a number."""
+    """Return which values of an act are texts, at any kind: a shell cannot tell "007" from 7."""
     acts = [of_kind[name] for of_kind in ACTS.values() if name in of_kind]
     return frozenset(taken.name for act in acts for taken in act.takes if taken.form == "text")
 
@@ -177,7 +177,7 @@ def act_named(cell: ControlledCell, name: object) -> ControlAct:
 
 
 def methods_of(cell: ControlledCell, name: str) -> tuple[str, ...]:
-    """Return how an act is asked for: by GET, too, where it changes nothing.
+    """Return the HTTP methods of an act: also GET, if it changes nothing.
 
     Raises:
         UnknownActError: No kind of controller has it.
@@ -189,7 +189,7 @@ def methods_of(cell: ControlledCell, name: str) -> tuple[str, ...]:
 
 
 def perform(cell: ControlledCell, name: object, given: Given) -> Answer:
-    """Do what an act says, at the present time, and return what it gives.
+    """Carry out an act at the present time, and return its result.
 
     Args:
         cell: Where.

@@ -1,4 +1,4 @@
-"""What acts answer beside ``ok``, described once: the OpenAPI document is made from it."""
+"""The answers of acts besides ``ok``, described once: the OpenAPI document is made from them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ LEFT_OUT: Final = "left out where it is as usual"
 
 @dataclass(frozen=True, slots=True)
 class FlangePlace:
-    """Where the flange stands, in base coordinates."""
+    """Where the flange is, in base coordinates."""
 
     x_mm: float
     y_mm: float
@@ -58,7 +58,7 @@ class BoardSeen:
 
 @dataclass(frozen=True, slots=True)
 class MapTool:
-    """A tool in the registers of a PLC, seen from the flange; null for what is no number there."""
+    """A tool in the registers of a PLC, seen from the flange; null for what is not a number."""
 
     x_mm: float | None
     y_mm: float | None
@@ -70,7 +70,7 @@ class MapTool:
 
 @dataclass(frozen=True, slots=True)
 class MapTruth:
-    """What is really so at a PLC with a register map, which has no world.
+    """The true state of a PLC with a register map, which has no world.
 
     Attributes:
         kind: The kind of controller.
@@ -85,7 +85,7 @@ class MapTruth:
 
 @dataclass(frozen=True, slots=True)
 class CellTruth:
-    """What is really so, at a controller and around its robot.
+    """The true state of a controller, and of the cell around its robot.
 
     Attributes:
         kind: The kind of controller.
@@ -114,7 +114,7 @@ class CellTruth:
 
 @dataclass(frozen=True, slots=True)
 class Counters:
-    """What was counted since the simulator was made or reset.
+    """Counts since the simulator was made or reset.
 
     Attributes:
         exchanges: Requests answered.
@@ -147,7 +147,7 @@ class ClockShown:
 
 @dataclass(frozen=True, slots=True)
 class SnapshotNames:
-    """The snapshots that there are.
+    """The existing snapshots.
 
     Attributes:
         snapshots: Their names.
@@ -158,7 +158,7 @@ class SnapshotNames:
 
 @dataclass(frozen=True, slots=True)
 class LinesTold:
-    """What crossed the wire.
+    """The traffic on the wire.
 
     Attributes:
         lines: The last lines, oldest first.
@@ -184,7 +184,7 @@ class MotionsTold:
 
 @dataclass(frozen=True, slots=True)
 class FaultKeys:
-    """A planned fault, as docs/fault-plans.md explains; a key that is as usual is left out.
+    """A planned fault, as docs/fault-plans.md explains; keys with default values are left out.
 
     Attributes:
         action: What goes wrong.
@@ -228,7 +228,7 @@ class FaultsTold:
 
 @dataclass(frozen=True, slots=True)
 class FlangeTold:
-    """Where the flange came to stand.
+    """Where the flange stopped.
 
     Attributes:
         flange: There.
@@ -239,7 +239,7 @@ class FlangeTold:
 
 @dataclass(frozen=True, slots=True)
 class TipTold:
-    """The nozzle that is on the arm now.
+    """The nozzle that is mounted now.
 
     Attributes:
         tip: Where its tip is, seen from the flange.
@@ -263,7 +263,7 @@ class MarksSeen:
 
 @dataclass(frozen=True, slots=True)
 class WaySeen:
-    """A way.
+    """A vector.
 
     Attributes:
         way_mm: It, in base axes.

@@ -43,7 +43,7 @@ from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 
 def perform(simulator: AnySimulator | ControlledCell, request: Given) -> Answer:
-    """Do what ``request["do"]`` names and return what it gives.
+    """Carry out the act in ``request["do"]`` and return its result.
 
     Raises:
         ConfigError: There is no such act, or a value is missing, wrong or unknown.
@@ -63,7 +63,7 @@ _TOKEN_CHARACTERS: Final = frozenset(
 
 @dataclass(frozen=True, slots=True)
 class AssistAddress:
-    """An assist URL, taken apart.
+    """The parts of an assist URL.
 
     Attributes:
         host: Host name or address.
@@ -86,7 +86,7 @@ class AssistAddress:
 
 
 def assist_address(url: str) -> AssistAddress:
-    """Take an assist URL apart.
+    """Split an assist URL into its parts.
 
     Args:
         url: ``assist+tcp://TOKEN@127.0.0.1:PORT``.
@@ -150,7 +150,7 @@ class AssistHost(TcpHost):
 
     @property
     def requests(self) -> int:
-        """How many lines came, of whomever."""
+        """The number of lines received, from any client."""
         return self._assisting.requests
 
 
@@ -191,7 +191,7 @@ class _AssistDevice:
         return link
 
     def advance(self, now_ns: int) -> None:
-        """Nothing happens here by itself."""
+        """Do nothing: nothing here happens by itself."""
 
     def next_change(self) -> int | None:
         return None
@@ -258,7 +258,7 @@ class _AssistLink:
         return answer
 
     def _real_thinking_s(self, thinks_s: float) -> float:
-        """Return how long they think by the clock that really passes, which whoever asks has."""
+        """Return how long they think in real time, which the client uses."""
         return max(self._device.clock.really_takes_s(thinks_s), min(thinks_s, LEAST_THINKING_S))
 
 
@@ -291,7 +291,7 @@ class AssistClient(ClosedAtExit):
             raise
 
     def do(self, act: str, **parameters: object) -> dict[str, Any]:
-        """Have something done and return what it gives.
+        """Carry out an act and return its result.
 
         Raises:
             ConfigError: The simulator cannot do it, and says why.
@@ -309,13 +309,13 @@ class AssistClient(ClosedAtExit):
         return PersonLook(**(self.do("look") if tool is None else self.do("look", tool=tool)))
 
     def way_along(self, axis: Axis, length_mm: float, tool: int) -> XyzMm:
-        """Return the way, in base axes, that the operator sees an axis of a tool lead."""
+        """Return the vector, in base axes, that the operator sees along an axis of a tool."""
         answer = self.do("way_along", axis=axis, length_mm=length_mm, tool=tool)
         x_mm, y_mm, z_mm = answer["way_mm"]
         return x_mm, y_mm, z_mm
 
     def be_asked(self, *, touch: bool, tool: int) -> PersonManner:
-        """Ask the operator something, and return how they take it.
+        """Ask the operator something, and return how the operator handles it.
 
         Args:
             touch: Whether they are to bring a tip onto the pin.
@@ -329,7 +329,7 @@ class AssistClient(ClosedAtExit):
         return flange
 
     def see(self, mark: int) -> list[tuple[float, float, float | None]]:
-        """Take a picture and return the pixels at which something looks like a mark.
+        """Take a picture and return the pixels of everything that looks like a mark.
 
         With each the radius that was found there, ``None`` where the finder tells none.
         """
@@ -385,12 +385,12 @@ class InProcessEyes:
             return self._simulator.world.operator.look(tool)
 
     def way_along(self, axis: Axis, length_mm: float, tool: int) -> XyzMm:
-        """Return the way, in base axes, that the operator sees an axis of a tool lead."""
+        """Return the vector, in base axes, that the operator sees along an axis of a tool."""
         with self._simulator.lock:
             return self._simulator.world.operator.way_along(axis, length_mm, tool)
 
     def be_asked(self, *, touch: bool, tool: int) -> PersonManner:
-        """Ask the operator something, and return how they take it."""
+        """Ask the operator something, and return how the operator handles it."""
         with self._simulator.lock:
             operator = self._simulator.world.operator
             return operator.begin_touch(tool) if touch else operator.be_asked()

@@ -1,4 +1,4 @@
-"""One simulated controller with all that acts upon it past the wire."""
+"""One simulated controller, with everything that acts on it outside the wire."""
 
 import hmac
 import secrets
@@ -17,12 +17,12 @@ _TOKEN_BYTES: Final = 16
 
 
 def drawn_token() -> str:
-    """Return a token that nobody guesses: 128 bits, in characters that a URL carries."""
+    """Return an unguessable token: 128 bits, in characters that are legal in a URL."""
     return secrets.token_urlsafe(_TOKEN_BYTES)
 
 
 def is_token(shown: object, token: str) -> bool:
-    """Whether ``shown`` is the token; takes as long for a near miss as for a far one."""
+    """Whether ``shown`` is the token; a near miss takes as long as any other."""
     return isinstance(shown, str) and hmac.compare_digest(
         shown.encode("utf-8", "surrogatepass"), token.encode()
     )

@@ -1,4 +1,4 @@
-"""The control API from Python, as ``robolink sim ctl`` and tests of one's own use it."""
+"""The control API from Python, as ``robolink sim ctl`` and users' tests call it."""
 
 import json
 from collections.abc import Mapping
@@ -59,7 +59,7 @@ class ControlClient(ClosedAtExit):
         self._connection = HTTPConnection(host, port, timeout=timeout_s)
 
     def do(self, act: str, **given: object) -> dict[str, Any]:
-        """Have something done, and return what it gives.
+        """Carry out an act, and return its result.
 
         Raises:
             ConfigError: The simulator cannot do it, and says why.
@@ -100,7 +100,7 @@ class ControlClient(ClosedAtExit):
         return self._told(reply.status, read)
 
     def _told(self, status: int, read: bytes) -> dict[str, Any]:
-        """Return what was answered, or raise what was refused."""
+        """Return the answer, or raise the refusal."""
         try:
             answer = json.loads(read)
         except (ValueError, RecursionError):
@@ -114,7 +114,7 @@ class ControlClient(ClosedAtExit):
         return {name: value for name, value in answer.items() if name not in ("ok", "schema")}
 
     def _be_connected(self) -> None:
-        """Connect, where that has not been done or the simulator has ended a silent connection."""
+        """Connect, unless connected; reconnect if the simulator has ended a silent connection."""
         held = self._connection.sock
         if held is not None and not _has_ended(held):
             return
@@ -126,7 +126,7 @@ class ControlClient(ClosedAtExit):
 
 
 def _has_ended(connection: socket) -> bool:
-    """Tell whether the far side ended a connection, or sent what nobody asked for.
+    """Return whether the far side ended a connection, or sent data without a request.
 
     Looked at before each request: one that was sent into an ended connection may, for all that
     its sender knows, have been carried out.

@@ -1,4 +1,4 @@
-"""An act is declared once: its name, what it takes, and what it does."""
+"""An act is declared once: its name, its parameters, and what it does."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -12,7 +12,7 @@ from robolink_simulators.control.answers import Described
 from robolink_simulators.control.cell import ControlledCell
 
 Answer = dict[str, object]
-"""What an act gives, ready for JSON."""
+"""The result of an act, ready for JSON."""
 
 Given = Mapping[str, Any]
 """What an act is given by name, as it came in."""
@@ -31,7 +31,7 @@ Form = Literal["whole", "number", "flag", "text"]
 
 @dataclass(frozen=True, slots=True)
 class Taken:
-    """One thing that an act takes.
+    """One parameter of an act.
 
     Attributes:
         name: Its name, with the unit in it.
@@ -57,11 +57,11 @@ class Taken:
 
     @property
     def whole_limits(self) -> tuple[int, int]:
-        """The lowest and the highest, if it is a whole number."""
+        """The limits of a whole number."""
         return int(max(self.least, 0)), int(min(self.most, MOST))
 
     def checked(self, act: str, value: object) -> object:
-        """Return the value, if it is one of these.
+        """Return the value, if it is allowed.
 
         Raises:
             ConfigError: It is something else.
@@ -87,7 +87,7 @@ class Taken:
         return float(value) if self.form == "number" else value  # type: ignore[arg-type]
 
     def _is_one(self, text: str) -> bool:
-        """Whether a text is one of those that it takes."""
+        """Whether a text is one of the allowed ones."""
         if self.choices:
             return text in self.choices
         fits = len(text) <= LONGEST_TEXT
@@ -134,7 +134,7 @@ class Taken:
 
 @dataclass(frozen=True, slots=True)
 class ControlAct:
-    """Something that can be done to a simulated cell, or looked at.
+    """An action at a simulated cell, or a reading of it.
 
     Attributes:
         name: Its name.
@@ -157,7 +157,7 @@ class ControlAct:
         return " ".join(lines)
 
     def checked(self, given: Given) -> dict[str, Any]:
-        """Return what was given, if it is what this act takes.
+        """Return the given values, if this act accepts them.
 
         Raises:
             ConfigError: Something is missing, wrong or unknown.
@@ -185,13 +185,13 @@ NUMBER: Final = Taken("number", "whole")
 
 
 def shown_flange(flange: Pose) -> dict[str, float]:
-    """Return a flange pose as acts give it."""
+    """Return a flange pose in the form of an act's result."""
     x_mm, y_mm, z_mm, u_deg, _, _ = flange.coordinates()
     return {"x_mm": x_mm, "y_mm": y_mm, "z_mm": z_mm, "u_deg": u_deg}
 
 
 def panel_act(panel: type, name: str, *takes: Taken, method: str = "") -> ControlAct:
-    """Return the act that does what the panel of the simulator has a method for.
+    """Return the act for a method of the simulator's panel.
 
     Args:
         panel: The class of the panel.

@@ -1,4 +1,4 @@
-"""The HTTP of the control API: connections, requests, and what is no request.
+"""The HTTP of the control API: connections, requests, and malformed requests.
 
 At most :data:`MOST_CLIENTS` are connected at a time, and each request is at most
 :data:`LONGEST_REQUEST` bytes. A connection ends by itself on which no whole request came for a
@@ -44,7 +44,7 @@ _BEFORE_ASKING_S: Final = 5.0
 
 
 class ApiReply(NamedTuple):
-    """What a request is answered with.
+    """The answer to a request.
 
     Attributes:
         status: How it went.
@@ -58,7 +58,7 @@ class ApiReply(NamedTuple):
 
 
 def error_document(what: str, remedy: str = "") -> dict[str, Any]:
-    """Return what a request is answered with that is not carried out."""
+    """Return the answer to a request that is not carried out."""
     return {"schema": SCHEMA, "ok": False, "error": what, "remedy": remedy}
 
 
@@ -71,7 +71,7 @@ def no_request(status: HTTPStatus) -> tuple[str, str]:
 
 
 class HttpPort(ThreadingHTTPServer):
-    """Serves each connection in a thread of its own, a bounded number of them.
+    """Serves each connection in a thread of its own, with a limit on their number.
 
     Args:
         address: Host and port to bind to.
@@ -105,7 +105,7 @@ class HttpPort(ThreadingHTTPServer):
         super().__init__(address, _Served)
 
     def server_bind(self) -> None:
-        """Bind without asking who this machine is, which may take seconds."""
+        """Bind without looking up this machine's name, which may take seconds."""
         if os.name == "posix":
             # Else nobody can listen here for a minute after one who was connected at the end. On
             # Windows it would let two programs share the port.
@@ -114,7 +114,7 @@ class HttpPort(ThreadingHTTPServer):
         self.server_address = self.socket.getsockname()
 
     def process_request(self, request: Any, client_address: Any) -> None:  # noqa: ANN401 - as there
-        """Serve a connection, or tell it that there are too many, unless those are too many too."""
+        """Serve a connection, or refuse it if there are too many; a flood is closed unanswered."""
         with self._counting:
             if len(self._served) >= MOST_CLIENTS:
                 self._make_room()
@@ -140,37 +140,37 @@ class HttpPort(ThreadingHTTPServer):
         super().shutdown_request(request)
 
     def has_asked(self, connection: socket) -> None:
-        """Leave a client its place, whoever comes."""
+        """Keep a client's place, whoever else comes."""
         with self._counting:
             if connection in self._served:
                 self._served[connection] = inf
 
     def end_connections(self) -> None:
-        """End those that are open; their threads see it."""
+        """End open connections; their threads notice it."""
         with self._counting:
             still_open = (*self._served, *self._turned_away)
         for connection in still_open:
             _end(connection)
 
     def _make_room(self) -> None:
-        """End the connection that has been open the longest without asking anything, if any."""
+        """End the connection that has been open longest without a request, if any."""
         oldest = min(self._served, key=self._served.__getitem__)
         if monotonic() - self._served[oldest] >= _BEFORE_ASKING_S:
             del self._served[oldest]
             _end(oldest)
 
     def handle_error(self, request: Any, client_address: Any) -> None:  # noqa: ANN401 - as there
-        """A client that is gone in the middle is nobody's business."""
+        """Ignore a client that disconnects in the middle."""
 
 
 def _end(connection: socket) -> None:
-    """End a connection; its thread sees it."""
+    """End a connection; its thread notices it."""
     with suppress(OSError):  # it has ended by itself
         connection.shutdown(SHUT_RDWR)
 
 
 class _RequestBytes(io.RawIOBase):
-    """What comes on a connection, as long as there is patience.
+    """The bytes of a connection, until its time-out.
 
     Args:
         connection: Where it comes.
@@ -183,7 +183,7 @@ class _RequestBytes(io.RawIOBase):
         self.await_another()
 
     def await_another(self) -> None:
-        """Have patience anew."""
+        """Restart the time-out."""
         self._until_s = monotonic() + self._patience_s
 
     def readable(self) -> bool:
@@ -214,7 +214,7 @@ class _Served(BaseHTTPRequestHandler):
     disable_nagle_algorithm = True
 
     def setup(self) -> None:
-        """Read by the patience that there is with a whole request, not with each byte of it."""
+        """Apply the time-out to a whole request, not to each byte of it."""
         super().setup()
         self.rfile.close()
         self._coming = _RequestBytes(self.connection, self.timeout)
@@ -226,11 +226,11 @@ class _Served(BaseHTTPRequestHandler):
         super().handle_one_request()
 
     def do_GET(self) -> None:
-        """Look."""
+        """Answer GET."""
         self._asked()
 
     def do_POST(self) -> None:
-        """Act."""
+        """Answer POST."""
         self._asked()
 
     def _asked(self) -> None:
@@ -239,7 +239,7 @@ class _Served(BaseHTTPRequestHandler):
             self._answer(self.command, body)
 
     def _body(self) -> bytes | None:
-        """Return what came with the request; ``None`` where it was refused for that."""
+        """Return the body of the request; ``None`` if it was refused because of it."""
         lengths = self.headers.get_all("Content-Length", ["0"])
         length = lengths[0]
         if (
@@ -273,7 +273,7 @@ class _Served(BaseHTTPRequestHandler):
         message: str | None = None,  # noqa: ARG002 - part of the signature
         explain: str | None = None,  # noqa: ARG002 - part of the signature
     ) -> None:
-        """Answer what is no request, or one of another method, in JSON as everything else."""
+        """Answer a malformed request, or another method, in JSON like everything else."""
         self.request_version = self.protocol_version  # or it would get no head
         if code == HTTPStatus.NOT_IMPLEMENTED:
             self.close_connection = True
@@ -296,7 +296,7 @@ class _Served(BaseHTTPRequestHandler):
         self._send(reply)
 
     def _of_a_page(self) -> ApiReply | None:
-        """Return what is answered to a browser that asks for a page which is not ours."""
+        """Return the answer to a browser that asks for a page of another origin."""
         if "Origin" in self.headers:
             return ApiReply(
                 HTTPStatus.FORBIDDEN,
@@ -336,7 +336,7 @@ class _Served(BaseHTTPRequestHandler):
 
 
 class _TurnedAway(_Served):
-    """Answers a first request, whatever it is, with that there is no room.
+    """Answers the first request, whatever it is, that there is no room.
 
     A client reads no answer before it has asked; it would see its connection end, and not why.
     """

@@ -96,7 +96,7 @@ class ControlServer(ClosedAtExit):
         return f"http://{host}:{self._http.server_address[1]}/{self._token}/{VERSION}"
 
     def url_of(self, name: str) -> str:
-        """Return where the acts of a controller stand."""
+        """Return the URL of a controller's acts."""
         return f"{self.url}/cells/{name}"
 
     def close(self) -> None:
@@ -109,7 +109,7 @@ class ControlServer(ClosedAtExit):
             self._thread.join()
 
     def answered(self, method: str, target: str, body: bytes) -> ApiReply:
-        """Return what a request is answered with."""
+        """Return the answer to a request."""
         self.requests += 1
         try:
             parts = urlsplit(target)
@@ -140,7 +140,7 @@ class ControlServer(ClosedAtExit):
             return _refused(HTTPStatus.INTERNAL_SERVER_ERROR, *defect(error))
 
     def _found(self, path: list[str]) -> _Address:
-        """Return what is at an address: the methods it answers, and how.
+        """Return what an address offers: its methods, and their handlers.
 
         Raises:
             UnknownActError: Nothing is there.
@@ -181,7 +181,7 @@ class ControlServer(ClosedAtExit):
 
 
 def _given(method: str, query: str, body: bytes) -> dict[str, Any]:
-    """Return what an act is given: a JSON object, or numbers and texts behind the question mark.
+    """Return the values for an act: a JSON object, or numbers and texts behind the question mark.
 
     Raises:
         ConfigError: It is neither, or stands where it would not be looked for.
@@ -220,7 +220,7 @@ def _given(method: str, query: str, body: bytes) -> dict[str, Any]:
 
 
 def _only(answer: Callable[[], dict[str, Any]]) -> Callable[[dict[str, Any]], dict[str, Any]]:
-    """Return what answers where nothing is taken."""
+    """Return the handler of an address that takes no values."""
 
     def answered(given: dict[str, Any]) -> dict[str, Any]:
         for name in given:
@@ -250,7 +250,7 @@ def _not_allowed(method: str, methods: tuple[str, ...]) -> ApiReply:
 
 
 def _each_once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Return what was given by name.
+    """Return the given values by name.
 
     Raises:
         ConfigError: A name stands there twice, and one of its values would be lost.

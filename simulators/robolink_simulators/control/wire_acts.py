@@ -1,4 +1,4 @@
-"""What is seen and done on the wire: its log, motions that were commanded, faults."""
+"""Acts on the wire: its log, commanded motions, faults."""
 
 from dataclasses import asdict
 from typing import Any, Final, get_args
@@ -38,13 +38,13 @@ _ACTIONS: Final = tuple(sorted({action.name.lower() for action in (*FaultAction,
 
 
 def _log(cell: ControlledCell, given: Given) -> Answer:
-    """Tell what crossed the wire, passwords hidden; after a number only what came behind it."""
+    """Return the traffic on the wire, passwords hidden; with a number only what came after it."""
     log = cell.simulator.log
     return {"lines": [asdict(line) for line in log.lines(_number(given))], "last": log.added}
 
 
 def _motions(cell: ControlledCell, given: Given) -> Answer:
-    """Tell the motions that began, whoever commanded them, and where the flange was to end."""
+    """Return the motions that began, whoever commanded them, and where the flange was to end."""
     motions = [asdict(motion) for motion in cell.simulator.motions(_number(given))]
     return {"motions": motions, "moves_started": cell.simulator.counters()["moves_started"]}
 
@@ -54,7 +54,7 @@ def _number(given: Given) -> int:
 
 
 def _faults(cell: ControlledCell, _given: Given) -> Answer:
-    """Tell the planned faults that have happened, and those that wait."""
+    """Return the planned faults that have happened, and those that wait."""
     faults = cell.simulator.faults
     pending = faults.pending
     return {
@@ -102,7 +102,7 @@ def _possible(tables: list[dict[str, Any]], links: tuple[LinkKind, ...]) -> tupl
 
 
 def _clear_faults(cell: ControlledCell, _given: Given) -> Answer:
-    """Plan no faults any more; what has happened stays told."""
+    """Remove all planned faults; those that happened stay in the list."""
     cell.simulator.faults.clear()
     return _faults(cell, {})
 
@@ -138,29 +138,29 @@ _NAME: Final = Taken("name", "text")
 
 
 def _truth(cell: ControlledCell, _given: Given) -> Answer:
-    """Tell where the tips and the pin really are, and what the controller holds."""
+    """Return where the tips and the pin really are, and what the controller holds."""
     return cell.simulator.truth()
 
 
 def _counters(cell: ControlledCell, _given: Given) -> Answer:
-    """Tell how many exchanges, motions, writes of tools, starts and touches there were."""
+    """Return the number of exchanges, motions, tool writes, starts and touches."""
     return {**cell.simulator.counters()}
 
 
 def _restart(cell: ControlledCell, _given: Given) -> Answer:
-    """Switch the controller off and on; what it keeps over that stays."""
+    """Switch the controller off and on; what it retains stays."""
     cell.simulator.restart()
     return {}
 
 
 def _reset(cell: ControlledCell, _given: Given) -> Answer:
-    """Make the controller and its world anew, under another identity; faults are forgotten."""
+    """Make the controller and its world anew, under another identity; faults are removed."""
     cell.simulator.reset()
     return {}
 
 
 def _snapshot(cell: ControlledCell, given: Given) -> Answer:
-    """Keep under a name what controller and world are now."""
+    """Store the present state of controller and world under a name."""
     if given["name"] not in cell.moments and len(cell.moments) >= _MOST_SNAPSHOTS:
         raise NotNowError(
             tr("There are {count} snapshots already.", count=len(cell.moments)),
@@ -171,7 +171,7 @@ def _snapshot(cell: ControlledCell, given: Given) -> Answer:
 
 
 def _restore(cell: ControlledCell, given: Given) -> Answer:
-    """Be again what was kept under a name, at rest, with nobody connected."""
+    """Restore the state stored under a name, at rest, with nobody connected."""
     moment = cell.moments.get(given["name"])
     if moment is None:
         raise NotNowError(
@@ -183,13 +183,13 @@ def _restore(cell: ControlledCell, given: Given) -> Answer:
 
 
 def _clock(cell: ControlledCell, _given: Given) -> Answer:
-    """Tell the simulated time, and how many simulated seconds a real one has; 0 is a pause."""
+    """Return the simulated time, and the simulated seconds per real second; 0 is a pause."""
     factor = cell.clock.factor if isinstance(cell.clock, SteeredClock) else None
     return {"simulated_s": cell.simulator.now_ns / NS_PER_S, "factor": factor}
 
 
 def _set_clock(cell: ControlledCell, given: Given) -> Answer:
-    """Let simulated time run at a factor of real time from now on; 0 pauses it."""
+    """Run simulated time at a factor of real time from now on; 0 pauses it."""
     if not isinstance(cell.clock, SteeredClock):
         raise NotNowError(
             tr("The time of this simulator passes only while somebody waits for it."),

@@ -1,4 +1,4 @@
-"""What is done to the world around any robot: see it, furnish it, spoil it, touch it."""
+"""Acts on the world around any robot: see it, equip it, disturb it, touch it."""
 
 from collections.abc import Iterator
 from dataclasses import asdict, replace
@@ -67,19 +67,19 @@ def _look(cell: ControlledCell, given: Given) -> Answer:
 
 
 def _jog_onto_pin(cell: ControlledCell, given: Given) -> Answer:
-    """Jog the tip onto the pin by hand (on an EPSON in Teach mode), and tell the flange there."""
+    """Jog the tip onto the pin by hand (on an EPSON in Teach mode), and return the flange there."""
     flange = world_of(cell).operator.jog_onto_pin(given.get("tool"))
     return {"flange": shown_flange(flange)}
 
 
 def _change_nozzle(cell: ControlledCell, given: Given) -> Answer:
-    """Put another nozzle on; its tip is some tenths of a millimetre from the old one's."""
+    """Mount another nozzle; its tip is some tenths of a millimetre from the old one's."""
     world, tool = world_of(cell), given.get("tool")
     return {"tip": asdict(world.change_nozzle() if tool is None else world.change_nozzle(tool))}
 
 
 def _see(cell: ControlledCell, given: Given) -> Answer:
-    """Take a picture with the up-looking camera, and tell the pixels of what looks like a mark."""
+    """Take a picture with the up-looking camera, and return the pixels that look like a mark."""
     spots = world_of(cell).spots(given.get("mark", 0))
     return {
         "seen": [[x, y] for x, y, _ in spots],
@@ -88,21 +88,21 @@ def _see(cell: ControlledCell, given: Given) -> Answer:
 
 
 def _be_asked(cell: ControlledCell, given: Given) -> Answer:
-    """Ask the person something, and tell how they take it."""
+    """Ask the person something, and return how the person handles it."""
     operator = world_of(cell).operator
     asked = given.get("touch", False)
     return asdict(operator.begin_touch(given.get("tool")) if asked else operator.be_asked())
 
 
 def _way_along(cell: ControlledCell, given: Given) -> Answer:
-    """Tell the way, in base axes, that the person sees an axis of a tool lead."""
+    """Return the vector, in base axes, that the person sees along an axis of a tool."""
     operator = world_of(cell).operator
     way_mm = operator.way_along(given["axis"], given["length_mm"], given.get("tool"))
     return {"way_mm": list(way_mm)}
 
 
 def _set_world(cell: ControlledCell, given: Given) -> Answer:
-    """Give the cell other imperfections, and tell all of them."""
+    """Give the cell other imperfections, and return all of them."""
     world = world_of(cell)
     asked = {
         name: str(int(value)) if isinstance(value, bool) else str(value)
@@ -130,12 +130,12 @@ def _mount_plate(cell: ControlledCell, given: Given) -> Answer:
 
 
 class _AnyOfTheWorld(ControlAct):
-    """Takes the parameters of the world, whose names stand there."""
+    """Takes the parameters of the world by their names."""
 
     __slots__ = ()
 
     def checked(self, given: Given) -> dict[str, object]:
-        """Check values; leave it to the world to refuse a name that it does not know."""
+        """Check values; the world itself refuses unknown names."""
         known = {taken.name for taken in self.takes}
         unknown = {name: value for name, value in given.items() if name not in known}
         checked = super().checked({name: value for name, value in given.items() if name in known})

@@ -1,1 +1,1 @@
-"""What simulated controllers of all kinds are alike in, for hosts, panels and tests."""
+"""What simulated controllers of all kinds share, for hosts, panels and tests."""

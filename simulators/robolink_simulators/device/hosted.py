@@ -1,4 +1,4 @@
-"""What a simulated controller of any kind shows to hosts, to panels and to tests."""
+"""The interface of every simulated controller to hosts, panels and tests."""
 
 import threading
 from abc import ABC, abstractmethod
@@ -28,11 +28,11 @@ NEW: Final[Mapping[str, int]] = MappingProxyType(
 
 @dataclass(frozen=True)
 class KeptMoment:
-    """What a simulated controller and its world were at an instant, to go back to.
+    """The state of a simulated controller and its world at an instant, for a restore.
 
     Attributes:
         machine: Which kind and model; only such a one can go back to it.
-        held: What is put back, by name.
+        held: What is restored, by name.
     """
 
     machine: str
@@ -40,7 +40,7 @@ class KeptMoment:
 
 
 class HostedDevice(ABC):
-    """The face that all simulated controllers have. Time is given, never taken.
+    """The interface of all simulated controllers. Time is given, never taken.
 
     Args:
         seed: Decides the world and every scatter.
@@ -81,12 +81,12 @@ class HostedDevice(ABC):
         self._counted_before: dict[str, int] = {}
 
     def keep_time(self, clock: WireClock) -> None:
-        """Take the present time from a clock; whoever hosts it says so."""
+        """Take the present time from a clock; the host calls this."""
         self.present_ns, self.wire_time.clock = clock.now_ns, clock
 
     @contextmanager
     def acting(self) -> Iterator[int]:
-        """Surround an act that comes past the wire; gives the present time."""
+        """Surround an act from outside the wire; gives the present time."""
         with self.lock:
             # A planned act happens at its own instant, in the middle of an advance.
             if self.present_ns is not None and not self._stepping:
@@ -99,7 +99,7 @@ class HostedDevice(ABC):
             watcher()
 
     def truth(self) -> dict[str, Any]:
-        """Return what is really so, ready for JSON, with the same keys for every kind.
+        """Return the true state, ready for JSON, with the same keys for every kind.
 
         ``stored`` are the tools that the controller holds, by number, ``selected_tool`` is the
         one in force; where it has a world, all of that too (``Workplace.truth``). Lengths are
@@ -109,7 +109,7 @@ class HostedDevice(ABC):
             return {"schema": SCHEMA, "kind": self.kind, **self._truth()}
 
     def reset(self) -> None:
-        """Make it anew, as it was made at first, and as another controller than before.
+        """Make it anew, as at first, but as another controller.
 
         Its serial number is drawn anew, so that nothing on record hangs on it; links are cut,
         planned faults, the log and the counters are forgotten. Time goes on.
@@ -125,19 +125,19 @@ class HostedDevice(ABC):
             self.forget_past()
 
     def forget_past(self) -> None:
-        """Count from the beginning again, with an empty log; nothing else is changed."""
+        """Restart the counts, with an empty log; nothing else is changed."""
         with self.lock:
             self.exchanges = 0
             self._count_on()
             self.log.clear()
 
     def kept_moment(self) -> KeptMoment:
-        """Return what is to be gone back to: tools, world, place of the robot, identity."""
+        """Return the state for a restore: tools, world, place of the robot, identity."""
         with self.acting():
             return KeptMoment(self.machine_name, self._moment())
 
     def go_back(self, moment: KeptMoment) -> None:
-        """Be again what it was then, at rest, with nobody connected; faults are forgotten.
+        """Restore that state, at rest, with nobody connected; faults are removed.
 
         What is counted goes on, and the log too: both tell what there was since :meth:`reset`.
 
@@ -161,7 +161,7 @@ class HostedDevice(ABC):
             self._count_on(counted)
 
     def counters(self) -> dict[str, int]:
-        """Return what was counted since it was made or reset.
+        """Return the counts since it was made or reset.
 
         These are exchanges, moves_started, tool_writes, starts and touches.
         """
@@ -172,7 +172,7 @@ class HostedDevice(ABC):
             return {"exchanges": self.exchanges, **since}
 
     def motions(self, after: int = 0) -> Iterator[StartedMotion]:
-        """Yield the motions that began, but for the first ``after`` ones.
+        """Yield the motions that began, without the first ``after`` ones.
 
         Those before it went back to an earlier moment are counted, and held no longer.
         """
@@ -182,12 +182,12 @@ class HostedDevice(ABC):
 
     @property
     def executes_program(self) -> bool:
-        """Whether it executes a program that was loaded, whose variables no snapshot holds."""
+        """Whether it executes a loaded program, whose variables no snapshot contains."""
         return False
 
     @property
     def failure(self) -> StateNotKeptError | None:
-        """Why it can keep its state no longer; whoever serves it ends it then."""
+        """Why it can no longer store its state; the server then ends it."""
         return None
 
     @property
@@ -201,19 +201,19 @@ class HostedDevice(ABC):
 
     @abstractmethod
     def restart(self) -> None:
-        """Switch off and on; what is kept over that stays."""
+        """Switch off and on; what it retains stays."""
 
     @abstractmethod
     def _counted(self) -> dict[str, int]:
-        """Return what its parts have counted: moves_started, tool_writes, starts, touches."""
+        """Return the counts of its parts: moves_started, tool_writes, starts, touches."""
 
     @abstractmethod
     def _motion_log(self) -> MotionLog:
-        """Return where each motion of its robots is noted."""
+        """Return the log of its robots' motions."""
 
     @abstractmethod
     def _truth(self) -> dict[str, Any]:
-        """Return what is really so."""
+        """Return the true state."""
 
     @abstractmethod
     def _renew(self) -> None:
@@ -221,20 +221,20 @@ class HostedDevice(ABC):
 
     @abstractmethod
     def _moment(self) -> dict[str, Any]:
-        """Return copies of what is to be gone back to."""
+        """Return copies of the state for a restore."""
 
     @abstractmethod
     def _restore(self, held: Mapping[str, Any]) -> None:
-        """Put back what :meth:`_moment` gave."""
+        """Restore what :meth:`_moment` returned."""
 
     def _count_on(self, counted: Mapping[str, int] = NEW) -> None:
-        """Go on from these counts, whatever its parts have counted."""
+        """Continue from these counts, whatever its parts have counted."""
         self._counted_before = {
             name: counted[name] - count for name, count in self._counted().items()
         }
 
     def _after_act(self) -> None:  # noqa: B027 - most have nothing to do
-        """Do what is due after an act past the wire."""
+        """Do what is due after an act from outside the wire."""
 
     def _require_renewable(self) -> None:
         if self.durable:
@@ -253,7 +253,7 @@ Act = Callable[[], None]
 
 
 class PlannedActs(ABC):
-    """What goes wrong around a controller, each act at its own instant."""
+    """Planned disturbances around a controller, each at its own instant."""
 
     def __init__(self) -> None:
         self._planned: list[tuple[int, Act]] = []
@@ -267,14 +267,14 @@ class PlannedActs(ABC):
 
     @abstractmethod
     def plan(self, now_ns: int, seconds: float, act: Act) -> None:
-        """Have something done some time from now."""
+        """Plan an act some time from now."""
 
     @abstractmethod
     def _act_of(self, fault: Any) -> Act | None:  # noqa: ANN401 - of the kind of controller
-        """Return what a fault does, if it is anything of this kind."""
+        """Return the act of a fault, if it is one of this kind."""
 
     def plan_at(self, at_ns: int, act: Act) -> None:
-        """Have something done at an instant."""
+        """Plan an act at an instant."""
         self._planned.append((at_ns, act))
 
     def next_change(self) -> int | None:
@@ -291,5 +291,5 @@ class PlannedActs(ABC):
             act()
 
     def forget(self) -> None:
-        """Plan nothing any more."""
+        """Remove all plans."""
         self._planned.clear()

@@ -1,4 +1,4 @@
-"""What crossed the wire of a simulated controller, with running numbers."""
+"""The traffic of a simulated controller, with running numbers."""
 
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -31,7 +31,7 @@ class StartedMotion:
 
 
 class MotionLog:
-    """The last motions; where each ends is worked out when somebody asks.
+    """The last motions; their ends are calculated when somebody asks.
 
     Attributes:
         added: How many there were so far.
@@ -49,7 +49,7 @@ class MotionLog:
             del self._held[:-MOST_MOTIONS]
 
     def motions(self, after: int = 0) -> Iterator[StartedMotion]:
-        """Yield those that are still held and have a number above ``after``."""
+        """Yield the stored ones with a number above ``after``."""
         held = self._held[-MOST_MOTIONS:]
         first = self.added - len(held) + 1
         for number, (at_ns, flange_mm, robot) in enumerate(held, first):
@@ -113,12 +113,12 @@ class WireRecord:
         self._held.extend((now_ns, direction, _held_once(text)))
 
     def clear(self) -> None:
-        """Forget all of it, and count from 1 again."""
+        """Remove all of it, and count from 1 again."""
         self._held.clear()
         self.added = 0
 
     def lines(self, after: int = 0) -> Iterator[WireLine]:
-        """Yield those that are still held and have a number above ``after``."""
+        """Yield the stored ones with a number above ``after``."""
         first = self.added - len(self) + 1
         skipped = max(0, after + 1 - first)
         for number, line in enumerate(islice(self, skipped, None), first + skipped):
@@ -126,7 +126,7 @@ class WireRecord:
 
 
 def _held_once(text: str) -> str:
-    """Return a text as it is held already: thousands of controllers are asked the same.
+    """Return the stored copy of a text: thousands of controllers receive the same ones.
 
     ``sys.intern`` would do, but for Pythons that never let go of what went through it: 3.12.1
     grew by 113 bytes for each different text, 3.11.7 and 3.13.0 by nothing.

@@ -1,4 +1,4 @@
-"""The time in which two machines count each other's silence.
+"""The time by which two machines measure each other's silence.
 
 A client at the other end of a real wire lives in real time, however simulated time is hastened:
 at twenty times its pace a minute of silence would be three seconds, and 500 ms between two
@@ -13,7 +13,7 @@ from typing import Any, Protocol, cast
 
 
 class WireClock(Protocol):
-    """A clock that knows of both times."""
+    """A clock with both times."""
 
     def now_ns(self) -> int:
         """Return the simulated time."""
@@ -22,11 +22,11 @@ class WireClock(Protocol):
         """Return the time on the wire at a simulated instant that is hardly past."""
 
     def simulated_at(self, wire_ns: int) -> int:
-        """Return when, as things are, the time on the wire is that."""
+        """Return when, at the present pace, the wire time has that value."""
 
 
 class WireTime:
-    """What a simulated controller counts silence by; the time it is given while nobody hosts it.
+    """The time by which a simulated controller measures silence; its given time without a host.
 
     Attributes:
         clock: That of its host, or none.
@@ -50,7 +50,7 @@ class WireTime:
 
 
 class _LateRandom:
-    """Stands for a generator that is made when it is first asked for something."""
+    """Stands for a generator that is made at first use."""
 
     __slots__ = ("_first", "_generator", "_seed")
 
@@ -72,7 +72,7 @@ class _LateRandom:
 def late_random(
     seed: str, *, first: Callable[[random.Random], object] | None = None
 ) -> random.Random:
-    """Return what draws as ``random.Random(seed)`` does; thousands of cells draw nothing.
+    """Return a generator like ``random.Random(seed)``, made late; thousands of cells draw nothing.
 
     Args:
         seed: Its seed.

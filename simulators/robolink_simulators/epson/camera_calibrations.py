@@ -28,7 +28,7 @@ _FEWEST_POINTS = 3
 
 
 class CameraMounting(IntEnum):
-    """Where a camera stands, as RC+ numbers it; one that rides on the robot is not simulated."""
+    """Where a camera is, as RC+ numbers it; one that rides on the robot is not simulated."""
 
     STANDALONE = 1
     FIXED_DOWNWARD = 2

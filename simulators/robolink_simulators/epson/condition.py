@@ -1,4 +1,4 @@
-"""What GetStatus shows of the controller, and why it says no.
+"""What GetStatus shows of the controller, and why it refuses.
 
 Why the simulated controller says no.
 
@@ -16,7 +16,7 @@ _MOST_DIGITS: Final = 9
 
 
 class RefusalKind(Enum):
-    """What went wrong, and the number that it has unless an option says otherwise.
+    """The kind of a refusal, and its number unless an option changes it.
 
     Numbers with a section stand in the language reference or in the table of errors; the others
     do not [U], and any number would do: each reason has one of its own.
@@ -158,12 +158,12 @@ class RefusalKind(Enum):
 
     @property
     def option(self) -> str:
-        """The field of ``SpelNumbers`` that gives it another number."""
+        """The field of ``SpelNumbers`` that changes its number."""
         return self.name.lower()
 
 
 class SpelRefusal(Exception):
-    """The controller will not do it; nothing was changed and nothing moves.
+    """The controller refuses; nothing was changed and nothing moves.
 
     Attributes:
         kind: What went wrong.
@@ -189,14 +189,14 @@ class RaisedError(SpelRefusal):
 
 
 class OutOfReach(SpelRefusal):
-    """A target that the arm cannot take up."""
+    """A target that the arm cannot reach."""
 
     def __init__(self, text: str) -> None:
         super().__init__(RefusalKind.OUT_OF_REACH, text)
 
 
 class RequestRefused(Exception):
-    """A request that is answered with ``!Name,code``: nothing was carried out.
+    """A request answered with ``!Name,code``: nothing was carried out.
 
     Attributes:
         code: What is answered (docs/reference/epson.md 1.6).
@@ -208,7 +208,7 @@ class RequestRefused(Exception):
 
 
 def malformed() -> RequestRefused:
-    """Return the refusal of a parameter that makes no sense."""
+    """Return the refusal of an invalid parameter."""
     return RequestRefused(ErrorCode.MALFORMED)
 
 
@@ -243,7 +243,7 @@ class Task(Enum):
 
 
 class Condition:
-    """The state that decides what a controller serves (docs/reference/epson.md 1.4).
+    """The state that decides which requests a controller serves (docs/reference/epson.md 1.4).
 
     An emergency stop stays in force until it is released and then Reset
     (docs/reference/epson.md 1.7). Ready means that start-up is over and no task executes; it stays
@@ -290,7 +290,7 @@ class Condition:
         self.task = Task.NONE
 
     def release_estop(self) -> None:
-        """Release the button; the stop stays in force until Reset."""
+        """Release the button; the stop remains active until Reset."""
         self.estop_pressed = False
 
     def open_guard(self) -> None:
@@ -310,7 +310,7 @@ class Condition:
         self.task = Task.NONE
 
     def raise_warning(self, number: int) -> None:
-        """Show a warning; tasks go on. An error that stands is kept."""
+        """Show a warning; tasks continue. A present error is kept."""
         if not self._error:
             self._warning = True
             self.code = number % 10_000
@@ -334,7 +334,7 @@ class Condition:
             self.failure = None
 
     def restart(self) -> None:
-        """Switch off and on: only what stands outside the controller stays as it is."""
+        """Switch off and on: only what is outside the controller stays as it is."""
         self._estop_latched = self.estop_pressed
         self._error = self._serious = self._warning = False
         self.code = self.program_error = 0
@@ -342,7 +342,7 @@ class Condition:
         self.task = Task.NONE
 
     def flags(self, *, executing: bool = False) -> StatusFlags:
-        """Return the flags; ``executing`` makes an Execute show as a running task."""
+        """Return the flags; ``executing`` shows an Execute as a running task."""
         return _shared_flags(
             self.mode is Mode.TEST,
             self.mode is Mode.TEACH,

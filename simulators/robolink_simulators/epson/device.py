@@ -117,7 +117,7 @@ class EpsonSimulator(SteppedController):
             self._flash.save_changes()  # and so is a file that cannot be written
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - whatever a controller has
-        """Make the controller when something of it is first asked for.
+        """Make the controller at first use.
 
         A process serves thousands, of which few are ever used; so what stands in :meth:`_make`
         costs nothing until then. It is what it would be, had it been made at once.
@@ -183,7 +183,7 @@ class EpsonSimulator(SteppedController):
 
     @property
     def world(self) -> World:
-        """The truth around the robot in force, and the person at the cell."""
+        """The truth around the current robot, and the person at the cell."""
         return self.worlds[self.machine.robot_number - 1]
 
     def load(
@@ -194,7 +194,7 @@ class EpsonSimulator(SteppedController):
         ports: Mapping[int, tuple[str, int]] | None = None,
         encoding: str | None = None,
     ) -> ProgramRunner:
-        r"""Load a project, in place of the one before: Start,n runs its function mainN.
+        r"""Load a project in place of the earlier one: Start,n runs its function mainN.
 
         Args:
             programs: Its .prg files, or the .sprj file that lists them; IOLabels.dat and
@@ -233,7 +233,7 @@ class EpsonSimulator(SteppedController):
             return self.program
 
     def status_flags(self) -> StatusFlags:
-        """Return the flags as they are, whatever the client may be shown."""
+        """Return the flags as they are, whatever the client sees."""
         return self.condition.flags(executing=self._window.busy)
 
     def connect(self, now_ns: int) -> EpsonServerLink:
@@ -241,7 +241,7 @@ class EpsonSimulator(SteppedController):
         return self._connected(None, now_ns)
 
     def connect_serial(self, now_ns: int) -> EpsonServerLink:
-        """Listen at a serial line to whoever turns Remote RS232 on there."""
+        """Listen at a serial line for a client that turns Remote RS232 on."""
         return self._connected(serial_dialect(self.options), now_ns)
 
     def _connected(self, dialect: Dialect | None, now_ns: int) -> EpsonServerLink:
@@ -260,7 +260,7 @@ class EpsonSimulator(SteppedController):
 
     @property
     def robot_name(self) -> str:
-        """Name of the model of robot 1; to ask for it makes nothing."""
+        """Name of the model of robot 1; reading it makes nothing."""
         return self._models[0].name
 
     def _counted(self) -> dict[str, int]:
@@ -275,7 +275,7 @@ class EpsonSimulator(SteppedController):
         return self.machine.motions
 
     def restart(self) -> None:
-        """Switch off and on: links are cut, all but the flash and the variables is forgotten."""
+        """Switch off and on: links are cut, everything except flash and variables is lost."""
         with self.acting():
             self.starts += 1
             self._links.cut()
@@ -291,7 +291,7 @@ class EpsonSimulator(SteppedController):
                 self.program.begin_background(self.now_ns)
 
     def push(self, data: bytes) -> None:
-        """Send every client bytes that nobody asked for (F10)."""
+        """Send every client bytes without a request (F10)."""
         with self.acting():
             self._links.push(data)
 
@@ -300,7 +300,7 @@ class EpsonSimulator(SteppedController):
 
     @property
     def failure(self) -> StateNotKeptError | None:
-        """Why it can keep its state no longer; ``None`` while it can."""
+        """Why it can no longer store its state; ``None`` while it can."""
         return self._flash.failure if self.durable else None
 
     @property

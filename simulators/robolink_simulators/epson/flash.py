@@ -1,4 +1,4 @@
-"""What a controller keeps over a power cycle, as one small file; and a whole moment of it."""
+"""What a controller retains over a power cycle, as one small file; and a whole state of it."""
 
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
@@ -64,7 +64,7 @@ class Flash(StateFile):
 def moment_of(
     machine: Machine, variables: Variables, worlds: Sequence[Workplace]
 ) -> dict[str, Any]:
-    """Return copies of tools, points, what is kept, variables, places and worlds."""
+    """Return copies of tools, points, retained values, variables, places and worlds."""
     robots = machine.robots
     return {
         "serials": [robot.serial for robot in robots],
@@ -88,7 +88,7 @@ def put_back(
     *,
     now_ns: int,
 ) -> None:
-    """Put back what :func:`moment_of` gave."""
+    """Restore what :func:`moment_of` returned."""
     for number, robot in enumerate(machine.robots):
         robot.serial = held["serials"][number]
         robot.tools.restore(held["tools"][number])

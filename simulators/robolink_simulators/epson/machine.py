@@ -1,4 +1,4 @@
-"""What SPEL+ statements touch: the robots of a controller, and the bits that all of them share."""
+"""What SPEL+ statements act on: the robots of a controller, and the bits that all share."""
 
 from collections.abc import Sequence
 from functools import partial
@@ -31,7 +31,7 @@ _T = TypeVar("_T")
 
 
 class _OfTheRobotInForce(Generic[_T]):
-    """An attribute of the robot that statements act on."""
+    """An attribute of the current robot."""
 
     def __set_name__(self, owner: type, name: str) -> None:
         self._name = name
@@ -50,7 +50,7 @@ class _OfTheRobotInForce(Generic[_T]):
 class Machine:
     """A controller's memory and its robots. No wire, no clock of its own.
 
-    What belongs to one robot (arm, tools, points, settings ...) is that of the robot in force:
+    What belongs to one robot (arm, tools, points, settings ...) is that of the current robot:
     ``Robot n`` and SetCurRobot choose it (docs/reference/epson.md 1.5).
 
     Args:
@@ -125,7 +125,7 @@ class Machine:
 
     @property
     def robot(self) -> DrivenRobot:
-        """The robot in force."""
+        """The current robot."""
         return self.robots[self.robot_number - 1]
 
     @property
@@ -147,7 +147,7 @@ class Machine:
         return self.robots[number - 1]
 
     def choose(self, number: int) -> None:
-        """Put a robot in force.
+        """Make a robot the current one.
 
         Raises:
             Refusal: There is no such robot.
@@ -167,7 +167,7 @@ class Machine:
 
     @property
     def offset(self) -> ToolOffset | None:
-        """The definition of the tool in force, ``None`` for the flange."""
+        """The definition of the selected tool, ``None`` for the flange."""
         return self.robot.offset
 
     def tip(self) -> Pose:
@@ -185,13 +185,13 @@ class Machine:
             robot.arm.halt(now_ns)
 
     def keep_places(self, now_ns: int) -> None:
-        """Stop every arm, and keep where it is for Recover (documented for the safeguard)."""
+        """Stop every arm, and store where it is for Recover (documented for the safeguard)."""
         self.halt(now_ns)
         for robot in self.robots:
             robot.recovers_to = robot.arm.joints
 
     def switch_motors(self, on: bool) -> None:
-        """Switch the motors of the robot in force ."""
+        """Switch the motors of the current robot."""
         self.robot.switch_motors(on)
 
     def switch_all_motors(self, on: bool) -> None:
@@ -210,7 +210,7 @@ class Machine:
             robot.reset_motion_parameters()
 
     def forget_volatile(self, now_ns: int) -> None:
-        """Forget what a power cycle takes; robot 1 is in force then (assumed)."""
+        """Forget what a power cycle clears; robot 1 is then current (assumed)."""
         for robot in self.robots:
             robot.forget_volatile(now_ns)
         self.robot_number = 1

@@ -1,4 +1,4 @@
-"""What no document settles about EPSON controllers, as named options; what one says of itself.
+"""EPSON behaviours that no document specifies, as named options; a controller's own texts.
 
 Each default is the likeliest reading; the driver must work with every value (the contract
 tests run with each). Evidence marks: [D] document, [R] transcript of a real controller,
@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
     @dataclass(frozen=True, slots=True)
     class SpelNumbers:
-        """What is made below, as a reader of types has to see it."""
+        """The fields that are made below, for type checkers."""
 
         def __init__(self, **numbers: int) -> None: ...
 
@@ -72,7 +72,7 @@ else:
 
 @dataclass(frozen=True, slots=True)
 class EpsonOptions:
-    """One controller's habits.
+    """The behaviours of one controller.
 
     Attributes:
         terminator: Line end in force in the controller setup, both ways [D].
@@ -111,7 +111,7 @@ class EpsonOptions:
         number_lead_blank: Print shows a blank before a number that begins its text [R, one
             client reads it so].
         accel_max: Highest Accel in percent; AccelMax gives it [D: usually 100, R: 120].
-        clear_selected_tool: What TLClr does to the tool in force: it is an error [D], Tool 0 is
+        clear_selected_tool: What TLClr does to the selected tool: it is an error [D], Tool 0 is
             selected, or the number stays selected without a definition [older firmware: U].
         xylim_counts: What XYLim holds inside its limits: the tip of the selected tool, or the
             flange [U].
@@ -283,7 +283,7 @@ def options_from_text(pairs: Mapping[str, str]) -> EpsonOptions:
 
 @lru_cache(maxsize=64)
 def _options(in_order: tuple[tuple[str, str], ...]) -> EpsonOptions:
-    """Make them once for all controllers with the same ones: thousands of a fleet."""
+    """Return the shared object for these options: thousands of a fleet have the same."""
     pairs = dict(in_order)
     if pairs.get("rc_plus") == "5":
         pairs.setdefault("status_flags", "10")
@@ -294,7 +294,7 @@ def _options(in_order: tuple[tuple[str, str], ...]) -> EpsonOptions:
 
 
 def read_profile(path: Path) -> Mapping[str, str]:
-    """Return the options of a cell profile as text; what was not settled is absent.
+    """Return the options of a cell profile as text; unknown ones are absent.
 
     Names and values are checked where the options are made.
 

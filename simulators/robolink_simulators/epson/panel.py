@@ -1,4 +1,4 @@
-"""What a person or the rest of the cell does to the controller past the wire, and mishaps."""
+"""What a person, or the rest of the cell, does to the controller outside the wire; and mishaps."""
 
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
@@ -19,7 +19,7 @@ from robolink_simulators.not_now import NotNowError
 
 
 class EpsonPanel:
-    """Buttons, doors, selector, errors: what hands can touch. Any thread may act.
+    """Buttons, doors, selector, errors: what hands can reach. Any thread may act.
 
     Args:
         machine: The robot.
@@ -57,7 +57,7 @@ class EpsonPanel:
         self.starter: Callable[[int], object] | None = None
 
     def press_estop(self) -> None:
-        """Press the emergency stop: the arm stands, the motors are off, an Execute fails."""
+        """Press the emergency stop: the arm stops, the motors are off, an Execute fails."""
         with self._acting() as now_ns:
             self._condition.press_estop()
             if self._outputs_off_at_estop:
@@ -65,19 +65,19 @@ class EpsonPanel:
             self._cut_power(self._numbers.emergency_stop, "Emergency stop", now_ns)
 
     def release_estop(self) -> None:
-        """Release the button; the stop stays in force until Reset."""
+        """Release the button; the stop remains active until Reset."""
         with self._acting():
             self._condition.release_estop()
 
     def open_guard(self) -> None:
-        """Open the safety door: as the emergency stop, but a task pauses (motors assumed)."""
+        """Open the safety door: like the emergency stop, but a task pauses (motors assumed)."""
         with self._acting() as now_ns:
             self._condition.open_guard()
             self._machine.keep_places(now_ns)
             self._cut_power(self._numbers.guard_open, "Safeguard open", now_ns)
 
     def close_guard(self) -> None:
-        """Close the safety door. Nothing goes on by itself."""
+        """Close the safety door. Nothing continues by itself."""
         with self._acting():
             self._condition.guard_open = False
 
@@ -89,7 +89,7 @@ class EpsonPanel:
             self._condition.raise_error(number, serious=serious)
 
     def raise_serious_error(self) -> None:
-        """Raise the error that only a restart clears."""
+        """Raise an error that only a restart clears."""
         self.raise_error(self._numbers.serious, serious=True)
 
     def raise_warning(self, number: int) -> None:
@@ -103,7 +103,7 @@ class EpsonPanel:
             self._alarms.raise_alarm(alarm)
 
     def switch_input(self, number: int, on: bool) -> None:
-        """Switch an input by hand; whatever waits for it goes on.
+        """Switch an input by hand; whatever waits for it continues.
 
         Raises:
             NotNowError: There is no such input.
@@ -126,7 +126,7 @@ class EpsonPanel:
         self.set_mode(Mode.AUTO)
 
     def set_mode(self, mode: Mode) -> None:
-        """Turn the mode selector; what runs ends without an error (assumed)."""
+        """Turn the mode selector; running tasks end without an error (assumed)."""
         with self._acting() as now_ns:
             if mode is not self._condition.mode:
                 self._condition.mode = mode
@@ -134,7 +134,7 @@ class EpsonPanel:
                 self._window.interrupt(now_ns)
 
     def set_monitoring_only(self, on: bool) -> None:
-        """Hand the cell to another control device, or back to Remote Ethernet."""
+        """Give control of the cell to another device, or back to Remote Ethernet."""
         with self._acting():
             self._condition.monitoring_only = on
 
@@ -156,7 +156,7 @@ class EpsonPanel:
             self._machine.reset_motion_parameters()
 
     def lose_login(self) -> None:
-        """Let the controller forget who is logged in; the connection stays (F15)."""
+        """Make the controller forget its login; the connection stays (F15)."""
         with self._acting():
             self._slot.free()
 
@@ -173,7 +173,7 @@ class EpsonPanel:
 
 
 class EpsonMishaps(PlannedActs):
-    """Does to the panel what a fault plan says, when it says.
+    """Applies the acts of a fault plan to the panel, at their time.
 
     Args:
         panel: What hands can touch.
@@ -187,7 +187,7 @@ class EpsonMishaps(PlannedActs):
 
     @cached_property
     def _acts(self) -> Mapping[FaultAction, Act]:
-        """What hands do; made when something first goes wrong."""
+        """The acts of hands; made when something first goes wrong."""
         panel = self._panel
         return {
             FaultAction.ESTOP: panel.press_estop,
@@ -199,7 +199,7 @@ class EpsonMishaps(PlannedActs):
         }
 
     def plan(self, now_ns: int, seconds: float, act: Act) -> None:
-        """Have something done some time from now; at once when that is no time at all."""
+        """Plan an act some time from now; without a delay do it at once."""
         if seconds > 0:
             self.plan_at(now_ns + round(seconds * NS_PER_S), act)
         else:

@@ -1,4 +1,4 @@
-"""How time passes in a simulated controller: what it does by itself, and when.
+"""How time passes in a simulated controller: its own actions, and when.
 
 The effect of the companion robolink_tools.prg in the simulated project.
 
@@ -48,7 +48,7 @@ class Companion:
         variables.declare("robolink_tool", VariableType.DOUBLE, 6 * HIGHEST_TOOL - 1)
 
     def publish_changes(self) -> None:
-        """Publish if a tool or the selection changed since it was looked at last."""
+        """Publish if a tool or the selection has changed since the last check."""
         tools = self._machine.tools
         mark = (tools.flash_writes, tools.selected)
         if mark != self._seen:
@@ -121,7 +121,7 @@ class SteppedController(RequestService, ABC):
 
     @property
     def _knows_next(self) -> bool:
-        """Whether nothing has happened since it was found that nothing goes on."""
+        """Whether nothing has happened since it was found idle."""
         return self._settled_ns == self._known_ns != -1
 
     def _found_next(self) -> int | None:
@@ -164,7 +164,7 @@ class SteppedController(RequestService, ABC):
 
     @property
     def _at_work(self) -> bool:
-        """Whether something goes on that is looked at as time passes."""
+        """Whether something is in progress that needs checking as time passes."""
         return (
             self.program is not None
             or self._window.busy
@@ -192,7 +192,7 @@ class SteppedController(RequestService, ABC):
             self._stepping = False
 
     def _supervise(self, now_ns: int) -> None:
-        """Keep the time-outs of docs/reference/epson.md 1.1."""
+        """Apply the time-outs of docs/reference/epson.md 1.1."""
         overdue, client = self._slot.overdue(now_ns, unfinished=self._unfinished)
         watches_only = self.condition.monitoring_only
         if overdue and (not watches_only or self.options.monitoring_timeout == "error"):

@@ -1,4 +1,4 @@
-"""A vision project in a file: what RC+ keeps beside the programs, and what the camera is like.
+"""A vision project in a file: what RC+ stores beside the programs, and the camera's properties.
 
 docs/spel-programs.md, "Vision" shows one and explains its keys.
 """
@@ -83,7 +83,7 @@ _KNOWN["calibration"] = _Calibration
 
 
 class VisionHost(Protocol):
-    """A simulated controller, as far as its vision system has to do with it.
+    """A simulated controller, as its vision system needs it.
 
     Attributes:
         options: Its habits.
@@ -102,7 +102,7 @@ class VisionHost(Protocol):
 
 
 def install_vision(simulator: VisionHost, path: Path) -> VisionSystem:
-    """Give the program of a simulated controller a vision system, as a file describes it.
+    """Give a simulated controller's program a vision system, as a file describes it.
 
     Args:
         simulator: A controller with a program.

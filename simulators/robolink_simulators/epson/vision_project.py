@@ -61,7 +61,7 @@ class PropertySet:
             self.set(name.lower(), value)
 
     def holds(self, name: str) -> bool:
-        """Tell whether there is such a property."""
+        """Return whether there is such a property."""
         return name in self._values
 
     def get(self, name: str) -> VisionValue:
@@ -145,7 +145,7 @@ class VisionSequence:
 
 @dataclass(slots=True)
 class VisionProject:
-    """What RC+ keeps about vision beside the programs.
+    """What RC+ stores about vision beside the programs.
 
     Attributes:
         sequences: By their names in lower case.

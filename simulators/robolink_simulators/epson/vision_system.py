@@ -1,4 +1,4 @@
-"""Runs vision sequences on pictures of the simulated world, and tells their results.
+"""Runs vision sequences on pictures of the simulated world, and returns their results.
 
 Source: docs/reference/vision.md 1, 2, 4.
 """
@@ -99,7 +99,7 @@ class VisionPicture:
 
 @dataclass(frozen=True, slots=True)
 class SequenceOutcome:
-    """What the last run of a sequence has left.
+    """The results of a sequence's last run.
 
     Attributes:
         picture: What it looked at.
@@ -187,7 +187,7 @@ class VisionSystem:
         self._saved = deepcopy(self.project)
 
     def load(self) -> None:
-        """Take the project as it was kept, without what was set since; results go (VLoad)."""
+        """Restore the project as stored, without later settings; results are lost (VLoad)."""
         self.project = deepcopy(self._saved)
         self._outcomes.clear()
         self._picture = None

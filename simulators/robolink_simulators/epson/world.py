@@ -1,4 +1,4 @@
-"""The truth behind a simulated EPSON robot: where its tips really are, and who looks at them."""
+"""The truth behind a simulated EPSON robot: where its tips really are, and who sees them."""
 
 import random
 from collections.abc import Callable, Hashable
@@ -40,7 +40,7 @@ STORED_ON_SIX_AXES: Final = ToolOffset(12.0, -3.5, 120.0)
 
 
 def stored_on(model: RobotModel) -> ToolOffset:
-    """Return what the controller of a robot holds for tool 1 at first."""
+    """Return the first value of tool 1 in a robot's controller."""
     return STORED_ON_SIX_AXES if model.six_axes else STORED
 
 
@@ -144,7 +144,7 @@ class World(Workplace):
         latency_s: float = 0.0,
         noise_mm: float = 0.0,
     ) -> None:
-        """Let a beam or a plate that the tip meets switch an input of the controller.
+        """Connect an input of the controller to a beam or a plate that the tip trips.
 
         Args:
             number: The input.
@@ -165,7 +165,7 @@ class World(Workplace):
         self._inputs.connect(number, sense)
 
     def disconnect(self, number: int) -> None:
-        """Take off what an input is connected to; it is off then."""
+        """Disconnect an input, which is then off."""
         self._inputs.set(number, on=False)
 
     def told_flange(self) -> Pose:

@@ -1,4 +1,4 @@
-"""What can be planned to go wrong: vocabulary, plans, plans drawn from a seed, files, disks.
+"""Possible faults: vocabulary, plans, plans drawn from a seed, files, disks.
 
 The numbers (F25) are those of docs/reference/faults.md; docs/fault-plans.md is for users.
 """

@@ -21,11 +21,11 @@ class Planned(Protocol):
 
     @property
     def match(self) -> str:
-        """Text that a request must contain to be counted; empty counts all."""
+        """Text that a counted request must contain; empty counts all."""
 
     @property
     def every(self) -> int:
-        """0 for once; else the steps in which it goes on meeting requests that match."""
+        """0 for once; else the interval at which it keeps meeting matching requests."""
 
 
 MOST_FIRED: Final = 2000
@@ -93,7 +93,7 @@ class CountedFaults(Generic[AnyFault]):
         heappush(group.due, (group.seen + fault.on_exchange, self._added, fault))
 
     def plan(self, faults: Iterable[Planned], seed: int, served: Collection[LinkKind]) -> None:
-        """Plan what a file says, for a device that is served on certain links.
+        """Plan the faults of a file, for a device that is served on certain links.
 
         Args:
             faults: What to plan.
@@ -123,17 +123,17 @@ class CountedFaults(Generic[AnyFault]):
         self._random = late_random(f"faults {seed}")
 
     def clear(self) -> None:
-        """Plan nothing any more; what fired stays told."""
+        """Remove all plans; what fired stays in the list."""
         self._groups.clear()
 
     def forget(self) -> None:
-        """Plan nothing, and tell of nothing that fired."""
+        """Remove all plans, and what fired."""
         self.clear()
         self.fired.clear()
         self.times_fired = 0
 
     def require_possible(self, served: Collection[LinkKind]) -> None:
-        """Refuse what waits and can happen on none of the links that are served.
+        """Refuse planned faults that can happen on none of the served links.
 
         Raises:
             FaultNotPossibleError: Names the first of them.
@@ -143,7 +143,7 @@ class CountedFaults(Generic[AnyFault]):
 
     @property
     def pending(self) -> tuple[AnyFault, ...]:
-        """What has not fired yet, or goes on, in the order in which it was planned."""
+        """What has not fired yet, or continues, in the order in which it was planned."""
         waiting = [item for group in self._groups.values() for item in group.due]
         return tuple(fault for _, _, fault in sorted(waiting, key=lambda item: item[1]))
 

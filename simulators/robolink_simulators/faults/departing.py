@@ -34,7 +34,7 @@ class DepartingReplies:
         return not (self._waiting or self.half_open or self.stalled_until_ns)
 
     def depart(self, departures: Sequence[Departure], now_ns: int) -> bool:
-        """Let replies leave as planned; False when the device has ended the link with them."""
+        """Send replies as planned; False when the device has ended the link with them."""
         for after_s, leaving in departures:
             if isinstance(leaving, bytes):
                 data = self._with_held(leaving) if self._held else leaving
@@ -49,7 +49,7 @@ class DepartingReplies:
         return True
 
     def post(self, leaving: bytes | LinkEnd | None, at_ns: int) -> None:
-        """Let something leave at an instant, or as soon as what was sent before it has left."""
+        """Send something at an instant, or as soon as what was sent before it has left."""
         self._waiting.append((max(at_ns, self._waiting[-1][0] if self._waiting else 0), leaving))
 
     def take(self, now_ns: int) -> bytes:
@@ -68,11 +68,11 @@ class DepartingReplies:
         return ready
 
     def ended(self, now_ns: int) -> bool:
-        """Tell whether the device has ended the link, after what was to leave."""
+        """Return whether the device has ended the link, after its pending data."""
         return self._due(now_ns) and not isinstance(self._waiting[0][1], bytes)
 
     def reset(self, now_ns: int) -> bool:
-        """Tell whether it ended the link with a reset."""
+        """Return whether it ended the link with a reset."""
         return self._due(now_ns) and self._waiting[0][1] is LinkEnd.RESET
 
     def next_change(self, now_ns: int) -> int | None:
@@ -88,7 +88,7 @@ class DepartingReplies:
         return None
 
     def empty(self, now_ns: int) -> bool:
-        """Tell whether nothing will leave any more."""
+        """Return whether nothing more will be sent."""
         return self.half_open or not self._waiting or self.ended(now_ns)
 
     def _due(self, now_ns: int) -> bool:

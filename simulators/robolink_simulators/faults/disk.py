@@ -45,7 +45,7 @@ _WITH: Final = ("", "-wal", "-journal")
 
 
 class DiskFault(Enum):
-    """What a disk can begin to do, and end again."""
+    """Faults of a disk that can begin and end."""
 
     FULL = auto()
     UNWRITABLE = auto()
@@ -104,20 +104,20 @@ class FaultyDisk:
         self._files.end()
 
     def begin(self, fault: DiskFault, *, after: int = 0) -> None:
-        """Let something go wrong, once so many more writes have succeeded."""
+        """Begin a fault, after so many more successful writes."""
         self._faults[fault] = self.writes + after
 
     @property
     def lies(self) -> bool:
-        """Whether what it says that it has stored may be lost."""
+        """Whether data that it reports as stored may be lost."""
         return self._is_on(DiskFault.SYNC_LIES)
 
     def end(self, fault: DiskFault) -> None:
-        """Let it go well again."""
+        """End the fault."""
         self._faults.pop(fault, None)
 
     def after_kill(self, database: Path, into: Path) -> Path:
-        """Return a copy as it is found when the process is killed now.
+        """Return a copy as found when the process is killed now.
 
         The files are closed after reading, with which SQLite's locks against other processes go.
         """
@@ -128,7 +128,7 @@ class FaultyDisk:
         return into / database.name
 
     def after_power_cut(self, database: Path, into: Path, *, seed: int | None = None) -> Path:
-        """Return a copy as it is found when the power fails now; see the table above.
+        """Return a copy as found when the power fails now; see the table above.
 
         Args:
             database: The file, open or not.
@@ -161,7 +161,7 @@ class FaultyDisk:
     # What SQLite asks for.
 
     def watches(self, path: str) -> bool:
-        """Tell whether a file stands in the folder."""
+        """Return whether a file is in the folder."""
         return path.startswith(self._folder)
 
     def opened(self, path: str, flags: int) -> int:  # noqa: ARG002 - the watcher's own signature
@@ -212,7 +212,7 @@ class FaultyDisk:
         return file.truncate(size)
 
     def sync(self, file: WatchedFile, flags: int) -> int:
-        """Bring to the disk what was written, fail, or lie about it."""
+        """Write pending data to the disk, fail, or lie about it."""
         self._step("sync", file)
         self.syncs += 1
         if self._is_on(DiskFault.SYNC_FAILS):
@@ -265,7 +265,7 @@ def bend_page(path: Path, page: int, *, seed: int = 1, page_bytes: int = 2048) -
 
 
 def _as_on_disk(written: bytes, changes: list[_Change], chance: random.Random | None) -> bytes:
-    """Take changes back, and make those again of which a seed lets something arrive."""
+    """Undo changes, and redo those that a seed lets arrive."""
     image = bytearray(written)
     for change in reversed(changes):
         end = change.offset + len(change.before)

@@ -50,7 +50,7 @@ Action = TypeVar("Action", FaultAction, PlcFaultAction)
 
 @dataclass(frozen=True, slots=True)
 class FaultRates:
-    """How often what goes wrong.
+    """How often each fault happens.
 
     Attributes:
         rate: Faults per exchange, 0 to 1.

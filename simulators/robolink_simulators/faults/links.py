@@ -28,7 +28,7 @@ class LinkKind(StrEnum):
 
 
 class FaultNotPossibleError(NotNowError):
-    """A fault was planned for a link on which there is no such thing.
+    """A fault was planned for a link on which it cannot exist.
 
     Attributes:
         action: The fault.

@@ -1,4 +1,4 @@
-"""The plan of a byte stream: what leaves instead of a reply, and what arrives of a request."""
+"""The plan of a byte stream: what is sent instead of a reply, and what arrives of a request."""
 
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from robolink_simulators.faults.stream import Fault, FaultAction
 
 
 class LinkEnd(Enum):
-    """An end of a link that is more than its being closed."""
+    """How a link ends, other than by being closed."""
 
     RESET = auto()
     HALF_OPEN = auto()
@@ -33,7 +33,7 @@ class HeldBack:
 
 Leaving = bytes | HeldBack | LinkEnd | None
 Departure = tuple[float, Leaving]
-"""Seconds from now, and what leaves then; ``None`` for the end of the link."""
+"""Seconds from now, and what is sent then; ``None`` for the end of the link."""
 
 _SPLIT_S: Final = 0.01
 """Between the halves of a split reply for which no other time is given."""
@@ -85,7 +85,7 @@ class FaultPlan(CountedFaults[Fault]):
         return cls(drawn_faults(seed, kind, rates), seed, links={kind})
 
     def departures(self, reply: bytes, faults: Iterable[Fault]) -> list[Departure]:
-        """Return what leaves instead of ``reply``, in order, when ``faults`` meet it."""
+        """Return what is sent instead of ``reply``, in order, when ``faults`` meet it."""
         leaving: list[Departure] = [(0.0, reply)]
         for fault in faults:
             leaving = self._met(leaving, fault)

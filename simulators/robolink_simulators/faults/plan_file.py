@@ -57,7 +57,7 @@ _OF_DRAWN: Final = ("rate", "exchanges", "actions", "match")
 
 @dataclass(frozen=True, slots=True)
 class FaultFile:
-    """What a fault plan says.
+    """The content of a fault plan.
 
     Attributes:
         link: The link that it was written and drawn for.
@@ -116,7 +116,7 @@ def _require_possible(name: object, link: LinkKind) -> None:
 
 
 def fault_as_keys(fault: Fault | PlcFault) -> dict[str, object]:
-    """Return a fault as a file has it: what is as usual is left out."""
+    """Return a fault in the form of a file, without default values."""
     keys: dict[str, object] = {"action": fault.action.name.lower()}
     for field in fields(fault)[1:]:
         value = getattr(fault, field.name)
@@ -126,7 +126,7 @@ def fault_as_keys(fault: Fault | PlcFault) -> dict[str, object]:
 
 
 class _Reader:
-    """Turns a document into a plan, and notes all that is wrong with it."""
+    """Turns a document into a plan, and notes all its errors."""
 
     def __init__(self, document: Mapping[str, object], text: str) -> None:
         self.problems: list[Problem] = []
@@ -135,7 +135,7 @@ class _Reader:
         self._mailbox = False
 
     def plan(self) -> FaultFile | None:
-        """Return the plan, ``None`` when something is wrong."""
+        """Return the plan, ``None`` if there are errors."""
         link = self._head()
         if link is None:
             return None

@@ -1,4 +1,4 @@
-"""SQLite's own file functions, wrapped: what the library writes passes through here first.
+"""SQLite's own file functions, wrapped: the library's writes pass here first.
 
 SQLite reaches files through a table of functions, its VFS (https://www.sqlite.org/vfs.html). The
 usual one is copied, and of each file opened under it writing, truncating and syncing are replaced.
@@ -50,10 +50,10 @@ _CLOSE: Final = CFUNCTYPE(c_int, c_void_p)
 
 
 class SqliteWatcher(Protocol):
-    """Decides what becomes of what SQLite does to its files; each answers with SQLite's code."""
+    """Decides the outcome of SQLite's file operations; each answers with SQLite's code."""
 
     def watches(self, path: str) -> bool:
-        """Tell whether a file is meant."""
+        """Return whether a file is watched."""
 
     def opened(self, path: str, flags: int) -> int:
         """Return the flags that a file is opened with."""
@@ -65,7 +65,7 @@ class SqliteWatcher(Protocol):
         """Cut a file short, or do not."""
 
     def sync(self, file: "WatchedFile", flags: int) -> int:
-        """See to it that all is on the disk, or do not."""
+        """Make sure that all is on the disk, or do not."""
 
 
 class WatchedFile:
@@ -97,7 +97,7 @@ class WatchedFile:
         return int(_TRUNCATE(self._table.truncate)(self._handle, size))
 
     def sync(self, flags: int) -> int:
-        """See to it that all is on the disk."""
+        """Make sure that all is on the disk."""
         return int(_SYNC(self._table.sync)(self._handle, flags))
 
     def size(self) -> int:
@@ -134,14 +134,14 @@ class SqliteFiles:
         self._taken = True
 
     def serves(self, watcher: SqliteWatcher) -> bool:
-        """Serve another watcher from here on, unless the one of before still needs it."""
+        """Serve another watcher from here on, unless the earlier one is still needed."""
         if self._taken or self._files:
             return False
         self._watcher, self._taken = watcher, True
         return True
 
     def begin(self) -> None:
-        """Have all that is opened from now on pass here."""
+        """Route everything that is opened from now on through here."""
         self._library.sqlite3_vfs_register(byref(self._vfs), 1)
 
     def end(self) -> None:

@@ -1,4 +1,4 @@
-"""Addresses to listen on: who could reach one, and why one cannot be had."""
+"""Addresses to listen on: who can reach one, and why one is unavailable."""
 
 import ipaddress
 from typing import Protocol, runtime_checkable
@@ -28,7 +28,7 @@ class ResettableLink(Protocol):
 
     @property
     def reset(self) -> bool:
-        """Whether it has ended it so, which is told at once and differently."""
+        """Whether it has ended with a reset, which is visible at once and in another way."""
 
 
 class WireDevice(Protocol):

@@ -1,4 +1,4 @@
-"""The garbage collector of a process that does nothing but serve simulated controllers.
+"""The garbage collector of a process that only serves simulated controllers.
 
 Theory of operation. A full collection looks at every object of every controller, some hundred
 each: 90 ms for a thousand, in which none of them answers. What has survived one that is not full

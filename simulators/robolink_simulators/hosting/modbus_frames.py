@@ -118,7 +118,7 @@ class Frames(ABC):
         self._buffer += data
 
     def forget(self) -> None:
-        """Drop what is no whole request yet: on a serial line silence ends a frame."""
+        """Discard an incomplete request: on a serial line silence ends a frame."""
         self._buffer = b""
 
     @abstractmethod

@@ -65,10 +65,10 @@ class ReplayDevice:
         return ReplayLink(self, self._dialogues[self._connections - 1])
 
     def advance(self, now_ns: int) -> None:
-        """Nothing happens by itself."""
+        """Do nothing: nothing happens by itself."""
 
     def next_change(self) -> None:
-        """Nothing happens by itself."""
+        """Return ``None``: nothing happens by itself."""
 
     def differ(self, what: str) -> None:
         """Note a difference."""

@@ -1,4 +1,4 @@
-"""A simulated PLC that keeps tool offsets where a map says, and answers as the map says.
+"""A simulated PLC with its tool offsets where a map says, which answers as the map says.
 
 How real PLC programs of this kind behave beyond their register list is theirs; the answers
 here are the plainest that each handshake allows (assumed).

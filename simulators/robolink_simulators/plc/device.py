@@ -36,12 +36,12 @@ class MappedPlcPanel:
         self._plc = plc
 
     def give_permit(self) -> None:
-        """Let the machine allow that offsets are changed."""
+        """Let the machine permit changes of offsets."""
         with self._plc.acting():
             self._plc.program.permit(True)
 
     def withdraw_permit(self) -> None:
-        """Let the machine allow it no longer."""
+        """Let the machine no longer permit changes of offsets."""
         with self._plc.acting():
             self._plc.program.permit(False)
 
@@ -116,17 +116,17 @@ class PlcLink:
         return self._outbox.next_change(self._plc.now_ns)
 
     def cut(self) -> None:
-        """End this connection, after what leaves now."""
+        """End this connection, after what is sent now."""
         self._outbox.post(None, self._plc.now_ns)
         self._over = True
 
     def stall(self, request: PlcRequest, seconds: float) -> None:
-        """Carry nothing for a while; then a request arrives, and what was sent behind it."""
+        """Carry nothing for a while; then a request arrives, and what was sent after it."""
         self._outbox.stalled_until_ns = self._plc.now_ns + max(1, round(seconds * NS_PER_S))
         self._late.append(request)
 
     def catch_up(self) -> None:
-        """Have served what was on its way while the link carried nothing."""
+        """Serve what was in transit while the link carried nothing."""
         if self._late and not self._stalled:
             late, self._late = self._late, []
             for request in late:
@@ -271,7 +271,7 @@ class PlcSimulator(HostedDevice):
     def serve(
         self, request: PlcRequest, frames: Frames, link: PlcLink, *, counted: bool = False
     ) -> list[Departure]:
-        """Carry a request out and return what leaves for it, when.
+        """Carry a request out and return what is sent for it, and when.
 
         Args:
             request: What a client asks.
@@ -374,6 +374,6 @@ class PlcSimulator(HostedDevice):
 
 
 def _offset(components: Mapping[str, float]) -> dict[str, float | None]:
-    """Return a tool as it is told; a client may have written what is no number."""
+    """Return a tool for a report; a client may have written something that is not a number."""
     named = ((it.name, components.get(it.name[0], 0.0)) for it in fields(ToolOffset))
     return {name: value if isfinite(value) else None for name, value in named}

@@ -1,4 +1,4 @@
-"""What the PLC's program does: keeps tools, takes new values over when it is asked."""
+"""What the PLC's program does: stores tools, takes new values over when asked."""
 
 import random
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -40,7 +40,7 @@ class Memory:
         self._values: dict[tuple[RegisterTable, int], int] = {}
 
     def read(self, table: RegisterTable, addresses: range) -> list[int]:
-        """Return what stands there.
+        """Return the values there.
 
         Raises:
             OutsideError: The table ends before.
@@ -55,15 +55,15 @@ class Memory:
             self._values[table, address + offset] = value
 
     def copied(self) -> dict[tuple[RegisterTable, int], int]:
-        """Return a copy of all that stands in them."""
+        """Return a copy of all values."""
         return dict(self._values)
 
     def put_back(self, values: Mapping[tuple[RegisterTable, int], int]) -> None:
-        """Take over what :meth:`copied` gave."""
+        """Restore what :meth:`copied` returned."""
         self._values = dict(values)
 
     def is_on(self, signal: Signal | None) -> bool:
-        """Tell whether a signal is on; none is off."""
+        """Return whether a signal is on; none is off."""
         if signal is None:
             return False
         value = self._values.get((signal.table, signal.address), 0)
@@ -136,11 +136,11 @@ class PlcProgram:
         self.in_force[tool] = self._stored(slot)
 
     def shown(self) -> dict[int, Components]:
-        """Return what the registers show, whether it was taken over or not."""
+        """Return the value in the registers, taken over or not."""
         return {slot.tool: self._stored(slot) for slot in self._map.slots.values()}
 
     def select(self, tool: int) -> None:
-        """Let the machine put a tool in force."""
+        """Let the machine select a tool."""
         if self._map.selected is not None:
             self.memory.write(self._map.selected.table, self._map.selected.address, [tool])
 
@@ -149,7 +149,7 @@ class PlcProgram:
         self._show(self._map.flange, pose)
 
     def permit(self, on: bool) -> None:
-        """Let the machine allow, or not, that offsets are changed."""
+        """Let the machine permit changes of offsets, or not."""
         self.memory.switch(self._map.permit, on)
 
     def written(self, now_ns: int) -> None:
@@ -183,11 +183,11 @@ class PlcProgram:
         self.memory.switch(commit.answer, True)
 
     def next_change(self) -> int | None:
-        """Return when it will answer, if a request is in work."""
+        """Return when it will answer, if a request is in progress."""
         return self._answer_at_ns
 
     def moment(self) -> dict[str, Any]:
-        """Return copies of its number, its tables, and what it works with."""
+        """Return copies of its number, its tables, and its active values."""
         return {
             "device_id": self.device_id,
             "memory": self.memory.copied(),
@@ -195,7 +195,7 @@ class PlcProgram:
         }
 
     def put_back(self, moment: Mapping[str, Any]) -> None:
-        """Take over what :meth:`moment` gave; a request that was in work is forgotten."""
+        """Restore what :meth:`moment` returned; a request in progress is dropped."""
         self.device_id, self._answer_at_ns = moment["device_id"], None
         self.memory.put_back(moment["memory"])
         self.in_force = deepcopy(moment["in_force"])

@@ -207,7 +207,7 @@ def _made_part(row: KinematicsRow, left: dict[str, float]) -> Any:  # noqa: ANN4
 
 
 def _assumed(parts: Sequence[KinematicsRow], kinematics: KinematicsModel) -> list[AxisLimits]:
-    """Return the limits of the drives, those of a coupled part behind the others."""
+    """Return the limits of the drives, those of a coupled part after the others."""
     special = dict(parts[0].limits)
     if len(parts) > 1:
         behind = len(cast(Coupled, kinematics).position.kinds)
@@ -232,7 +232,7 @@ def _limits(axis: int, assumed: AxisLimits, left: dict[str, float]) -> AxisLimit
 
 
 def _require_standing(name: str, kinematics: KinematicsModel, limits: Sequence[AxisLimits]) -> None:
-    """Refuse limits that let the axes come where the machine falls apart, as rods do."""
+    """Refuse limits that let the axes reach an impossible state, as rods can."""
     try:
         for corner in product(*((it.low, it.high) for it in limits)):
             kinematics.flange(corner)
@@ -287,7 +287,7 @@ def load_row(part: str, *, carries: bool = False, orients: bool = False) -> Kine
 def require_true(
     name: str, kinematics: KinematicsModel, limits: Sequence[tuple[float, float]]
 ) -> None:
-    """Try what a kinematics says of itself at axis values drawn within their limits.
+    """Test a kinematics' own claims at axis values drawn within their limits.
 
     Raises:
         ConfigError: A flange orientation lies outside of the space that the image gives for it,
@@ -322,7 +322,7 @@ def require_true(
 
 @dataclass(frozen=True, slots=True)
 class _OwnKinematics:
-    """A class of one's own as the simulated group works with it.
+    """A user's own class as the simulated group uses it.
 
     Attributes:
         name: ``module:Class``.
@@ -342,13 +342,13 @@ class _OwnKinematics:
         return _asked(lambda: Frame(*self.own.axes_to_cartesian(axes)))
 
     def configuration(self, axes: AxisValues) -> Configuration:  # noqa: ARG002 - has none
-        """Return that there is none: the solution nearest to the present axes is taken."""
+        """Return that there is none: the solution nearest to the present axes is used."""
         return ANY_CONFIGURATION
 
 
 @dataclass(frozen=True, slots=True)
 class CustomPosition(_OwnKinematics):
-    """A kinematics of one's own that moves the machine.
+    """A user's own kinematics that moves the machine.
 
     Attributes:
         carries: Whether an orientation kinematics is coupled to it: then ISMPositionKinematics2
@@ -363,12 +363,12 @@ class CustomPosition(_OwnKinematics):
         configuration: Configuration,  # noqa: ARG002 - has none
         near: AxisValues,
     ) -> AxisValues:
-        """Return the axes that bring the flange there."""
+        """Return the axis values that move the flange there."""
         wanted = (flange.shift_mm, flange.rotation)
         return _asked(lambda: tuple[float, ...](self.own.cartesian_to_axes(wanted, near)))
 
     def orientation_image(self, wanted: Matrix) -> OrientationSpace | None:
-        """Return what is known of the flange; ``None`` where the class has no interface for it."""
+        """Return what is known of the flange; ``None`` if the class has no interface for it."""
         if isinstance(self.own, ISMKinematicsWithOrientationImage) and not self.carries:
             return _asked(partial(self.own.get_flange_orientation_image, wanted))
         if isinstance(self.own, ISMPositionKinematics2):
@@ -378,7 +378,7 @@ class CustomPosition(_OwnKinematics):
 
 @dataclass(frozen=True, slots=True)
 class CustomOrientation(_OwnKinematics):
-    """A kinematics of one's own that turns a flange on another one."""
+    """A user's own kinematics that turns a flange on another one."""
 
     def axes_for(
         self,

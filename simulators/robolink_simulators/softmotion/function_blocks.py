@@ -8,7 +8,7 @@ from robolink_simulators.softmotion.smc_errors import SmcError
 
 
 class BlockState(Enum):
-    """Where an execution stands; one at a time (PLCopen, docs/reference/softmotion.md 2.5)."""
+    """The state of an execution; one at a time (PLCopen, docs/reference/softmotion.md 2.5)."""
 
     BUSY = "busy"
     ACTIVE = "active"
@@ -74,19 +74,19 @@ class BlockExecution:
         return self._outputs.state in ENDS
 
     def activate(self) -> None:
-        """It moves the group from now on."""
+        """Note that it moves the group from now on."""
         self._become(BlockState.ACTIVE)
 
     def finish(self) -> None:
-        """It did what it was asked."""
+        """Note that it did what it was asked."""
         self._become(BlockState.DONE)
 
     def abort(self) -> None:
-        """Another block ended it."""
+        """Note that another block ended it."""
         self._become(BlockState.COMMAND_ABORTED)
 
     def fail(self, error: SmcError) -> None:
-        """It cannot do it."""
+        """Note that it cannot do it."""
         self._become(BlockState.ERROR, error)
 
     def _become(self, state: BlockState, error: SmcError | None = None) -> None:

@@ -1,4 +1,4 @@
-"""What no document settles about SoftMotion, and what differs by version, as named options.
+"""SoftMotion behaviours that no document specifies or that differ by version, as options.
 
 Evidence marks as in docs/reference/softmotion.md: [D] vendor documentation, [F] field report,
 [I] inferred, [U] unverified.
@@ -38,14 +38,14 @@ class SmcNumbers:
     outside_motion_task: int = 12108  # [F]
 
     def error(self, kind: ErrorKind, text: str = "") -> SmcError:
-        """Return the complaint with its number."""
+        """Return the error with its number."""
         number: int = getattr(self, kind.value)
         return SmcError(kind, number, text)
 
 
 @dataclass(frozen=True, slots=True)
 class GroupOptions:
-    """One axis group's habits.
+    """The behaviours of one axis group.
 
     Attributes:
         cycle_us: Period of the motion task, in microseconds [project setting].

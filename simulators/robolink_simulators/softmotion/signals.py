@@ -22,7 +22,7 @@ class DigitalInputs:
         self._senses: dict[int, Sense] = {}
 
     def switch(self, number: int, on: bool) -> None:
-        """Switch an input by hand; what it was connected to is taken off.
+        """Switch an input by hand; this disconnects it.
 
         Raises:
             Refused: There is no such input.

@@ -1,4 +1,4 @@
-"""What a function block or the axis group can complain about.
+"""The errors of a function block or of the axis group.
 
 Numbers of ``SMC_ERROR`` are no stable public API (docs/reference/softmotion.md 1.4): each complaint
 has a kind of ours, the vendor's symbol where a document names it, and a number that
@@ -11,7 +11,7 @@ from typing import Final
 
 
 class ErrorKind(StrEnum):
-    """What went wrong; each value names the field of ``SmcNumbers`` that numbers it."""
+    """The kind of an error; each value names the field of ``SmcNumbers`` that numbers it."""
 
     WRONG_STATE = "wrong_state"
     NOTHING_TO_RESET = "nothing_to_reset"
@@ -49,7 +49,7 @@ SYMBOLS: Final = {
 
 @dataclass(frozen=True, slots=True)
 class SmcError:
-    """A complaint as a PLC program reads it.
+    """An error as a PLC program reads it.
 
     Attributes:
         kind: What it is about.
@@ -68,7 +68,7 @@ class SmcError:
 
 
 class BlockRefused(Exception):
-    """A block will not do it; nothing was changed and nothing new moves.
+    """A block refuses; nothing was changed and nothing new moves.
 
     The text is data of the simulated PLC and not translated.
 

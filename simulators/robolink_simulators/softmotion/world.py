@@ -130,7 +130,7 @@ class SoftMotionWorld(Workplace):
     def connect(
         self, number: int, switch: TipSwitch, tool: int = MOUNTED_TOOL, *, noise_mm: float = 0.0
     ) -> None:
-        """Let a beam or a plate that the tip meets switch an input of the group.
+        """Connect an input of the group to a beam or a plate that the tip trips.
 
         Args:
             number: The input.
@@ -164,7 +164,7 @@ class SoftMotionWorld(Workplace):
         return self._seen[2]
 
     def disconnect(self, number: int) -> None:
-        """Take off what an input is connected to; it is off then."""
+        """Disconnect an input, which is then off."""
         self.group.inputs.switch(number, on=False)
 
     def _require_rest(self) -> None:
@@ -231,7 +231,7 @@ def _stance(low: float, high: float) -> float:
 
 
 def _fitting(tip: ToolOffset, image: OrientationSpace) -> ToolOffset:
-    """Return as much of a tip as the kinematics can be told."""
+    """Return as much of a tip as the kinematics can accept."""
     shift = (tip.x_mm, tip.y_mm, tip.z_mm)
     return ToolOffset(*subtract(shift, image.impossible(shift)))
 
@@ -246,7 +246,7 @@ def trailing(group: AxisGroup, axes: AxisValues) -> AxisValues:
 
 
 def _way_at(flange: Frame, lean: Lean) -> Direction:
-    """Return which way a shaft goes that leans, in base axes."""
+    """Return the direction of a leaning shaft, in base axes."""
     if lean == UPRIGHT:
         return STANDING
     x, y, _ = turned(flange.rotation, (*lean, 0.0))

@@ -1,4 +1,4 @@
-"""An interpreter for the subset of Structured Text that several compilers take alike.
+"""An interpreter for the subset of Structured Text that several compilers read alike.
 
 It executes what ``robolink expert plc export`` writes (docs/reference/structured_text.md 4). It
 refuses, with file, line and column, what is outside of the subset, and what compilers are known to

@@ -1,4 +1,4 @@
-"""What the operators of an expression do, in the one way on which compilers agree."""
+"""The operators of an expression, in the one way on which compilers agree."""
 
 import math
 from collections.abc import Callable
@@ -48,7 +48,7 @@ _LOGIC: Final[dict[str, Join]] = {
 
 
 def binary(left: Typed, sign: str, right: Typed, place: TextPlace) -> Typed:
-    """Return what an operator makes of two operands.
+    """Return the result of an operator with two operands.
 
     Raises:
         StructuredTextError: It does not work on them, or compilers disagree about it.
@@ -124,7 +124,7 @@ def _on_reals(a: Getter, sign: str, b: Getter) -> Getter:
 
 
 def unary(sign: str, operand: Typed, place: TextPlace) -> Typed:
-    """Return what a sign makes of an operand.
+    """Return the result of a sign before an operand.
 
     Raises:
         StructuredTextError: It does not work on it.

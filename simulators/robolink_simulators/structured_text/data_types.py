@@ -1,4 +1,4 @@
-"""The data types of the subset, what variables of them hold, and how values are kept in range.
+"""The data types of the subset, the values of their variables, and their ranges.
 
 A scalar is an ``int``, ``bool`` or ``float``; a duration is an ``int`` of microseconds. An array,
 a structure and the instance of a function block are Python lists: the same list wherever the
@@ -65,7 +65,7 @@ class ScalarType:
         return (1 << (self.bits - 1 if self.signed else self.bits)) - 1
 
     def initial(self) -> Value:
-        """Return what a variable holds that is given nothing."""
+        """Return the value of a variable without an initial value."""
         return {Family.BOOL: False, Family.REAL: 0.0}.get(self.family, 0)
 
     def wrapping(self, get: Getter) -> Getter:
@@ -220,7 +220,7 @@ DINT: Final = ELEMENTARY["DINT"]
 
 
 def same(one: DataType, other: DataType) -> bool:
-    """Tell whether values of one type can be given to variables of another."""
+    """Return whether values of one type can be assigned to variables of another."""
     if isinstance(one, StructType | BlockType) or isinstance(other, StructType | BlockType):
         return one is other
     return one == other
@@ -353,7 +353,7 @@ def paired(left: Typed, right: Typed, place: TextPlace) -> tuple[Typed, Typed]:
 
 
 def settled(piece: Typed, place: TextPlace, where: str) -> Typed:
-    """Refuse what has another value on a compiler that computes in 16 bits.
+    """Refuse an expression with another value on a compiler that computes in 16 bits.
 
     Args:
         piece: The expression.
@@ -393,7 +393,7 @@ def kept(piece: Typed, wanted: DataType, place: TextPlace) -> Getter:
 
 
 def type_name(of: DataType) -> str:
-    """Return how a type is called."""
+    """Return the name of a type."""
     name = getattr(of, "name", "")
     return str(name) or tr("an array")
 

@@ -201,7 +201,7 @@ class Declarations:
 
 
 def retained_scalars(of: DataType) -> bool:
-    """Tell whether a type can be kept in a file: scalars all the way down."""
+    """Return whether a type can be kept in a file: scalars all the way down."""
     if isinstance(of, ArrayType):
         return retained_scalars(of.element)
     if isinstance(of, StructType):

@@ -124,7 +124,7 @@ class StructuredProgram:
         self._main.run(self._frame)
 
     def restart(self) -> None:
-        """Give every variable what it holds at first, but those that are retained."""
+        """Give every variable its initial value, except retained ones."""
         kept = self.retained()
         self._frame = self._main.initial()
         for container, variable in self._declared.globals.values():
@@ -155,14 +155,14 @@ class StructuredProgram:
             container[slot][:] = value
 
     def retained(self) -> dict[str, Any]:
-        """Return what a restart keeps, ready for JSON."""
+        """Return what a restart retains, ready for JSON."""
         return {
             name: _copied(variable.type, container[variable.slot])
             for name, (container, variable) in self._kept()
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Take over what :meth:`retained` gave; other names are passed over."""
+        """Restore what :meth:`retained` returned; other names are ignored."""
         for name, (container, variable) in self._kept():
             if name not in state:
                 continue

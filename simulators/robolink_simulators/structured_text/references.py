@@ -1,4 +1,4 @@
-"""Names, members and indices: where a value stands, and how it is got and put."""
+"""Names, members and indices: where a value is, and how it is read and written."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field

@@ -424,7 +424,7 @@ def _counting(
     runtime: Runtime,
     place: TextPlace,
 ) -> Action:
-    """A FOR loop; its end is worked out anew at each turn, as both compilers do."""
+    """A FOR loop; its end is calculated at each turn, as both compilers do."""
 
     def count(frame: Frame) -> int:
         value = frame[slot] = first(frame)

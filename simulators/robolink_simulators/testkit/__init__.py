@@ -1,1 +1,1 @@
-"""What the pytest fixtures bring; usable without pytest as well."""
+"""The parts of the pytest fixtures; usable without pytest as well."""

@@ -1,4 +1,4 @@
-"""Makes simulated controllers of each kind and serves them, as a test asks for."""
+"""Makes simulated controllers of each kind and serves them, for a test."""
 
 import sys
 from collections.abc import Callable, Iterable, Mapping
@@ -34,7 +34,7 @@ FASTEST: Final = 1000.0
 
 @dataclass(frozen=True, slots=True)
 class CellRequest:
-    """How a simulated cell is to be.
+    """The requested properties of a simulated cell.
 
     Attributes:
         robot: Model of an EPSON robot, for example ``C8-C901S``.
@@ -65,7 +65,7 @@ class CellRequest:
 
     @classmethod
     def of(cls, given: Mapping[str, Any]) -> "CellRequest":
-        """Return what was asked for by name.
+        """Return a request from its named parts.
 
         Raises:
             ConfigError: There is no such name, or its value is not of the form that it takes.
@@ -101,7 +101,7 @@ class CellRequest:
 
 
 def require_heeded(names: Iterable[str], kinds: Iterable[str]) -> None:
-    """Refuse what no cell of the kinds that a test has would pay heed to.
+    """Refuse options that no cell of the test's kinds would use.
 
     Args:
         names: What was given, of the fields of :class:`CellRequest`.
@@ -340,7 +340,7 @@ def _furnished(
 
 
 def _forget_record(url: str) -> None:
-    """Let go of what was recorded, in memory, of a cell that no other process reaches."""
+    """Forget the records, in memory, of a cell that no other process reaches."""
     if "robolink.journal" in sys.modules:
         from robolink.journal import forget_memory
         from robolink.transport import parse_url
@@ -357,7 +357,7 @@ def _plan(simulator: Any, request: CellRequest, link: LinkKind) -> None:  # noqa
 
 
 def _time(request: CellRequest, medium: str, clock: ManualClock | None) -> Any:  # noqa: ANN401 - stepped or steered
-    """Return the time of a cell; in real time, which a test asked for, requests take none."""
+    """Return the clock of a cell; in real time, which a test requested, requests take none."""
     if medium == "sim":
         return clock or ManualClock()
     speed, exchange_s = SERVED_SPEED, EXCHANGE_S

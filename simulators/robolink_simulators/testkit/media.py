@@ -1,4 +1,4 @@
-"""Serves a simulated controller that a test has made itself, for as long as a ``with`` lasts."""
+"""Serves a simulated controller made by a test, for as long as a ``with`` lasts."""
 
 import itertools
 import os
@@ -29,7 +29,7 @@ def served(
     clock: Any = None,  # noqa: ANN401 - stepped or scaled
     map_file: Path | None = None,
 ) -> Iterator[str]:
-    """Serve a simulator and yield its URL, under a name or on a port that nobody else has.
+    """Serve a simulator and yield its URL, under a name or on a port of its own.
 
     Args:
         simulator: Of any kind, furnished as the test likes.

@@ -1,4 +1,4 @@
-"""A person at a simulated cell who does what a script says, when it is time."""
+"""A person at a simulated cell who follows a script, at the right time."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -39,7 +39,7 @@ class ScriptedOperator:
     _cues: list[_Cue] = field(default_factory=list)
 
     def do(self, act: str, **given: object) -> dict[str, object]:
-        """Do something now, and return what it gives.
+        """Carry out an act now, and return its result.
 
         Raises:
             ConfigError: There is no such act, or a value is missing, wrong or unknown.
@@ -47,7 +47,7 @@ class ScriptedOperator:
         return perform(self.cell, act, given)
 
     def when(self, match: str, act: str, *, skip: int = 0, **given: object) -> None:
-        """Do something just before a request that contains a text is carried out, once.
+        """Carry out an act just before a request that contains a text, once.
 
         Args:
             match: Any part of the request, as the wire log shows it.
@@ -69,11 +69,11 @@ class ScriptedOperator:
 
     @property
     def waiting(self) -> int:
-        """How many cues have not come yet."""
+        """The number of cues that have not come yet."""
         return len(self._cues)
 
     def unplayed(self) -> list[str]:
-        """Return what of the script was not done, each as a sentence."""
+        """Return what was not done of the script, each as a sentence."""
         late = [
             f"No request came that contains {cue.match!r}, at which {cue.act} was to be done."
             for cue in self._cues
@@ -81,7 +81,7 @@ class ScriptedOperator:
         return late + [f"{act} could not be done: {why}" for act, why in self.failed]
 
     def forget(self) -> None:
-        """Drop the script, what was done, and what could not be."""
+        """Drop the script, its results, and its failures."""
         self._cues.clear()
         self.done.clear()
         self.failed.clear()

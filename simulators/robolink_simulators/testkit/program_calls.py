@@ -1,4 +1,4 @@
-"""What a SPEL+ program of a simulated controller asks, answered in the process of the test.
+"""Answers a simulated controller's SPEL+ program in the process of the test.
 
 In place of the network of the program's port: no socket, no thread. The answer is there as soon as
 the question has been sent, so that only the time of the controller decides what comes when.
@@ -19,7 +19,7 @@ _END: Final = b"\r\n"
 
 @dataclass(frozen=True, slots=True)
 class CallFault:
-    """What becomes of one question and its answer.
+    """The outcome of one question and its answer.
 
     Attributes:
         drop_question: The question is lost.
@@ -180,7 +180,7 @@ class ProgramCalls:
         self._call = None
 
     def asked(self, line: bytes, far: CallPartner) -> bytes | None:
-        """Return what the program is sent for a question; ``None`` cuts it off."""
+        """Return what the program receives for a question; ``None`` disconnects it."""
         self.questions.append(line)
         fault = self.fault(len(self.questions) - 1, line) or CallFault()
         if fault.cut_before:

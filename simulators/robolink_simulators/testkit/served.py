@@ -1,4 +1,4 @@
-"""A simulated cell as a test gets it: made, served, looked at, put back."""
+"""A simulated cell as a test gets it: made, served, observed, restored."""
 
 import json
 import os
@@ -24,7 +24,7 @@ _SHOWN: Final = 40
 
 @dataclass(frozen=True, slots=True)
 class WireLook:
-    """What crossed the wire of a simulated controller, passwords hidden.
+    """The traffic of a simulated controller, passwords hidden.
 
     Args:
         simulator: Whose.
@@ -44,7 +44,7 @@ class WireLook:
         return tuple(line.text for line in self.lines if line.direction == ">")
 
     def sent(self, text: str) -> int:
-        """Return how many requests contain a text; upper and lower case are told apart.
+        """Return how many requests contain a text; case matters.
 
         Raises:
             AssertionError: The log is not whole any more, so that none knows how many.
@@ -59,7 +59,7 @@ class WireLook:
         return sum(text in line.text for line in lines if line.direction == ">")
 
     def assert_sent(self, text: str, times: int | None = None) -> None:
-        """Fail unless a text was sent, and exactly so often where ``times`` says it.
+        """Fail unless a text was sent, and exactly ``times`` times if given.
 
         Raises:
             AssertionError: It was not; shows the last requests.
@@ -192,7 +192,7 @@ class SimulatedCell:
     operator: ScriptedOperator = field(init=False)
 
     def __post_init__(self) -> None:
-        """Put a person there, and keep the moment for :meth:`put_back`."""
+        """Add a person, and store the state for :meth:`put_back`."""
         object.__setattr__(self, "operator", ScriptedOperator(self.controlled))
         if not self.simulator.durable:
             self.controlled.moments[_FIRST] = self.simulator.kept_moment()
@@ -213,24 +213,24 @@ class SimulatedCell:
         return self.controlled.clock
 
     def truth(self) -> dict[str, Any]:
-        """Return what is really so: the tips, the pin, what the controller holds."""
+        """Return the true state: the tips, the pin, what the controller holds."""
         truth: dict[str, Any] = self.simulator.truth()
         return truth
 
     def do(self, act: str, **given: object) -> dict[str, object]:
-        """Do an act of the control API, and return what it gives; see docs/control-api.md."""
+        """Carry out an act of the control API, and return its result; see docs/control-api.md."""
         return self.operator.do(act, **given)
 
     def snapshot(self, name: str) -> None:
-        """Keep what controller and world are now."""
+        """Store the present state of controller and world."""
         self.do("snapshot", name=name)
 
     def restore(self, name: str) -> None:
-        """Be again what was kept."""
+        """Restore a stored state."""
         self.do("restore", name=name)
 
     def put_back(self) -> None:
-        """Be as at first, the same controller: no faults, script, log or counts. Between tests."""
+        """Restore the first state of the same controller: no faults, script, log or counts."""
         self.operator.forget()
         self.restore(_FIRST)
         self.simulator.forget_past()
@@ -277,7 +277,7 @@ class SimulatedCell:
 
     @property
     def by_hand(self) -> tuple[str, ...]:
-        """The options by which a command asks this person, and asks nobody else.
+        """The options by which a command asks this person, and nobody else.
 
         Raises:
             ConfigError: There is none.
@@ -307,7 +307,7 @@ class EndedCommand:
 
 @dataclass(frozen=True, slots=True)
 class OwnFolder:
-    """Where a factory puts what it serves, and closes it at the end.
+    """Where a factory keeps its served cells, and closes them at the end.
 
     Attributes:
         stack: Closed at the end of the test.

@@ -52,7 +52,7 @@ def test_a_first_touch_that_the_robot_went_to_by_itself_is_jogged_too():
     going = MoveSubject(ARRIVAL, Way.JOINT, 20.0, "Moving to the station for tool 1.")
     carried = Sitting().happens(WasRegarded(going)).asked(touch_subject(number=1, arrival=None))
     carried.keys("5")
-    assert "still stands where the robot put it" in carried.state.message
+    assert "is still where the robot stopped" in carried.state.message
     assert not carried.sent
     carried.keys("3").jogs("z-0.1").keys("5")
     assert carried.sent == ["z-0.1", "done"]
@@ -61,7 +61,7 @@ def test_a_first_touch_that_the_robot_went_to_by_itself_is_jogged_too():
 def test_a_touch_is_jogged_in_coarse_steps_and_taken_after_a_fine_one():
     hand = at_touch()
     hand.key("main")
-    assert "still stands where the robot put it" in hand.state.message
+    assert "is still where the robot stopped" in hand.state.message
     hand.keys("+", "+", "3")
     assert hand.sent == ["z-1"]
     hand.jogs("z-1.0").keys("5")
@@ -383,7 +383,7 @@ def test_nothing_of_one_touch_counts_for_the_next():
     hand = at_touch(types=True).jogs("z-0.1").line("pose 1 2 3 4")
     hand.asked(touch_subject(types=True)).keys("5")
     assert hand.sent == []
-    assert "still stands where the robot put it" in hand.state.message
+    assert "is still where the robot stopped" in hand.state.message
     going = MoveSubject(ARRIVAL, Way.JOINT, 20.0, "Moving to the station for tool 2.")
     hand = at_touch().jogs("z-0.1").happens(WasRegarded(going))
     hand.asked(touch_subject(number=1, arrival=None)).keys("5")

@@ -43,7 +43,7 @@ SAID = {
         r"Next|Take it back|Yes|Switch them on|Start moving.*|Do it|Record.*|It is there"
         r"|Show the result|Finish|Start again"
     ),
-    "the safe way out": r"STOP|Stop: .*|Leave.*|Do not write|Put the old value back\.",
+    "the safe way out": r"STOP|Stop: .*|Leave.*|Do not write|Restore the old value\.",
     "more, less": r"One more touch|Next tool|",
     "a touch again": r"Touch \d+ again|Start again at touch 1",
     "open what is not shown": r"The rest|Show the report|Type the pose, .*|shows the rest\.",

@@ -61,7 +61,7 @@ def test_a_needle_by_hand_is_measured_written_by_its_number_and_tested(hand, sim
     hand.terminal.wait_for(r"take, again 1, stop, or help\.")
     time.sleep(0.35)
     hand.type("take")
-    hand.terminal.wait_for("still stands where the robot put it")
+    hand.terminal.wait_for("is still where the robot stopped")
     hand.type("help")
     hand.terminal.wait_for("take records")
     hand.jog()

@@ -249,7 +249,7 @@ def unsaved():
 def recovering():
     """What was written and never tested; reading alone decides nothing."""
     options = (
-        tr("The old one. Put the old value back."),
+        tr("The old one. Restore the old value."),
         tr("The new one. Make the turn test, then keep the new value."),
         tr("I am not sure. Keep the robot blocked and call an engineer."),
     )
@@ -627,7 +627,7 @@ def test_the_next_command_after_a_contradiction_learns_the_station_where_that_wa
 def test_lines_show_each_row_of_a_contradicted_turn_test_and_what_enter_does():
     hand = turn_test_asks()
     told = told_before(hand.state)
-    assert told[0] == "  1 Put the old value back."
+    assert told[0] == "  1 Restore the old value."
     assert told[2] == "  2 Make one more touch."
     assert told_question(hand.state).endswith(
         "What should happen now? [Type the number of a row. Enter alone: 1.]"

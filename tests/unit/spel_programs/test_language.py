@@ -305,7 +305,7 @@ def test_one_project_is_read_in_one_code_page(cell):
         (LOOP.format("GoTo away"), "error 3108"),
         (LOOP.format("For i = 1 To 2\nNext"), "main.prg:2: nothing is called i"),
         (LOOP.format("Do"), "main.prg:2: this is never closed (expected Loop)"),
-        (LOOP.format("Do\nEndIf"), "nothing that this belongs to is open (expected Loop)"),
+        (LOOP.format("Do\nEndIf"), "no open block that this belongs to (expected Loop)"),
         (LOOP.format("Where"), "where is for the command window only"),
         (LOOP.format("Integer a\nInteger A"), "a is declared twice"),
         (LOOP.format("Exit For"), "there is no such loop around it"),

@@ -1,4 +1,4 @@
-"""plc check-map: whether a map is right, as far as the file, a probe or a person can tell."""
+"""plc check-map: whether a map is right, as far as the file, a probe or a person can show."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -176,7 +176,7 @@ def _opened(context: CliContext) -> "PlcMapController":
 
 
 class MapValues:
-    """What stands in the registers of the tools now; reads only.
+    """The present contents of the tools' registers; reads only.
 
     Attributes:
         found: By value, mm or degrees.
@@ -207,7 +207,7 @@ class MapValues:
         }
 
     def show(self) -> None:
-        """Show it to a person who stands at the HMI."""
+        """Show it to a person at the HMI."""
         rows = [
             [
                 str(value),
@@ -224,7 +224,7 @@ class MapValues:
 
 
 def place_rows(register_map: RegisterMap) -> list[list[str]]:
-    """Return what stands where, every number given both ways."""
+    """Return which value is where, every number given both ways."""
     rows = []
     for slot in register_map.slots.values():
         for name, number in slot.components.items():
@@ -266,7 +266,7 @@ def _form(number: Number) -> str:
 
 
 class MapComparison:
-    """The comparison of one map at one PLC. A difference takes all back that was confirmed."""
+    """The comparison of one map at one PLC. A difference withdraws all confirmations."""
 
     def __init__(self, context: CliContext, controller: "PlcMapController") -> None:
         self._controller = controller
@@ -289,7 +289,7 @@ class MapComparison:
         self._keep(made)
 
     def of_what_is_missing(self, values: MapValues) -> None:
-        """Ask for what is not compared yet; off a terminal, only where nothing is.
+        """Ask for values that are not yet compared; off a terminal, only if there are none.
 
         Raises:
             MapDiffersError: A value differs.
@@ -344,7 +344,7 @@ class MapComparison:
         )
 
     def _asked(self, wanted: OpenValue, values: MapValues) -> list[ComparedValue]:
-        """Ask for one value; return what was compared, nothing where it was left out."""
+        """Ask for one value; return what was compared, nothing if it was left out."""
         value, test = wanted.value, wanted.test_mm_or_deg
         if test is None:
             answer = self._answer(
@@ -380,7 +380,7 @@ class MapComparison:
         return made
 
     def _given(self, answer: str, value: MapValue) -> bool:
-        """Whether there is an answer; one that is left out is not asked for again.
+        """Return whether there is an answer; one that is left out is not asked for again.
 
         Raises:
             DeclinedError: The person ended it.
@@ -389,8 +389,8 @@ class MapComparison:
             raise DeclinedError(
                 tr("Not everything was compared."),
                 remedy=tr(
-                    "The comparisons made are on record; robolink does not change the "
-                    "rest. Run the command again to go on."
+                    "The comparisons made are recorded; robolink does not change the rest. Run "
+                    "the command again to continue."
                 ),
             )
         if not answer:
@@ -398,7 +398,7 @@ class MapComparison:
         return bool(answer)
 
     def _put_back(self, value: MapValue, before: float | None, now: float | None) -> None:
-        """Have a test value taken away again, and look whether it was."""
+        """Let a person remove a test value, and check that it is gone."""
         if now == before:
             return
         self._answer(

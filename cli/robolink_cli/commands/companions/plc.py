@@ -141,7 +141,7 @@ def plc_texts(
 
 
 def export_texts(folder: Path, texts: Mapping[str, str], *, replace: bool = False) -> list[Path]:
-    """Write the files into ``folder``, which is made when it is missing.
+    """Write the files into ``folder``, which is created if it is missing.
 
     A file that is there already with the same content is fine.
 

@@ -1,4 +1,4 @@
-"""serve: programs that measure and write a tool themselves ask here whether it may stay."""
+"""serve: answers programs that measure and write a tool themselves."""
 
 import json
 from typing import TYPE_CHECKING, Annotated, Literal
@@ -56,10 +56,9 @@ def serve(
         CliOption(
             "--on-record",
             metavar="NAME",
-            help="Name under which a robot is on record; by default epson: and its serial "
-            "number. For a "
-            "controller with several robots repeat it: each name ends in the robot's serial "
-            "number.",
+            help="Name under which a robot is recorded; default: epson: and its serial number. "
+            "For a controller with several robots repeat it: each name ends in the "
+            "robot's serial number.",
         ),
     ] = (),
     tolerance_mm: Annotated[
@@ -167,7 +166,7 @@ def _serve_programs(
 
 
 def _announce(server: "CallbackServer") -> None:
-    """Say where it listens, at once, because whoever started it waits for that."""
+    """Show where it listens, at once, because whoever started it waits for that."""
     import json
 
     host, port = server.address
@@ -184,7 +183,7 @@ def _announce(server: "CallbackServer") -> None:
 
 
 class ServeEvents:
-    """Tells each event at once: a line of JSON for a script, a sentence for a person.
+    """Reports each event at once: a line of JSON for a script, a sentence for a person.
 
     It is made in the thread of the command, which alone knows whether JSON was asked for.
     """
@@ -193,20 +192,20 @@ class ServeEvents:
         self._json = json_is_on()
 
     def tell(self, event: str, sentence: str, **payload: object) -> None:
-        """Tell an event; ``sentence`` may be empty where a person was told already."""
+        """Report an event; ``sentence`` may be empty if a person was already told."""
         if self._json:
             hand_over(json.dumps({"schema": "robolink/serve-event/1", "event": event, **payload}))
         elif sentence:
             show(sentence)
 
     def refused(self, sentence: str, code: str, error: RobolinkError, **payload: object) -> None:
-        """Tell a refusal: a person reads what to do, a script gets the code as well."""
+        """Report a refusal: a person reads what to do, a script also gets the code."""
         note(sentence)
         self.tell("refused", "", code=code, what=error.what, remedy=error.remedy, **payload)
 
 
 def serve_plc(context: CliContext, plan: "PermitPlan", limits: "CallbackLimits") -> None:
-    """Answer calls. Each has a session of its own: its end gives the mailbox back.
+    """Answer calls. Each has its own session, whose end releases the mailbox.
 
     Raises:
         RobolinkError: The PLC is not reached, or a write is in doubt: the machine stays blocked.

@@ -48,7 +48,7 @@ def companion_texts() -> Mapping[str, bytes]:
 
 
 def export_companions(folder: Path, *, replace: bool = False) -> list[Path]:
-    """Write the files into ``folder``, which is made when it is missing.
+    """Write the files into ``folder``, which is created if it is missing.
 
     A file that is there already with the same content is fine.
 
@@ -235,7 +235,7 @@ def _run(
     trace: bool,
     printed: list[str],
 ) -> bool:
-    """Run a program to its end; tell whether that came in time."""
+    """Run a program to its end; return whether that came in time."""
     from robolink_simulators.epson.spel.tasks.runner import run_to_end
 
     from robolink_cli.commands.simulate.epson import start_function
@@ -259,13 +259,13 @@ def _run(
 
 
 def _typed_line() -> str | None:
-    """Return what is typed for Input, ``None`` at the end of what there is."""
+    """Return what is typed for Input, ``None`` at the end of the input."""
     line = sys.stdin.readline()
     return line.rstrip("\r\n") if line else None
 
 
 def _failed(failure: "TaskFailure", default_robot: str | None) -> ControllerFaultError:
-    """Return how a program ended; with the robot, where a default one may be the cause."""
+    """Return how a program ended; with the robot, if a default one may be the cause."""
     remedy = tr("Correct that line, or handle the error with OnErr.")
     if default_robot is not None:
         remedy = tr(

@@ -1,4 +1,4 @@
-"""cell check: whether cells are as they were left, and whether anything is due. Moves nothing."""
+"""cell check: unexpected changes of cells, and overdue checks. Moves nothing."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 
 class CheckScope(NamedTuple):
-    """What is looked at, and how.
+    """What is checked, and how.
 
     Attributes:
         published: Whether the tools are those that the companion program published.
@@ -48,7 +48,7 @@ class CheckScope(NamedTuple):
 
 
 class CheckedCell(NamedTuple):
-    """One cell that was looked at, or could not be.
+    """One cell that was checked, or could not be.
 
     Attributes:
         name: Its name, or its URL where it has none.
@@ -62,7 +62,7 @@ class CheckedCell(NamedTuple):
 
     @property
     def well(self) -> bool:
-        """Whether it was looked at and nobody has to see to anything."""
+        """Whether it was checked and needs no attention."""
         found = self.inspection
         return self.error is None and found is not None and not found.findings
 
@@ -114,7 +114,7 @@ def check(
 
 
 def _contexts(context: CliContext, names: Sequence[str]) -> list[CliContext]:
-    """Return each cell that is meant.
+    """Return each selected cell.
 
     Raises:
         ConfigError: There is none of that name, or none at all.
@@ -131,7 +131,7 @@ def _contexts(context: CliContext, names: Sequence[str]) -> list[CliContext]:
 
 
 def _checked(context: CliContext, scope: CheckScope) -> CheckedCell:
-    """Look at one cell; what keeps it from being looked at stands in the result."""
+    """Check one cell; the result names what prevented a check."""
     name = context.cell.name if context.cell else context.require_url()
     seen: list[Inspection] = []
     try:
@@ -144,7 +144,7 @@ def _checked(context: CliContext, scope: CheckScope) -> CheckedCell:
 
 
 def _inspect(context: CliContext, scope: CheckScope, seen: "list[Inspection]") -> None:
-    """Look at one cell and put on record what was found.
+    """Check one cell and record the findings.
 
     Args:
         context: The cell.
@@ -173,7 +173,7 @@ def _inspect(context: CliContext, scope: CheckScope, seen: "list[Inspection]") -
 
 
 def _record_that_nobody_looked(context: CliContext, error: RobolinkError) -> None:
-    """Put on record that a cell could not be looked at; say it where that cannot be recorded."""
+    """Record that a cell could not be checked; show it if that cannot be recorded."""
     from robolink import __version__
     from robolink.journal import open_log, signature_here
     from robolink.transport import parse_url
@@ -200,7 +200,7 @@ def _not_looked(error: RobolinkError) -> "NewEntry":
 
 
 def _payload(one: CheckedCell) -> Mapping[str, object]:
-    """Return what is known of one cell; ``None`` for what nobody could look at."""
+    """Return what is known of one cell; ``None`` for what could not be checked."""
     from robolink.model import json_value
 
     error = one.error and {
@@ -227,7 +227,7 @@ def _payload(one: CheckedCell) -> Mapping[str, object]:
 
 
 def _show(checked: Sequence[CheckedCell]) -> None:
-    """Print one line a cell, what is to be seen to below it; cells with something first."""
+    """Print one line a cell, its findings below it; cells with findings first."""
     for one in sorted(checked, key=lambda one: one.well):
         if one.inspection is None:
             say(tr("{cell}: could not be checked.", cell=one.name))

@@ -23,7 +23,7 @@ FoundT = TypeVar("FoundT")
 
 
 class Level(StrEnum):
-    """How bad it is; only BAD keeps robolink from working."""
+    """How serious it is; only BAD keeps robolink from working."""
 
     OK = declared("ok")
     WARN = declared("warn")
@@ -32,7 +32,7 @@ class Level(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Remark:
-    """What was looked at and found.
+    """What was checked and found.
 
     Attributes:
         subject: Short name of what was looked at; the same in every language.
@@ -48,7 +48,7 @@ class Remark:
 
 
 def guarded(subject: str, look: Callable[[], Iterable[Remark]]) -> Iterator[Remark]:
-    """Yield what a look finds; if it breaks off, one more remark says why.
+    """Yield what a check finds; if it fails, one more remark says why.
 
     A driver, a keyring service or a package's metadata may fail in any way of its own, and whoever
     runs ``doctor`` needs the other looks then more than ever.
@@ -71,7 +71,7 @@ def guarded(subject: str, look: Callable[[], Iterable[Remark]]) -> Iterator[Rema
 def tried(
     look: Callable[[], FoundT], problem: Callable[[str], str], problems: list[str]
 ) -> FoundT | None:
-    """Return what a look finds, ``None`` if it breaks off.
+    """Return what a check finds, ``None`` if it fails.
 
     Args:
         look: Finds it out.
@@ -86,7 +86,7 @@ def tried(
 
 
 def failure(error: Exception) -> str:
-    """Return what a failed look ended with, in one line."""
+    """Return the error of a failed check, in one line."""
     return " ".join(f"{type(error).__name__}: {error}".split()).rstrip(":")
 
 
@@ -118,7 +118,7 @@ def requirement(text: str) -> Requirement:
 
 
 def fits(version: str, versions: str) -> bool:
-    """Tell whether a version lies in a range such as ``>=8.1,<9``; numbers only.
+    """Return whether a version lies in a range such as ``>=8.1,<9``; numbers only.
 
     Raises:
         ValueError: The range uses an operator that robolink does not.
@@ -240,7 +240,7 @@ def _numbers(version: str) -> tuple[int, ...]:
 
 
 def check_up() -> list[Remark]:
-    """Return everything that was looked at, what is worst first."""
+    """Return everything that was checked, the worst first."""
     looks: dict[str, Callable[[], Iterable[Remark]]] = {
         "packages": check_versions,
         "name": check_name,
@@ -268,7 +268,7 @@ def in_words(remarks: Sequence[Remark]) -> Iterator[str]:
 
 
 def check_state_folder() -> Iterator[Remark]:
-    """See whether backups can be kept; without one nothing is ever written."""
+    """Check that backups can be kept; without one nothing is ever written."""
     folder = state_folder("backups")
     # On Windows not even the drive need be there.
     above = (path for path in (folder, *folder.parents) if path.exists())
@@ -328,7 +328,7 @@ def check_cell_files() -> Iterator[Remark]:
 
 
 def check_keyring() -> Iterator[Remark]:
-    """See whether passwords can be kept in the system's keyring."""
+    """Check that passwords can be kept in the system's keyring."""
     other = tr("A password can come from --password-file or ROBOLINK_PASSWORD.")
     try:
         import keyring
@@ -344,7 +344,7 @@ def check_keyring() -> Iterator[Remark]:
 
 
 def check_serial_ports() -> Iterator[Remark]:
-    """See whether the serial ports may be used."""
+    """Check that the serial ports may be used."""
     ports = serial_ports()
     for port in ports:
         if port.usable:
@@ -364,7 +364,7 @@ def check_serial_ports() -> Iterator[Remark]:
 
 
 def check_lines_of_cells() -> Iterator[Remark]:
-    """See whether the ports that cells name are there."""
+    """Check that the ports that cells name are there."""
     from robolink_cli.commands.computer.lines import devices_of_cells
 
     known = [port.device for port in serial_ports()]
@@ -379,7 +379,7 @@ def check_lines_of_cells() -> Iterator[Remark]:
 
 
 def check_journal() -> Iterator[Remark]:
-    """List what was begun on any controller and is not proved finished."""
+    """List the interrupted jobs on any controller."""
     from robolink.journal import default_location, may_exist, open_journal
     from robolink.model import begun_in_words
 

@@ -1,4 +1,4 @@
-"""cell list, show, people, files, validate: cells that have a name, and where it stands."""
+"""cell list, show, people, files, validate: the named cells, and where they are defined."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -107,7 +107,7 @@ def new_cell(
 
 
 def _right(given: str | None, ask: Callable[[], str], check: Callable[[str], object]) -> str:
-    """Return what was given, or typed; of what is typed wrongly a person is told, and asked again.
+    """Return a given or typed value; after a wrong one tell the person, and ask again.
 
     Raises:
         ConfigError: What was given is wrong.

@@ -1,4 +1,4 @@
-"""doctor: what could get in the way on this computer."""
+"""doctor: what could cause trouble on this computer."""
 
 import click
 

@@ -1,4 +1,4 @@
-"""Serial lines: which cells name one, and who answers at a line that a person names."""
+"""Serial lines: which cells name one, and who answers at a given line."""
 
 import os
 from collections.abc import Sequence
@@ -80,7 +80,7 @@ class AskedLine:
 
 
 def devices_of_cells() -> dict[str, list[str]]:
-    """Return the cells of each serial port that cell files name, by the port.
+    """Return the cells of each serial port in the cell files, by the port.
 
     Files that are wrong name none: ``doctor`` tells what is wrong with them.
     """
@@ -120,7 +120,7 @@ def ask_lines(urls: Sequence[str], timeout_s: float) -> list[AskedLine]:
 
 
 def show_lines(asked: Sequence[AskedLine]) -> None:
-    """Say what was found at each line, and every byte that was sent."""
+    """Show what was found at each line, and every byte that was sent."""
     from robolink.controllers.epson.verify import AtTheLine
     from robolink_cli.console.render import say  # doctor reads ports where click is broken
 

@@ -1,1 +1,1 @@
-"""Commands at one controller: look, calm, tools, inputs, variables, jog, backup."""
+"""Commands at one controller: state, stop, tools, inputs, variables, jog, backup."""

@@ -41,7 +41,7 @@ def backup_payload(backup: Backup, file: Path) -> dict[str, object]:
 
 
 def show_backup(backup: Backup, file: Path) -> None:
-    """Say what was saved, and of which controller."""
+    """Show what was saved, and of which controller."""
     facts, tools = backup.facts, backup.state.tools
     unknown = tr("unknown")
     say(
@@ -271,7 +271,7 @@ class Restoration:
         self._plan = plan
 
     def requests(self) -> list[str]:
-        """Return what would be sent besides reads; finds what the controller cannot hold.
+        """Return what would be sent besides reads; finds what the controller cannot store.
 
         Raises:
             ToolError: A value does not fit this robot.
@@ -301,8 +301,8 @@ class Restoration:
         """Carry it out and return the document; nothing is sent when nothing differs.
 
         Args:
-            accepted_mm: The length of a jump that was accepted beforehand.
-            accepted_deg: The angle of a jump that was accepted beforehand.
+            accepted_mm: The length of a jump that was accepted in advance.
+            accepted_deg: The angle of a jump that was accepted in advance.
         """
         receipts: tuple[ToolReceipt, ...] = ()
         if not self._plan.empty:
@@ -328,7 +328,7 @@ class Restoration:
         }
 
     def show_end(self) -> None:
-        """Say how it ended."""
+        """Show how it ended."""
         if self._plan.empty:
             say(tr("The controller has these values already. Nothing was written."))
         elif self._plan.changes:

@@ -28,12 +28,12 @@ _SPEED_MM_S: Final = 10.0
 
 @dataclass(frozen=True, slots=True)
 class _Asked:
-    """What is to be checked besides what can be read.
+    """What is checked besides what can be read.
 
     Attributes:
         tool: The tool that may be written; ``None`` for none.
         step_mm: How far the robot may go up; ``None`` for nowhere.
-        yes: Whether a person agreed beforehand.
+        yes: Whether a person agreed in advance.
     """
 
     tool: int | None
@@ -94,10 +94,10 @@ def check_contract(
     """Check that a controller behaves as every controller type must; without options it only reads.
 
     With --write it writes one tool several times, selects it and the flange, stops and resets;
-    with --move it moves up and down in small steps. Tool, selection, power and speed are restored,
-    and stay on record until then: if this is killed, 'robolink recover' restores them. Exit code 1
-    when a check fails; if the controller refuses to show something in its present state, that is an
-    error, as elsewhere.
+    with --move it moves up and down in small steps. It restores tool, selection, power and speed.
+    If the command is killed before that, 'robolink recover' restores them. Exit code 1 when a check
+    fails; if the controller refuses to show something in its present state, that is an error, as
+    elsewhere.
     """
     if (writes and tool is None) or (tool is not None and not writes):
         raise click.UsageError(
@@ -119,7 +119,7 @@ def check_contract(
 
 
 def _show(report: "ContractReport") -> None:
-    """Give the result of checks that were all made."""
+    """Show the result of checks that were all made."""
     found, broken = report.found, report.broken
 
     def show() -> None:
@@ -141,7 +141,7 @@ def _show(report: "ContractReport") -> None:
 
 
 def _of_a_cell(context: CliContext, asked: _Asked, report: "ContractReport") -> None:
-    """Check a controller of a cell; what was there stands on its record meanwhile."""
+    """Check a controller of a cell; its record holds the earlier state meanwhile."""
     from robolink.testing import kept_on_site
     from robolink_cli.commands.controller.contract_report import TrialConnections
     from robolink_cli.session.connection import open_controller
@@ -165,7 +165,7 @@ def _of_a_cell(context: CliContext, asked: _Asked, report: "ContractReport") -> 
 
 
 def _of_a_driver(driver: str, asked: _Asked, report: "ContractReport") -> None:
-    """Check what somebody's own function gives; only the checks put back what they change."""
+    """Check the result of a user's function; only the checks restore what they change."""
     from robolink_cli.commands.controller.contract_report import driver_named, told_of_the_driver
 
     made = driver_named(driver)
@@ -178,7 +178,7 @@ def _of_a_driver(driver: str, asked: _Asked, report: "ContractReport") -> None:
 
 
 def _looked_at(connect: "Callable[[], Controller]", asked: _Asked, report: "ContractReport") -> int:
-    """Note who it is; return which tool is looked at.
+    """Note which controller it is; return which tool is checked.
 
     Raises:
         ConfigError: It cannot do what was asked for.
@@ -196,7 +196,7 @@ def _looked_at(connect: "Callable[[], Controller]", asked: _Asked, report: "Cont
 
 
 def _checks(asked: _Asked) -> "Sequence[Check]":
-    """Return the checks that were asked for."""
+    """Return the requested checks."""
     from robolink.testing import (
         MOVING_CHECKS,
         READING_CHECKS,
@@ -217,7 +217,7 @@ def _checks(asked: _Asked) -> "Sequence[Check]":
 def _examine(
     connect: "Callable[[], Controller]", asked: _Asked, report: "ContractReport", tool: int
 ) -> None:
-    """Make the checks that were asked for, and tell of each on the way.
+    """Make the requested checks, and report each.
 
     Raises:
         RobolinkError: A stop, a link that is gone, a state that refuses: nothing more is begun.
@@ -235,7 +235,7 @@ def _examine(
 
 
 def _agree(controller: "Controller", asked: _Asked) -> None:
-    """Have a person say yes to what will be written and moved.
+    """Let a person agree to what will be written and moved.
 
     Raises:
         DeclinedError: No, or nobody could be asked.

@@ -1,4 +1,4 @@
-"""What the checks of the contract found, told whatever ends them: to a person and to pipelines."""
+"""What the contract checks found, reported whatever ends them: to people and to pipelines."""
 
 import re
 from collections.abc import Callable, Iterator, Sequence
@@ -37,7 +37,7 @@ _END: Final = "what_was_there_is_put_back"
 
 
 class ContractReport:
-    """Collects how each promise was found.
+    """Collects the result of each promise.
 
     The file for pipelines is whole at any moment. Until the end it says that there was none, so
     that a file of before, or one of a process that was killed, is not taken for a good end.
@@ -64,7 +64,7 @@ class ContractReport:
 
     @contextmanager
     def told(self, *, on_the_way: bool) -> Iterator[None]:
-        """Surround the checks: whatever ends the block, it is told how far they came.
+        """Surround the checks: whatever ends the block, the progress is reported.
 
         Args:
             on_the_way: Whether a person read of each check as it was made.
@@ -138,7 +138,7 @@ class ContractReport:
         )
 
     def _add_the_end(self, suite: Xml.Element, ended_by: str) -> None:
-        """Add the check that was ended, or could not begin; behind the last, what came then."""
+        """Add the check that was ended, or could not start; after the last one, what followed."""
         names = [check.__name__ for check in self._checks]
         _add(_case(suite, [*names, _END][len(suite)]), "error", ended_by)
 
@@ -152,7 +152,7 @@ def _add(case: Xml.Element, kind: str, message: str, text: str = "") -> None:
 
 
 def _plain(text: str) -> str:
-    """Return a text with what no XML document may hold written as an escape."""
+    """Return a text with characters that XML does not allow written as escapes."""
     return _NO_XML.sub(lambda found: found[0].encode("unicode_escape").decode("ascii"), text)
 
 
@@ -164,7 +164,7 @@ def _unwritable(path: Path, cause: str) -> ConfigError:
 
 
 class TrialConnections:
-    """Connects for each check anew, and lets a second terminal stop what that does.
+    """Connects for each check anew, and lets a second terminal stop it.
 
     The checks open and settle markers on purpose; those go to a record in memory. A stop that
     somebody else gives ends them all, and is heard between two checks too: a check releases its
@@ -214,14 +214,14 @@ class TrialConnections:
         return controller
 
     def close(self) -> None:
-        """Listen no longer, and forget what an interrupted check left begun. Idempotent."""
+        """Listen no longer, and forget what an interrupted check left open. Idempotent."""
         from robolink.journal import forget_memory
 
         self._listening.close()
         forget_memory(self._identity)
 
     def stop(self) -> None:
-        """Bring the controller to rest, whether a check has it now or none does; any thread."""
+        """Stop the controller, whether a check has it now or none does; any thread."""
         self._stopped = True
         with self._lock:  # a connection that is being made is the one that stops
             controller = self._latest
@@ -276,7 +276,7 @@ class TrialConnections:
 
 
 def driver_named(name: str) -> "Callable[[], Controller]":
-    """Return what makes a controller of somebody's own: ``module:name`` of a class or function.
+    """Return the function that makes a user's own controller: ``module:name``.
 
     Raises:
         ConfigError: There is no such module or name, or nothing that can be called.
@@ -317,7 +317,7 @@ def driver_named(name: str) -> "Callable[[], Controller]":
 
 @contextmanager
 def told_of_the_driver(name: str) -> Iterator[None]:
-    """Tell an error that is not one of robolink's as the driver's, before any check is made.
+    """Report an error that is not robolink's as the driver's, before any check is made.
 
     Raises:
         ConfigError: There was one.

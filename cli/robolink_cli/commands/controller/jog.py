@@ -119,7 +119,7 @@ def _jogged(
     dry_run: bool,
     yes: bool,
 ) -> "Pose | None":
-    """Jog, and return where the tool is then; ``None`` where requests were only shown."""
+    """Jog, and return where the tool is then; ``None`` if requests were only shown."""
     from robolink_cli.prompts.jog_keys import jog_by_hand, jog_by_steps, plan_jog
 
     with open_controller(context) as controller:
@@ -141,7 +141,7 @@ def _jogged(
 
 @dataclass(frozen=True, slots=True)
 class _Turning:
-    """A turn in the air, as it was asked for."""
+    """A turn in the air, as requested."""
 
     turn_deg: float
     lift_mm: float
@@ -150,7 +150,7 @@ class _Turning:
     box_mm: float
 
     def done(self, context: CliContext, *, dry_run: bool, yes: bool) -> "Pose | None":
-        """Carry it out, and return where the tool is then; ``None`` where it was only shown."""
+        """Carry it out, and return where the tool is then; ``None`` if it was only shown."""
         from robolink_cli.prompts.jog_keys import plan_turn, require_turn, turn
 
         how = {"lift_mm": self.lift_mm, "speed_mm_s": self.speed_mm_s, "box_mm": self.box_mm}
@@ -185,7 +185,7 @@ class _Turning:
 
 
 def _require_one(steps: tuple[str, ...], turn_deg: float | None, *, keys: bool) -> None:
-    """Refuse a turn beside steps, and what belongs to a turn without one.
+    """Refuse a turn together with steps, and options of a turn without one.
 
     Raises:
         ConfigError: Names what does not go together.
@@ -204,7 +204,7 @@ def _require_one(steps: tuple[str, ...], turn_deg: float | None, *, keys: bool) 
 
 
 def _require_keys(steps: tuple[str, ...], *, dry_run: bool) -> None:
-    """Refuse keys where there are none, or where what is to be done is known before.
+    """Refuse keys where there are none, or where the movement is already given.
 
     Raises:
         ConfigError: There is no terminal; or steps or a dry run were asked for besides.

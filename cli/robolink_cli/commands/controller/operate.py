@@ -1,4 +1,4 @@
-"""status, where, stop, reset, motors: looking at a controller and calming it."""
+"""status, where, stop, reset, motors: read the state of a controller, and stop it."""
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -155,7 +155,7 @@ def reset(
 
 
 def _left_open(controller: "Controller") -> "tuple[Marker, ...]":
-    """Return what is unsettled; a journal that is broken is told of at the end."""
+    """Return the unfinished jobs; a damaged journal is reported at the end."""
     try:
         return controller.outcomes.open_markers()
     except JournalError:
@@ -163,7 +163,7 @@ def _left_open(controller: "Controller") -> "tuple[Marker, ...]":
 
 
 def _effect_of_reset(controller: "Controller") -> tuple[str, bool]:
-    """Return what a reset does to the outputs, and whether the controller told that."""
+    """Return what a reset does to the outputs, and whether the controller reported that."""
     from robolink.protocols.epson_text import Preference
 
     told = preferences_of(controller)
@@ -246,7 +246,7 @@ def execute_raw(
     statement: Annotated[str, CliArgument()],
     yes: Yes = False,
 ) -> None:
-    """Run one SPEL+ statement as typed; for engineers. It goes on record.
+    """Run one SPEL+ statement as typed; for engineers. It is recorded.
 
     robolink sends it once, unchanged, and needs the answer within --timeout. Do not use it for
     movements: robolink may not be able to confirm how they ended.
@@ -298,7 +298,7 @@ def take_ownership(
 
 
 def _holder(plc: "SoftMotionController") -> str | None:
-    """Ask for the mailbox as everybody does; return who holds it, ``None`` when it was given."""
+    """Ask for the mailbox as everybody does; return who has it, ``None`` if it was given."""
     try:
         plc.take()
     except LeaseHeldError as error:
@@ -307,7 +307,7 @@ def _holder(plc: "SoftMotionController") -> str | None:
 
 
 def _ask(plc: "SoftMotionController", holder: str, *, yes: bool) -> None:
-    """Have a person insist.
+    """Let a person insist.
 
     Raises:
         DeclinedError: The answer was no, or nobody could be asked.

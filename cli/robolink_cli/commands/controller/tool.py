@@ -120,7 +120,7 @@ def get(
 
 
 def _get_by_mode(context: CliContext, mode: str) -> None:
-    """Show what the PLC's own reading block says about the tool in force."""
+    """Show what the PLC's own reading block says about the selected tool."""
     from robolink.model import json_value
     from robolink.protocols.mailbox import ReadMode
     from robolink_cli.access.capabilities import require_softmotion
@@ -135,7 +135,7 @@ def _get_by_mode(context: CliContext, mode: str) -> None:
 
 
 class _Components(NamedTuple):
-    """The components of an offset that were given."""
+    """The given components of an offset."""
 
     x: Annotated[float | None, CliOption(metavar="MM", help="mm from the flange.")] = None
     y: Annotated[float | None, CliOption(metavar="MM", help="mm from the flange.")] = None
@@ -221,7 +221,7 @@ def set_tool(
 
 
 class _Setting:
-    """What ``tool set`` was told, in the steps of its write."""
+    """The options of ``tool set``, in the steps of its write."""
 
     def __init__(
         self, context: CliContext, number: int, changes: Mapping[str, float], kept: list[str]
@@ -233,7 +233,7 @@ class _Setting:
         self._context, self._number, self._changes, self._kept = context, number, changes, kept
 
     def look_up(self, controller: "Controller") -> "tuple[ToolOffset | None, ToolOffset]":
-        """Return what the tool holds, and what it is to hold."""
+        """Return the tool's present value, and its new one."""
         from robolink.model import ToolOffset
 
         controller.tools.require_writable(self._number)
@@ -246,7 +246,7 @@ class _Setting:
     def show_change(
         self, controller: "Controller", before: "ToolOffset | None", wanted: "ToolOffset"
     ) -> None:
-        """Show a person what the tool holds, and what it is to hold."""
+        """Show a person the tool's present value, and its new one."""
         from robolink_cli.views.documents import show_change
 
         controller.tools.selected()  # read now: the last line of a failure names it
@@ -254,7 +254,7 @@ class _Setting:
             show_change(self._number, before, wanted, after_name=tr("new"))
 
     def ask(self, controller: "Controller", *, agreed: bool, yes: bool) -> None:
-        """Have a person agree who did not yet; back up before the first write."""
+        """Let a person agree who has not yet; back up before the first write."""
         from robolink.backup import keep_first_backup
 
         if not agreed:
@@ -276,7 +276,7 @@ class _Setting:
         return receipt_payload(receipt) | {"kept": self._kept}
 
     def show(self, payload: Mapping[str, object], order: "Order | None") -> None:
-        """Give the result: of this write, or of the one that the order was carried out with."""
+        """Show the result: of this write, or of the one that carried out the order."""
         skipped = tr("already stored, nothing was written")
         done = skipped if payload["skipped"] else tr("written, read back")
 

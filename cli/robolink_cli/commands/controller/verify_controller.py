@@ -84,7 +84,7 @@ def verify_controller(
 
 
 def _verify_plc(context: CliContext, url: str, kind: str) -> None:
-    """Look at what a mailbox shows of itself; a map has a check of its own."""
+    """Read what a mailbox shows of itself; a map has its own check."""
     import robolink
     from robolink.controllers import SoftMotionController
     from robolink.journal import memory_journal

@@ -1,4 +1,4 @@
-"""cell accuracy: what a cell knows of its accuracy, and measuring a row of it."""
+"""cell accuracy: what a cell knows of its accuracy, and measuring one of its rows."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -82,9 +82,7 @@ def measure(
     tool: Annotated[
         int | None,
         click.IntRange(1, 15),
-        CliOption(
-            shell_complete=complete_tool, help="The tool whose calibrations on record count."
-        ),
+        CliOption(shell_complete=complete_tool, help="The tool whose recorded calibrations count."),
     ] = None,
     true: Annotated[
         str | None,
@@ -178,7 +176,7 @@ class Asked:
 
 
 def measure_row(context: CliContext, row: str, asked: Asked, *, yes: bool) -> None:
-    """Calculate a row, show it, ask, and put it on record; no tool is written, nothing moves.
+    """Calculate a row, show it, ask, and record it; writes no tool, moves nothing.
 
     Raises:
         CalibrationError: Too few measurements count.
@@ -221,7 +219,7 @@ def row_payload(found: MeasuredRow) -> dict[str, object]:
 
 
 def _checked(row: str, asked: Asked) -> tuple[float, float] | None:
-    """Return where the gauge tip truly is, ``None`` where none is used.
+    """Return the true place of the gauge tip, ``None`` if none is used.
 
     Raises:
         ConfigError: See :func:`measure_row`.

@@ -48,7 +48,7 @@ def cell_tools(context: CliContext) -> None:
 def _told(
     controller: "Controller", number: int, offset: "ToolOffset", left: int | None
 ) -> Mapping[str, object]:
-    """Return what is known of one tool JSON."""
+    """Return what is known of one tool, as JSON."""
     from robolink.model import EntryKind, json_value
     from robolink.transaction import changed_since
     from robolink_cli.commands.measure.recipe_choice import due_in
@@ -74,7 +74,7 @@ def _told(
 
 
 def _changes_left(context: CliContext) -> dict[int, int]:
-    """Return after how many changes each tool needs a full calibration; the recipes say it."""
+    """Return how many changes each tool may have before a full calibration, by the recipes."""
     from robolink.journal import default_location, may_exist, open_journal
     from robolink.recipe import changes_left_of, load_recipe
     from robolink_cli.commands.measure.recipe_choice import recipes_at

@@ -1,4 +1,4 @@
-"""poses show: what robolink understands of a file of poses. Nothing is connected."""
+"""poses show: how robolink reads a file of poses. Nothing is connected."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final
@@ -62,7 +62,7 @@ _BESIDE: Final = ("name", "number", "hand", "local", "tool")
 
 
 def _pose_payload(entry: "TabledPose") -> dict[str, object]:
-    """Return a pose with its units in the keys; ``None`` for what the file does not say."""
+    """Return a pose with its units in the keys; ``None`` for what the file does not state."""
     from robolink.model import COMPONENTS
 
     pose = entry.pose

@@ -53,7 +53,7 @@ def answers_from(
     lot: str | None,
     yes: bool,
 ) -> "Answers":
-    """Return what the options answer.
+    """Return the answers in the options.
 
     Raises:
         ConfigError: An answer to nothing that the recipe asks, or one that is no answer.
@@ -201,7 +201,7 @@ def recalibrate(
 
 
 def _chosen(context: CliContext, recipe: Path | None) -> "tuple[CliContext, LoadedRecipe]":
-    """Have cell and recipe chosen, as far as the line does not name them."""
+    """Let a person choose cell and recipe, as far as the command line does not name them."""
     from robolink.recipe import load_recipe
     from robolink_cli.commands.measure.recipe_choice import choose_recipe, context_at_desk
     from robolink_cli.prompts.current_desk import current_desk
@@ -225,7 +225,7 @@ def _chosen(context: CliContext, recipe: Path | None) -> "tuple[CliContext, Load
 
 
 def _chosen_anew(before: CliContext) -> "tuple[CliContext, LoadedRecipe]":
-    """Have cell and recipe chosen for the next tool, the cell of the one before marked."""
+    """Let a person choose cell and recipe for the next tool, the last cell marked."""
     from robolink_cli.commands.measure.recipe_choice import choose_cell, choose_recipe
     from robolink_cli.prompts.current_desk import current_desk
     from robolink_cli.session.context import context_of_cell, header_of
@@ -255,7 +255,7 @@ def steps_of(loaded: "LoadedRecipe") -> int:
 
 
 def _as_typed(path: Path) -> tuple[str, ...]:
-    """Return what is typed for a recipe that was chosen, as short as it goes."""
+    """Return the shortest name to type for a chosen recipe."""
     typed = click.get_current_context().meta.get(TYPED, ())
     shown = _as_short_as_it_goes(path)
     return (shown,) if {"change", "recalibrate"} & set(typed) else ("change", shown)

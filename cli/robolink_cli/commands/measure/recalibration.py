@@ -39,7 +39,7 @@ from robolink_cli.views.fit import report_payload, show_report, steps_payload
 
 
 class EventStream:
-    """Writes one JSON line for each event, where that is wanted.
+    """Writes one JSON line for each event, if requested.
 
     Args:
         context: Click's, so that text for people goes to stderr.
@@ -68,7 +68,7 @@ class EventStream:
 
 
 class Progress(Listener):
-    """Tells a person and a script what happens.
+    """Reports the events to a person and a script.
 
     Attributes:
         tool: Number of the tool at work.
@@ -83,7 +83,7 @@ class Progress(Listener):
         self.tool = 0
 
     def moment(self, moment: Moment, bench: MeasurementContext, tool: int | None = None) -> None:  # noqa: ARG002 - a phase is a phase
-        """Say which phase begins."""
+        """Show which phase begins."""
         if tool is not None:
             self.tool = tool
         if not drawn_elsewhere():
@@ -97,14 +97,14 @@ class Progress(Listener):
         self._events.emit("phase", phase=moment, tool=tool)
 
     def step(self, tool: int, done: StepDone) -> None:
-        """Tell of one step."""
+        """Report one step."""
         self.tool = tool
         kind, text = _in_words(done.step)
         pose = pose_payload(done.pose) if done.pose else None
         self._events.emit("step", tool=tool, kind=kind, text=text, pose=pose)
 
     def refused(self, tool: int, error: CalibrationError, *, again: bool) -> None:
-        """Tell of a measurement that is not believed."""
+        """Report a measurement that is not believed."""
         if again:
             note(tr("Tool {tool}: {error} Measuring it again.", tool=tool, error=error))
         self._events.emit(
@@ -112,7 +112,7 @@ class Progress(Listener):
         )
 
     def proposed(self, proposals: Sequence[Proposal]) -> None:
-        """Show what was measured, next to what is stored."""
+        """Show the measured value next to the stored one."""
         from robolink_cli.views.fit import show_proposal
 
         for proposal in proposals:
@@ -120,7 +120,7 @@ class Progress(Listener):
             self._events.emit("proposal", **proposal_payload(proposal))
 
     def wrote(self, receipt: ToolReceipt) -> None:
-        """Tell of a write."""
+        """Report a write."""
         from robolink_cli.views.fit import tell_written
 
         tell_written(receipt)
@@ -128,11 +128,11 @@ class Progress(Listener):
         self._events.emit("write", **receipt_payload(receipt))
 
     def verified(self, tool: int, result: VerifyResult) -> None:
-        """Tell of a verification."""
+        """Report a turn test."""
         self._events.emit("verification", tool=tool, **(verification_payload(result) or {}))
 
     def told(self, sentence: str) -> None:
-        """Pass on what a person was told."""
+        """Pass on a message to the person."""
         self._events.emit("note", text=sentence)
 
 
@@ -150,7 +150,7 @@ def _in_words(step: TakenStep) -> tuple[str, str]:
 
 
 def _heading(moment: Moment, tool: int) -> str:
-    """Return the line over what comes next, empty for none."""
+    """Return the heading of what comes next, empty for none."""
     if moment is Moment.BEFORE_MEASURE:
         return tr("-- tool {tool}: measure", tool=tool)
     if moment is Moment.BEFORE_WRITE:
@@ -160,10 +160,10 @@ def _heading(moment: Moment, tool: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class RunOptions:
-    """What was typed for one run of a recipe.
+    """The typed options of one run of a recipe.
 
     Attributes:
-        answers: What was answered beforehand.
+        answers: What was answered in advance.
         assist_url: A simulator's stand-in for the person.
         take_reference: Whether only a reference is taken.
         accepted_change_mm: A larger jump that an engineer accepts this time.
@@ -182,7 +182,7 @@ class RunOptions:
 
     @property
     def alone(self) -> bool:
-        """Whether nobody, and no simulator either, could answer a question."""
+        """Whether nobody, not even a simulator, could answer a question."""
         return self.assist_url is None and not on_terminal()
 
 
@@ -250,7 +250,7 @@ class Recalibration:
 
     @contextmanager
     def _prepared(self, controller: Controller, order: Order | None) -> Iterator[RecipeRun]:
-        """Give the run, with whoever answers it, once nothing speaks against it."""
+        """Give the run, with whoever answers it, once nothing forbids it."""
         options = self.options
         progress = Progress(self.events, len(self.loaded.recipe.tools))
         with operator_at(options.assist_url, lambda: progress.tool, controller.clock) as operator:
@@ -286,7 +286,7 @@ class Recalibration:
         )
 
     def _consent(self, controller: Controller, run: RecipeRun) -> None:
-        """Have the person agree to what is about to happen; back up before it does.
+        """Let the person agree to what is about to happen; back up before it does.
 
         Raises:
             NotReadyError: Nothing can move now; nobody was asked anything.
@@ -360,7 +360,7 @@ class Recalibration:
             )
 
     def _require_writer(self, run: RecipeRun) -> None:
-        """Refuse to write values that nobody watched being measured without a yes."""
+        """Refuse to write values without a yes if nobody watched the measurement."""
         nobody = not self.options.answers.yes and self.options.alone
         if nobody and not run.takes_reference:
             raise DeclinedError(
@@ -390,7 +390,7 @@ class Recalibration:
     def _told(
         self, controller: Controller, run: RecipeRun, report: ChangeReport
     ) -> dict[str, object]:
-        """Show a person what was done; return the document of it."""
+        """Show a person what was done; return its document."""
         # Now, because Ctrl-C may come before the logout is answered.
         desk = current_desk()
         if desk is not None:
@@ -401,7 +401,7 @@ class Recalibration:
             say(tr("The reference was recorded; nothing was written."))
         say(
             tr(
-                "On record as change {change}: robolink journal report {change}",
+                "Recorded as change {change}: robolink journal report {change}",
                 change=report.change[:8],
             )
         )

@@ -1,4 +1,4 @@
-"""Which cell and which job: what is asked of whoever typed neither."""
+"""Asks which cell and which job, if neither was typed."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -26,7 +26,7 @@ _FOLDERS: Final = ("", "recipes")
 
 
 def nobody_to_ask() -> DeclinedError:
-    """Return the end of a command that would have to ask, where nobody is."""
+    """Return the error of a command that would have to ask, where nobody is."""
     return DeclinedError(
         tr("There is nobody to ask here. Add --yes, or run it on a terminal."),
         remedy=tr("Nothing was sent."),
@@ -34,7 +34,7 @@ def nobody_to_ask() -> DeclinedError:
 
 
 def context_at_desk(context: "CliContext", job: str, *, steps: int = 0) -> "CliContext":
-    """Return what a command was told, with a cell where it names none and somebody is at a desk.
+    """Return the context of a command; a person at a desk chooses a missing cell.
 
     Args:
         context: What it was told.
@@ -58,7 +58,7 @@ def context_at_desk(context: "CliContext", job: str, *, steps: int = 0) -> "CliC
 
 
 def choose_cell(desk: AskingDesk, head: "Callable[[], Header]", *, marked: str = "") -> "Cell":
-    """Have one of the cells of this computer chosen; the only one is taken.
+    """Let a person choose one of the cells of this computer; take the only one.
 
     Args:
         desk: Where.
@@ -100,7 +100,7 @@ def choose_recipe(
     *,
     head: "Callable[[], Header] | None" = None,
 ) -> "LoadedRecipe":
-    """Have one of the recipes chosen that stand beside the cell file or here.
+    """Let a person choose one of the recipes beside the cell file or here.
 
     Those of other cells, and those that this kind of controller could not carry out, are not among
     them. What was only used on another robot so far comes last.
@@ -143,7 +143,7 @@ def choose_recipe(
 
 
 def _loaded(desk: AskingDesk, paths: Sequence[Path]) -> "list[LoadedRecipe]":
-    """Return the recipes that are right; of the others the person is told.
+    """Return the correct recipes; show the errors of the others.
 
     Raises:
         ConfigError: There is none.
@@ -170,7 +170,7 @@ def _copied(
     url: str | None,
     head: "Callable[[], Header] | None",
 ) -> ConfigError:
-    """Have one of the recipes that come along copied; return that it is not run as it is.
+    """Let a person copy a shipped recipe; return that it is not run unchanged.
 
     Raises:
         ConfigError: None of them can be run by this kind of controller.
@@ -229,7 +229,7 @@ def _of_this_cell(loaded: "list[LoadedRecipe]", cell: "Cell | None") -> "list[Lo
 
 
 def _axes(cell: "Cell | None") -> int | None:
-    """Return how many axes the robot of a cell has, where the cell file names a model."""
+    """Return the number of axes of a cell's robot, if the cell file names a model."""
     from robolink.controllers import axes_of_model
 
     if cell is None:
@@ -238,7 +238,7 @@ def _axes(cell: "Cell | None") -> int | None:
 
 
 def _needs_tilt(loaded: "LoadedRecipe", *, unknown: bool) -> tuple[str, ...]:
-    """Return what a recipe needs of a robot of which nobody knows yet whether it has that."""
+    """Return what a recipe needs of a robot that is not yet known to have it."""
     if not unknown or not loaded.recipe.source.of_method.needs.tilt:
         return ()
     return (
@@ -252,7 +252,7 @@ def _needs_tilt(loaded: "LoadedRecipe", *, unknown: bool) -> tuple[str, ...]:
 def _of_this_kind(
     loaded: "list[LoadedRecipe]", url: str | None, axes: int | None
 ) -> "list[LoadedRecipe]":
-    """Return the recipes that this robot can carry out as far as known, as a run refuses the rest.
+    """Return the recipes that this robot can carry out as far as known; a run refuses the rest.
 
     Raises:
         ConfigError: There is none.
@@ -275,7 +275,7 @@ def _of_this_kind(
 
 
 def _pasts(loaded: "list[LoadedRecipe]", url: str | None) -> "tuple[RecipePast, ...]":
-    """Return what is on record of each recipe; nothing where there is no record to be read."""
+    """Return the records of each recipe; nothing if there is no readable record."""
     from robolink.errors import RobolinkError
     from robolink.journal import open_journal
     from robolink.recipe import RecipePast, pasts_of
@@ -287,7 +287,7 @@ def _pasts(loaded: "list[LoadedRecipe]", url: str | None) -> "tuple[RecipePast, 
 
 
 def _rows_of(loaded: "Sequence[LoadedRecipe]", pasts: "Sequence[RecipePast]") -> tuple[str, ...]:
-    """Return the rows, with how long each job took here, where that is on record."""
+    """Return the rows, with the recorded duration of each job here."""
     names = [f"{one.name}   ({one.path.name})" for one in loaded]
     told = [
         "" if past.usual_s is None else tr("about {n} min", n=max(1, round(past.usual_s / 60)))
@@ -305,7 +305,7 @@ def _rows_of(loaded: "Sequence[LoadedRecipe]", pasts: "Sequence[RecipePast]") ->
 
 
 def _told_of(loaded: "LoadedRecipe", past: "RecipePast") -> tuple[str, ...]:
-    """Return what a recipe does, for which tools, when it did so last, and what is due."""
+    """Return what a recipe does, for which tools, when it last did, and what is due."""
     from robolink.timing import local_label
 
     recipe = loaded.recipe
@@ -334,7 +334,7 @@ def _told_of(loaded: "LoadedRecipe", past: "RecipePast") -> tuple[str, ...]:
 
 
 def due_in(left: int) -> str:
-    """Return after how many more changes a full calibration is due, in words.
+    """Return how many more changes are allowed before a full calibration, in words.
 
     Args:
         left: So many, 0 for now.
@@ -347,7 +347,7 @@ def due_in(left: int) -> str:
 
 
 def recipes_at(cell: "Cell | None") -> list[Path]:
-    """Return the files of recipes beside the cell file and in the working folder.
+    """Return the recipe files beside the cell file and in the working folder.
 
     Args:
         cell: The cell, ``None`` where only a URL is known.
@@ -364,7 +364,7 @@ def recipes_at(cell: "Cell | None") -> list[Path]:
 
 
 def _folders(cell: "Cell | None") -> list[Path]:
-    """Return the folder of the cell file, where there is one, and the working folder."""
+    """Return the folder of the cell file, if there is one, and the working folder."""
     here = [Path.cwd()]
     return [cell.origins["url"].parent, *here] if cell and "url" in cell.origins else here
 

@@ -1,4 +1,4 @@
-"""station learn: find a station with a tip that is known, show it, keep it."""
+"""station learn: find a station with a known tip, show it, keep it."""
 
 from dataclasses import replace
 
@@ -50,7 +50,7 @@ def learn(
     dry_run: bool,
     yes: bool,
 ) -> None:
-    """Measure a station, ask, and put it on record. No tool is written.
+    """Measure a station, ask, and record it. Writes no tool.
 
     Raises:
         CalibrationError: The measurement is not trusted.
@@ -113,7 +113,7 @@ def learn(
 
 
 def _height_of_pin(controller: Controller, known: Station, found: Found, tool: int) -> Found:
-    """Return what was found, a pin's height only where Z of the tool is more than a kept value."""
+    """Return the findings, with a pin's height only if Z of the tool is more than a kept value."""
     if found.kind is not StationKind.PIN or height_is_known(controller, tool):
         return found
     note(

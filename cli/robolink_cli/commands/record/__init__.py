@@ -1,1 +1,1 @@
-"""Commands about what is on record: journal, undo, recover, report."""
+"""Commands about the record: journal, undo, recover, report."""

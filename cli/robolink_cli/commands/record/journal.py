@@ -1,4 +1,4 @@
-"""journal list, show, diff, drift, export, verify: what is on record. Reads only, no controller."""
+"""journal list, show, diff, drift, export, verify: the record. Reads only, no controller."""
 
 import sys
 from collections.abc import Callable, Iterator
@@ -34,7 +34,7 @@ _KINDS: Final = {str(kind).replace(" ", "-"): kind for kind in EntryKind}
 
 
 class _Wanted(NamedTuple):
-    """Which entries the options mean."""
+    """The entries that the options select."""
 
     controller: OfController = None
     tool: Annotated[
@@ -220,7 +220,7 @@ def verify() -> int:
 
 @contextmanager
 def _progress(opened: "Journal") -> Iterator[Callable[[int, int], None] | None]:
-    """Show how far a check is, on a terminal."""
+    """Show the progress of a check, on a terminal."""
     if not sys.stderr.isatty():
         yield None
         return

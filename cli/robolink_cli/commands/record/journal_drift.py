@@ -1,4 +1,4 @@
-"""journal drift: how the tools of cells went over their changes. Reads only, no controller."""
+"""journal drift: how the tools of cells changed over time. Reads only, no controller."""
 
 import datetime
 from collections.abc import Iterator, Sequence
@@ -89,7 +89,7 @@ def drift(
 def _cells(
     journal: "Journal", controller: str | None, *, tool: int | None, since: str, baseline: int
 ) -> "list[CellDrift]":
-    """Return the course of each controller that has measured changes, in the order of names."""
+    """Return the drift of each controller that has measured changes, in the order of names."""
     from robolink.drift import KINDS, drift_of
     from robolink.methods import all_methods
 
@@ -115,7 +115,7 @@ def _cells(
 
 
 def _name_now(journal: "Journal", name: str) -> str:
-    """Return what a controller is called now that was called something else before."""
+    """Return a controller's present name, from a former one."""
     return journal.names_of(name)[0]
 
 
@@ -134,7 +134,7 @@ _LEAST_REACH_MM: Final = 0.005
 
 
 def show_drift(cells: Sequence[CellDrift], *, all_plots: bool, called: str = "") -> None:
-    """Print a table a controller, the charts of what stands out, and what that means.
+    """Print a table a controller, the charts of unusual values, and what they mean.
 
     Args:
         cells: The controllers.

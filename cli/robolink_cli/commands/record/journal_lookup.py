@@ -1,4 +1,4 @@
-"""Finding entries of the journal by what a person types; nothing here adds to it."""
+"""Finds entries of the journal by what a person types; adds nothing."""
 
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Annotated, Final
@@ -47,7 +47,7 @@ OfController = Annotated[
 
 
 def controller_meant(named: str | None) -> str | None:
-    """Return the address of the controller that was named here or before the command.
+    """Return the address of the controller named here or before the command.
 
     The journal knows who was met there last.
 
@@ -70,7 +70,7 @@ def controller_meant(named: str | None) -> str | None:
 
 
 def cell_meant(named: str | None) -> str:
-    """Return the name of the cell that was named here or before the command; else nothing."""
+    """Return the name of the cell named here or before the command; else nothing."""
     chosen = _named(named)
     return chosen if chosen is not None and is_cell_name(chosen) else ""
 

@@ -1,4 +1,4 @@
-"""recover: the one way to settle what was begun and not proved finished."""
+"""recover: the one way to finish or undo an interrupted job."""
 
 from typing import Annotated, Final, Literal
 
@@ -32,7 +32,7 @@ BLOCKED: Final = "blocked"
 
 
 def chosen_at_desk(controller: Controller) -> str | None:
-    """Have the person at the desk choose, where reading alone decides nothing.
+    """Let the person at the desk choose, where reading alone decides nothing.
 
     Returns ``old``, ``new`` or ``blocked``; ``None`` where nobody is to be asked, or nothing that
     is open takes a person. A recovery is then what reading makes of it.
@@ -103,7 +103,7 @@ def _option(answer: str, *, written: bool, tests: bool) -> str:
     if not written:
         return tr("Everything is as it should be. Work can continue.")
     if answer == OLD:
-        return tr("The old one. Put the old value back.")
+        return tr("The old one. Restore the old value.")
     if tests:
         return tr("The new one. Make the turn test, then keep the new value.")
     return tr("The new one. Keep the new value; nobody has tested it.")
@@ -120,15 +120,15 @@ def recover(
         bool,
         CliOption(
             late=True,
-            help="Keep untested new values; without it robolink writes the old ones back.",
+            help="Keep untested new values; without it robolink restores the old ones.",
         ),
     ] = False,
     choose: Annotated[
         Literal["old", "new", "blocked"] | None,
         CliOption(
             late=True,
-            help="Your answer to every question: old values back; new values kept, on a "
-            "terminal after their turn test; or everything left blocked.",
+            help="Your answer to every question: restore the old values; keep the new ones, on "
+            "a terminal after their turn test; or leave everything blocked.",
         ),
     ] = None,
     yes: Annotated[
@@ -222,12 +222,12 @@ def resolve(
 
 
 def _somebody_there() -> bool:
-    """Whether a person can agree to movements, and bring the tip onto the pin."""
+    """Whether a person can agree to movements, and move the tip onto the pin."""
     return current_desk() is not None or (on_terminal() and not json_is_on())
 
 
 def _gone_through(guide: Guide, *, forget: bool, yes: bool, dry_run: bool) -> tuple[Recovery, int]:
-    """Return what was found and done, and how much was forgotten."""
+    """Return what was found and done, and how many markers were removed."""
     if forget:
         return Recovery((), ()), guide.forget(yes=yes, dry_run=dry_run)
     return guide.look() if dry_run else guide.run(), 0

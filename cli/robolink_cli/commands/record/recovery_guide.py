@@ -1,4 +1,4 @@
-"""A recovery, told step by step: what is found, what is done, what takes a person's word."""
+"""A recovery, step by step: findings, actions, and questions to a person."""
 
 from collections.abc import Collection, Iterator
 from contextlib import suppress
@@ -34,7 +34,7 @@ class Guide:
     Args:
         controller: The controller, connected.
         keep: Whether new values that nobody verified stay.
-        word: Whether a person's word is given beforehand for what reading cannot settle.
+        word: Whether a person's word is given in advance for what reading cannot settle.
         by: How that was given, for the record; ``None`` where it is on record already.
         tests: Whether a new value is kept only after its turn test, where one can be made: a
             person is at the robot who chose it.
@@ -57,7 +57,7 @@ class Guide:
         self.declined = False
 
     def run(self) -> Recovery:
-        """Settle what can be settled; a turn test comes last, when nothing else is open.
+        """Recover what can be recovered; a turn test comes last, when nothing else is open.
 
         Raises:
             RobolinkError: A step failed; the rest stays open.
@@ -75,7 +75,7 @@ class Guide:
             return Recovery(done.settled, findings)
 
     def _tell_untested(self) -> None:
-        """Say of each new value that no turn test can prove now why, and what does."""
+        """Show, for each new value that cannot get its turn test now, why, and what tests it."""
         from robolink.calibration_run import untested_sentences
 
         for sentence in untested_sentences(self._controller):
@@ -110,7 +110,7 @@ class Guide:
         return Recovery((), findings)
 
     def forget(self, *, yes: bool, dry_run: bool) -> int:
-        """Forget everything that is open on a person's word; return how much that was.
+        """Remove all open markers at a person's confirmation; return how many.
 
         Raises:
             BusyError: Somebody else is changing this controller just now.
@@ -133,7 +133,7 @@ class Guide:
         return len(markers)
 
     def payload(self, done: Recovery) -> dict[str, object]:
-        """Return the document of it; a controller that answers nothing now has no selected tool."""
+        """Return the document; a controller without an answer has no selected tool."""
         selected: int | None = None
         with suppress(ControllerError):
             selected = self._controller.tools.selected()
@@ -166,7 +166,7 @@ class Guide:
         return agreed
 
     def _show_where(self) -> None:
-        """Say once where the robot stands, in the tool that is selected by now."""
+        """Show once where the robot is, with the tool that is selected by now."""
         if self._where is None:
             with suppress(ControllerError):
                 here = self._where = self._controller.groups[0].pose()
@@ -193,7 +193,7 @@ class Guide:
 
 
 def show_end(payload: dict[str, object]) -> None:
-    """Say how it ended."""
+    """Show how it ended."""
     left, tool = payload["left"], payload["selected_tool"]
     if left:
         say(
@@ -242,7 +242,7 @@ class TurnTests:
         return tuple(self._tests)
 
     def made(self) -> Iterator[Finding]:
-        """Make one after the other when a person agrees; yields what is closed by it.
+        """Make them one by one when a person agrees; yields what each one closes.
 
         Raises:
             DeclinedError: The answer was no; the change stays open.
@@ -267,7 +267,7 @@ class TurnTests:
             self._controller,
             tr("to test tool {tool}, from where you jog the tip into contact", tool=tools)
             if tests[0].test.by_touch
-            else tr("to test tool {tool}, straight up from where it stands first", tool=tools),
+            else tr("to test tool {tool}, first straight up from where it is", tool=tools),
             moves=sum(one.test.moves(here) for one in tests),
             speed_mm_s=settings.speed_mm_s,
             box_mm=box.x_max_mm - box.x_min_mm,

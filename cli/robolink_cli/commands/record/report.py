@@ -114,7 +114,7 @@ def find_change(journal: Journal, name: str | None, *, controller: str | None) -
 def with_points(
     context: CliContext, reports: Sequence[Report], request: ImpactRequest
 ) -> tuple[Report, ...]:
-    """Add what the controller says now: which it is, and where taught points lead.
+    """Add the controller's present answers: which it is, and its taught points.
 
     Raises:
         ConfigError: It has no taught points.
@@ -146,7 +146,7 @@ def report_payload(reports: Sequence[Report], path: Path) -> dict[str, object]:
 
 
 def _tool_payload(report: Report) -> dict[str, object]:
-    """Return what an auditor's program wants of one tool; ``null`` for what is not on record."""
+    """Return the values of one tool for an auditor's program; ``null`` if not recorded."""
     fit, proof = report.fit, report.verification
     return {
         "tool": report.tool,
@@ -172,7 +172,7 @@ def _tool_payload(report: Report) -> dict[str, object]:
 
 
 def _accurate_to_mm(report: Report) -> float | None:
-    """Return what the tip is accurate to by the statement that stands, a wider one included."""
+    """Return what the tip is accurate to by the valid statement, a wider one included."""
     if report.widened_mm is not None:
         return report.widened_mm
     return None if report.fit is None else report.fit.accurate_to_mm

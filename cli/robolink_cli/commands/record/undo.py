@@ -1,4 +1,4 @@
-"""undo: what tools held before a change is written back."""
+"""undo: writes back what tools held before a change."""
 
 from typing import Annotated
 
@@ -90,7 +90,7 @@ class Undoing:
     Args:
         controller: The controller, connected.
         plan: What to do.
-        then_select: The tool to put in force in place of one that becomes undefined.
+        then_select: The tool to select in place of one that becomes undefined.
     """
 
     def __init__(
@@ -105,7 +105,7 @@ class Undoing:
         """Return what would be sent besides reads.
 
         Raises:
-            ToolError: A value does not fit this robot, or the tool in force would become
+            ToolError: A value does not fit this robot, or the selected tool would become
                 undefined.
             NotReadyError: The state forbids a write.
         """
@@ -143,7 +143,7 @@ class Undoing:
         }
 
     def show_end(self, cell: str) -> None:
-        """Say how it ended, and how it is undone.
+        """Show how it ended, and how to undo it.
 
         Args:
             cell: How a person names the controller.

@@ -1,1 +1,1 @@
-"""What comes with robolink to be read and copied: pages and recipes."""
+"""What comes with robolink to read and copy: pages and recipes."""

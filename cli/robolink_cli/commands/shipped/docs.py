@@ -77,7 +77,7 @@ def _title(path: Path) -> str:
 
 
 def _in_language(path: Path) -> Path:
-    """Return the page in the language of the process, where there is one."""
+    """Return the page in the language of the process, if there is one."""
     from robolink_cli.console.language import language_now
 
     other = path.with_suffix(f".{language_now()}.md")
@@ -94,7 +94,7 @@ def _list(titles: dict[str, str]) -> None:
 
 
 def _show(text: str) -> None:
-    """Show a page: through the pager on a terminal, as it stands to a program."""
+    """Show a page: through the pager on a terminal, unchanged to a program."""
     if is_terminal(sys.stdout) and is_terminal(sys.stdin):
         click.echo_via_pager(page_lines(_COMMENT.sub("", text), shutil.get_terminal_size().columns))
     else:
@@ -125,7 +125,7 @@ def page_lines(text: str, width: int) -> str:
 
 
 def _parts(text: str) -> Iterator[tuple[bool, str]]:
-    """Yield paragraphs and items, each joined to one line, and the other lines; and which it is."""
+    """Yield paragraphs and items, each joined to one line, and other lines; with their kind."""
     prose, in_code = "", False
     for line in text.split("\n"):
         fence = line.startswith("```")

@@ -1,4 +1,4 @@
-"""recipe list, new, check: recipes to begin with, and whether one is right."""
+"""recipe list, new, check: recipes to start from, and whether one is right."""
 
 import re
 from pathlib import Path
@@ -35,12 +35,12 @@ _NUMBERS: Final = (
 
 
 def models() -> dict[str, Path]:
-    """Return the recipes that come along, by name."""
+    """Return the shipped recipes, by name."""
     return {path.stem: path for path in sorted(recipes_folder().glob("*.toml"))}
 
 
 def purpose_of(path: Path) -> str:
-    """Return what a recipe is for, a sentence.
+    """Return the purpose of a recipe, a sentence.
 
     Args:
         path: One that comes along.
@@ -49,7 +49,7 @@ def purpose_of(path: Path) -> str:
 
 
 def copy_recipe(name: str, path: Path, *, replace: bool = False) -> None:
-    """Copy a recipe that comes along; the copy runs on simulated controllers alone.
+    """Copy a shipped recipe; the copy runs on simulated controllers alone.
 
     Args:
         name: Its name.
@@ -73,7 +73,7 @@ def copy_recipe(name: str, path: Path, *, replace: bool = False) -> None:
 
 
 def first_comment(path: Path) -> str:
-    """Return what a recipe says of itself first, in English; empty for nothing.
+    """Return the first comment of a recipe, in English; empty for none.
 
     Args:
         path: The recipe.

@@ -1,4 +1,4 @@
-"""Where the pages and recipes are that come with robolink."""
+"""Where the shipped pages and recipes are."""
 
 from collections.abc import Sequence
 from difflib import get_close_matches
@@ -18,7 +18,7 @@ def pages_folder() -> Path:
 
 
 def recipes_folder() -> Path:
-    """Return the folder of the recipes to begin with."""
+    """Return the folder of the recipes to start from."""
     return _folder("recipes", "examples/recipes")
 
 
@@ -28,7 +28,7 @@ def recipe_schema() -> Path:
 
 
 def require_one_of(name: str, names: Sequence[str], *, remedy: str) -> None:
-    """Refuse a name that is none of these, with those that look like it.
+    """Refuse a name that is none of these, and suggest similar ones.
 
     Raises:
         ConfigError: It is none.

@@ -1,4 +1,4 @@
-"""Acting at a simulated cell from the shell."""
+"""Actions at a simulated cell from the shell."""
 
 from collections.abc import Mapping, Sequence
 
@@ -14,7 +14,7 @@ from robolink_cli.console.render import emit, say
 
 
 def do_act(url: str, act: str, values: Sequence[str]) -> None:
-    """Have ``act`` done at the simulator behind ``url`` and show what it gives.
+    """Carry out ``act`` at the simulator behind ``url`` and show its result.
 
     Raises:
         ConfigError: A value is not NAME=NUMBER, or the simulator cannot do it and says why.
@@ -27,7 +27,7 @@ def do_act(url: str, act: str, values: Sequence[str]) -> None:
 
 
 def do_controlled(url: str, act: str, values: Sequence[str]) -> None:
-    """Have ``act`` done by the control API behind ``url`` and show what it gives.
+    """Carry out ``act`` through the control API behind ``url`` and show its result.
 
     Raises:
         ConfigError: A value is not NAME=VALUE, or the simulator cannot do it and says why.
@@ -50,7 +50,7 @@ def _show_answer(act: str, answer: Mapping[str, object]) -> None:
 
 
 def _typed(text: str) -> bool | int | float | str:
-    """Return what a value on the command line means: a number, true or false, else a text."""
+    """Return the value of a word on the command line: a number, true or false, else a text."""
     if text in ("true", "false"):
         return text == "true"
     try:

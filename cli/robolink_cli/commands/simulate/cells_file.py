@@ -1,4 +1,4 @@
-"""The keys of a simulated cell in a file: the options of its command, and nothing besides.
+"""The keys of a simulated cell in a file: the options of its command, no others.
 
 Each key is the name of an option without its dashes: ``--allow-remote`` is ``allow_remote``. What a
 value may be is asked of the option itself, so that file and command line cannot differ.
@@ -57,7 +57,7 @@ class DeclaredKeys:
         return (key for key, option in self.options.items() if option.metavar == ADDRESS)
 
     def values(self, table: Mapping[str, object], object_to: Objection) -> dict[str, Any]:
-        """Return the values that the command would be called with; none where one is wrong.
+        """Return the values for a call of the command; none if one is wrong.
 
         Args:
             table: What stands in the file.
@@ -93,7 +93,7 @@ class DeclaredKeys:
             return {}
 
     def _typed(self, option: click.Option, given: object) -> list[str]:
-        """Return what would be typed for a value, if the option takes it.
+        """Return the words that a person would type for a value, if the option takes it.
 
         Raises:
             click.BadParameter, ConfigError: It is none.
@@ -139,7 +139,7 @@ def _key_of(option: click.Option) -> str:
 
 
 def _is_named(option: click.Option) -> bool:
-    """Tell whether an option is NAME=VALUE, which a file has as a table."""
+    """Return whether an option is NAME=VALUE, which is a table in a file."""
     return bool(re.fullmatch(r"\w+=\w+", str(option.metavar)))
 
 
@@ -200,7 +200,7 @@ class PlannedCell:
 
 
 def numbered(tables: Iterable[CellTable], object_to: CellObjection) -> tuple[PlannedCell, ...]:
-    """Return each cell by itself; objects to what two of them would have to share."""
+    """Return each cell by itself; refuse values that two of them would share."""
     cells: list[PlannedCell] = []
     places: dict[object, str] = {}
     for table in tables:
@@ -272,7 +272,7 @@ def _named(value: object, name: str) -> object:
 
 
 def _claims(table: CellTable, cell: PlannedCell) -> Iterator[tuple[str, object]]:
-    """Yield what a cell must have for itself: keys, and what they say."""
+    """Yield what a cell must have for itself: keys, and their values."""
     for key in table.keys.addresses():
         address = cell.given[str(table.keys.options[key].name)]
         if address is not None and (place := host_and_port(address, ""))[1]:
@@ -326,7 +326,7 @@ def read_cells(path: Path, commands: Mapping[str, click.Command]) -> tuple[Plann
 
 
 class _CellsReader:
-    """Turns a document into cells, and notes all that is wrong with it."""
+    """Turns a document into cells, and notes all its errors."""
 
     def __init__(
         self,
@@ -342,7 +342,7 @@ class _CellsReader:
         self._commands = commands
 
     def cells(self) -> tuple[PlannedCell, ...]:
-        """Return the cells; of use only where there are no problems."""
+        """Return the cells; use them only if there are no problems."""
         for key in self._document:
             if key not in ("schema", "cells"):
                 self._object("", key, is_not_known(key[:80], ("schema", "cells")))
@@ -356,7 +356,7 @@ class _CellsReader:
         return numbered([table for table in read if table is not None], self._object)
 
     def try_first_of_each_table(self, cells: Sequence[PlannedCell]) -> None:
-        """Make one simulator of each table, and note what it objects to; no file is touched."""
+        """Make one simulator of each table, and note its errors; no file is touched."""
         tried = set[str]()
         for cell in cells:
             if cell.table in tried:
@@ -412,7 +412,7 @@ class _CellsReader:
         self.problems.append(Problem(f"line {line}, {where}" if line else where, what))
 
     def _line(self, cell: str, key: str) -> int:
-        """Return the line of a key, else of its table; 0 where the form of the file hides it."""
+        """Return the line of a key, else of its table; 0 if the form of the file hides it."""
         header = re.compile(r"^\s*\[\s*cells\s*\.\s*[\"']?([^\"'\]]+?)[\"']?\s*\]")
         at, inside = 0, cell == ""
         for number, text in enumerate(self._lines, 1):

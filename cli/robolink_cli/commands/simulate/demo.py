@@ -97,12 +97,12 @@ class DemonstratedChange(ABC):
 
     @abstractmethod
     def show(self) -> None:
-        """Say how it ended."""
+        """Show how it ended."""
 
 
 @dataclass(frozen=True, slots=True)
 class AcceptedChange(DemonstratedChange):
-    """A nozzle change that was written and proved.
+    """A nozzle change that was written and tested.
 
     Attributes:
         report: What was measured, written and verified.
@@ -134,7 +134,7 @@ class AcceptedChange(DemonstratedChange):
         }
 
     def show(self) -> None:
-        """Say how it ended, and how far off it was."""
+        """Show how it ended, and how far off it was."""
         say()
         show_report(self.report)
         say(
@@ -171,7 +171,7 @@ class RefusedChange(DemonstratedChange):
         }
 
     def show(self) -> None:
-        """Say what was refused, and which tool is in force."""
+        """Show what was refused, and which tool is selected."""
         say()
         say(tr("Refused: {what}", what=self.error.what))
         if self.error.remedy:
@@ -196,7 +196,7 @@ _OF_INTEREST = tuple(f'> $Execute,"{word} ' for word in ("Tool", "TLSet", "Move"
 
 
 class DemoOperator(StrEnum):
-    """Who stands at the demonstrated cells."""
+    """The person at the demonstrated cells."""
 
     CAREFUL = "careful"
     """Jogs the tip onto the pin whenever asked to."""
@@ -206,7 +206,7 @@ class DemoOperator(StrEnum):
 
 
 class WireLog:
-    """Collects what crossed the wire, the login excepted."""
+    """Collects the traffic on the wire, except for the login."""
 
     def __init__(self) -> None:
         self.lines: list[str] = []
@@ -233,7 +233,7 @@ class WireLog:
 
 
 def demonstrate(*, seed: int, speed: float, operator: DemoOperator) -> None:
-    """Run the demonstration and show it, or hand over its document.
+    """Run the demonstration and show it, or return its document.
 
     Raises:
         CalibrationError, VerifyError: A careful person was refused.

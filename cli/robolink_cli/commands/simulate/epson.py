@@ -1,4 +1,4 @@
-"""sim epson: serving a simulated EPSON controller."""
+"""sim epson: serves a simulated EPSON controller."""
 
 import os
 from collections.abc import Sequence
@@ -109,7 +109,7 @@ EPSON_KIND: Final = SimulatedKind(
 
 @dataclass(frozen=True, slots=True)
 class ProjectSurroundings:
-    """What a project needs beside its files: what the options that go with programs name.
+    """What a project needs besides its files, from the options that go with programs.
 
     Attributes:
         vision: The vision project.
@@ -165,7 +165,7 @@ def load_programs(
     *,
     cell: str = "",
 ) -> None:
-    """Load a project, if any; what its tasks print is shown beside the announcement.
+    """Load a project, if any; its tasks' output is shown beside the announcement.
 
     Args:
         simulator: Into which.
@@ -193,7 +193,7 @@ def load_programs(
 
 
 def run_first(simulator: EpsonSimulator, runner: ProgramRunner, function: str) -> None:
-    """Run the function that says what the project keeps outside its programs.
+    """Run the function that sets up what the project keeps outside its programs.
 
     Raises:
         ConfigError: It fails, or does not end.

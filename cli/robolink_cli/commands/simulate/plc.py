@@ -1,4 +1,4 @@
-"""sim plc: serving a simulated PLC that keeps its tools where a map says."""
+"""sim plc: serves a simulated PLC whose tools are where a map says."""
 
 from contextlib import ExitStack
 from pathlib import Path

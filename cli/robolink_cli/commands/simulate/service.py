@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 class ParentWatch:
-    """Tells whether the process has ended that a simulator must not outlive.
+    """Reports when the process has ended that a simulator must not outlive.
 
     Args:
         number: Its process id; ``None`` for the process that started this one.
@@ -69,14 +69,14 @@ class ParentWatch:
         return self._gone
 
     def close(self) -> None:
-        """Look no more."""
+        """Stop checking."""
         if self._handle is not None:
             os.close(self._handle)
             self._handle = None
 
 
 class Termination:
-    """Makes SIGTERM an orderly end; Ctrl-C stays what it is.
+    """Makes SIGTERM an orderly end; Ctrl-C is unchanged.
 
     What a simulator fails of that can keep its state no longer is told once, by whoever waits: the
     thread that served it tells nothing.
@@ -159,7 +159,7 @@ class Termination:
         self._folder.cleanup()
 
     def _tell(self, failed: threading.ExceptHookArgs) -> None:
-        """Tell what a thread has ended of, unless the one that waits tells it."""
+        """Report what ended a thread, unless the waiting one reports it."""
         from robolink_simulators.state_files import StateNotKeptError
 
         if not isinstance(failed.exc_value, StateNotKeptError):

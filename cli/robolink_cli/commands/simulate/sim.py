@@ -1,4 +1,4 @@
-"""sim: serve a simulated controller for anybody's client."""
+"""sim: serves a simulated controller for any client."""
 
 from pathlib import Path
 from typing import Annotated, Literal, NamedTuple
@@ -82,7 +82,7 @@ def _complete_kinematics(_: click.Context, __: click.Parameter, start: str) -> l
 
 
 class _SoftMotionOptions(NamedTuple):
-    """What a simulated SoftMotion PLC has for itself, beside Modbus."""
+    """The options of a simulated SoftMotion PLC, besides Modbus."""
 
     can: Annotated[
         str | None,
@@ -168,7 +168,7 @@ sim.add_command(sim_run)
 
 
 class _EpsonOptions(NamedTuple):
-    """What a simulated EPSON controller has for itself."""
+    """The options of a simulated EPSON controller."""
 
     address: Annotated[
         str,

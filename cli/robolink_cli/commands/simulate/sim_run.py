@@ -1,4 +1,4 @@
-"""sim run: serve all simulated cells of a file from one process."""
+"""sim run: serves all simulated cells of a file from one process."""
 
 import json
 import os
@@ -68,7 +68,7 @@ def sim_run(
 
 
 def _serving_commands() -> dict[str, click.Command]:
-    """Return the commands beside this one: what they take, the file may say."""
+    """Return the commands beside this one: the file may hold what they take."""
     parent = click.get_current_context().parent
     group = parent and parent.command
     return dict(group.commands) if isinstance(group, click.Group) else {}
@@ -90,7 +90,7 @@ _MOST_SHOWN: Final = 20
 
 
 def made(cells: Sequence[PlannedCell]) -> Mapping[str, AnySimulator]:
-    """Make the simulators of cells; no port is opened.
+    """Make the simulators of cells; opens no port.
 
     Raises:
         ConfigError: One cannot be made; tells which.
@@ -105,7 +105,7 @@ def made(cells: Sequence[PlannedCell]) -> Mapping[str, AnySimulator]:
 
 
 def run_cells(path: Path, cells: Sequence[PlannedCell], life: ServedLife) -> None:
-    """Serve cells until SIGTERM or Ctrl-C, and say where they are once all of them listen.
+    """Serve cells until SIGTERM or Ctrl-C, and show where they are once all listen.
 
     Args:
         path: Their file, for a person.
@@ -152,7 +152,7 @@ def _served(stack: ExitStack, cell: PlannedCell, simulator: AnySimulator) -> Ser
 def _failure(
     cells: Sequence[PlannedCell], simulators: Mapping[str, AnySimulator]
 ) -> ConfigError | None:
-    """Return why a cell can go on no longer, ``None`` as long as all can."""
+    """Return why a cell cannot continue, ``None`` as long as all can."""
     for cell in cells:
         if (failed := simulators[cell.name].failure) is not None:
             return ConfigError(_of_cell(cell, failed), remedy=failed.remedy)
@@ -175,7 +175,7 @@ def _told(path: Path, about: Mapping[str, Mapping[str, object]], control: str) -
 
 
 def _raise_most_files() -> None:
-    """Let this process have as many sockets open as the system lets it."""
+    """Let this process open as many sockets as the system allows."""
     try:
         import resource  # not on Windows, which has no such limit
     except ImportError:
@@ -194,7 +194,7 @@ _MOST_S: Final = 120.0
 
 
 def start_and_wait(arguments: Sequence[str]) -> int:
-    """Start ``sim run`` beside this process and hand its first line over.
+    """Start ``sim run`` beside this process and pass on its first line.
 
     Args:
         arguments: Of ``sim run``, without what led here.
@@ -245,7 +245,7 @@ def _first_line(process: "subprocess.Popen[bytes]", log: Path, errors: Path) -> 
 
 
 def _tell_end(document: str, messages: str) -> None:
-    """Tell why nothing is served, as the process would have told it itself."""
+    """Report why nothing is served, as the process would have reported it itself."""
     if messages:
         show(messages.rstrip("\n"), beside=True)
     if json_is_on() or not document.startswith("{"):
@@ -259,6 +259,6 @@ def _tell_end(document: str, messages: str) -> None:
 
 
 def parent_of_starter() -> int | None:
-    """Return whose end a process started here waits for, ``None`` for who started it."""
+    """Return the process whose end a started process waits for, ``None`` for its starter."""
     named = os.environ.get(PARENT, "")
     return int(named) if named.isascii() and named.isdigit() else None

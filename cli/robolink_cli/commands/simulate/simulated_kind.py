@@ -1,4 +1,4 @@
-"""One kind of simulator: how it is made and served from the options of its command."""
+"""One kind of simulator: how the options of its command make and serve it."""
 
 import json
 from collections.abc import Callable, Collection, Mapping
@@ -44,7 +44,7 @@ class ServedCell:
 
     @property
     def requests(self) -> int:
-        """How much has come to its ports, and left from there, since it was made or reset."""
+        """Traffic to and from its ports since it was made or reset."""
         asked = 0 if self.assist is None else self.assist.requests
         return self.controlled.simulator.log.added + asked
 
@@ -147,7 +147,7 @@ def plan_faults(
     *,
     cell: str = "",
 ) -> None:
-    """Plan what a file says; each fault that fires is told then, in one line on stdout.
+    """Plan the faults of a file; each fault that fires is then reported in a line on stdout.
 
     Args:
         simulator: For which.

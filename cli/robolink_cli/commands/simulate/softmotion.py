@@ -1,4 +1,4 @@
-"""sim softmotion: serving a simulated PLC on one or several field buses."""
+"""sim softmotion: serves a simulated PLC on one or several field buses."""
 
 import sys
 from collections.abc import Sequence
@@ -121,7 +121,7 @@ def _buses(
 def _served(
     stack: ExitStack, simulator: SoftMotionSimulator, buses: Buses, clock: ScaledClock
 ) -> dict[str, str]:
-    """Put the PLC on each bus; what is not wanted is not imported."""
+    """Serve the PLC on each bus; unwanted ones are not imported."""
     urls: dict[str, str] = {}
     address = buses.modbus_tcp
     if address is None and buses.modbus_rtu is None and buses.can is None:

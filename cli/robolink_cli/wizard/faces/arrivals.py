@@ -1,4 +1,4 @@
-"""Keys with the time at which they came to the terminal, however busy this process is.
+"""Keys with the time at which they reached the terminal, however busy this process is.
 
 Whether a key was pressed by a hand is told by what came just before and after it
 (:mod:`robolink_cli.wizard.keys`). On a busy computer a screen is drawn for longer than a hand
@@ -34,7 +34,7 @@ _MOST_BYTES: Final = 1024
 
 @dataclass(frozen=True, slots=True)
 class Arrival:
-    """What came in one piece.
+    """Input that came in one piece.
 
     Attributes:
         data: The bytes, empty at the end of the stream.
@@ -48,7 +48,7 @@ class Arrival:
 
 
 class ArrivalReader:
-    """Reads a descriptor, and notes when. Any thread may look.
+    """Reads a descriptor, and notes the time. Any thread may read.
 
     Args:
         fd: What is read.
@@ -66,7 +66,7 @@ class ArrivalReader:
         self._quiet_s = self._last_s = now_s()
 
     def look(self) -> bool:
-        """Take what is there; tell whether anything was."""
+        """Read what is there; return whether anything was."""
         with self._lock:
             before_s = self._now_s()
             if self.over or not _readable(self._fd):
@@ -89,7 +89,7 @@ class ArrivalReader:
             return came
 
     def quiet(self) -> float | None:
-        """Return a time at which nothing was there, ``None`` while something waits to be taken.
+        """Return a time at which nothing was there, ``None`` while something waits to be read.
 
         What waits to be read is left to the thread, which tells the loop of it.
         """
@@ -102,12 +102,12 @@ class ArrivalReader:
 
     @property
     def watched(self) -> bool:
-        """Whether it is not known yet that nothing follows what came last."""
+        """Return whether it is still unknown if something follows the last input."""
         return self._quiet_s - self._last_s < _WATCHED_S
 
     @contextmanager
     def following(self, came: Callable[[], None]) -> Iterator[None]:
-        """Read in a thread of its own; ``came`` is called there when there is something to take."""
+        """Read in a thread of its own; ``came`` is called there when there is input."""
         end, ends = os.pipe()
 
         def follow() -> None:
@@ -142,7 +142,7 @@ class TimedPress(KeyPress):
 
 
 class TimedKeys(Input):
-    """The keys of another input, each with its time; all else is left to that one.
+    """The keys of another input, each with its time; that input does the rest.
 
     Args:
         source: Where they come from.
@@ -212,7 +212,7 @@ class TimedInput(TimedKeys):
         return keys
 
     def flush_keys(self) -> list[KeyPress]:
-        """Return what is no longer taken for the beginning of a longer key."""
+        """Return the keys that can no longer be the beginning of a longer key."""
         self._parser.flush()
         return self._timed()
 
@@ -223,7 +223,7 @@ class TimedInput(TimedKeys):
 
     @contextmanager
     def attach(self, input_ready_callback: Callable[[], None]) -> Iterator[None]:
-        """Have the loop that runs told when there are keys."""
+        """Notify the running loop when there are keys."""
         loop = get_running_loop()
 
         def came() -> None:
@@ -240,7 +240,7 @@ class TimedInput(TimedKeys):
 
 
 def _readable(*descriptors: int, wait_s: float | None = 0.0) -> list[int]:
-    """Return those that can be read; one that was closed can, to find just that."""
+    """Return the readable ones; a closed one counts, so that its end is found."""
     try:
         return select.select(descriptors, [], [], wait_s)[0]
     except (OSError, ValueError):
@@ -270,7 +270,7 @@ class TimedConsole(TimedKeys):
         self._last = (self._quiet_s, self._quiet_s)
 
     def look(self) -> bool:
-        """Take what is there; tell whether there was anything. Any thread may look.
+        """Read what is there; return whether there was anything. Any thread may read.
 
         A lone Esc is no key yet: only when the loop has been told does it ask for what is left.
         """
@@ -300,14 +300,14 @@ class TimedConsole(TimedKeys):
             return came
 
     def flush_keys(self) -> list[KeyPress]:
-        """Return what is no longer taken for the beginning of a longer key."""
+        """Return the keys that can no longer be the beginning of a longer key."""
         with self._lock:
             self._keep(self._source.flush_keys())
         return self.read_keys()
 
     @contextmanager
     def attach(self, input_ready_callback: Callable[[], None]) -> Iterator[None]:
-        """Have the loop that runs told when there are keys."""
+        """Notify the running loop when there are keys."""
         loop, over = get_running_loop(), threading.Event()
 
         def follow() -> None:
@@ -332,7 +332,7 @@ class TimedConsole(TimedKeys):
 
 
 def fine_clock() -> Callable[[], float]:
-    """Return a clock that is finer than two keys of a scanner are apart.
+    """Return a clock that is finer than the time between two keys of a scanner.
 
     Up to Python 3.12 ``time.monotonic`` goes in steps of 16 ms on Windows (``GetTickCount64``),
     ``time.perf_counter`` never does. Where the two have drifted apart, the coarse one is right.
@@ -359,7 +359,7 @@ def timed(source: Input) -> TimedKeys:
 
 
 def _queue_of(source: Any) -> Callable[[], bool]:  # noqa: ANN401 - its class exists on Windows only
-    """Return what tells whether the queue of a console holds anything."""
+    """Return a function that reports whether the queue of a console holds anything."""
     import ctypes
 
     console: Any = ctypes.WinDLL("kernel32")  # type: ignore[attr-defined,unused-ignore]

@@ -91,12 +91,12 @@ class FullFace:
         return narrow
 
     def _has_room(self) -> bool:
-        """Tell whether a screen has room in the window."""
+        """Return whether a screen fits into the window."""
         size = self._output.get_size()
         return size.columns >= WIDTH and size.rows >= HEIGHT
 
     async def _turn(self, application: "Application[bool]") -> None:
-        """Take what happens, until the work has ended or the window is too small."""
+        """Handle events, until the work has ended or the window is too small."""
         while True:
             ended, now_s = self._work.ended, time.monotonic()
             happened: list[Happening] = [*self._desk.happened()]
@@ -121,7 +121,7 @@ class FullFace:
         return [*found, TooFast()] if self._gate.burst_ended(quiet_s) else found
 
     def _shows_the_end(self) -> bool:
-        """Show how the work ended, where there is a screen for it, until it is left."""
+        """Show how the work ended, if there is a screen for it, until a person leaves it."""
         if ended_by() is EndedBy.HUNG_UP:
             return False  # nobody is there to leave it
         if self._state.ended is None:
@@ -160,7 +160,7 @@ class FullFace:
             self._happens(self._pressed(one))
 
     def _pasted(self, press: KeyPress) -> None:
-        """Take what came at once: one line into a field, as a Windows console hands a scan on.
+        """Handle input that came at once: a line into a field, as a Windows console passes a scan.
 
         prompt_toolkit makes a paste of keys that its reader finds in one look, ENTER among them.
         """
@@ -176,7 +176,7 @@ class FullFace:
             self._press(Keys.ControlM.value, KeyPress(Keys.ControlM))
 
     def _fills(self, key: str, text: str) -> bool:
-        """Tell whether a key goes into the field at once; what writes goes through the gate."""
+        """Return whether a key goes into the field at once; writing keys go through the gate."""
         if self._state.writing is None:
             return True
         return text.isdigit() or name_of(key) == "backspace"
@@ -194,7 +194,7 @@ class FullFace:
         return "\n".join(visible(row) for row in rows)
 
     def _forget_keys(self) -> None:
-        """Drop what is still held down: it is not for the shell."""
+        """Discard keys still held down: they are not for the shell."""
         clear_typeahead(self._input)
         if os.name == "nt":
             open_lines().forget(0.0)
@@ -206,12 +206,12 @@ class FullFace:
 
 
 def _when(press: KeyPress) -> tuple[float, float | None]:
-    """Return by when a key had come, and when it surely had not, where that is known."""
+    """Return the latest time at which a key came, and the earliest possible, if known."""
     if isinstance(press, TimedPress):
         return press.at_s, press.quiet_s
     return time.monotonic(), None
 
 
 def _writes(key: str) -> bool:
-    """Tell whether a key is a character, or ends or shortens what is in a field."""
+    """Return whether a key is a character, or ends or shortens what is in a field."""
     return len(key) == 1 or name_of(key) in ("enter", "backspace")

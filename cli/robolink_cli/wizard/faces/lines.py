@@ -47,7 +47,7 @@ def carry_out(desk: Desk, effects: list[Effect]) -> None:
 
 
 def leaves(effects: list[Effect]) -> bool:
-    """Tell whether the last screen is left, for good or for what was chosen there."""
+    """Return whether a person leaves the last screen, for good or for a choice on it."""
     return any(isinstance(one, WizardCommand) for one in effects if one is not _END)
 
 
@@ -97,7 +97,7 @@ class LineFace:
             state = self._listen(desk, state)
 
     def _screen_may_follow(self) -> bool:
-        """Tell whether a screen has had room for a while; what was typed by then is dropped."""
+        """Return whether a screen has had room for a while; discard what was typed by then."""
         now_s = time.monotonic()
         if self._has_room is None or not self._has_room():
             self._room_since_s = None
@@ -131,7 +131,7 @@ class LineFace:
         return state
 
     def _at_the_end(self, state: WizardState, work: "Work[Any]") -> WizardState:
-        """Ask what comes after a job that was carried out; any other end is told by lines alone."""
+        """Ask what comes after a finished job; any other end is shown in lines alone."""
         ended = state.ended or ended_of(state, work.error, time.monotonic())
         if ended is None or not ended.done or not state.offers or ended_by() is not None:
             return state
@@ -157,7 +157,7 @@ class LineFace:
         return state
 
     def _tell(self, happening: Happening, state: WizardState) -> None:
-        """Say what a happening is to a person who sees no screen."""
+        """Show a happening to a person without a screen."""
         match happening:
             case WasTold(text=text):
                 self._forget(0.0)

@@ -1,4 +1,4 @@
-"""Screens (a) and (j): a list of which one is chosen."""
+"""Screens (a) and (j): a list from which a person chooses."""
 
 from typing import Final
 
@@ -13,7 +13,7 @@ _LEAST_SHOWN: Final = 3
 
 
 def choice_screen(state: WizardState, subject: ChoiceSubject, now_s: float) -> Screen:
-    """Return the screen of a list; where it is longer than the screen, the part about the mark."""
+    """Return the screen of a list; if it is too long, the part around the mark."""
     assert state.question is not None  # noqa: S101 - looked at by whoever calls
     above = [row for line in subject.above for row in broken(line)]
     most = BODY - 2 - min(_LEAST_SHOWN, len(subject.options))
@@ -44,7 +44,7 @@ def choice_screen(state: WizardState, subject: ChoiceSubject, now_s: float) -> S
 
 
 def language_label(language: str) -> str:
-    """Return what a language is called beside the key that changes to it.
+    """Return a language's label beside the key that changes to it.
 
     Args:
         language: One of :data:`robolink.locale.languages.LANGUAGES`.
@@ -53,7 +53,7 @@ def language_label(language: str) -> str:
 
 
 def _details(state: WizardState, subject: ChoiceSubject) -> tuple[str, ...]:
-    """Return what is to be read of the marked option."""
+    """Return the details of the marked option."""
     if state.marked is None or not subject.details:
         return ()
     return subject.details[state.marked]
@@ -81,7 +81,7 @@ def check_screen(state: WizardState, subject: CheckSubject, now_s: float) -> Scr
 
 
 def _main(state: WizardState, here: CheckPoint | None, start: str) -> tuple[tuple[str, str], ...]:
-    """Return what the main key does on the marked row; nothing where none is marked."""
+    """Return what the main key does on the marked row; nothing without one."""
     if state.marked is None:
         return ()
     if here is None:
@@ -90,7 +90,7 @@ def _main(state: WizardState, here: CheckPoint | None, start: str) -> tuple[tupl
 
 
 def mark_of(point: CheckPoint, checked: frozenset[str]) -> str:
-    """Return the word for how a point stands."""
+    """Return the word for the state of a point."""
     if point.mark is Mark.OK or point.name in checked:
         return tr("OK")
     if point.mark is Mark.LOOK:

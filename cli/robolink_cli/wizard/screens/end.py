@@ -1,4 +1,4 @@
-"""Screens (h) and (i): what stands at the end, shown as the last screen and kept as lines."""
+"""Screens (h) and (i): the end, as the last screen and as lines that stay."""
 
 from collections.abc import Iterator
 
@@ -28,7 +28,7 @@ from robolink_cli.wizard.state import CheckSubject, ChoiceSubject, LastScreen, W
 
 
 def done_lines(state: WizardState, report: ChangeReport) -> list[str]:
-    """Return what was reached."""
+    """Return the results."""
     needle = state.header.needle
     lines = [line for one in report.tools for line in _tool_lines(one, needle)]
     record = tr(
@@ -78,7 +78,7 @@ def _tool_lines(report: ToolReport, needle: str) -> list[str]:
 
 
 def ended_of(state: WizardState, error: BaseException | None, at_s: float) -> LastScreen | None:
-    """Return the last screen; ``None`` for an end that is told by lines alone.
+    """Return the last screen; ``None`` for an end that is shown in lines alone.
 
     Args:
         state: The last one.
@@ -104,7 +104,7 @@ def ended_of(state: WizardState, error: BaseException | None, at_s: float) -> La
 
 
 def stopped_lines(state: WizardState, error: RobolinkError) -> list[str]:
-    """Return why it ended, where, what stands on the controller, and the one command to go on."""
+    """Return why it ended, where, what stands on the controller, and the next command."""
     outcome = outcome_after(error)
     blocked = _is_blocked(error)
     stands = "" if outcome is UNTOUCHED else describe_outcome(outcome, settles=not blocked)
@@ -143,7 +143,7 @@ def _offered(state: WizardState) -> Iterator[tuple[str, str]]:
 
 
 def told_end(state: WizardState) -> str:
-    """Return what can be typed at the end of a job that was carried out."""
+    """Return what can be typed at the end of a finished job."""
     words = []
     if WizardCommand.SHOW_REPORT in state.offers:
         words.append(tr("report = show the report."))
@@ -165,7 +165,7 @@ def _headed(state: WizardState, error: BaseException) -> str:
 
 
 def _is_blocked(error: RobolinkError) -> bool:
-    """Tell whether the robot takes nothing but ``recover``, and what comes before it."""
+    """Return whether the robot accepts only ``recover``, and what comes before it."""
     return outcome_after(error).left_open or isinstance(error, OutcomeUnknownError)
 
 
@@ -177,7 +177,7 @@ def _where(state: WizardState) -> list[str]:
 
 
 def _next(state: WizardState, error: RobolinkError) -> list[str]:
-    """Return what to go on with, where it is known; a blocked robot takes nothing else.
+    """Return how to continue, if known; a blocked robot accepts nothing else.
 
     What was refused would be refused again, so it is proposed only where a person, or what was
     measured, ended it.

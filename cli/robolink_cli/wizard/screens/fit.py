@@ -20,7 +20,7 @@ _MOST_ROWS: Final = 9
 
 
 def fit_screen(state: WizardState, fit: FitSubject) -> Screen:
-    """Return the screen of a fit whose worst sample may be taken again."""
+    """Return the screen of a fit whose worst sample may be repeated."""
     worst = fit.rows[fit.worst].number if fit.worst is not None else 0
     retake, show = ("/", tr("Touch {k} again", k=worst)), ("5", tr("Show the result"))
     more = (("+", tr("One more touch")),) if fit.more else ()
@@ -35,7 +35,7 @@ def fit_screen(state: WizardState, fit: FitSubject) -> Screen:
 
 
 def fit_lines(fit: FitSubject, width: int = WIDTH) -> list[str]:
-    """Return the bars, and what they say in words.
+    """Return the bars, and their meaning in words.
 
     Args:
         fit: The fit.
@@ -61,7 +61,7 @@ def fit_lines(fit: FitSubject, width: int = WIDTH) -> list[str]:
 
 
 def _table(fit: FitSubject, away: list[float], width: int) -> Iterator[str]:
-    """Yield a row for each of the touches that are farthest off, its bar as long as there is room.
+    """Yield a row for each of the worst touches, its bar as long as there is room.
 
     Where not even its name has room beside its figures, these stand in a row below.
     """
@@ -99,7 +99,7 @@ def _table(fit: FitSubject, away: list[float], width: int) -> Iterator[str]:
 
 
 def _side(row: FitRow) -> str:
-    """Return along which axis of the base a touch is off most, and to which side: ``Y-``.
+    """Return the base axis and side on which a touch is off most: ``Y-``.
 
     A single component is a height. The keys of a jog bear the same names.
     """

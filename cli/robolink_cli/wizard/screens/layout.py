@@ -37,7 +37,7 @@ class Screen:
     message: str = ""
 
     def room(self) -> int:
-        """Return how many rows of the body are free, two left for a message."""
+        """Return the number of free rows in the body, two left for a message."""
         used = sum(1 for line in self.lines for _ in broken(line))
         keys = sum(1 for _ in key_rows(self.actions))
         return HEIGHT - 1 - bool(self.status) - 2 - keys - 2 - used
@@ -126,7 +126,7 @@ def title_row(state: WizardState, name: str, step: JobStep | None = None) -> tup
 
 
 def status_row(state: WizardState, now_s: float) -> str:
-    """Return the second row: the state of the machine, and how old the reading is."""
+    """Return the second row: the state of the machine, and the age of the reading."""
     reading = state.reading
     if reading is None:
         return tr("No reading from the controller yet.")
@@ -139,7 +139,7 @@ def status_row(state: WizardState, now_s: float) -> str:
 
 
 def _switched(reading: Reading) -> Iterator[str]:
-    """Yield what was read of motors and power; what was not read is not said."""
+    """Yield what was read of motors and power, and nothing else."""
     if reading.motors is not None:
         yield tr("motors on") if reading.motors else tr("motors OFF")
     if reading.low_power is not None:
@@ -153,7 +153,7 @@ _TILTS_DEG: Final = 0.005
 
 
 def coordinate_names(*shown: Pose | ToolOffset) -> tuple[str, ...]:
-    """Return which coordinates a table has: V and W only where one of its rows tilts."""
+    """Return the coordinates of a table: V and W only if one of its rows tilts."""
     tilts = any(abs(angle) >= _TILTS_DEG for one in shown for angle in (one.v_deg, one.w_deg))
     return _TILTED if tilts else UPRIGHT
 

@@ -1,4 +1,4 @@
-"""Screen (c): the robot goes by itself, or the work goes on without a question."""
+"""Screen (c): the robot moves by itself, or the work continues without a question."""
 
 import math
 import re
@@ -28,7 +28,7 @@ _ARROWS: Final = (">", "/", "^", "\\", "<", "/", "v", "\\")
 
 @dataclass(frozen=True, slots=True)
 class _Plan:
-    """The points to be drawn, base X and Y in mm."""
+    """The points to draw, base X and Y in mm."""
 
     flange: tuple[float, float]
     target: tuple[float, float] | None
@@ -36,7 +36,7 @@ class _Plan:
 
 
 def elbow_of(pose: Pose, axes: tuple[float, ...]) -> tuple[float, float] | None:
-    """Return where the elbow of a SCARA is, base X and Y in mm; ``None`` where it is none."""
+    """Return the elbow of a SCARA, base X and Y in mm; ``None`` if there is none."""
     if len(axes) < 2:
         return None
     first, second = math.radians(axes[0]), math.radians(axes[0] + axes[1])
@@ -87,7 +87,7 @@ class _Page:
 
     @classmethod
     def holding(cls, points: list[tuple[float, float]]) -> "_Page":
-        """Return a page on which all these points lie, well inside."""
+        """Return a page that shows all these points, well inside."""
         xs, ys = [x for x, _ in points], [y for _, y in points]
         wide, high = max(max(xs) - min(xs), 10.0), max(max(ys) - min(ys), 10.0)
         per_mm = min((COLUMNS - 6) / wide, (ROWS - 3) * _RATIO / high)
@@ -113,7 +113,7 @@ class _Page:
             self._grid[row][round(column0 + (column1 - column0) * step / count)] = "."
 
     def beside(self, point: tuple[float, float], u_deg: float) -> None:
-        """Show which way U points, in the cell next to a point."""
+        """Show the direction of U, in the cell next to a point."""
         row, column = self.place(point)
         octant = round(u_deg / 45.0) % 8
         row -= round(math.sin(octant * math.pi / 4))
@@ -170,12 +170,12 @@ def moving_screen(state: WizardState, now_s: float) -> Screen:
 
 
 def step_of_movement(state: WizardState) -> JobStep:
-    """Return the step of a movement: once a write was agreed to, those of the turn test follow."""
+    """Return the step of a movement: after an accepted write, those of the turn test follow."""
     return JobStep.TURN_TEST if state.accepted else JobStep.ON_THE_WAY
 
 
 def _hanging(line: str) -> Iterator[str]:
-    """Yield a line in rows that fit beside the picture, those after the first below its text."""
+    """Yield a line in rows that fit beside the picture, with a hanging indent."""
     named = re.match(r"\S+ {2,}", line)
     name = named[0] if named else ""
     first, *more = broken(line.removeprefix(name), WIDTH - _LEFT - columns(name))
@@ -184,7 +184,7 @@ def _hanging(line: str) -> Iterator[str]:
 
 
 def _told(subject: MoveSubject, here: Pose | None, *, low_power: bool, left: bool) -> list[str]:
-    """Return what the movement is, in short rows beside the picture."""
+    """Return the description of the movement, in short rows beside the picture."""
     target = subject.target
     lines = [tr("^ Y"), "|", tr("+---> X"), "", tr("Now:   {purpose}", purpose=subject.purpose)]
     if subject.then:
@@ -202,18 +202,18 @@ def _told(subject: MoveSubject, here: Pose | None, *, low_power: bool, left: boo
 
 
 def _turns_deg(here: Pose, target: Pose) -> float:
-    """Return by how much the largest of the three angles changes."""
+    """Return the largest change of the three angles."""
     angles = zip(here.coordinates()[3:], target.coordinates()[3:], strict=True)
     return max(abs(angle_difference_deg(there, now)) for now, there in angles)
 
 
 def _is_left(reading: Reading | None, now_s: float) -> bool:
-    """Tell whether the way from a reading is what is left: it is of now, and not of the start."""
+    """Return whether the distance from a reading is what is left: it is recent, not the start's."""
     return reading is not None and reading.follows and now_s - reading.at_s <= _OLD_S
 
 
 def _way(subject: MoveSubject, way_mm: float, turn_deg: float, *, left: bool) -> str:
-    """Return how far it is; of a plain straight way, about how long that takes too.
+    """Return the distance; for a plain straight move, also the time.
 
     A turn of the joints has a speed of its own, which nobody reads, and so has a turn of the tool.
     """
@@ -228,7 +228,7 @@ def _way(subject: MoveSubject, way_mm: float, turn_deg: float, *, left: bool) ->
 
 
 def _how_fast(subject: MoveSubject, *, low_power: bool) -> str:
-    """Return how fast it goes, and in which power mode where that was read."""
+    """Return the speed, and the power mode if it was read."""
     speed = f"{subject.speed_mm_s:g}"
     if subject.path is not Path.STRAIGHT:
         slow = tr("Slow turn of the joints")

@@ -45,7 +45,7 @@ def screen_of(state: WizardState, now_s: float) -> Screen:
 
 
 def _with_heard(state: WizardState, screen: Screen) -> Screen:
-    """Return a screen with what was told before it, as much as there is room for, the last first.
+    """Return a screen with the earlier messages, as many as fit, the last first.
 
     The work says it between two questions, when there is no screen that anybody could read.
     """

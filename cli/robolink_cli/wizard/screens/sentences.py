@@ -16,7 +16,7 @@ from robolink_cli.wizard.state import CheckSubject, ChoiceSubject, WizardState
 
 
 def told_before(state: WizardState, width: int = WIDTH) -> list[str]:
-    """Return what is to be read before a yes-or-no question.
+    """Return what to read before a yes-or-no question.
 
     Args:
         state: The state.
@@ -117,7 +117,7 @@ def _angles(touch: TouchSubject | None) -> list[str]:
 
 
 def told_where(state: WizardState) -> str:
-    """Return where the frame in force is."""
+    """Return where the selected frame is."""
     pose = state.pose
     if pose is None:
         return ""

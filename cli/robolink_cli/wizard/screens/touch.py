@@ -1,4 +1,4 @@
-"""Screens (d) and (g): bring the tip onto the pin."""
+"""Screens (d) and (g): jog the tip onto the pin."""
 
 import math
 
@@ -58,14 +58,14 @@ def touch_title(touch: TouchSubject | None) -> str:
 
 
 def _step(touch: TouchSubject | None) -> JobStep | None:
-    """Return the step of a place; one that is no touch has none."""
+    """Return the step of a place; a place without a touch has none."""
     if touch is None or not touch.number:
         return None
     return JobStep.TURN_TEST if touch.proof else JobStep.TOUCH
 
 
 def instruction(state: WizardState) -> str:
-    """Return what the person is to do."""
+    """Return what the person has to do."""
     touch, question = state.touch, state.question
     said = question.text if question is not None else ""
     asks = question is not None and question.kind is Question.PLACE
@@ -90,7 +90,7 @@ def _what(state: WizardState, touch: TouchSubject | None) -> list[str]:
 
 
 def _angles(touch: TouchSubject | None, most: int) -> list[str]:
-    """Return what the turn test has shown at each angle so far, the newest, and the one to come."""
+    """Return the turn test's angles so far, the newest, and the next one."""
     if touch is None or not touch.earlier:
         return []
     rows = [row_of((tr("U"), tr("off by")))]
@@ -104,7 +104,7 @@ def _angles(touch: TouchSubject | None, most: int) -> list[str]:
 
 
 def angle_word(shown: AngleShown) -> str:
-    """Return what one angle of the turn test says by itself."""
+    """Return what one angle of the turn test shows by itself."""
     if shown.within is None:
         return tr("too near the limit")
     return tr("OK") if shown.within else tr("over the limit")
@@ -147,12 +147,12 @@ def _since(state: WizardState) -> list[str]:
 
 
 def _names(state: WizardState) -> tuple[str, ...]:
-    """Return the names of the coordinates that are shown: V and W of an arm that tilts its tool."""
+    """Return the names of the shown coordinates: V and W for an arm that tilts its tool."""
     return coordinate_names(*(one for one in (state.pose, state.arrival) if one is not None))
 
 
 def _is_tilted(state: WizardState) -> bool:
-    """Tell whether six columns are shown: they fill a row, and nothing stands beside them."""
+    """Return whether six columns are shown: they fill a row, with nothing beside them."""
     return len(_names(state)) > len(UPRIGHT)
 
 
@@ -168,7 +168,7 @@ def _contact(touch: TouchSubject | None) -> list[str]:
 
 
 def _range(jog: JogRange | None) -> list[str]:
-    """Return where a free jog may go, in the columns of where it is."""
+    """Return the limits of a free jog, in the columns of its position."""
     if jog is None:
         return []
     box = jog.box
@@ -195,7 +195,7 @@ def _keypad(state: WizardState) -> list[str]:
 
 
 def _typing(state: WizardState) -> list[str]:
-    """Return the field of a typed pose, where one can be typed."""
+    """Return the field of a typed pose, if one can be typed."""
     if state.typing:
         return [
             "",
@@ -224,7 +224,7 @@ def _actions(state: WizardState) -> tuple[tuple[str, str], ...]:
     if touch is None or not touch.number:
         return (("5", tr("It is there")), ("0", tr("STOP")))
     if touch.proof:
-        return (("5", tr("Record")), ("0", tr("Stop: the old value comes back")))
+        return (("5", tr("Record")), ("0", tr("Stop: restore the old value")))
     take, stop = ("5", tr("Record this touch")), ("0", tr("STOP"))
     if touch.number < 2:
         return take, stop

@@ -50,7 +50,7 @@ def values_screen(state: WizardState, subject: WriteSubject) -> Screen:
 
 
 def _shown(state: WizardState, subject: WriteSubject) -> tuple[list[str], int]:
-    """Return what stands above the field, and in how many parts all of it would.
+    """Return what stands above the field, and the number of parts of the whole.
 
     Room is left for the field, a message and a second row of keys. Nothing is left out: before a
     write a person reads all of it.
@@ -70,7 +70,7 @@ def _shown(state: WizardState, subject: WriteSubject) -> tuple[list[str], int]:
 
 
 def taught_lines(state: WizardState, subject: WriteSubject) -> list[str]:
-    """Return what the write does where a program goes, and what was found with the tool."""
+    """Return the effect of the write on programs, and what was found with the tool."""
     lines = [
         tr(
             "Stations found with tool {t}: {n} ({names}).",
@@ -111,7 +111,7 @@ def _at_points(impact: "Impact | None", proposal: Proposal) -> str:
 
 
 def _further(subject: WriteSubject) -> tuple[tuple[str, str], ...]:
-    """Return the keys that lead back to the touches."""
+    """Return the keys that return to the touches."""
     if subject.again is None:
         return ()
     again = ("/", tr("Touch {k} again", k=subject.again))
@@ -182,13 +182,13 @@ def _table(proposal: Proposal, *, short: bool) -> list[str]:
 
 
 def _changes(old: ToolOffset, new: ToolOffset) -> Iterator[float]:
-    """Yield by how much each component changes, mm and degrees."""
+    """Yield the change of each component, mm and degrees."""
     for number, (before, after) in enumerate(zip(old.components(), new.components(), strict=True)):
         yield after - before if number < _LENGTHS else angle_difference_deg(after, before)
 
 
 def stated_lines(proposal: Proposal) -> list[str]:
-    """Return what the new values are repeatable and accurate to, and what brings most."""
+    """Return the repeatability and accuracy of the new values, and the largest row."""
     from robolink.calibration import largest_row_sentence, statement_line
 
     line, accuracy = statement_line(proposal.result), proposal.result.accuracy

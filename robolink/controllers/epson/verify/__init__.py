@@ -1,4 +1,4 @@
-"""Finding out, without motion and without a write, what a controller really does."""
+"""Finds out, without motion and without a write, what a controller really does."""
 
 from robolink.controllers.epson.verify.line_probe import (
     AtTheLine,

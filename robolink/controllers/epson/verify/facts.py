@@ -1,4 +1,4 @@
-"""What the requests and their answers show. Legal at any time, production included.
+"""What the requests and their answers show. Allowed at any time, production included.
 
 What printed statements show. Each only prints; they need Execute.
 
@@ -35,7 +35,7 @@ def status_flags(interview: Interview) -> Fact:
 def case_echo(interview: Interview) -> Fact:
     """Whether an answer repeats the name as it was written (docs/reference/epson.md 1.1)."""
     echoed = interview.echo("getstatus")
-    same = tr("as it was written") if echoed == "getstatus" else tr("in a spelling of its own")
+    same = tr("as it was written") if echoed == "getstatus" else tr("in its own spelling")
     return Fact(tr("name in an answer"), same, evidence=f"$getstatus -> #{echoed}")
 
 
@@ -192,7 +192,7 @@ def where_width(interview: Interview) -> Fact:
 
 
 def base(interview: Interview) -> Fact:
-    """Where the base stands that positions count from (docs/reference/spel.md 5.4)."""
+    """Where the base is, from which positions count (docs/reference/spel.md 5.4)."""
 
     def read(text: str) -> tuple[str, OptionValue] | None:
         place = spel.parse_base(text)
@@ -252,7 +252,7 @@ def _layout(name: str, listing: str, tools: dict[int, ToolOffset]) -> Fact:
     ]
     if len(fits) == 1:
         return Fact(name, fits[0], "tool_listing", fits[0], first)
-    return Fact(name, tr("none that is known: {line!r}", line=first), "tool_listing")
+    return Fact(name, tr("none of the known forms: {line!r}", line=first), "tool_listing")
 
 
 def _wrap(name: str, tools: dict[int, ToolOffset]) -> Fact:
@@ -284,7 +284,7 @@ def _fact(
     except RemoteProtocolError:
         found = None
     if found is None:
-        return Fact(name, tr("neither of what is known: {text!r}", text=text), option)
+        return Fact(name, tr("not one of the known forms: {text!r}", text=text), option)
     finding, value = found
     return Fact(name, finding, option, value if option else None, repr(text))
 
@@ -334,7 +334,7 @@ def _nak_code(interview: Interview, dialect: Dialect) -> Fact:
         return Fact(name, tr("not seen: bit {bit} exists", bit=_NO_SUCH_BIT), "rs232_nak_code")
     evidence = f"GetIO {_NO_SUCH_BIT} -> {code}"
     if code not in _CODES:
-        finding = tr("makes no sense: say nak_code=digits in the URL")
+        finding = tr("is not possible: set nak_code=digits in the URL")
         return Fact(name, finding, "rs232_nak_code", evidence=evidence)
     return Fact(name, dialect.nak_code.value, "rs232_nak_code", dialect.nak_code.value, evidence)
 
@@ -353,7 +353,7 @@ def _abort(interview: Interview) -> Fact:
 
 def _not_asked() -> tuple[Fact, ...]:
     ports = tr("not tried: a wrong length is an error that cannot be told from others")
-    opening = tr("not seen: any answer to EOT is thrown away")
+    opening = tr("not seen: robolink discards any answer to EOT")
     return (
         Fact(tr("number of a port of words"), ports, "rs232_word_port_bytes"),
         Fact(tr("answer to EOT"), opening, "rs232_eot_answer"),

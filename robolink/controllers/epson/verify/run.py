@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 def not_tried() -> tuple[Fact, ...]:
-    """Return the facts that would need a motion, a write, an error or a long wait."""
+    """Return the facts that need a motion, a write, an error or a long wait."""
     error = tr("not tried: it would leave the controller in error")
     moving = tr("not tried: something would have to run and be stopped")
     minutes = tr("not tried: it takes minutes")
@@ -121,7 +121,7 @@ def _dialect_of(line: EpsonLine) -> "Dialect | None":
 
 
 def _with_every_letter(url: LinkUrl) -> LinkUrl:
-    """Let the letters be tried that no manual prints: of them only Abort, at rest."""
+    """Try letters that no manual prints: of them only Abort, at rest."""
     if url.medium != SERIAL:
         return url
     return replace(url, options={**url.options, "letters": "guessed"})

@@ -65,11 +65,11 @@ class Verification:
 
     @property
     def options(self) -> dict[str, OptionValue]:
-        """The simulator's options that this controller settled."""
+        """The simulator's options that this controller determined."""
         return {fact.option: fact.value for fact in self.facts if fact.value is not None}
 
     def profile(self, *, redact: bool = False) -> dict[str, object]:
-        """Return the cell profile as plain values; ``redact`` leaves out whose it is."""
+        """Return the cell profile as plain values; ``redact`` leaves out its identity."""
         models = self.about.robot_models
         return {
             "schema": PROFILE_SCHEMA,
@@ -208,13 +208,13 @@ class Interview:
         return None if too_early else reply.fields[0]
 
     def log_out(self) -> None:
-        """Log out where that does no harm, and close."""
+        """Log out if that is harmless, and close."""
         if may_log_out(self.controller.status()):
             self._session.exchange("Logout")
         self._session.close()
 
     def leave(self) -> bool | None:
-        """Log out and close; tell whether Logout was answered before its line end came.
+        """Log out and close; return whether Logout was answered before its line end came.
 
         Logout is the one request after which nothing can be mistaken any more. The line end
         follows in any case. Where it would do harm the connection is just closed, and ``None``

@@ -1,1 +1,1 @@
-"""The arm of a simulated EPSON robot: models, kinematics, speeds and the ways it goes."""
+"""The arm of a simulated EPSON robot: models, kinematics, speeds and paths."""

@@ -1,4 +1,4 @@
-"""A motion of a SCARA's tip on a way that is no straight line: Arc, Arc3, CVMove.
+"""A motion of a SCARA's tip on a path that is not straight: Arc, Arc3, CVMove.
 
 Which sense of an angle is positive, the reference's readable pages do not say: counter-clockwise
 seen from above here (assumed).
@@ -32,7 +32,7 @@ MeasuredWay = tuple[Way, float]
 
 @dataclass(frozen=True, slots=True)
 class WayLeg(RampedLeg):
-    """The tip on a way of its own; U runs evenly along it."""
+    """The tip on a path of its own; U runs evenly along it."""
 
     model: RobotModel
     start: Pose
@@ -51,7 +51,7 @@ class WayLeg(RampedLeg):
         return self._flange_after(self._share_at(elapsed_ns))
 
     def joints_after(self, share: float) -> Joints:
-        """Return the joints after a share of the way."""
+        """Return the joints after a share of the path."""
         return solve(self.model, self._flange_after(share), self.hand, self.posture)
 
     def _flange_after(self, share: float) -> Pose:
@@ -69,14 +69,14 @@ def plan_level_way(
     offset: ToolOffset | None,
     near: Joints,
 ) -> WayLeg:
-    """Plan a way of a SCARA's tip.
+    """Plan a path of a SCARA's tip.
 
     Args:
         model: The robot.
         ends: Where the tip is, and where it comes to.
         way: The way and its length in mm.
         pace: How fast it may be.
-        offset: The tool in force.
+        offset: The selected tool.
         near: The joints at the start.
 
     Raises:
@@ -109,7 +109,7 @@ def level_through(start: Pose, mid: Pose, end: Pose) -> MeasuredWay:
 
 
 def level_by_angle(start: Pose, end: Pose, angle_deg: float) -> MeasuredWay:
-    """Return the arc that turns by an angle on its way.
+    """Return the arc that turns by an angle along its path.
 
     Raises:
         Refusal: The angle is 0, or 360 degrees and more (both documented), or the ends coincide.

@@ -36,7 +36,7 @@ AT_DELIVERY: Final = tuple(Arch(10.0 * n, 10.0 * n) for n in range(3, 10))
 
 
 class ArchTable:
-    """Arches 0 to 6 of one robot; nothing puts them back (documented)."""
+    """Arches 0 to 6 of one robot; no reset changes them (documented)."""
 
     def __init__(self) -> None:
         self._arches = list(AT_DELIVERY)
@@ -72,7 +72,7 @@ class ArchTable:
         return [list(arch) for arch in self._arches]
 
     def restore(self, state: object) -> None:
-        """Take over what :meth:`to_state` returned.
+        """Restore what :meth:`to_state` returned.
 
         Raises:
             TypeError, ValueError: It is something else.
@@ -140,7 +140,7 @@ class ArchedLeg:
 
 
 def arched(gate: list[JointLeg], arch: Arch, *, looks: bool) -> list[ArchedLeg] | None:
-    """Return rise, way across and descent of a gate motion, rounded by an arch.
+    """Return rise, crossing and descent of a gate motion, rounded by an arch.
 
     Args:
         gate: The three legs of the gate motion.
@@ -170,7 +170,7 @@ def arched(gate: list[JointLeg], arch: Arch, *, looks: bool) -> list[ArchedLeg] 
 
 
 def _after(leg: JointLeg, share: float) -> int:
-    """Return when a leg of joint 3 alone has a share of its way behind it."""
+    """Return when a leg of joint 3 alone has covered a share of its path."""
     low_ns, high_ns = 0, leg.duration_ns
     begin_mm, way_mm = leg.start.j3_mm, leg.end.j3_mm - leg.start.j3_mm
     while high_ns - low_ns > 1:

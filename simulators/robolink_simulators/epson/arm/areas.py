@@ -1,4 +1,4 @@
-"""Boxes and planes about a robot: those whose approach is checked, and the one that holds it.
+"""Boxes and planes about a robot: those that are watched, and the one that limits it.
 
 Boxes and planes whose approach a controller checks (docs/reference/spel.md 5.5).
 
@@ -36,7 +36,7 @@ class CheckBox(NamedTuple):
     shows_on: bool = True
 
     def holds(self, place: Coordinates) -> bool:
-        """Tell whether a place, seen from its local, lies inside; its faces count (assumed)."""
+        """Return whether a place, seen from its local, lies inside; its faces count (assumed)."""
         checked = [(s, at) for s, at in zip(self.spans, place, strict=False) if s != _OFF]
         return bool(checked) and all(low <= at <= high for (low, high), at in checked)
 
@@ -47,7 +47,7 @@ class CheckPlane(NamedTuple):
     coordinates: Coordinates
 
     def holds(self, place: Coordinates) -> bool:
-        """Tell whether a place of the base lies on the +Z side, the plane itself too (assumed)."""
+        """Return whether a place of the base is on the +Z side or on the plane itself (assumed)."""
         x, y, z, u, v, w = self.coordinates
         back = Frame((x, y, z), zyx(u, v, w)).inverse()
         return back.point((place[0], place[1], place[2]))[2] >= 0
@@ -102,7 +102,7 @@ class AreaTable(Generic[_Area]):
         self._areas[number] = area
 
     def clear(self, number: int) -> None:
-        """Forget an area; one that is not defined is none after it, too.
+        """Remove an area; removing an undefined one is allowed.
 
         Raises:
             Refusal: There is no such number.
@@ -138,7 +138,7 @@ class CheckedAreas:
         return {"boxes": self.boxes.to_state(), "planes": self.planes.to_state()}
 
     def restore(self, state: object) -> None:
-        """Take over what :meth:`to_state` returned.
+        """Restore what :meth:`to_state` returned.
 
         Raises:
             KeyError, TypeError, ValueError: It is something else.
@@ -216,7 +216,7 @@ class XYLimits:
         return list(self.values)
 
     def restore(self, state: object) -> None:
-        """Take over what :meth:`to_state` returned.
+        """Restore what :meth:`to_state` returned.
 
         Raises:
             TypeError, ValueError: It is something else.

@@ -1,4 +1,4 @@
-"""The simulated arm: where it is at any instant, and what it was told to do.
+"""The simulated arm: where it is at any instant, and its commands.
 
 A motion is a row of legs whose end is known when it starts. Stopping freezes the arm where it
 is (assumed: a real one needs a few milliseconds to come to rest).
@@ -39,7 +39,7 @@ _Ways = tuple[float, ...]
 
 @dataclass(frozen=True, slots=True)
 class Travelled:
-    """A motion, or what there was of it until it was stopped or looked at.
+    """A motion, or its part until it was stopped or observed.
 
     Attributes:
         start_ns: When it began.
@@ -70,7 +70,7 @@ class _Travel:
         return self.ends_ns[-1] if self.ends_ns else self.start_ns
 
     def looks(self, since_ns: int, now_ns: int) -> list[int]:
-        """Return when to look at the joints so that each one's last way of turning is seen."""
+        """Return when to observe the joints so that each one's last direction is seen."""
         instants = {t for end in (*self.ends_ns, now_ns) for t in (end - _LOOK_BACK_NS, end)}
         return sorted(t for t in instants if since_ns < t <= now_ns)
 
@@ -111,7 +111,7 @@ class _Travel:
 
 
 def rest_of(model: RobotModel) -> Joints:
-    """Return where a new arm stands (assumed).
+    """Return where a new arm is (assumed).
 
     A SCARA is bent to the right, fully up, with U 0; six axes hold the tool straight down in front
     of the base, away from every singularity.
@@ -176,17 +176,17 @@ class Arm:
 
     @property
     def moving(self) -> bool:
-        """Whether a motion is under way."""
+        """Whether a motion is in progress."""
         return self._travel is not None
 
     @property
     def true_joints(self) -> Joints:
-        """Where the joints really are: commanded, less backlash and false zeros. No noise."""
+        """Where the joints really are: commanded, minus backlash and false zeros. No noise."""
         return self._trailing(self._joints, self._turned)
 
     @property
     def leg(self) -> Leg | None:
-        """The leg of the motion under way, ``None`` at rest."""
+        """The leg of the motion in progress, ``None`` at rest."""
         return None if self._travel is None else self._travel.leg_at(self._now_ns)
 
     def flange(self) -> Pose:
@@ -198,7 +198,7 @@ class Arm:
         return forward(self.model, self.true_joints)
 
     def true_flange_at(self, now_ns: int) -> Pose:
-        """Return where the flange will really be, or was, in the motion under way."""
+        """Return where the flange will really be, or was, in the motion in progress."""
         if self._travel is None:
             return self.true_flange()
         if not self.backlash_deg and not self.backlash_mm and not any(self.origin_errors):
@@ -219,7 +219,7 @@ class Arm:
     def real_position(
         self, rng: random.Random, noise_mm: float, model: RobotModel | None = None
     ) -> Pose:
-        """Return the flange pose as RealPos measures it; ``model`` has the arm in force.
+        """Return the flange pose as RealPos measures it; ``model`` has the present arm.
 
         Encoders sit before the play, so backlash does not show; X, Y and Z scatter with the
         standard deviation ``noise_mm`` (seen in a transcript: 2 um, docs/reference/epson.md 6,
@@ -253,7 +253,7 @@ class Arm:
         return posture_of(self.model, self._joints)
 
     def start(self, legs: Sequence[Leg], now_ns: int) -> int:
-        """Begin one motion made of ``legs`` and return the instant at which it ends."""
+        """Begin a motion made of ``legs`` and return the instant at which it ends."""
         self.halt(now_ns)
         legs = self.guard(legs)
         last = legs[-1]
@@ -281,15 +281,15 @@ class Arm:
 
     @property
     def under_way(self) -> Travelled | None:
-        """What has been travelled of the motion under way, ``None`` at rest."""
+        """The travelled part of the motion in progress, ``None`` at rest."""
         return None if self._travel is None else self._travel.until(self._now_ns)
 
     def next_change(self) -> int | None:
-        """Return when the motion under way ends, ``None`` at rest."""
+        """Return when the motion in progress ends, ``None`` at rest."""
         return None if self._travel is None else self._travel.end_ns
 
     def brake(self, now_ns: int) -> int:
-        """Come to rest with the motion's own deceleration; return when that is."""
+        """Stop with the motion's own deceleration; return when it has stopped."""
         if self._travel is None:
             return now_ns
         self._travel = self._travel.braked(now_ns)
@@ -317,7 +317,7 @@ class Arm:
         self._take_up(joints)
 
     def tell_elsewhere(self, joints: Joints) -> None:
-        """Take the arm, which stays where it is, for one that stands elsewhere.
+        """Treat the arm, which stays where it is, as if it were elsewhere.
 
         Raises:
             OutOfReach: A joint would stand outside its range.
@@ -330,7 +330,7 @@ class Arm:
         self._joints = joints
 
     def _ways(self, before: Joints, after: Joints) -> _Ways:
-        """Return which way each joint has turned last, having gone from one to the other."""
+        """Return in which direction each joint last turned, from one pose to the other."""
         changes = zip(before, after, self._turned, strict=True)
         return tuple(_sign(new - old) or way for old, new, way in changes)
 
@@ -351,7 +351,7 @@ def _unnoted(at_ns: int, flange_mm: Callable[[], Place]) -> None:
 
 
 def _whole(legs: Sequence[Leg]) -> Sequence[Leg]:
-    """Return the legs as they are: nothing stops the drives."""
+    """Return the legs unchanged: nothing stops the drives."""
     return legs
 
 

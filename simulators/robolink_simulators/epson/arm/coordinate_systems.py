@@ -1,4 +1,4 @@
-"""What coordinates count from: locals, the base, and added arms.
+"""The origins of coordinates: locals, the base, and added arms.
 
 Coordinates of SPEL+ and systems that they count from (docs/reference/spel.md 5.4).
 
@@ -44,7 +44,7 @@ class Local:
         return frame_at((self.x_mm, self.y_mm, self.z_mm, self.u_deg, self.v_deg, self.w_deg))
 
     def to_base(self, coordinates: Coordinates, *, tilting: bool) -> Coordinates:
-        """Express coordinates of this local in the base, of a robot that tilts its tool or not.
+        """Return coordinates of this local in the base, for a robot that tilts its tool or not.
 
         A local of two pairs is turned about Z alone: with BaseU its U is simply not added.
         """
@@ -56,7 +56,7 @@ class Local:
         return (self.x_mm + dx_mm, self.y_mm + dy_mm, self.z_mm + z, turned_deg, v, w)
 
     def from_base(self, coordinates: Coordinates, *, tilting: bool) -> Coordinates:
-        """Express base coordinates in this local; undoes :meth:`to_base`."""
+        """Return base coordinates in this local; undoes :meth:`to_base`."""
         if tilting and not self.base_u:
             return coordinates_of_frame(self.frame.inverse() @ frame_at(coordinates))
         x, y, z, u, v, w = coordinates
@@ -98,7 +98,7 @@ class RobotBase:
 
     @property
     def moved(self) -> bool:
-        """Whether it is another than the robot's own."""
+        """Whether it differs from the robot's own."""
         return any(self.coordinates)
 
     @property
@@ -107,7 +107,7 @@ class RobotBase:
         return max(abs(self._place.v_deg), abs(self._place.w_deg)) > _LEVEL_DEG
 
     def move(self, coordinates: Coordinates) -> bool:
-        """Put it elsewhere; tell whether that is another place.
+        """Move it elsewhere; return whether that is another place.
 
         Raises:
             Refusal: It would lean, and the robot does not tilt its tool.
@@ -140,7 +140,7 @@ class RobotBase:
         return list(self.coordinates)
 
     def restore(self, state: object) -> None:
-        """Take over what :meth:`to_state` returned.
+        """Restore what :meth:`to_state` returned.
 
         Raises:
             TypeError, ValueError: It is something else.
@@ -171,7 +171,7 @@ class AddedArms:
         self.selected = 0
 
     def is_defined(self, number: int) -> bool:
-        """Tell whether an arm is defined; arm 0 is.
+        """Return whether an arm is defined; arm 0 is.
 
         Raises:
             Refusal: There is no such number.
@@ -204,10 +204,10 @@ class AddedArms:
         self._added[number] = (*map(float, values), *self._own[len(values) :])
 
     def clear(self, number: int) -> None:
-        """Forget an added arm; one that is not defined is none after it, too.
+        """Remove an added arm; removing an undefined one is allowed.
 
         Raises:
-            Refusal: Arm 0, the arm in force, or no such number.
+            Refusal: Arm 0, the selected arm, or no such number.
         """
         self._require_added(number)
         if number == self.selected:
@@ -215,7 +215,7 @@ class AddedArms:
         self._added.pop(number, None)
 
     def select(self, number: int) -> None:
-        """Put an arm in force.
+        """Select an arm.
 
         Raises:
             Refusal: It is not defined, or there is no such number.
@@ -229,7 +229,7 @@ class AddedArms:
         return {**added, _SELECTED: self.selected}
 
     def restore(self, state: object) -> None:
-        """Take over what :meth:`to_state` returned.
+        """Restore what :meth:`to_state` returned.
 
         Raises:
             TypeError, ValueError: It is something else.

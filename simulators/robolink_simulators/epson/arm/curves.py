@@ -111,7 +111,7 @@ class CurveFiles:
         return dict(self._files)
 
     def restore(self, state: object) -> None:
-        """Take over what :meth:`to_state` returned.
+        """Restore what :meth:`to_state` returned.
 
         Raises:
             TypeError, ValueError: It is something else.
@@ -162,7 +162,7 @@ class SmoothWay:
         return tuple(a + (b - a) * part for a, b in ends)
 
     def along_itself(self) -> "SmoothWay":
-        """Return the same way with U turning as its direction in the plane does.
+        """Return the same path with U turning as its direction in the plane does.
 
         U begins at that of the first place (documented). Where the way stands still in the plane
         its direction stays (assumed).
@@ -260,7 +260,7 @@ class CurveLeg(WayLeg):
 
 
 def when(leg: RampedLeg, share: float) -> int:
-    """Return how many ns after the start of a leg a share of its way is behind."""
+    """Return how many ns after the start of a leg a share of its path is covered."""
     low_ns, high_ns = 0, leg.duration_ns
     while leg.ramp is not None and high_ns - low_ns > 1:
         middle_ns = (low_ns + high_ns) // 2
@@ -280,7 +280,7 @@ def plan_curve(
     offset: ToolOffset | None,
     near: Joints,
 ) -> CurveLeg:
-    """Plan a curve of a SCARA's tip from where it stands.
+    """Plan a curve of a SCARA's tip from where it is.
 
     Raises:
         OutOfReach: The curve leaves the envelope.
@@ -305,7 +305,7 @@ def plan_curve(
 
 @dataclass(frozen=True, slots=True)
 class SmoothCourse:
-    """The flange on a smooth way of the tip, or of a control point over the workpiece.
+    """The flange on a smooth path of the tip, or of a control point over the workpiece.
 
     Attributes:
         model: The robot.
@@ -324,7 +324,7 @@ class SmoothCourse:
     angle_deg: float
 
     def flange(self, share: float) -> Frame:
-        """Return the frame of the flange after a share of the way."""
+        """Return the frame of the flange after a share of the path."""
         x, y, z, *orientation = self.curve.at(share)
         rotation, shift = _rotation(orientation), (x, y, z)
         if self.point is not None:
@@ -335,7 +335,7 @@ class SmoothCourse:
 def smooth_course_through(
     model: RobotModel, tips: Sequence[Pose], *, point: Frame | None, closed: bool
 ) -> SmoothWay:
-    """Return the way through places of the tip; ``point`` as in :class:`SmoothCourse`.
+    """Return the path through places of the tip; ``point`` as in :class:`SmoothCourse`.
 
     Raises:
         Refusal: Two neighbours are one place, of the tip or of the point over the workpiece.
@@ -357,7 +357,7 @@ def plan_turned_curve(
     near: Joints,
     avoiding: SingularSurroundings | None,
 ) -> TiltedLeg:
-    """Plan the way from where the tip stands; the other arguments are those of ``plan_line``.
+    """Plan the path from where the tip is; the other arguments are those of ``plan_line``.
 
     Raises:
         Refusal: It leaves the envelope, or a joint would be too fast.

@@ -1,4 +1,4 @@
-"""What is set of a robot's drives and joints: settings, zeros and ranges.
+"""The settings of a robot's drives and joints: settings, zeros and ranges.
 
 Settings of a robot's drives: what each may be, and what puts it back.
 
@@ -22,7 +22,7 @@ from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 
 
 class RestoredAt(Enum):
-    """What puts a setting back; start-up puts each back."""
+    """The occasions that reset a setting; start-up resets each."""
 
     FIVE = "Motor On, SFree, SLock, Reset, the end of tasks"
     DRIVES = "Motor On, SFree, SLock"
@@ -105,11 +105,11 @@ class DriveSettings:
         return self._values[word]
 
     def is_on(self, word: str) -> bool:
-        """Tell whether a switch is on."""
+        """Return whether a switch is on."""
         return bool(self._values[word][0])
 
     def takes(self, word: str) -> tuple[int, ...]:
-        """Return how many values a setting may be given."""
+        """Return how many values a setting may have."""
         return _counts(self._axes, DRIVE_SETTINGS[word])
 
     def set(self, word: str, values: tuple[float, ...]) -> None:
@@ -118,7 +118,7 @@ class DriveSettings:
         self._values[word] = values if len(values) == count else values * count
 
     def put_back(self, *occasions: RestoredAt) -> None:
-        """Put back what some occasions put back."""
+        """Reset what some occasions reset."""
         for occasion in occasions:
             self._values.update(_usual_at(self._axes, occasion))
 
@@ -129,7 +129,7 @@ def _counts(axes: int, setting: DriveSetting) -> tuple[int, ...]:
 
 @lru_cache(maxsize=32)
 def _usual_at(axes: int, occasion: RestoredAt) -> Mapping[str, tuple[float, ...]]:
-    """Return what an occasion puts back on a robot of so many joints; robots share it."""
+    """Return what an occasion resets on a robot of so many joints; robots share it."""
     return {
         word: (setting.usual,) * _counts(axes, setting)[0]
         for word, setting in DRIVE_SETTINGS.items()
@@ -172,7 +172,7 @@ class JointOrigins:
 
     @property
     def errors(self) -> tuple[float, ...]:
-        """How far each joint really stands from where the controller says, in degrees or mm."""
+        """How far each joint really is from where the controller shows it, in degrees or mm."""
         joints = zip(self.offsets, self._scales, strict=True)
         return tuple(-offset / scale for offset, scale in joints)
 
@@ -182,7 +182,7 @@ class JointOrigins:
         return {"offsets": list(self.offsets), "reference": reference, "order": list(self.order)}
 
     def restore(self, state: object) -> None:
-        """Take over what :meth:`to_state` returned.
+        """Restore what :meth:`to_state` returned.
 
         Raises:
             KeyError, TypeError, ValueError: It is something else.
@@ -251,7 +251,7 @@ class JointRanges:
         return [list(ends) for ends in self.ends]
 
     def restore(self, state: object) -> None:
-        """Take over what :meth:`to_state` returned.
+        """Restore what :meth:`to_state` returned.
 
         Raises:
             TypeError, ValueError: It is something else.

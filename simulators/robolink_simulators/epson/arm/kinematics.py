@@ -136,7 +136,7 @@ def forward(model: RobotModel, joints: Joints) -> Pose:
 
 
 def hand_of(model: RobotModel, joints: Joints) -> Hand:
-    """Return the hand of an arm that stands so."""
+    """Return the hand of an arm in these joints."""
     return six_axes.hand_of(model, joints) if model.six_axes else _scara_hand(model, joints)
 
 
@@ -178,7 +178,7 @@ def inverse(model: RobotModel, flange: Pose, hand: Hand, posture: Posture | None
 
 
 def continued(model: RobotModel, flange: Pose, near: Joints) -> Joints:
-    """Return the joints for a flange pose that go on from where the joints are.
+    """Return the joints for a flange pose that continue from the present joints.
 
     Hand, elbow and wrist stay; each joint of six axes takes its nearest turn.
 
@@ -256,7 +256,7 @@ def tip_of(model: RobotModel, flange: Pose, offset: ToolOffset | None, *, tool: 
 
 
 def tip_place(model: RobotModel, flange: Pose, offset: ToolOffset | None) -> Vector:
-    """Return where a tool's tip is, in mm: all that a search asks in each millisecond."""
+    """Return where a tool's tip is, in mm: all that a search needs in each millisecond."""
     if offset is None:
         return (flange.x_mm, flange.y_mm, flange.z_mm)
     if model.six_axes:

@@ -1,4 +1,4 @@
-"""Speeds, accelerations and LimZ, their defaults and what low power makes of them."""
+"""Speeds, accelerations and LimZ, their defaults and their values in low power."""
 
 from dataclasses import dataclass
 from enum import IntEnum

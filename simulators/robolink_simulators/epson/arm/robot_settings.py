@@ -1,4 +1,4 @@
-"""What a robot is told about its load, its arm and its joints.
+"""A robot's settings for its load, its arm and its joints.
 
 Source: docs/reference/spel.md 6.2, 6.3, 7.2.
 """
@@ -29,7 +29,7 @@ class SingularSurroundings:
 
 @dataclass(slots=True)
 class RobotSettings:
-    """Settings without a bearing on where the robot goes, but for the last four.
+    """Settings that do not affect where the robot goes, except for the last four.
 
     The defaults of Weight and Inertia are per model; these are assumed. Which statement resets
     which of them is documented (docs/reference/spel.md 6.3).
@@ -64,7 +64,7 @@ class RobotSettings:
 
     @property
     def avoided(self) -> SingularSurroundings | None:
-        """Return what a straight way keeps clear of, ``None`` where it does not."""
+        """Return what a straight movement keeps clear of, ``None`` for nothing."""
         return self.surroundings if self.avoid_singularity else None
 
     @classmethod

@@ -56,7 +56,7 @@ class Range(NamedTuple):
     high: float
 
     def holds(self, value: float) -> bool:
-        """Tell whether ``value`` lies inside; 1e-9 absorbs the arithmetic of a round trip."""
+        """Return whether ``value`` lies inside; 1e-9 absorbs the arithmetic of a round trip."""
         return self.low - 1e-9 <= value <= self.high + 1e-9
 
 
@@ -116,7 +116,7 @@ class RobotModel:
 
     @property
     def narrow_below(self) -> tuple[float, float] | None:
-        """Below which height in mm joint 2 is held to how many degrees, ``None`` for nowhere."""
+        """Below which height in mm joint 2 is limited to how many degrees, ``None`` for nowhere."""
         return _NARROW_BELOW.get(self.name)
 
     @property
@@ -157,7 +157,7 @@ class RobotModel:
         return (a2_mm, 0.0, 0.0, a1_mm, 0.0)
 
     def with_arm(self, values: Sequence[float]) -> "RobotModel":
-        """Return a SCARA as it moves with an added arm in force; ``values`` as ArmSet takes them.
+        """Return a SCARA as it moves with an added arm selected; ``values`` as ArmSet takes them.
 
         The lengths count from the axis of joint 2 and from that of joint 1 (documented).
         """
@@ -265,7 +265,7 @@ def check_ranges(model: RobotModel, joints: Joints) -> None:
 
 
 def check_depth(model: RobotModel, joints: Joints) -> None:
-    """Refuse to go where a model holds its joint 2 to less, the shaft being low.
+    """Refuse targets where a model limits its joint 2 more, because the shaft is low.
 
     Raises:
         OutOfReach: Names the joint and the range there.
@@ -281,7 +281,7 @@ def check_depth(model: RobotModel, joints: Joints) -> None:
 
 
 def within(low: float, high: float, angle_deg: float) -> float:
-    """Return the angle, whole turns away, that lies next to the middle of a range."""
+    """Return the angle, whole turns away, nearest to the middle of a range."""
     middle = (low + high) / 2
     turned = (angle_deg - middle) % 360.0
     return middle + (turned - 360.0 if turned > 180.0 else turned)
@@ -294,5 +294,5 @@ def wrapped(angle_deg: float) -> float:
 
 
 def nearest_turn(angle_deg: float, near_deg: float) -> float:
-    """Return the angle, whole turns away, that is nearest to another."""
+    """Return the angle, whole turns away, nearest to another."""
     return angle_deg + 360.0 * round((near_deg - angle_deg) / 360.0)

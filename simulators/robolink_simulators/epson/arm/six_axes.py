@@ -214,7 +214,7 @@ def _branch_of(model: RobotModel, joints: Joints) -> _Branch:
 
 
 def _flags_joint_1(model: RobotModel) -> bool:
-    """Tell whether joint 1 goes beyond half a turn: C8 and C12 only (documented)."""
+    """Return whether joint 1 goes beyond half a turn: C8 and C12 only (documented)."""
     return model.ranges[0].high > FIRST_TURN_DEG + 1
 
 

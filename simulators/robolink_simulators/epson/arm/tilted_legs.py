@@ -56,7 +56,7 @@ _MOST_CHECKS = 2000
 
 
 class TiltedCourse(Protocol):
-    """Where the flange goes, by the share of its way.
+    """Where the flange goes, by the share of its path.
 
     Attributes:
         model: The robot.
@@ -72,13 +72,13 @@ class TiltedCourse(Protocol):
     def angle_deg(self) -> float: ...  # noqa: D102
 
     def flange(self, share: float) -> Frame:
-        """Return the frame of the flange after a share of the way."""
+        """Return the frame of the flange after a share of the path."""
         ...
 
 
 @dataclass(frozen=True, slots=True)
 class _Course:
-    """The tip's way and the turn of the tool along it, for the flange that carries it."""
+    """The tip's path and the turn of the tool along it, for the flange that carries it."""
 
     model: RobotModel
     way: Way
@@ -89,14 +89,14 @@ class _Course:
     to_flange: Frame
 
     def flange(self, share: float) -> Frame:
-        """Return the frame of the flange after a share of the way."""
+        """Return the frame of the flange after a share of the path."""
         turn = about(self.axis, self.angle_deg * share)
         return Frame(self.way(share), product(turn, self.start)) @ self.to_flange
 
 
 @dataclass(frozen=True, slots=True)
 class _HeldCourse:
-    """The way of an external control point, as a held workpiece sees it.
+    """The path of an external control point, as a held workpiece sees it.
 
     The tip goes otherwise then. That the orientation of the point runs evenly is assumed.
     """
@@ -111,7 +111,7 @@ class _HeldCourse:
     to_flange: Frame
 
     def flange(self, share: float) -> Frame:
-        """Return the frame of the flange after a share of the way."""
+        """Return the frame of the flange after a share of the path."""
         turn = about(self.axis, self.angle_deg * share)
         seen = Frame(self.way(share), product(turn, self.start))
         return self.point @ seen.inverse() @ self.to_flange
@@ -169,7 +169,7 @@ def plan_line(
         model: The robot.
         ends: Where the tip is and where it goes.
         pace: How fast it may be.
-        offset: The tool in force.
+        offset: The selected tool.
         near: The joints at the start.
         avoiding: The surroundings of singular places that are left; ``None`` for staying.
 
@@ -205,7 +205,7 @@ def plan_about_point(
         pace: How fast the point may be on the workpiece.
         point: The external control point, in the base.
         way: Its way as the tip sees it, and the length; ``None`` for a straight one.
-        offset: The tool in force.
+        offset: The selected tool.
         near: The joints at the start.
         avoiding: The surroundings of singular places that are left; ``None`` for staying.
 
@@ -239,7 +239,7 @@ def _turn(model: RobotModel, ends: tuple[Pose, ...], turn: Matrix) -> tuple[Vect
 
 
 def carried_by(model: RobotModel, offset: ToolOffset | None) -> Frame:
-    """Return the frame of a tool on the flange; a SCARA takes up no V and W."""
+    """Return the frame of a tool on the flange; a SCARA ignores V and W."""
     if offset is None or model.six_axes:
         return tool_frame(offset)
     return tool_frame(replace(offset, v_deg=0.0, w_deg=0.0))
@@ -255,7 +255,7 @@ def plan_way(
     near: Joints,
     avoiding: SingularSurroundings | None = _USUAL,
 ) -> Leg:
-    """Plan a way of the tip between where it is and where it comes to.
+    """Plan a path of the tip from where it is to its target.
 
     The orientation runs evenly, that of places between the ends does not count (documented,
     docs/reference/spel.md 7.1). ``way`` is the way and its length in mm; the other arguments are
@@ -274,7 +274,7 @@ def plan_way(
 
 
 def require_same_posture(model: RobotModel, near: Joints, end: Pose) -> None:
-    """Refuse a place on the way for which hand, elbow or wrist would have to change.
+    """Refuse a place on the path for which hand, elbow or wrist would have to change.
 
     Raises:
         Refusal: It has others than the arm.
@@ -347,7 +347,7 @@ def _from_joint_to_joint(first: Joints, last: Joints, steps: int) -> list[Joints
 
 
 def _fastest(model: RobotModel, knots: list[Joints]) -> float:
-    """Return how much of the way a second may hold, for the joint that is hardest pressed."""
+    """Return how much of the path a second may cover, for the most limiting joint."""
     steps = len(knots) - 1
     hardest = max(
         abs(b - a) / top

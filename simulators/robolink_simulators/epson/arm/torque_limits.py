@@ -1,4 +1,4 @@
-"""Limits of the torque, and what ends a motion because of them.
+"""Limits of the torque, and the end of a motion because of them.
 
 What ends a motion because of its torque: torque control, LimitTorqueStop, CollisionDetect.
 
@@ -50,7 +50,7 @@ class TorqueLimit:
 
 @dataclass(frozen=True, slots=True)
 class CutLeg:
-    """A leg that ends before its way does, at once (assumed)."""
+    """A leg that ends at once, before its path does (assumed)."""
 
     leg: Leg
     duration_ns: int
@@ -70,7 +70,7 @@ class CutLeg:
 
 
 class DriveGuard:
-    """Stops the motions of one robot where a drive would push too hard.
+    """Stops the motions of one robot if a drive would push too hard.
 
     Args:
         observer: What estimates the torques.
@@ -88,11 +88,11 @@ class DriveGuard:
         self._observer, self._limits = observer, limits
 
     def ended(self, *, complete: bool) -> None:
-        """Take note that the motion is over, where it was to end or before."""
+        """Note that the motion is over, at its end or before."""
         self._come, self.coming = self.coming if complete else None, None
 
     def require_no_error(self) -> None:
-        """Tell of the error in which the last motion ended, once.
+        """Report once the error that ended the last motion.
 
         Raises:
             Refusal: That error.
@@ -118,7 +118,7 @@ class DriveGuard:
         return legs
 
     def _allowed(self, limit: TorqueLimit, leg: Leg) -> TorqueLimit:
-        """Return a limit without what the drives push with already when the motion begins."""
+        """Return a limit without the drives' torque at the start of the motion."""
         held = self._shares(limit, motion_at(lambda _: leg.joints_at(0), 0, 0))
         pairs = zip(limit.shares, held, strict=True)
         shares = tuple(None if s is None else max(s, abs(h) * _HARDER) for s, h in pairs)
@@ -164,7 +164,7 @@ controller compares speeds (documented)."""
 
 
 class TorqueLimits:
-    """The limits of one robot, as shares of what its drives give for a moment.
+    """The limits of one robot, as shares of its drives' momentary torque.
 
     Args:
         drives: Tells its settings.

@@ -1,4 +1,4 @@
-"""Torques and speeds of a robot's joints: an estimate of them, and what is measured of it.
+"""Estimated torques and speeds of a robot's joints, and their measured values.
 
 An estimate of the torques of a robot's drives: the simulator's own, not EPSON's.
 
@@ -49,7 +49,7 @@ _MM_PER_M: Final = 1000.0
 
 @dataclass(frozen=True, slots=True)
 class CarriedLoad:
-    """What Weight and Inertia say: kg, and kg m2 about the last joint."""
+    """The load by Weight and Inertia: kg, and kg m2 about the last joint."""
 
     weight_kg: float
     inertia_kg_m2: float
@@ -68,7 +68,7 @@ class JointMotion:
 def torques(
     model: RobotModel, load: CarriedLoad, motion: JointMotion, resistance_n: Vector
 ) -> tuple[float, ...]:
-    """Return the torque of each joint as a share of what its drive can give for a moment.
+    """Return the torque of each joint as a share of its drive's momentary torque.
 
     Args:
         model: The robot.
@@ -95,7 +95,7 @@ def speeds(model: RobotModel, motion: JointMotion) -> tuple[float, ...]:
 
 @lru_cache(maxsize=64)
 def momentary(model: RobotModel) -> tuple[float, ...]:
-    """Return the most that each drive gives for a moment: N m, or N for a linear joint."""
+    """Return the momentary torque of each drive: N m, or N for a linear joint."""
     mass_kg, found = model.payload_kg + OWN_KG, list[float]()
     for index, lever_m in enumerate(_levers_m(model)):
         if index + 1 in model.linear_joints:
@@ -175,7 +175,7 @@ _LATE: Final = {
 
 @dataclass(slots=True)
 class _Measured:
-    """What there was of one joint since its clearing; ``sums`` is of values or squares, times s."""
+    """Measurements of one joint since its clearing; ``sums`` is of values or squares, times s."""
 
     since_ns: int
     sums: float = 0.0
@@ -216,7 +216,7 @@ class DriveObserver:
         self._last.clear()
 
     def clear(self, quantity: DriveQuantity, joints: Iterable[int]) -> None:
-        """Begin to measure a quantity of some joints, by their numbers."""
+        """Start to measure a quantity of some joints, by their numbers."""
         self._catch_up()
         of_joints = self._measured.setdefault(quantity, {})
         for joint in joints:
@@ -244,13 +244,13 @@ class DriveObserver:
         return math.sqrt(mean) if quantity is DriveQuantity.MEAN_TORQUE else mean
 
     def present(self, joint: int) -> float:
-        """Return the torque of a joint now, as a share of the highest that is allowed."""
+        """Return the present torque of a joint, as a share of the highest allowed."""
         under_way, now_ns = self._arm.under_way, self._arm.now_ns
         motion = self._motion(under_way, now_ns)
         return _within_limits(self.torques(motion), self._limits())[joint - 1]
 
     def overload(self, joint: int) -> float:
-        """Return the mean square of a joint's torque over the last minute, 1 for what it bears."""
+        """Return the mean square of a joint's torque over the last minute, 1 for the rated one."""
         now_ns, found = self._arm.now_ns, 0.0
         began_ns = max(0, now_ns - MEAN_FOR_S * NS_PER_S)
         moved_ns = 0
@@ -267,11 +267,11 @@ class DriveObserver:
         return found / (MEAN_FOR_S * NS_PER_S) / _LASTING
 
     def torques(self, motion: JointMotion) -> tuple[float, ...]:
-        """Return the torques of a motion at an instant, as shares of what the drives can give."""
+        """Return the torques of a motion at an instant, as shares of the momentary torque."""
         return torques(self._arm.model, self._load(), motion, self.resistance_n(motion.now))
 
     def pressing(self, joints: Joints) -> tuple[float, ...]:
-        """Return the torques with which the drives push against a thing in the way, as shares."""
+        """Return the torques with which the drives push against an obstacle, as shares."""
         force_n = self.resistance_n(joints)
         if force_n == NO_FORCE:
             return (0.0,) * self._arm.model.axes
@@ -282,7 +282,7 @@ class DriveObserver:
         return tuple(a - b for a, b in zip(pushed, free, strict=True))
 
     def take(self, travelled: Travelled) -> None:
-        """Take note of a motion that is over."""
+        """Note a motion that is over."""
         self._last.append(travelled)
         if self._measured:
             self._rest_until(travelled.start_ns)
@@ -335,7 +335,7 @@ class DriveObserver:
 
 
 def motion_at(joints_at: Callable[[int], Joints], at_ns: int, start_ns: int) -> JointMotion:
-    """Return the motion about an instant, from a function that tells the joints."""
+    """Return the motion about an instant, from a function that gives the joints."""
     middle_ns = max(at_ns, start_ns + _STEP_NS)
     before, now, after = (joints_at(middle_ns + step) for step in (-_STEP_NS, 0, _STEP_NS))
     return JointMotion(before, now, after, _STEP_NS / NS_PER_S)
@@ -348,6 +348,6 @@ def _looks(start_ns: int, end_ns: int, count: int) -> list[tuple[int, float]]:
 
 
 def _within_limits(shares: tuple[float, ...], limits: tuple[float, ...]) -> tuple[float, ...]:
-    """Return torques as shares of the highest that are allowed; none gives more (documented)."""
+    """Return torques as shares of the highest allowed; none gives more (documented)."""
     pairs = zip(shares, limits, strict=True)
     return tuple(max(-1.0, min(1.0, share / limit)) for share, limit in pairs)

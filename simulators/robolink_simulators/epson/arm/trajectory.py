@@ -64,14 +64,14 @@ class Ramp:
 
 @dataclass(frozen=True, slots=True)
 class BrakedRamp:
-    """A ramp that is left after ``at_s`` to come to rest with its own deceleration."""
+    """A ramp that is interrupted after ``at_s`` and stops with its own deceleration."""
 
     ramp: Ramp
     at_s: float
 
     @property
     def duration_s(self) -> float:
-        """How long it takes to come to rest, from the start of the path."""
+        """How long it takes to stop, from the start of the path."""
         return self.at_s + self._braking_s
 
     def share_at(self, time_s: float) -> float:
@@ -141,7 +141,7 @@ class Leg(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class RampedLeg:
-    """What the legs share that one time law leads along their way.
+    """What legs share that follow one time law along their path.
 
     Attributes:
         ramp: How the share of the way grows with time, ``None`` for a leg that stays.
@@ -278,7 +278,7 @@ def plan_move(
     offset: ToolOffset | None,
     near: Joints,
 ) -> LineLeg:
-    """Plan a straight leg of a SCARA's tip between two tip poses; ``near`` is where it stands.
+    """Plan a straight leg of a SCARA's tip between two tip poses; ``near`` is where it is.
 
     The whole line is checked before anything moves (assumed: a real controller may notice a
     line that leaves the envelope only on the way).

@@ -1,1 +1,1 @@
-"""What a simulated EPSON controller remembers: tools, points, bits, variables, flash."""
+"""The memory of a simulated EPSON controller: tools, points, bits, variables, flash."""

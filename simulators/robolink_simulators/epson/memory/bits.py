@@ -32,7 +32,7 @@ WORD: Final = 16
 
 
 class IOLabel(NamedTuple):
-    """What a name stands for that a project gives inputs, outputs or memory bits.
+    """The meaning of a project's name for inputs, outputs or memory bits.
 
     Attributes:
         kind: Input, output or memory (IOTYPE_INPUT, IOTYPE_OUTPUT, IOTYPE_MEMORY).
@@ -152,16 +152,16 @@ class TimedBits:
         self._planned: list[tuple[int, BitBank, int, bool]] = []
 
     def plan(self, at_ns: int, bank: BitBank, number: int, on: bool) -> None:
-        """Switch a bit later; what was planned for it before is forgotten (assumed)."""
+        """Switch a bit later; its earlier plan is dropped (assumed)."""
         self.forget(bank, number)
         self._planned.append((at_ns, bank, number, on))
 
     def forget(self, bank: BitBank, number: int) -> None:
-        """Plan nothing for a bit any more: somebody has switched it."""
+        """Drop the plan for a bit: somebody has switched it."""
         self._planned = [p for p in self._planned if p[1] is not bank or p[2] != number]
 
     def clear(self) -> None:
-        """Plan nothing any more."""
+        """Drop all plans."""
         self._planned.clear()
 
     def next_change(self) -> int | None:

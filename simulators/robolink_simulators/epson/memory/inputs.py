@@ -63,11 +63,11 @@ class InputBits(BitBank):
 
     @property
     def instant_ns(self) -> int | None:
-        """The instant that is looked at inside :meth:`as_at`, ``None`` for the present."""
+        """The instant that is observed inside :meth:`as_at`, ``None`` for the present."""
         return self._instant_ns
 
     def follows(self, number: int) -> bool:
-        """Tell whether an input follows what the robot meets."""
+        """Return whether an input follows what the robot meets."""
         return number in self._senses
 
     def connect(self, number: int, sense: Sense) -> None:
@@ -88,7 +88,7 @@ class InputBits(BitBank):
         return on
 
     def set(self, number: int, on: bool) -> None:
-        """Switch one bit by hand; what it was connected to is taken off."""
+        """Switch one bit by hand; this disconnects it."""
         rises = on and not super().get(number)
         super().set(number, on)
         self._senses.pop(number, None)
@@ -106,7 +106,7 @@ class InputBits(BitBank):
             self.set(8 * port + bit, bool(value >> bit & 1))
 
     def count_from_zero(self, number: int) -> None:
-        """Let an input be counted from now on (CTReset): up to 16 inputs at a time.
+        """Count an input from now on (CTReset): up to 16 inputs at a time.
 
         Raises:
             Refusal: There is no such input, 16 others are counted, or it follows what the robot
@@ -126,7 +126,7 @@ class InputBits(BitBank):
 
     @contextmanager
     def as_at(self, instant_ns: int) -> Iterator[None]:
-        """Read inputs inside the block as they are at an instant of the motion under way."""
+        """Read inputs inside the block as they are at an instant of the motion in progress."""
         self._instant_ns = instant_ns
         try:
             yield
@@ -134,7 +134,7 @@ class InputBits(BitBank):
             self._instant_ns = None
 
     def show(self, asked: InputsAsked, instant_ns: int) -> bool:
-        """Tell whether inputs show at an instant of the motion under way what they showed."""
+        """Return whether inputs show at an instant of the motion in progress what they showed."""
         # Without a block, of which a search would enter one for each millisecond.
         before_ns, self._instant_ns = self._instant_ns, instant_ns
         try:
@@ -153,7 +153,7 @@ class InputBits(BitBank):
 
 
 def first_between(before_ns: int, after_ns: int, holds: Callable[[int], bool]) -> int:
-    """Return the first instant at which something holds, to the nanosecond."""
+    """Return the first instant at which a condition is true, to the nanosecond."""
     while after_ns - before_ns > 1:
         middle_ns = (before_ns + after_ns) // 2
         if holds(middle_ns):
@@ -209,7 +209,7 @@ class TipInput:
         self._shake = Shake(noise_mm, rng)
 
     def __call__(self, instant_ns: int | None) -> bool:
-        """Tell whether the input is on at an instant of the motion, ``None`` for now."""
+        """Return whether the input is on at an instant of the motion, ``None`` for now."""
         arm, nozzle = self._arm, self._nozzle()
         if instant_ns is None:
             flange = arm.true_flange()
@@ -229,7 +229,7 @@ class TipInput:
 
 
 def _way(model: RobotModel, flange: Pose, tip: ToolOffset | None, lean: Lean) -> Direction:
-    """Return which way a shaft goes that leans, in base axes.
+    """Return the direction of a leaning shaft, in base axes.
 
     A SCARA's flange looks up with its Z axis, so the shaft goes along it, less its lean; six axes
     look out of the flange, and the shaft comes back along the tool's own Z.
@@ -266,7 +266,7 @@ class LatchSetting(NamedTuple):
 
 
 class PositionLatch:
-    """Takes the joints of an arm at edges of an input.
+    """Stores the joints of an arm at edges of an input.
 
     Args:
         arm: Whose joints.
@@ -291,7 +291,7 @@ class PositionLatch:
 
     @property
     def complete(self) -> bool:
-        """Whether as many positions are taken as were asked for (LatchState)."""
+        """Whether the requested number of positions is stored (LatchState)."""
         return self._setting is not None and len(self.taken) >= self._setting.times
 
     def set(self, port: int, *, rising: bool, times: int) -> None:
@@ -307,7 +307,7 @@ class PositionLatch:
         self._setting = LatchSetting(port, rising, times)
 
     def enable(self, on: bool) -> None:
-        """Begin to look out, with no position taken, or cease; what was taken is kept (assumed).
+        """Start to watch, with no position stored, or stop; stored positions stay (assumed).
 
         Raises:
             Refusal: It was not said for what (documented that SetLatch comes before it).

@@ -91,7 +91,7 @@ class LocalTable:
         self._locals: dict[int, Local] = {0: Local()}
 
     def defined(self, number: int) -> bool:
-        """Tell whether a local is defined (LocalDef)."""
+        """Return whether a local is defined (LocalDef)."""
         return number in self._locals
 
     def get(self, number: int) -> Local:
@@ -115,7 +115,7 @@ class LocalTable:
         self._locals[number] = local
 
     def clear(self, number: int) -> None:
-        """Forget local 1 to 15; one that is not defined may be forgotten.
+        """Remove local 1 to 15; removing an undefined one is allowed.
 
         Raises:
             Refusal: There is no such local to forget.
@@ -131,7 +131,7 @@ class LocalTable:
         self._locals = {0: Local()}
 
     def to_base(self, point: Point) -> Point:
-        """Express a point in the base frame."""
+        """Return a point in the base frame."""
         local = self.get(point.local)
         if point.local == 0:
             return point
@@ -139,7 +139,7 @@ class LocalTable:
         return replace(point, coordinates=coordinates, local=0)
 
     def convert(self, point: Point, number: int) -> Point:
-        """Express a point in another local (the modifier ``@n``, docs/reference/spel.md 5.2)."""
+        """Return a point in another local (the modifier ``@n``, docs/reference/spel.md 5.2)."""
         if number == point.local:
             return point
         base, local = self.to_base(point), self.get(number)
@@ -167,11 +167,11 @@ class PointTable:
         self._descriptions[number] = text
 
     def description(self, number: int) -> str:
-        """Return the description of a point, nothing where it has none."""
+        """Return the description of a point, empty without one."""
         return self._descriptions.get(number, "")
 
     def label(self, number: int, name: str) -> None:
-        """Give a point a name; where it was the name of another point, it is moved."""
+        """Give a point a name; another point loses that name."""
         self.defined(number)
         self._labels[name.lower()] = number
 
@@ -200,7 +200,7 @@ class PointTable:
         return self._points[number]
 
     def defined(self, number: int) -> bool:
-        """Tell whether a point is stored.
+        """Return whether a point is stored.
 
         Raises:
             Refusal: The number does not exist.
@@ -239,7 +239,7 @@ HIGHEST_CONTROL_POINT: Final = 15
 
 
 class ControlPoints:
-    """Control points 1 to 15 of one robot, and the one in force; a power cycle selects none.
+    """Control points 1 to 15 of one robot, and the selected one; a power cycle selects none.
 
     Attributes:
         selected: Number of the one in force, 0 for none.
@@ -250,7 +250,7 @@ class ControlPoints:
         self._places: dict[int, Coordinates] = {}
 
     def defined(self, number: int) -> bool:
-        """Tell whether one is defined.
+        """Return whether one is defined.
 
         Raises:
             Refusal: There is no such number.
@@ -294,7 +294,7 @@ class ControlPoints:
         self._places.pop(number, None)
 
     def select(self, number: int) -> None:
-        """Put one in force, 0 for none.
+        """Select one, 0 for none.
 
         Raises:
             Refusal: It is not defined.
@@ -405,5 +405,5 @@ class PalletTable:
         self._pallets[number] = Pallet(tuple(corners), columns, rows, outside)
 
     def clear(self, number: int) -> None:
-        """Forget a pallet; one that is not defined may be forgotten."""
+        """Remove a pallet; removing an undefined one is allowed."""
         self._pallets.pop(number, None)

@@ -1,4 +1,4 @@
-"""One robot of a controller: its arm, and what the controller keeps for it alone."""
+"""One robot of a controller: its arm, and what the controller stores for it alone."""
 
 import random
 from collections.abc import Mapping, Sequence
@@ -48,7 +48,7 @@ from robolink_simulators.epson.memory.tools import ToolMemory
 
 
 class KeptDefinitions:
-    """What one robot is told once and keeps over a power cycle, but for its tools.
+    """What one robot retains over a power cycle, except for its tools.
 
     Args:
         own_arm: The values of arm 0, as ArmSet lists them.
@@ -84,7 +84,7 @@ class KeptDefinitions:
         return {name: getattr(self, name).to_state() for name in _KEPT}
 
     def restore(self, state: Mapping[str, object]) -> None:
-        """Take over what :meth:`to_state` returned.
+        """Restore what :meth:`to_state` returned.
 
         Raises:
             KeyError, TypeError, ValueError: It is something else.
@@ -105,11 +105,11 @@ class ReservedMotion(Protocol):
 
     @property
     def stands(self) -> bool:
-        """Whether whoever gave it still waits for it."""
+        """Whether its giver still waits for it."""
         ...
 
     def start_reserved(self, now_ns: int) -> None:
-        """Begin it at an instant, with its robot in force."""
+        """Begin it at an instant, with its robot current."""
         ...
 
 
@@ -124,7 +124,7 @@ class DrivenRobot:
 
     Attributes:
         arm: The arm in simulated time.
-        tools: Tool definitions and the tool in force.
+        tools: Tool definitions and the selected tool.
         points: P0 to P999.
         locals: Local coordinate systems.
         parameters: Speeds, accelerations, LimZ.
@@ -189,7 +189,7 @@ class DrivenRobot:
 
     @property
     def model(self) -> RobotModel:
-        """Which robot it is, with its arm in force and the ranges that its joints are held to."""
+        """The robot's model, with the present arm and its joint ranges."""
         arms = self.kept.arms
         return (
             self.arm.model.with_arm(arms.values(arms.selected)) if arms.selected else self.arm.model
@@ -197,11 +197,11 @@ class DrivenRobot:
 
     @property
     def recovering(self) -> bool:
-        """Whether it is on its way back to where the safeguard stopped it."""
+        """Whether it is moving back to where the safeguard stopped it."""
         return self.arm.moving and self.arm.moves_started == self.way_back
 
     def put_in_force(self, number: int) -> None:
-        """Put an arm in force: all that is said of places counts for it from then on.
+        """Select an arm: all places count for it from then on.
 
         Raises:
             Refusal: It is not defined, or has none of that number.
@@ -211,12 +211,12 @@ class DrivenRobot:
 
     @property
     def hand(self) -> Hand:
-        """The present hand of the arm in force."""
+        """The present hand of the selected arm."""
         return hand_of(self.model, self.arm.joints)
 
     @property
     def posture(self) -> Posture | None:
-        """The present elbow, wrist and flags of the arm in force, ``None`` where it has none."""
+        """The present elbow, wrist and flags of the selected arm, ``None`` if it has none."""
         return posture_of(self.model, self.arm.joints)
 
     def _load(self) -> CarriedLoad:
@@ -233,13 +233,13 @@ class DrivenRobot:
         return motion if motion is not None and motion.stands else None
 
     def take_up_kept(self) -> None:
-        """Heed what has just been restored of arm, ranges and zeros of the joints."""
+        """Apply the restored arm, ranges and zeros of the joints."""
         self.arm.added_in_force = self.kept.arms.selected != 0
         self.hold_to_ranges()
         self.arm.origin_errors = self.kept.origins.errors
 
     def offset_origins(self, offsets: Sequence[int]) -> None:
-        """Take other zeros of the joints: the arm stays, the controller takes it for elsewhere.
+        """Set other zeros of the joints: the arm stays, the controller believes it elsewhere.
 
         Raises:
             OutOfReach: A joint would stand outside its range.
@@ -253,14 +253,14 @@ class DrivenRobot:
 
     @property
     def at_home(self) -> bool:
-        """Whether it stands at HomeSet."""
+        """Whether it is at HomeSet."""
         scales = zip(self.arm.joints, self.model.pulses_per_unit, strict=True)
         home = self.settings.home_pulses
         return home is not None and list(home) == [round(at * scale) for at, scale in scales]
 
     @property
     def brakes_closed(self) -> tuple[bool, ...]:
-        """Whether each joint of six axes is held by its brake: all while the motors are off."""
+        """Whether the brake of each of six joints is closed: all while the motors are off."""
         joints = range(1, self.model.axes + 1)
         return tuple(not self.motors_on and joint not in self.opened_brakes for joint in joints)
 
@@ -271,13 +271,13 @@ class DrivenRobot:
         return self._motors_on_ns + (self.arm.now_ns - since_ns if self.motors_on else 0)
 
     def hold_to_ranges(self) -> None:
-        """Heed the ranges of the joints that were given."""
+        """Apply the given ranges of the joints."""
         ranges = tuple(Range(*ends) for ends in self.kept.ranges.ends)
         self.arm.model = replace(self.arm.model, ranges=ranges)
 
     @property
     def offset(self) -> ToolOffset | None:
-        """The definition of the tool in force, ``None`` for the flange."""
+        """The definition of the selected tool, ``None`` for the flange."""
         return self.tools.get(self.tools.selected)
 
     def tip(self) -> Pose:
@@ -302,13 +302,13 @@ class DrivenRobot:
         return self._tip_of(forward(self.model, joints))
 
     def tip_on_the_way(self, instant_ns: int | None) -> Pose:
-        """Return the tip at an instant of the motion under way, or for ``None`` at the present."""
+        """Return the tip at an instant of the motion in progress, or for ``None`` at present."""
         if instant_ns is None:
             return self.tip()
         return self._tip_of(forward(self.model, self.arm.position_at(instant_ns)))
 
     def joints_for(self, target: Point) -> Joints:
-        """Return the joints that bring the selected tool's tip to a point.
+        """Return the joints that move the selected tool's tip to a point.
 
         Raises:
             Refusal: Its local is not defined, or the arm cannot take it up.
@@ -361,7 +361,7 @@ class DrivenRobot:
         return frame_at(self.kept.base.to_robot(self.control_points.get(number)))
 
     def move_base(self, coordinates: Coordinates) -> None:
-        """Put the base elsewhere: every local has to be defined anew (documented).
+        """Move the base: every local has to be defined anew (documented).
 
         Raises:
             Refusal: The robot cannot have such a base.
@@ -389,7 +389,7 @@ class DrivenRobot:
         self.drives.put_back(RestoredAt.FIVE)
 
     def forget_volatile(self, now_ns: int) -> None:
-        """Forget what a power cycle takes: all but tools, HomeSet and its place."""
+        """Forget what a power cycle clears: all but tools, HomeSet and its place."""
         self.arm.halt(now_ns)
         self.reservation = None
         self.observer.forget()

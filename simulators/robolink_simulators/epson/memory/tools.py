@@ -1,4 +1,4 @@
-"""The tool definitions a controller keeps, and what each change costs."""
+"""The tool definitions that a controller stores, and the cost of each change."""
 
 from collections.abc import Mapping
 from typing import Final, Literal, TypeAlias
@@ -9,7 +9,7 @@ from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 HIGHEST_TOOL: Final = 15
 
 ClearInForce: TypeAlias = Literal["selects_zero", "keeps", "error"]
-"""What TLClr does to the tool in force."""
+"""What TLClr does to the selected tool."""
 
 
 class ToolMemory:
@@ -26,7 +26,7 @@ class ToolMemory:
 
     @property
     def selected(self) -> int:
-        """Number of the tool in force, 0 for the flange."""
+        """Number of the selected tool, 0 for the flange."""
         return self._selected
 
     def get(self, tool: int) -> ToolOffset | None:
@@ -54,16 +54,16 @@ class ToolMemory:
         self.flash_writes += 1
 
     def clear(self, tool: int, *, in_force: ClearInForce = "error") -> None:
-        """Forget a definition.
+        """Remove a definition.
 
         Args:
             tool: Number of the tool.
-            in_force: What happens when it is the tool in force. That it is an error is documented
+            in_force: What happens when it is the selected tool. That it is an error is documented
                 for RC+ 8 (docs/reference/spel.md 10); what older firmware does is not: Tool 0
                 may be selected, or the number stays selected, and targets are the flange's.
 
         Raises:
-            Refusal: Tool 0, no such tool number, or the tool in force where that is an error.
+            Refusal: Tool 0, no such tool number, or the selected tool where that is an error.
         """
         self._check_writable(tool)
         selected = self._selected == tool
@@ -75,7 +75,7 @@ class ToolMemory:
         self.flash_writes += 1
 
     def select(self, tool: int) -> None:
-        """Put a tool in force.
+        """Select a tool.
 
         Raises:
             Refusal: It is not defined (seen in a client: it needs a reset,
@@ -94,7 +94,7 @@ class ToolMemory:
         }
 
     def restore(self, state: Mapping[str, object]) -> None:
-        """Take over what :meth:`to_state` returned.
+        """Restore what :meth:`to_state` returned.
 
         Raises:
             TypeError, ValueError: It is something else.

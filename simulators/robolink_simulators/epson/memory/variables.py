@@ -68,7 +68,7 @@ class _Variable:
         return position
 
     def share(self, values: MutableSequence[Any]) -> None:
-        """Hold what a program's variable holds."""
+        """Share the content of a program's variable."""
         self._held = values
 
     def copied(self) -> list[Value]:
@@ -76,7 +76,7 @@ class _Variable:
         return list(self._values)
 
     def take(self, values: Sequence[Value]) -> None:
-        """Take over what :meth:`copied` gave."""
+        """Restore what :meth:`copied` returned."""
         self._values[:] = values
 
     def row(self, subscripts: Sequence[int], count: int) -> list[Value]:
@@ -139,7 +139,7 @@ class Variables:
     def adopt(
         self, name: str, type_name: str, bounds: tuple[int, ...], values: MutableSequence[Any]
     ) -> None:
-        """Show a Global Preserve variable of a program, as Remote Ethernet's types allow.
+        """Show a Global Preserve variable of a program, as far as Remote Ethernet's types allow.
 
         Args:
             name: Its name.
@@ -183,16 +183,16 @@ class Variables:
         return ()
 
     def values(self) -> dict[str, list[Value]]:
-        """Return a copy of what each variable holds, element by element."""
+        """Return a copy of each variable's content, element by element."""
         return {name: it.copied() for name, it in self._variables.items()}
 
     def put_back(self, values: Mapping[str, Sequence[Value]]) -> None:
-        """Take over what :meth:`values` gave."""
+        """Restore what :meth:`values` returned."""
         for name, held in values.items():
             self._variables[name].take(held)
 
     def holds(self, name: str) -> bool:
-        """Tell whether the project declares a variable."""
+        """Return whether the project declares a variable."""
         return name.lower() in self._variables
 
     def read(self, name: str) -> Value:
@@ -247,7 +247,7 @@ def _parsed(kind: VariableType, text: str) -> Value:
 
 
 def project_variables(true_text: str) -> Variables:
-    """Return what the project in the simulated controller declares: one of each kind."""
+    """Return the declarations of the project in the simulated controller: one of each kind."""
     return Variables(true_text, _declare_project)
 
 

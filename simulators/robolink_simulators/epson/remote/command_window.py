@@ -35,7 +35,7 @@ class SpelWindow:
 
     @property
     def busy(self) -> bool:
-        """Whether a statement runs."""
+        """Whether a statement is running."""
         return self._running is not None
 
     def start(self, statement: str, exchange: PendingRequest, now_ns: int) -> None:
@@ -48,7 +48,7 @@ class SpelWindow:
         self.advance(now_ns)
 
     def advance(self, now_ns: int) -> None:
-        """Let the statement go on until ``now_ns``."""
+        """Continue the statement until ``now_ns``."""
         if self._running is not None:
             self._running[0].advance(now_ns)
             self._settle()
@@ -73,7 +73,7 @@ class SpelWindow:
             self._settle()
 
     def restart(self) -> None:
-        """Forget what statements before have set: stored conditions, TMOut, TW."""
+        """Forget the settings of earlier statements: stored conditions, TMOut, TW."""
         self._interpreter.forget()
 
     def fail(self, number: int, text: str, now_ns: int) -> None:

@@ -1,4 +1,4 @@
-"""Which request is served now, and what it does (docs/reference/epson.md 1.2).
+"""Which requests are served now, and what they do (docs/reference/epson.md 1.2).
 
 Remote Ethernet's input, output and memory commands (docs/reference/epson.md 1.2).
 
@@ -156,7 +156,7 @@ def preferences_of(options: EpsonOptions) -> frozenset[Preference]:
 
 
 def check_robot(text: str, machine: Machine) -> int:
-    """Return the number of a robot that there is, or 0 for all.
+    """Return the number of an existing robot, or 0 for all.
 
     Raises:
         Refused: There is no such robot.
@@ -165,7 +165,7 @@ def check_robot(text: str, machine: Machine) -> int:
 
 
 class Alarms:
-    """Numbers of the alarms that stand (docs/reference/epson.md 1.2)."""
+    """Numbers of the active alarms (docs/reference/epson.md 1.2)."""
 
     def __init__(self) -> None:
         self._numbers: list[int] = []
@@ -180,7 +180,7 @@ class Alarms:
         return (str(len(self._numbers)), *map(str, self._numbers))
 
     def reset(self, text: str) -> Fields:
-        """Carry out ResetAlm; an alarm that does not stand is malformed (assumed)."""
+        """Carry out ResetAlm; an alarm that is not active is malformed (assumed)."""
         alarm = number(text)
         if alarm not in self._numbers:
             raise malformed()
@@ -282,7 +282,7 @@ class CommandDesk:
 
     @cached_property
     def _served(self) -> dict[str, Served]:
-        """The commands by lower-case name, made when the first is asked for: most ask none."""
+        """The commands by lower-case name, made at first use: most controllers need none."""
         machine, (variables, alarms, card) = self._machine, self._held
         return {
             **io_commands(machine),
@@ -303,7 +303,7 @@ class CommandDesk:
         }
 
     def admit(self, command: RemoteCommand, *, logged_in: bool, executing: bool) -> None:
-        """Check everything that stands in the way of a command.
+        """Check everything that could prevent a command.
 
         The order of the checks is assumed: unknown, not logged in, monitoring only, an
         Execute running, a flag missing.
@@ -339,7 +339,7 @@ class CommandDesk:
             raise malformed() from refusal
 
     def check_home(self, robot: tuple[str, ...]) -> None:
-        """Check what a Home names.
+        """Check the values of a Home.
 
         Raises:
             Refused: There is no such robot, or no number where one is needed.
@@ -347,7 +347,7 @@ class CommandDesk:
         self._check_robot(robot)
 
     def status(self, *, executing: bool) -> Fields:
-        """Answer GetStatus; whether an Execute shows is an option."""
+        """Answer GetStatus; an option decides whether an Execute shows."""
         shown = executing and self._options.flags_during_execute == "running"
         flags = self._condition.flags(executing=shown)
         return status_fields(flags, self._condition.code, self._options.status_flags)

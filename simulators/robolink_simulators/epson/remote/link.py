@@ -1,4 +1,4 @@
-"""Connections of clients to the simulated controller: codec, login, what leaves and when.
+"""Connections of clients to the simulated controller: codec, login, replies and their times.
 
 Who is logged in, and for how long silence is tolerated (docs/reference/epson.md 1.1).
 
@@ -82,7 +82,7 @@ class ClientSlot:
         self.heard(now_ns)
 
     def hears(self, link: "EpsonServerLink", *, cuts: bool) -> bool:
-        """Tell whether a connection is listened to; whoever comes second may be cut off."""
+        """Return whether a connection is served; a second client may be cut off."""
         if self.client in (None, link):
             return True
         if cuts:
@@ -90,32 +90,32 @@ class ClientSlot:
         return False
 
     def heard(self, now_ns: int) -> None:
-        """The client sent a request."""
+        """Note a request of the client."""
         self._heard_ns = self._wire_time.at(now_ns)
 
     def free(self) -> None:
-        """The client logged out."""
+        """Note the client's logout."""
         self.client = self._heard_ns = None
 
     def lost(self, *, unfinished: bool) -> None:
-        """The client is gone; keep counting its silence while something is unfinished."""
+        """Note that the client is gone; keep measuring its silence while a job is unfinished."""
         self.client = None
         self.settle(unfinished=unfinished)
 
     def settle(self, *, unfinished: bool) -> None:
-        """Forget the silence of a client that is gone once nothing of its is unfinished."""
+        """Drop the silence of a client that is gone once nothing of it is unfinished."""
         if self.client is None and not unfinished:
             self._heard_ns = None
 
     def deadline(self, *, unfinished: bool) -> int | None:
-        """Return when the silence will have lasted too long, if it is counted."""
+        """Return when the silence will be too long, if it is measured."""
         counted = self.client is not None or unfinished
         if self._heard_ns is None or not self._timeout_ns or not counted:
             return None
         return self._wire_time.simulated_at(self._heard_ns + self._timeout_ns)
 
     def overdue(self, now_ns: int, *, unfinished: bool) -> "tuple[bool, EpsonServerLink | None]":
-        """Return whether the silence has lasted too long, and whose it was; its place is free."""
+        """Return whether the silence is too long, and whose it was; the place is free."""
         self.settle(unfinished=unfinished)
         deadline = self.deadline(unfinished=unfinished)
         if deadline is None or now_ns < deadline:
@@ -127,7 +127,7 @@ class ClientSlot:
 
 @dataclass(frozen=True, slots=True)
 class PendingRequest:
-    """A request that came in.
+    """A request that was received.
 
     Attributes:
         number: Running number over all clients, from 1.
@@ -154,7 +154,7 @@ class PendingRequest:
         self.link.answer(self, Refusal(self.name, int(code)))
 
     def meets(self, action: FaultAction) -> bool:
-        """Tell whether a fault of this kind is planned for it."""
+        """Return whether a fault of this kind is planned for it."""
         return any(fault.action is action for fault in self.faults)
 
 
@@ -180,22 +180,22 @@ class RequestHandler(Protocol):
         """Let simulated time reach ``now_ns``."""
 
     def take(self, link: "EpsonServerLink", event: Request | BadRequest) -> None:
-        """Deal with a request."""
+        """Handle a request."""
 
     def take_late(self, link: "EpsonServerLink", event: Request | BadRequest) -> None:
-        """Deal with a request that was counted already: it meets no fault again."""
+        """Handle a request that was counted already: it meets no fault again."""
 
     def leaving(self, exchange: PendingRequest, reply: bytes) -> Sequence[Departure]:
-        """Count a reply and return what of it leaves, when."""
+        """Count a reply and return which parts of it are sent, and when."""
 
     def listening(self) -> None:
-        """Be told that a request has begun which silence may end."""
+        """Note that a request has begun which silence may end."""
 
     def announce(self, exchange: PendingRequest, reply: bytes) -> None:
-        """Tell whoever watches that a reply is about to leave."""
+        """Tell observers that a reply is about to be sent."""
 
     def forget(self, link: "EpsonServerLink") -> None:
-        """The connection is over."""
+        """Note that the connection is over."""
 
 
 class EpsonServerLink:
@@ -301,7 +301,7 @@ class EpsonServerLink:
         return min(login_ns, silent_ns)
 
     def supervise(self, now_ns: int) -> None:
-        """End a request after which nothing came; cut whoever did not log in for too long."""
+        """End a request after which nothing came; disconnect a client without a login in time."""
         if self._late and not self._stalled:
             self._catch_up()
         silent_ns = self._silence_ends_ns()
@@ -317,7 +317,7 @@ class EpsonServerLink:
         self._anonymous_since_ns = None if logged_in else self._wire_time.at(now_ns)
 
     def answer(self, exchange: PendingRequest, event: Reply | Refusal) -> None:
-        """Let an answer leave, as the faults planned for it allow."""
+        """Send an answer, as its planned faults allow."""
         if self.over:
             return
         try:
@@ -333,17 +333,17 @@ class EpsonServerLink:
             self._depart(departures)
 
     def push(self, data: bytes) -> None:
-        """Send bytes that nobody asked for."""
+        """Send bytes without a request."""
         self._outbox.post(data, self._controller.now_ns)
 
     def cut(self) -> None:
-        """End the connection from the controller's side, after what is on its way."""
+        """End the connection from the controller's side, after what is in transit."""
         if not self.over:
             self._outbox.post(None, self._controller.now_ns)
             self._end()
 
     def stall(self, event: Request | BadRequest, seconds: float) -> None:
-        """Carry nothing for a while; then a request arrives, and what was sent behind it."""
+        """Carry nothing for a while; then a request arrives, and what was sent after it."""
         self._outbox.stalled_until_ns = self._controller.now_ns + max(1, round(seconds * NS_PER_S))
         self._late.append(event)
 
@@ -364,7 +364,7 @@ class EpsonServerLink:
         self._leave()
 
     def _leave(self) -> None:
-        """Let the controller notice that the client is gone, once it can."""
+        """Let the controller notice, once it can, that the client is gone."""
         if self._hung_up and not self.over and not self._stalled:
             self._end()
 
@@ -373,7 +373,7 @@ class EpsonServerLink:
             self._end()
 
     def _note_silence(self) -> None:
-        """Count from now how long nothing comes behind the beginning of a request."""
+        """Measure from now the silence after the beginning of a request."""
         if not (self._serial or self._controller.options.requests_end_with_silence):
             return
         begun = self._codec.bytes_held
@@ -389,7 +389,7 @@ class EpsonServerLink:
             self._controller.take(self, request)
 
     def _requests(self) -> Iterator[Request | BadRequest]:
-        """Yield what has come whole, while this connection carries anything."""
+        """Yield the complete requests, while this connection carries anything."""
         while not (self.over or self._stalled or self._outbox.half_open):
             if (event := self._codec.next_event()) is NEED_DATA:
                 return
@@ -413,14 +413,14 @@ class EpsonServerLink:
         return self._wire_time.simulated_at(over_ns)
 
     def _silence_ends_ns(self) -> int | None:
-        """Return when a request that was begun is taken for whole."""
+        """Return when a request that was begun counts as complete."""
         if self._silent_since_ns is None:
             return None
         return self._wire_time.simulated_at(self._silent_since_ns + _SILENCE_NS)
 
 
 class OpenLinks:
-    """Holds connections until nothing will happen on them any more."""
+    """Stores connections until nothing will happen on them any more."""
 
     __slots__ = ("_links",)
 
@@ -429,14 +429,14 @@ class OpenLinks:
 
     @property
     def settled(self) -> bool:
-        """Whether none has ended, of which something may still be on its way."""
+        """Whether none has ended with data still in transit."""
         for link in self._links:  # noqa: SIM110 - asked in every exchange: a generator costs more
             if link.over:
                 return False
         return True
 
     def add(self, link: EpsonServerLink) -> None:
-        """Hold one more."""
+        """Add one."""
         self._links.append(link)
 
     def next_change(self) -> int | None:
@@ -449,7 +449,7 @@ class OpenLinks:
         return first
 
     def supervise(self, now_ns: int) -> None:
-        """Keep their time-outs, and forget those that have ended."""
+        """Apply their time-outs, and forget those that have ended."""
         for link in self._links:
             link.supervise(now_ns)
         self._links = [link for link in self._links if not link.drained]
@@ -460,6 +460,6 @@ class OpenLinks:
             link.cut()
 
     def push(self, data: bytes) -> None:
-        """Send every client bytes that nobody asked for (F10)."""
+        """Send every client bytes without a request (F10)."""
         for link in self._links:
             link.push(data)

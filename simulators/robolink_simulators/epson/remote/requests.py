@@ -1,4 +1,4 @@
-"""What a controller does with a request: faults, log, hooks, and where it goes.
+"""The path of a request in the controller: faults, log, hooks, handler.
 
 Where a request goes: login, logout, the command window, or the desk.
 
@@ -145,7 +145,7 @@ class RequestService(HostedDevice, ABC):
     """Until when all is done, -1 after anything that may have changed what comes."""
 
     def take(self, link: EpsonServerLink, event: Request | BadRequest) -> None:
-        """Deal with a request of a client; while another is logged in, it is not heard."""
+        """Handle a request of a client; while another is logged in, it is not served."""
         self._settled_ns, shown = -1, shown_request(event)
         self.log.add(self.now_ns, ">", shown)
         if not self._slot.hears(link, cuts=self.options.second_client == "closed"):
@@ -177,7 +177,7 @@ class RequestService(HostedDevice, ABC):
                 self._mishaps.plan(self.now_ns, fault.seconds, again)
 
     def take_late(self, link: EpsonServerLink, event: Request | BadRequest) -> None:
-        """Deal with a request that was under way while its link carried nothing."""
+        """Handle a request that was in transit while its link carried nothing."""
         if self._slot.hears(link, cuts=self.options.second_client == "closed"):
             self._carry_out(link, event, shown_request(event), ())
 
@@ -200,7 +200,7 @@ class RequestService(HostedDevice, ABC):
     def _serve(
         self, link: EpsonServerLink, exchange: PendingRequest, event: Request | BadRequest
     ) -> None:
-        """Do what a request asks, or refuse it."""
+        """Carry out a request, or refuse it."""
         try:
             name, request = self._admitted(link, event)
             if name == "Execute":
@@ -217,7 +217,7 @@ class RequestService(HostedDevice, ABC):
             exchange.refuse(refused.code)
 
     def _admitted(self, link: EpsonServerLink, event: Request | BadRequest) -> tuple[str, Request]:
-        """Return a request that may be served now, with the name of its command.
+        """Return a request that is allowed now, with the name of its command.
 
         Raises:
             RequestRefused: It may not.
@@ -274,7 +274,7 @@ class RequestService(HostedDevice, ABC):
         return self._window.busy or self.condition.task is not Task.NONE
 
     def leaving(self, exchange: PendingRequest, reply: bytes) -> Sequence[Departure]:
-        """Count a reply and return what of it leaves, when."""
+        """Count a reply and return which parts of it are sent, and when."""
         self._flash.save_changes()
         self.exchanges += 1
         # A login that was bent may come back in its refusal.
@@ -286,16 +286,16 @@ class RequestService(HostedDevice, ABC):
         return self.faults.departures(reply, exchange.faults)
 
     def listening(self) -> None:
-        """Look anew for what happens next: a request has begun that silence may end."""
+        """Look anew for the next event: a request has begun that silence may end."""
         self._settled_ns = -1
 
     def announce(self, exchange: PendingRequest, reply: bytes) -> None:
-        """Tell the hook that a reply is about to leave."""
+        """Tell the hook that a reply is about to be sent."""
         if self.on_reply is not None:
             self.on_reply(exchange.number, shown_reply(reply))
 
     def forget(self, link: EpsonServerLink) -> None:
-        """A connection is over; what runs goes on or not, as the option says."""
+        """Note the end of a connection; an option decides whether running statements continue."""
         self._settled_ns = -1
         if self._slot.client is link:
             # Production that another device started is not this client's to supervise.

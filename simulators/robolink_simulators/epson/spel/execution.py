@@ -1,4 +1,4 @@
-"""Carries statements out, one after the other, in simulated time.
+"""Carries statements out, one by one, in simulated time.
 
 What statements do that take no time: print, assign, set.
 
@@ -108,7 +108,7 @@ def _assign(evaluator: Evaluator, name: str, value: Value) -> None:
 
 
 def _print_to(evaluator: Evaluator, statement: PrintTo) -> None:
-    """Print to a port: only those that a program has opened are there."""
+    """Print to a port: only those that a program has opened exist."""
     session = evaluator.session
     channel = evaluator.integer(statement.channel)
     values = [evaluator.shown(item) for item in statement.items]
@@ -128,7 +128,7 @@ class SpelError:
 
 
 class StatementExecution:
-    """Statements under way: a line of the command window, or a statement of a task.
+    """Statements in progress: a line of the command window, or a statement of a task.
 
     Args:
         evaluator: What works expressions out.
@@ -200,12 +200,12 @@ class StatementExecution:
         return self._waiting is not None
 
     def saw(self, now_ns: int) -> None:
-        """Note that nothing that it waits for came before an instant."""
+        """Note that nothing it waits for came before an instant."""
         self._seen_ns = max(self._seen_ns, now_ns)
 
     @property
     def travels(self) -> bool:
-        """Whether its motion is under way."""
+        """Whether its motion is in progress."""
         return self._aim is not None and self._evaluator.session.machine.arm.moving
 
     @property
@@ -214,7 +214,7 @@ class StatementExecution:
         return self._reserved is not None and not self._done and self._evaluator.carries(self)
 
     def start_reserved(self, now_ns: int) -> None:
-        """Begin the motion that was reserved; one that is held begins when it goes on (assumed)."""
+        """Begin the reserved motion; a held one begins when it continues (assumed)."""
         if self._held:
             self._released = True
         elif self._reserved is not None:
@@ -234,7 +234,7 @@ class StatementExecution:
             self._aim = None
 
     def resume(self, now_ns: int) -> None:
-        """Go on after :meth:`suspend`; a timed wait begins anew (docs/reference/spel.md 4.6).
+        """Continue after :meth:`suspend`; a timed wait starts again (docs/reference/spel.md 4.6).
 
         What is left of a motion is travelled point to point, of a straight one in a straight
         line (assumed).
@@ -308,12 +308,12 @@ class StatementExecution:
         return False
 
     def next_poll_ns(self, seen_ns: int) -> int:
-        """Return when it has to be looked at again."""
+        """Return when it has to be checked again."""
         self.saw(seen_ns)
         return seen_ns + 1 if self._done else self._change_ns
 
     def _advance_meanwhile(self, now_ns: int) -> None:
-        """Carry out what is due of that which stands inside ``!...!``."""
+        """Carry out what is due inside ``!...!``."""
         meanwhile = self._meanwhile
         if meanwhile is None:
             return
@@ -398,7 +398,7 @@ class StatementExecution:
         self._note(outcome)
 
     def _note(self, outcome: StatementOutcome) -> None:
-        """Take up what a statement has begun, and how long it lasts."""
+        """Note what a statement has begun, and how long it takes."""
         start_ns, machine = self._busy_until_ns, self._evaluator.session.machine
         self.output += outcome.output
         if outcome.timed is not None:
@@ -412,7 +412,7 @@ class StatementExecution:
         self._busy_until_ns += outcome.duration_ns
 
     def _reserve(self, motion: MotionStatement) -> StatementOutcome:
-        """Keep a motion with SYNC for SyncRobots; what it could not do is refused now (assumed)."""
+        """Store a motion with SYNC for SyncRobots; refuse an impossible one now (assumed)."""
         robot = self._evaluator.session.machine.robot
         plan(self._evaluator, motion)
         self._reserved, robot.reservation = motion, self

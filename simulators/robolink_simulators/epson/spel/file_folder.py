@@ -57,7 +57,7 @@ class FileFolder:
         return f"{self.drive.upper()}:\\" + "\\".join(self._present)
 
     def path(self, name: str) -> Path:
-        """Return where a name leads on this machine; whether anything is there or not.
+        """Return the path of a name on this machine, existing or not.
 
         Raises:
             Refusal: It leads out of the folder, or is no name of a file.
@@ -65,7 +65,7 @@ class FileFolder:
         return self._within(*self._parts(name))
 
     def exists(self, name: str, *, folder: bool) -> bool:
-        """Tell whether there is a file, or a folder, of that name (FileExists, FolderExists).
+        """Return whether a file, or a folder, of that name exists (FileExists, FolderExists).
 
         Raises:
             Refusal: It is no name, or leads out of the folder.

@@ -69,7 +69,7 @@ class Interpreter:
         return self._evaluator.session
 
     def forget(self) -> None:
-        """Forget what statements have set: stored conditions, TMOut, TW, Err."""
+        """Forget the settings of statements: stored conditions, TMOut, TW, Err."""
         self._evaluator.session.memory = WindowMemory()
 
     def start(self, statement: str, now_ns: int) -> StatementExecution:

@@ -42,7 +42,7 @@ def go_leg(
 
 
 def is_short(leg: JointLeg) -> bool:
-    """Tell whether a point-to-point leg is too short for its speed: PTPBoost counts for it.
+    """Return whether a point-to-point leg is too short for its speed: PTPBoost applies to it.
 
     That it is these is read from the help on PTPBoost, docs/reference/spel.md 7.2.
     """
@@ -93,7 +93,7 @@ def line_leg(machine: Machine, start: Pose, end: Pose, *, near: Joints) -> Leg:
 
 
 def held_leg(machine: Machine, end: Pose, way: MeasuredWay | None = None) -> Leg:
-    """Plan a leg about the external control point in force, from where the tip is.
+    """Plan a leg about the selected external control point, from where the tip is.
 
     Args:
         machine: The robot.
@@ -117,7 +117,7 @@ def held_leg(machine: Machine, end: Pose, way: MeasuredWay | None = None) -> Leg
 
 
 def seen_from(machine: Machine, tip: Pose) -> Pose:
-    """Return where a workpiece that the tip holds sees the external control point in force.
+    """Return where a workpiece that the tip holds sees the selected external control point.
 
     Raises:
         Refusal: None is in force.
@@ -133,7 +133,7 @@ def _point_in_force(machine: Machine) -> Frame:
 
 
 def way_leg(machine: Machine, end: Pose, way: MeasuredWay) -> Leg:
-    """Plan a way of the selected tip from where it is.
+    """Plan a path of the selected tip from where it is.
 
     Raises:
         Refusal: It leaves the envelope, or hand, elbow or wrist would have to change.

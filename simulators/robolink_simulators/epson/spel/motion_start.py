@@ -1,4 +1,4 @@
-"""How a motion begins and comes to rest, and how Recover leads back to one.
+"""How a motion begins and stops, and how Recover leads back to one.
 
 How long the servo needs to come within Fine, or FineDist, of a target.
 

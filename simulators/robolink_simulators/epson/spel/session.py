@@ -1,4 +1,4 @@
-"""What an expression or a statement can reach."""
+"""What an expression or a statement can access."""
 
 import random
 from collections.abc import Mapping
@@ -29,7 +29,7 @@ def _at_power_on() -> Expression:
 
 @dataclass(slots=True)
 class WindowMemory:
-    """What statements leave behind for the next ones; a restart forgets it.
+    """What statements store for the next ones; a restart clears it.
 
     Attributes:
         till: Condition of a bare Till.
@@ -62,7 +62,7 @@ class UserError(NamedTuple):
 
 @dataclass(slots=True)
 class Session:
-    """The machine, the controller's state and habits, and what was said before.
+    """The machine, the controller's state and behaviour, and earlier settings.
 
     Attributes:
         machine: The robot and its memory.

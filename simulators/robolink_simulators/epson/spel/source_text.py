@@ -1,4 +1,4 @@
-"""Files of a project as lines, the macros in them, and what is wrong with them.
+"""Files of a project as lines, their macros, and their errors.
 
 What ``#define`` gives a name to (docs/reference/spel.md 1.1).
 

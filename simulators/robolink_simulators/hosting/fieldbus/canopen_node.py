@@ -38,7 +38,7 @@ _OF_ANOTHER_NODE: Final = bytes.fromhex("4b41600037020000")
 
 
 class PlcSdoServer(SdoServer):
-    """Answers late or not at all when told so; may refresh an object during its upload.
+    """Answers late or not at all when requested; may refresh an object during its upload.
 
     Args:
         node: Whose objects.
@@ -69,7 +69,7 @@ class PlcSdoServer(SdoServer):
         self._fresh = fresh
 
     def let_go(self, served: ServedAccess) -> None:
-        """Answer the request under way as ``served`` says."""
+        """Answer the request in progress as ``served`` says."""
         if served.delay_s:
             time.sleep(self._real_seconds(served.delay_s))
         self._silent = not served.answered
@@ -102,7 +102,7 @@ class PlcSdoServer(SdoServer):
         return _untyped(self).network
 
     def _is_due(self, fault: PlcFault) -> bool:
-        """Tell whether a fault meets the frame that is about to leave."""
+        """Return whether a fault meets the frame that is about to be sent."""
         if fault.action not in (PlcFaultAction.LOSE_SEGMENT, PlcFaultAction.WRONG_TOGGLE):
             return True
         if not self._segments:
@@ -145,7 +145,7 @@ _BEAT: Final = COMMAND["client_heartbeat"].word
 
 
 class EventTimer:
-    """Says when the heartbeat and TPDO1 are due: by time, however seldom somebody asks.
+    """Reports when the heartbeat and TPDO1 are due: by time, however seldom it is asked.
 
     Counted in looks, the period would grow with the load of the computer, until a client takes a
     node that is there for lost. What was missed is not made up for; the phase is kept.
@@ -214,7 +214,7 @@ class CanopenFace:
         self._network.send_message(_HEARTBEAT + self._id, bytes([_BOOT_UP]))
 
     def look(self, *, due: bool) -> None:
-        """Send what there is to send: heads that changed, and all of it when it is ``due``."""
+        """Send what is due: heads that changed, and all of it when it is ``due``."""
         if self._starts != self._simulator.plc.starts:
             self._starts = self._simulator.plc.starts
             self.boot()
@@ -253,7 +253,7 @@ MULTICAST_PORT: Final = 43113
 
 @dataclass(frozen=True, slots=True)
 class CanPlace:
-    """Where a node is put.
+    """The place of a node on the bus.
 
     Attributes:
         interface: Of python-can: ``virtual``, ``udp_multicast``, ``socketcan`` ...
@@ -275,7 +275,7 @@ class CanPlace:
         return f"{host}?interface={self.interface}&node={self.node}"
 
     def settings(self) -> dict[str, Any]:
-        """Return what python-can is told. Multicast frames never leave this computer."""
+        """Return python-can's settings. Multicast frames never leave this computer."""
         settings: dict[str, Any] = {"interface": self.interface, "channel": self.channel}
         if self.interface == "udp_multicast":
             settings |= {"port": self.port, "hop_limit": 0, "fd": False}

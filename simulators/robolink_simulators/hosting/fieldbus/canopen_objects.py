@@ -43,10 +43,10 @@ Present = Callable[[], int]
 
 
 class SdoAnswering(Protocol):
-    """Takes what becomes of an exchange: late, or not answered at all."""
+    """Accepts the outcome of an exchange: late, or not answered at all."""
 
     def let_go(self, served: ServedAccess) -> None:
-        """Answer in the way that ``served`` says."""
+        """Answer as ``served`` says."""
 
 
 class MailboxObjects:
@@ -73,7 +73,7 @@ class MailboxObjects:
             self._copy = simulator.plc.response(simulator.now_ns)
 
     def read(self, *, index: int, subindex: int, od: object) -> bytes | int | float | None:  # noqa: ARG002 - canopen's own signature
-        """Return what an object holds, ``None`` where the dictionary itself knows."""
+        """Return the content of an object, ``None`` if the dictionary itself knows it."""
         if index == RESPONSE_OBJECT:
             return self._given(self._read_copy())
         if (index, subindex) == SERIAL_NUMBER:
@@ -90,7 +90,7 @@ class MailboxObjects:
             return self._constant(subindex) if index == MAILBOX_OBJECT else None
 
     def write(self, *, index: int, subindex: int, od: object, data: bytes) -> None:  # noqa: ARG002 - canopen's own signature
-        """Take what a client writes.
+        """Accept a client's write.
 
         Raises:
             SdoAbortedError: The length does not fit.

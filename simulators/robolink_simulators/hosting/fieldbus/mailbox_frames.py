@@ -93,7 +93,7 @@ class MailboxFrames:
         return round(delay_s * NS_PER_S)
 
     def look(self) -> None:
-        """End connections when the PLC was started anew or its cable pulled; a line has none."""
+        """End connections when the PLC was restarted or its cable pulled; a line has none."""
         seen, self._seen = self._seen, self.registers.ends
         if self.unit is None and seen != self._seen:
             for link in self._links:
@@ -188,7 +188,7 @@ class MailboxFramesLink:
         return read(_BANKS[request.table or RegisterTable.HOLDING], address, request.count)
 
     def _gone(self, served: ServedAccess) -> bool:
-        """End the connection where that is planned; tell whether no answer leaves."""
+        """End the connection if that is planned; return whether no answer is sent."""
         if not self._frames.shared:
             if served.cut:
                 self.end(None)

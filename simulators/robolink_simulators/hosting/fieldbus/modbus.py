@@ -38,7 +38,7 @@ class ModbusTcpHost(TcpHost):
         simulator.url = simulator.url or self.url
 
     def wake(self) -> None:
-        """Have the PLC looked at again; any thread may call it."""
+        """Let the PLC be checked again; any thread may call it."""
         with self._lock:
             self._frames.look()
         super().wake()
@@ -119,7 +119,7 @@ def serve_modbus_rtu(
 
 
 def _client_options(options: MailboxOptions) -> dict[str, str]:
-    """Return what a client must be told beside the address."""
+    """Return what a client must be told besides the address."""
     usual = MailboxOptions()
     names = ("command", "response", "slots", "registers")
     return {

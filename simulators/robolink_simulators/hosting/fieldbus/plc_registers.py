@@ -50,7 +50,7 @@ class PlcRegisters:
 
     @property
     def ends(self) -> tuple[int, int]:
-        """What counts the ends of all connections: starts, and cables that were pulled."""
+        """Counts the ends of all connections: starts, and pulled cables."""
         return self._simulator.plc.starts, self._simulator.plc.cuts
 
     def read(self, bank: Bank, address: int, count: int) -> ServedAccess:

@@ -116,7 +116,7 @@ class InProcessMailboxLink:
         self._closed = True
 
     def _exchange(self, serve: Callable[[int], ServedAccess]) -> Words:
-        """Have a request served: half of the time passes before, half of it after."""
+        """Let a request be served: half of the time passes before, half of it after."""
         with self._simulator.lock:
             if self._closed:
                 raise TransportClosedError(

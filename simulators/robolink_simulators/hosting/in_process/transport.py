@@ -1,4 +1,4 @@
-"""A transport into a simulated device of this process, as nasty as TCP."""
+"""A transport into a simulated device of this process, as difficult as TCP."""
 
 import random
 from contextlib import AbstractContextManager
@@ -212,7 +212,7 @@ class LinePort:
 
 
 class _OpenPort:
-    """One client's time at the port."""
+    """One client's session at the port."""
 
     closed = False
     """A line has no end."""

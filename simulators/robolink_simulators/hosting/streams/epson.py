@@ -58,7 +58,7 @@ class EpsonLineHost(LineHost):
 
 
 def _told(dialect: Dialect) -> dict[str, str]:
-    """Return the options that a client has to give, since the usual ones are others."""
+    """Return the options that a client has to give, because they differ from the defaults."""
     usual = Dialect()
     return {
         name: str(value)

@@ -27,7 +27,7 @@ MOST_AT_ONCE: Final = 16
 
 
 class Readiness(Protocol):
-    """What is watched, each with something of the caller's own."""
+    """What is watched, each with data of the caller's own."""
 
     def register(self, what: socket.socket | int, events: int, data: object) -> None:
         """Watch a socket or descriptor for events, those of :mod:`selectors`."""
@@ -166,7 +166,7 @@ class LoopHost(Protocol):
         """Take what was ready, and let time pass."""
 
     def answer(self) -> float | None:
-        """Let out what is ready; return in how many seconds to look again, ``None`` for never."""
+        """Send what is ready; return in how many seconds to check again, ``None`` for never."""
 
     def end(self) -> None:
         """Close all that is open."""
@@ -205,13 +205,13 @@ class ServingLoop:
         return True
 
     def wake(self, host: LoopHost) -> None:
-        """Have a host look at its device again; any thread may call it."""
+        """Let a host check its device again; any thread may call it."""
         with self._gate:
             if not self._ended:
                 self._ask(partial(self._look_at, host))
 
     def leave(self, host: LoopHost) -> None:
-        """Serve a host no more, and return once it is closed; in the loop itself, soon."""
+        """Stop serving a host, and return once it is closed; in the loop itself, soon."""
         inside = self._thread is threading.current_thread()
         gone = threading.Event()
         with self._gate:
@@ -225,7 +225,7 @@ class ServingLoop:
                 self._thread.join()
 
     def _ask(self, act: Callable[[], None]) -> None:
-        """Have something done in the thread; the gate is held."""
+        """Let the thread do something; the gate is locked."""
         self._asked.append(act)
         if not self._alarmed:
             self._alarmed = True
@@ -281,12 +281,12 @@ class ServingLoop:
                 self._look_at(host)
 
     def _look_at(self, host: LoopHost) -> None:
-        """Have a host look at its device although nothing came, and answer."""
+        """Let a host check its device although nothing came, and answer."""
         self._serve(host, None, 0)
         self._answer()
 
     def _serve(self, host: LoopHost, served: Served | None, events: int) -> None:
-        """Let a host work; one that fails is served no more, and the others are."""
+        """Let a host work; a failing one is dropped, and the others are served."""
         if host.stopping or host not in self._hosts:
             return
         try:
@@ -298,7 +298,7 @@ class ServingLoop:
             self._unanswered.append(host)
 
     def _answer(self) -> None:
-        """Let out what those have to say that were served."""
+        """Send the answers of the served hosts."""
         answering, self._unanswered = self._unanswered, []
         for host in answering:
             if host in self._hosts:
@@ -311,7 +311,7 @@ class ServingLoop:
                     self._look_again(host, patience_s)
 
     def _look_again(self, host: LoopHost, patience_s: float | None) -> None:
-        """Look at a host when it wants to be looked at."""
+        """Check a host again when it wants to be checked."""
         host.due_s = None if patience_s is None else monotonic() + patience_s
         if host.due_s is not None and (host.queued_s is None or host.due_s < host.queued_s):
             self._queue(host, host.due_s)
@@ -375,5 +375,5 @@ _SHARED: Final = _SharedLoop()
 
 
 def serve_beside_others(host: LoopHost) -> ServingLoop:
-    """Have a host served by the thread of this process, which begins when there is none."""
+    """Serve a host in this process's thread, which starts if there is none."""
     return _SHARED.join(host)

@@ -43,7 +43,7 @@ class Connection:
         host.watch(client, self._watched, self.serve)
 
     def serve(self, events: int, now_ns: int) -> None:
-        """Deal with what the selector saw."""
+        """Handle what the selector reports."""
         if not events & selectors.EVENT_READ or self.finished:
             return
         try:

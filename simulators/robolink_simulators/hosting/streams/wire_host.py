@@ -56,7 +56,7 @@ class WireHost(ClosedAtExit):
         self._loop = serve_beside_others(self)
 
     def present(self, simulator: HostedDevice, url: str = "") -> None:
-        """Let a simulator keep the time of this host, and wake it after an act past the wire.
+        """Let a simulator keep the time of this host, and wake it after an act outside the wire.
 
         Args:
             simulator: What is served.
@@ -67,7 +67,7 @@ class WireHost(ClosedAtExit):
         simulator.watchers.append(self.wake)
 
     def wake(self) -> None:
-        """Have the device looked at again; any thread may call it."""
+        """Let the device be checked again; any thread may call it."""
         if not (self._woken or self.stopping):
             self._woken = True
             self._loop.wake(self)
@@ -93,11 +93,11 @@ class WireHost(ClosedAtExit):
 
     @abstractmethod
     def flush(self) -> None:
-        """Let out what is ready; the device is held."""
+        """Send what is ready; the device is locked."""
 
     @abstractmethod
     def shut(self, now_ns: int) -> None:
-        """Close what the subclass has opened; the device is held."""
+        """Close what the subclass has opened; the device is locked."""
 
     def serve(self, served: Served | None, events: int) -> None:
         """See ``LoopHost.serve``."""
@@ -125,7 +125,7 @@ class WireHost(ClosedAtExit):
             self.shut(self._clock.now_ns())
 
     def watch(self, what: "socket.socket | int", events: int, served: Served) -> None:
-        """Have something called when one of the events is seen; in the thread of the loop."""
+        """Call a function when one of the events is seen; in the thread of the loop."""
         self._loop.watched.register(what, events, (self, served))
 
     def watch_for(self, what: "socket.socket | int", events: int, served: Served) -> None:

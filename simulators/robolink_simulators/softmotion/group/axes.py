@@ -44,7 +44,7 @@ class AxisLimits:
     acceleration_per_s2: float
 
     def holds(self, value: float) -> bool:
-        """Tell whether a value lies inside; 1e-9 absorbs the arithmetic of a round trip."""
+        """Return whether a value lies inside; 1e-9 absorbs the arithmetic of a round trip."""
         return self.low - _ROUNDING <= value <= self.high + _ROUNDING
 
 
@@ -110,7 +110,7 @@ class Axis:
         self._value = value
 
     def trailing(self, value: float) -> float:
-        """Return where the true axis is, with the encoder at ``value`` on the way it last went."""
+        """Return where the true axis is, with the encoder at ``value``, by its last direction."""
         return value - self.play / 2 * self._way
 
     @property
@@ -124,7 +124,7 @@ class Axis:
 
     @property
     def moving_alone(self) -> bool:
-        """Whether a single movement is under way."""
+        """Whether a single movement is in progress."""
         return self._travel is not None
 
     def switch(self, on: bool) -> None:
@@ -180,7 +180,7 @@ class Axis:
         self._coupled = AxisState.SYNCHRONIZED_MOTION
 
     def free(self) -> None:
-        """Show that the group lets go of the axis."""
+        """Show that the group releases the axis."""
         self._coupled = AxisState.STANDSTILL
 
     def fail(self) -> None:

@@ -194,7 +194,7 @@ _SAME_PLACE = 1e-6
 
 
 class StateBlocks(GroupCore):
-    """Power, enable and disable, reset, and every way of coming to rest."""
+    """Power, enable and disable, reset, and every way of stopping."""
 
     def power(self, *, on: bool) -> None:
         """``MC_Power`` of every drive; off while moving or stopping is a group error."""
@@ -249,7 +249,7 @@ class StateBlocks(GroupCore):
 
     @block
     def stop(self, execution: BlockExecution) -> None:
-        """``MC_GroupStop`` with ``Execute`` held: Done at rest, locked until released."""
+        """``MC_GroupStop`` with ``Execute`` on: Done at rest, locked until released."""
         self._require_enabled()
         self.machine.begin_stop(execution)
 
@@ -259,7 +259,7 @@ class StateBlocks(GroupCore):
 
     @block
     def halt(self, execution: BlockExecution) -> None:
-        """``MC_GroupHalt``: come to rest through Moving to Standby."""
+        """``MC_GroupHalt``: stop, through Moving to Standby."""
         self._require_unlocked()
         if self.motion.interrupting:
             raise BlockRefused(ErrorKind.WRONG_STATE, "An interrupt is under way")
@@ -267,7 +267,7 @@ class StateBlocks(GroupCore):
 
     @block
     def interrupt(self, execution: BlockExecution) -> None:
-        """``MC_GroupInterrupt``: come to rest on the path; the movements stay busy."""
+        """``MC_GroupInterrupt``: stop on the path; the movements stay busy."""
         self._require_unlocked()
         if self.motion.interrupting:
             raise Overruled
@@ -279,7 +279,7 @@ class StateBlocks(GroupCore):
 
     @block
     def resume(self, execution: BlockExecution) -> None:
-        """``MC_GroupContinue``: go on with what was interrupted, each with its own tool."""
+        """``MC_GroupContinue``: continue what was interrupted, each with its own tool."""
         self._require_unlocked()
         if self.state is not SmcGroupState.STANDBY:
             raise BlockRefused(ErrorKind.WRONG_STATE, f"Not STANDBY but {self.state.name}")
@@ -299,7 +299,7 @@ class StateBlocks(GroupCore):
             raise BlockRefused(ErrorKind.WRONG_STATE, f"In {self.state.name}")
 
     def _require_unlocked(self) -> None:
-        """Refuse in Disabled and ErrorStop; a stop that is held overrules (documented)."""
+        """Refuse in Disabled and ErrorStop; a present stop overrules (documented)."""
         self._require_enabled()
         if self.state is SmcGroupState.STOPPING:
             raise Overruled
@@ -312,10 +312,10 @@ class ToolBlocks(GroupCore):
     def set_tool(
         self, execution: BlockExecution, tool: CoordRef, name: str = "ToolInForce"
     ) -> None:
-        """``SMC_GroupSetTool``: counts for movements commanded from now on.
+        """``SMC_GroupSetTool``: applies to movements commanded from now on.
 
         Refused in Disabled and ErrorStop, and when the kinematics cannot honour the shift;
-        the tool in force then stays (documented). The rotation never matters.
+        the selected tool then stays (documented). The rotation never matters.
         """
         self._require_tool_change()
         self._require_fit(tool)
@@ -345,7 +345,7 @@ class ToolBlocks(GroupCore):
 
     @block
     def set_kin_transform(self, execution: BlockExecution, kinematics: KinematicsModel) -> None:
-        """``MC_SetKinTransform``: takes the tool off, even with the same kinematics (documented).
+        """``MC_SetKinTransform``: removes the tool, even with the same kinematics (documented).
 
         Accepted in Disabled and Standby (assumed) for a kinematics that the drives fit;
         interrupted movements end, since their way was another kinematics's (assumed).
@@ -443,7 +443,7 @@ class ToolBlocks(GroupCore):
             raise BlockRefused(ErrorKind.WRONG_STATE, f"No tool can be set in {self.state.name}")
 
     def _require_unused(self, system: CoordSystem) -> None:
-        """Refuse to move a PCS in which something under way counts (unverified where)."""
+        """Refuse to move a PCS that something in progress uses (unverified where)."""
         jog = self.motion.jog
         under_way = [*self.motion.queue.unfinished, *self.motion.interrupted]
         systems = [*(it.system for it in under_way), *([jog.system] if jog else ())]

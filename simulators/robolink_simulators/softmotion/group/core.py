@@ -29,7 +29,7 @@ Core = TypeVar("Core", bound="GroupCore")
 def block(
     method: Callable[Concatenate[Core, BlockExecution, Inputs], None],
 ) -> Callable[Concatenate[Core, Inputs], BlockExecution]:
-    """Make a method a function block: it returns its execution, and complaints are outputs."""
+    """Make a method a function block: it returns its execution, and errors are outputs."""
 
     @wraps(method)
     def executed(core: Core, /, *args: Inputs.args, **kwargs: Inputs.kwargs) -> BlockExecution:
@@ -61,7 +61,7 @@ class GroupCore:
         transforms: Where the coordinate systems stand (MC_SetCoordinateTransform).
         inputs: Digital inputs.
         outputs: Digital outputs.
-        tool: The tool in force for movements to come.
+        tool: The selected tool for movements to come.
         motions: Movements and jogs accepted.
         motion: What moves the drives.
         machine: State and time.

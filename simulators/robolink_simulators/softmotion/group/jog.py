@@ -60,7 +60,7 @@ class JogCommand:
 
 
 class JogMotion:
-    """A jog under way.
+    """A jog in progress.
 
     Args:
         command: What is pressed at first.

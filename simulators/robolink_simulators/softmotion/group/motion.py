@@ -16,7 +16,7 @@ _HALVINGS = 40
 
 
 class GroupMotion:
-    """The axes, and what is under way on them.
+    """The axes, and what is in progress on them.
 
     Args:
         axes: Gives the drives that belong to the kinematics.
@@ -52,7 +52,7 @@ class GroupMotion:
 
     @property
     def resting(self) -> bool:
-        """Whether no movement and no jog is under way; one held back by an interrupt rests."""
+        """Whether no movement and no jog is in progress; an interrupted one rests."""
         if self.jog is not None:
             return False
         return not self.queue.running if self.interrupting else self.queue.empty
@@ -73,7 +73,7 @@ class GroupMotion:
         self._singles.append((axis, execution))
 
     def brake(self, now_ns: int) -> None:
-        """Abort every movement and jog and come to rest."""
+        """Abort every movement and jog and stop."""
         self.queue.take_over(now_ns)
         self.abandon_interrupted()
         if self.jog is not None:
@@ -87,7 +87,7 @@ class GroupMotion:
             self.jog = None
 
     def interrupt(self, now_ns: int) -> None:
-        """Come to rest on the path and keep what is left of it."""
+        """Stop on the path and keep what is left of it."""
         self.interrupting = True
         self.queue.brake(now_ns)
 
@@ -98,7 +98,7 @@ class GroupMotion:
         self.interrupted_at = self.values
 
     def resume(self, now_ns: int) -> None:
-        """Go on with what was interrupted."""
+        """Continue what was interrupted."""
         self.queue.resume(self.interrupted, now_ns)
         self.interrupted = []
 

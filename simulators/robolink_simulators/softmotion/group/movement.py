@@ -60,7 +60,7 @@ class Movement:
         number: Its id, from 1.
         path: Where it leads.
         pace: How fast; ``None`` when there is no way to go.
-        tool: The tool in force when it was commanded; it stays the movement's own.
+        tool: The selected tool when it was commanded; it stays the movement's own.
         mode: How it joins the movement before.
         base: Where the coordinate system of its command stands in MCS.
         execution: What its block shows.
@@ -115,7 +115,7 @@ class Movement:
 
     @property
     def unfinished(self) -> bool:
-        """Whether its rest is neither its end nor what it stops for, so that it can go on."""
+        """Whether it stopped before its end without reason, so that it can continue."""
         at_edge = self.latched and self.watch is not None and self.watch.stops
         return self.rest_share < 1 and not at_edge and not self.execution.ended
 
@@ -126,7 +126,7 @@ class Movement:
 
     @property
     def rest_ns(self) -> int:
-        """When it comes to rest."""
+        """When it stops."""
         return self._instant(self._profile.duration_s)
 
     @property
@@ -136,7 +136,7 @@ class Movement:
 
     @property
     def rest_share(self) -> float:
-        """How much of its path it will have covered at rest."""
+        """How much of its path it will have covered when it stops."""
         return self._profile.end
 
     def share_at(self, now_ns: int) -> float:
@@ -148,7 +148,7 @@ class Movement:
         return self._profile.share_at((now_ns - self._start_ns) / NS_PER_S)
 
     def start(self, now_ns: int) -> None:
-        """Begin, or go on after an interruption, from rest."""
+        """Begin, or continue after an interruption, from rest."""
         share = self._profile.end if self.begun else 0.0
         self._profile = SpeedProfile.fastest(share, self._pace)
         self._start_ns = now_ns
@@ -156,7 +156,7 @@ class Movement:
         self.execution.activate()
 
     def brake(self, now_ns: int) -> None:
-        """Come to rest on the path with the movement's own deceleration (assumed)."""
+        """Stop on the path with the movement's own deceleration (assumed)."""
         self._profile = self._braked_profile(now_ns)
         self._braked = self._profile.end < 1
 
@@ -171,7 +171,7 @@ class Movement:
             self.execution.latched = CoordRef.of(self._base.inverse() @ tcp)
 
     def can_blend_from(self, before: "Movement") -> bool:
-        """Tell whether the corner between two movements can be rounded.
+        """Return whether the corner between two movements can be rounded.
 
         Both direct, or both on lines with the same tool; anything else is buffered (assumed).
         """
@@ -254,26 +254,26 @@ class MovementQueue:
         self.last = movement
 
     def take_over(self, now_ns: int) -> None:
-        """Abort everything for a movement to come; what runs comes to rest first (assumed)."""
+        """Abort everything for a movement to come; what runs stops first (assumed)."""
         for movement in self.unfinished:
             movement.execution.abort()
         self.brake(now_ns)
         self._waiting.clear()
 
     def brake(self, now_ns: int) -> None:
-        """Bring what runs to rest on its path; what waits stays."""
+        """Stop what runs on its path; what waits stays."""
         for movement in self._running:
             movement.brake(now_ns)
 
     def drop(self) -> list[Movement]:
-        """Forget everything at once and return what was unfinished."""
+        """Drop everything at once and return what was unfinished."""
         unfinished = self.unfinished
         self._running.clear()
         self._waiting.clear()
         return unfinished
 
     def resume(self, movements: list[Movement], now_ns: int) -> None:
-        """Let interrupted movements go on, those that had begun at once."""
+        """Continue interrupted movements, those that had begun at once."""
         self._running = [movement for movement in movements if movement.begun]
         self._waiting = deque(movement for movement in movements if not movement.begun)
         for movement in self._running:
@@ -292,7 +292,7 @@ class MovementQueue:
         return self._cycle_after(due_ns, now_ns)
 
     def settle(self, now_ns: int) -> list[Movement]:
-        """Take off what has come to rest by now, and return it."""
+        """Remove what has stopped by now, and return it."""
         rested = []
         # In order: the second in a corner may be at rest before the first has arrived there.
         while self._running and self._running[0].rest_ns <= now_ns:

@@ -1,4 +1,4 @@
-"""The ways a movement can lead, as functions of the share covered."""
+"""The paths of a movement, as functions of the share covered."""
 
 import math
 from collections.abc import Sequence
@@ -42,7 +42,7 @@ _MOST_CHECKS = 500
 
 
 class Dynamics(NamedTuple):
-    """What a movement may reach.
+    """The limits of a movement's dynamics.
 
     In mm/s, mm/s2, mm/s2 and mm/s3 on a line; factors above 0 up to 1 of what the axes can do
     in a direct movement. The jerk is checked and plays no part (see :mod:`.profile`).
@@ -91,7 +91,7 @@ class LinePath:
 
     Attributes:
         kinematics: Of the group.
-        tool: Flange to TCP; the tool in force when the movement was commanded.
+        tool: Flange to TCP; the selected tool when the movement was commanded.
         configuration: Kept all along.
         start: Axes at its beginning.
         end: Axes at its end.
@@ -139,7 +139,7 @@ class LinePath:
 
     @property
     def length_mm(self) -> float:
-        """Way of the TCP."""
+        """Path length of the TCP."""
         return math.dist(self.start_tcp.shift_mm, self.end_tcp.shift_mm)
 
     @property
@@ -163,7 +163,7 @@ def axes_for_tcp(
     *,
     near: AxisValues,
 ) -> AxisValues:
-    """Return the axes that bring the TCP somewhere, its orientation as close as it can be.
+    """Return the axes that move the TCP somewhere, its orientation as close as possible.
 
     The orientation is projected first and the position kept (documented,
     docs/reference/softmotion.md 3.1).
@@ -336,7 +336,7 @@ class Planner:
         return self._transforms.in_mcs(system, self._kinematics.flange(start) @ tool)
 
     def tcp(self, start: AxisValues, target: Target, tool: Frame) -> Frame:
-        """Return where a target brings the TCP, in MCS.
+        """Return where a target moves the TCP, in MCS.
 
         Args:
             start: Axes where the movement starts: TCS stands there.

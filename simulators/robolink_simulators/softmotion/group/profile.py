@@ -21,7 +21,7 @@ class Phase(NamedTuple):
 
 
 class Pace(NamedTuple):
-    """What a profile may reach, in shares of the path."""
+    """The limits of a profile, in shares of the path."""
 
     rate_per_s: float
     rise_per_s2: float
@@ -90,7 +90,7 @@ class SpeedProfile:
         return max(0.0, final)
 
     def braked(self, time_s: float, fall_per_s2: float) -> Self:
-        """Return this profile as far as ``time_s``, coming to rest after that.
+        """Return this profile up to ``time_s``, stopping after that.
 
         Slows down harder than asked where the path would end first, as MC_GroupStop may
         (documented, docs/reference/softmotion.md 2.3).

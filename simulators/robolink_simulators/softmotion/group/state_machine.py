@@ -70,7 +70,7 @@ class StateMachine:
             raise BlockRefused(ErrorKind.INTERRUPTED_BY_SINGLE_AXIS, text)
 
     def begin_motion(self) -> None:
-        """Something begins to move the group; a halt under way ends for it (assumed)."""
+        """Note that something moves the group; a halt in progress ends for it (assumed)."""
         self._abort_endings()
         self._rest_ns = None
         self.state = SmcGroupState.MOVING
@@ -78,18 +78,18 @@ class StateMachine:
             axis.couple()
 
     def begin_halt(self, execution: BlockExecution) -> None:
-        """Come to rest and be in Standby a cycle later."""
+        """Stop and be in Standby a cycle later."""
         self.begin_motion()
         self._motion.brake(self.now_ns)
         self._ending = [execution]
 
     def begin_interrupt(self, execution: BlockExecution) -> None:
-        """Come to rest on the path and keep what is left."""
+        """Stop on the path and keep what is left."""
         self._motion.interrupt(self.now_ns)
         self._ending = [execution]
 
     def begin_stop(self, execution: BlockExecution) -> None:
-        """Come to rest and stay locked until :meth:`release_stop`; another stop joins in."""
+        """Stop and stay locked until :meth:`release_stop`; another stop joins in."""
         self.stop_held = True
         if self.state is SmcGroupState.STOPPING:
             self._ending.append(execution)
@@ -102,7 +102,7 @@ class StateMachine:
         self._ending = [execution]
 
     def release_stop(self) -> None:
-        """``Execute`` of the stop falls; once at rest, Standby follows a cycle later."""
+        """Let ``Execute`` of the stop fall; once at rest, Standby follows a cycle later."""
         if self._rest_ns is not None:
             self._rest_ns = self.now_ns
         self.stop_held = False
@@ -162,7 +162,7 @@ class StateMachine:
             self.state, self.error = SmcGroupState.STANDBY, None
 
     def restart(self) -> None:
-        """The PLC starts anew: what moved stands still where it is, the group is Disabled."""
+        """Start the PLC anew: what moved stops where it is, the group is Disabled."""
         self._end_everything(None)
         self.state, self.error = SmcGroupState.DISABLED, None
         self._free_axes()
@@ -225,7 +225,7 @@ class StateMachine:
 
     @property
     def _settled(self) -> bool:
-        """Whether the group is at rest in a state that it will leave for that."""
+        """Whether the group is at rest in a state that it leaves for that."""
         return self._motion.resting and self.state in (SmcGroupState.MOVING, SmcGroupState.STOPPING)
 
     def _cycle_after(self, now_ns: int) -> int:

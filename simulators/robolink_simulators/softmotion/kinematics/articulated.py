@@ -69,7 +69,7 @@ class PosRRR:
         return Configuration(arm_backwards=backwards, elbow_low=bent_up is backwards)
 
     def axes_for(self, flange: Frame, configuration: Configuration, near: AxisValues) -> AxisValues:
-        """Return the axes that bring the flange to the position; how it is turned follows."""
+        """Return the axes that move the flange to the position; its turn follows."""
         wanted = configuration.completed(self.configuration(near))
         x, y, z = flange.shift_mm
         square = x * x + y * y - self.d3_mm * self.d3_mm
@@ -167,7 +167,7 @@ class Palletizer4Axis:
         return Configuration(arm_backwards=self._out(axes) < 0, elbow_low=axes[2] < -90.0)
 
     def axes_for(self, flange: Frame, configuration: Configuration, near: AxisValues) -> AxisValues:
-        """Return the axes that bring the flange there."""
+        """Return the axes that move the flange there."""
         wanted = configuration.completed(self.configuration(near))
         x, y, z = flange.shift_mm
         out = math.hypot(x, y)

@@ -141,7 +141,7 @@ class Configuration:
         return Configuration(*(o if m is None else m for m, o in self._pairs(other)))
 
     def contradicts(self, other: "Configuration") -> bool:
-        """Tell whether both say something about one choice, and not the same."""
+        """Return whether both state one choice, and differently."""
         return any(None not in pair and pair[0] is not pair[1] for pair in self._pairs(other))
 
     def _pairs(self, other: "Configuration") -> list[tuple[bool | None, bool | None]]:

@@ -78,7 +78,7 @@ class RodMachine:
         configuration: Configuration,  # noqa: ARG002 - has none
         near: AxisValues,  # noqa: ARG002 - nothing goes round
     ) -> AxisValues:
-        """Return the axes that bring the plate to the position."""
+        """Return the axes that move the plate to the position."""
         if self._places_deg == _TWO_DEG and abs(flange.shift_mm[1]) > _IN_PLANE_MM:
             raise BlockRefused(ErrorKind.UNREACHABLE, "It moves in the XZ plane only")
         return tuple(self._drive(place, flange.shift_mm) for place in self._places_deg)

@@ -103,7 +103,7 @@ class Scara2Z:
         return Configuration(elbow_right=axes[1] >= 0)
 
     def axes_for(self, flange: Frame, configuration: Configuration, near: AxisValues) -> AxisValues:
-        """Return the axes that bring the flange to the position; its turn follows."""
+        """Return the axes that move the flange to the position; its turn follows."""
         x, y, z = flange.shift_mm
         l1, l2 = self.arm_length_1_mm, self.arm_length_2_mm
         cosine = (x * x + y * y - l1 * l1 - l2 * l2) / (2 * l1 * l2)
@@ -166,7 +166,7 @@ class Polar:
         configuration: Configuration,  # noqa: ARG002 - has none
         near: AxisValues,
     ) -> AxisValues:
-        """Return the axes that bring the flange to the position; its turn follows."""
+        """Return the axes that move the flange to the position; its turn follows."""
         x, y, z = flange.shift_mm
         radius = math.hypot(x, y)
         angle_deg = near[0] if radius < _ROUNDING else math.degrees(math.atan2(y, x))
@@ -219,7 +219,7 @@ class Gantry:
         configuration: Configuration,  # noqa: ARG002 - has none
         near: AxisValues,  # noqa: ARG002 - nothing turns
     ) -> AxisValues:
-        """Return the axes that bring the flange to the position."""
+        """Return the axes that move the flange to the position."""
         x, y, z = flange.shift_mm
         (a, b), (c, d) = self.of_x, self.of_y
         whole = a * d - b * c

@@ -111,7 +111,7 @@ class Inbox:
             self._newest = (command.owner, command.epoch, command.sequence)
 
     def _is_of_before(self, command: Command) -> bool:
-        """Tell whether its owner has sent a newer one in this epoch: it comes late, or twice."""
+        """Return whether its owner has sent a newer one in this epoch: it comes late, or twice."""
         if self._newest is None or (command.owner, command.epoch) != self._newest[:2]:
             return False
         return not 0 < (command.sequence - self._newest[2]) % _SEQUENCES <= _MOST_AHEAD
@@ -209,7 +209,7 @@ class WireFaults(CountedFaults[PlcFault]):
         return tuple(words)
 
     def leaving(self, shown: str, words: Words, faults: Iterable[PlcFault]) -> ServedAccess:
-        """Return what leaves instead of an answer."""
+        """Return what is sent instead of an answer."""
         served = ServedAccess(words)
         for fault in faults:
             match fault.action:

@@ -1,4 +1,4 @@
-"""Commands at work and what becomes of each: results, error classes, jobs."""
+"""Commands in progress and the outcome of each: results, error classes, jobs."""
 
 import math
 from collections import deque
@@ -94,7 +94,7 @@ def require_finite(values: Sequence[float]) -> None:
 
 
 def require_slot(number: int) -> int:
-    """Return the number of a slot, which there must be.
+    """Return the number of a slot, which must exist.
 
     Raises:
         Rejected: SLOT_OUT_OF_RANGE.
@@ -106,7 +106,7 @@ def require_slot(number: int) -> int:
 
 @dataclass(frozen=True, slots=True)
 class CommandResult:
-    """What becomes of a command.
+    """The outcome of a command.
 
     Attributes:
         execution: The block that carries it out.
@@ -276,7 +276,7 @@ class Jobs:
             self._unfinished.append(job)
 
     def follow(self) -> None:
-        """Look how far everything is, and note what has ended."""
+        """Check the progress of everything, and note what has ended."""
         if not self._unfinished:
             return
         for job in self._unfinished:

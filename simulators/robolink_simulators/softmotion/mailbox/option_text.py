@@ -18,7 +18,7 @@ _LARGEST_UDINT: Final = 0xFFFF_FFFF
 
 @dataclass(frozen=True, slots=True)
 class PlcOptions:
-    """Everything that can be set about a simulated PLC, beside its machine.
+    """All options of a simulated PLC, besides its machine.
 
     Attributes:
         group: The axis group's habits.

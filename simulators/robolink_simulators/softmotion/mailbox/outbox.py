@@ -103,7 +103,7 @@ class Outbox:
         return arranged(RESPONSE, encode_response(told), self._order)
 
     def head(self, program: MailboxProgram, heartbeat: int) -> Words:
-        """Return the words before ``boot_id``: for these clients ask all the time."""
+        """Return the words before ``boot_id``: clients read these all the time."""
         told = self._told_of_command(program)
         told |= {"version": VERSION, "plc_heartbeat": heartbeat}
         return arranged(HEAD, HEAD.pack(told), self._order)

@@ -32,15 +32,15 @@ class MailboxOwnership:
         self.holder = 0
 
     def answer(self) -> Answer:
-        """Return what 30005 answers, taken or not."""
+        """Return the answer of 30005, taken or not."""
         return Answer.of_owner(self.holder, self._memory.epoch)
 
     def heard(self, now_ns: int) -> None:
-        """Note a sign of the owner."""
+        """Note a sign of life of the owner."""
         self._heard_ns = self._wire_time.at(now_ns)
 
     def owns(self, command: Command) -> bool:
-        """Tell whether a command comes from the owner, in its present epoch."""
+        """Return whether a command comes from the owner, in its present epoch."""
         return self.holder != 0 and (command.owner, command.epoch) == (
             self.holder,
             self._memory.epoch,
@@ -60,7 +60,7 @@ class MailboxOwnership:
             raise Rejected(ErrorClass.STALE_EPOCH)
 
     def carry_out(self, command: Command, now_ns: int, *, moving: bool) -> None:
-        """Let a client take the mailbox, or give it back.
+        """Let a client take the mailbox, or release it.
 
         The owner itself may take it again, under a new epoch (assumed).
 
@@ -79,7 +79,7 @@ class MailboxOwnership:
             raise Rejected(ErrorClass.STALE_EPOCH if stale else ErrorClass.NOT_OWNER)
 
     def seize(self, now_ns: int) -> None:
-        """Let a client take it that nobody here knows, because a person at it insists."""
+        """Let an unknown client take it, because its user insists."""
         self._take(_A_STRANGER, now_ns, insists=True, moving=False)
 
     def _take(self, owner: int, now_ns: int, *, insists: bool, moving: bool) -> None:

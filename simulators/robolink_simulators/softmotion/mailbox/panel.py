@@ -1,4 +1,4 @@
-"""What a person or the rest of the machine does to a simulated PLC, past the wire."""
+"""What a person, or the rest of the machine, does to a simulated PLC outside the wire."""
 
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager
@@ -50,7 +50,7 @@ class PlcPanel:
             self._plc.program.permitted = True
 
     def withdraw_permit(self) -> None:
-        """Let the machine permit them no longer; what moves ends in the next cycle."""
+        """Let the machine no longer permit changes; what moves ends in the next cycle."""
         with self._acting():
             self._plc.program.permitted = False
 
@@ -67,7 +67,7 @@ class PlcPanel:
             return self._plc.program.holder != 0
 
     def take_change_back(self) -> None:
-        """Let the machine's own program say that it knows of the change (``xToolChanged``)."""
+        """Let the machine's own program confirm that it knows of the change (``xToolChanged``)."""
         with self._acting():
             self._plc.memory.tool_changed = False
 
@@ -131,17 +131,17 @@ class PlcPanel:
             self._plc.program.zero_inputs(now_ns)
 
     def freeze(self) -> None:
-        """Let the mailbox program stand still, its heartbeat too; what moves goes on."""
+        """Stop the mailbox program, with its heartbeat; what moves continues."""
         with self._acting() as now_ns:
             self._plc.freeze(now_ns)
 
     def thaw(self) -> None:
-        """Let the mailbox program go on."""
+        """Continue the mailbox program."""
         with self._acting():
             self._plc.thaw()
 
     def freeze_heartbeat(self) -> None:
-        """Let the heartbeat alone stand still, as when only the motion task has died (F69)."""
+        """Stop only the heartbeat, as when only the motion task has died (F69)."""
         with self._acting() as now_ns:
             self._plc.freeze_heartbeat(now_ns)
 
@@ -156,7 +156,7 @@ class PlcPanel:
             self._plc.shift = words
 
     def take_ownership(self) -> None:
-        """Let somebody else insist on the mailbox (F46)."""
+        """Let another client insist on the mailbox (F46)."""
         with self._acting() as now_ns:
             self._plc.program.seize(now_ns)
 
@@ -166,7 +166,7 @@ class PlcPanel:
             self._plc.cuts += 1
 
     def restart(self) -> None:
-        """Start the PLC anew; what is retained stays."""
+        """Restart the PLC; what is retained stays."""
         with self._acting() as now_ns:
             self._plc.start(now_ns)
 
@@ -180,7 +180,7 @@ class PlcPanel:
 
 
 class PlcMishaps(PlannedActs):
-    """Does to the panel what a fault plan says, each act at its own instant."""
+    """Applies the acts of a fault plan to the panel, each at its own instant."""
 
     def __init__(self, panel: PlcPanel) -> None:
         super().__init__()
@@ -196,7 +196,7 @@ class PlcMishaps(PlannedActs):
         }
 
     def plan(self, now_ns: int, seconds: float, act: Act) -> None:
-        """Have something done some time from now, not before the request is carried out."""
+        """Plan an act some time from now, not before the request is carried out."""
         self.plan_at(now_ns + max(1, round(seconds * NS_PER_S)), act)
 
     def _act_of(self, fault: PlcFault) -> Act | None:

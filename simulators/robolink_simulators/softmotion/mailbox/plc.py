@@ -38,7 +38,7 @@ class RunningProgram(Protocol):
 
     @property
     def capabilities(self) -> Capability:
-        """What it can be told."""
+        """What it supports."""
 
     @property
     def holder(self) -> int:
@@ -60,7 +60,7 @@ class RunningProgram(Protocol):
         """Return when ``run`` will next do something by itself, if ever."""
 
     def seize(self, now_ns: int) -> None:
-        """Let a client take the mailbox that nobody here knows, because a person insists."""
+        """Let an unknown client take the mailbox, because a person insists."""
 
 
 class Plc:
@@ -74,7 +74,7 @@ class Plc:
     Attributes:
         group: The axis group.
         memory: The retained variables.
-        tools: Slots and the tool in force.
+        tools: Slots and the selected tool.
         program: The mailbox program since the last start.
         starts: PLC starts so far.
         cuts: How often its cable was pulled; hosts end their connections then.
@@ -116,7 +116,7 @@ class Plc:
 
     @property
     def frozen(self) -> bool:
-        """Whether the mailbox program stands still."""
+        """Whether the mailbox program is stopped."""
         return self._frozen is not None
 
     def start(self, now_ns: int) -> None:
@@ -143,7 +143,7 @@ class Plc:
         self.tools.preset(_PRESET_SLOT, tool)
 
     def freeze(self, now_ns: int) -> None:
-        """Stop the mailbox program; what moves goes on."""
+        """Stop the mailbox program; what moves continues."""
         self._frozen = self.output(now_ns)
 
     def freeze_heartbeat(self, now_ns: int) -> None:
@@ -157,7 +157,7 @@ class Plc:
         self._modelled.inbox.lay_words(order)
 
     def thaw(self) -> None:
-        """Let the mailbox program go on."""
+        """Continue the mailbox program."""
         self._frozen = None
 
     def advance(self, now_ns: int) -> None:
@@ -177,7 +177,7 @@ class Plc:
         return min(change, look_ns)
 
     def keep_pace(self, took_ns: int) -> None:
-        """Take note how much simulated time went by while this computer worked out one step."""
+        """Note how much simulated time passed while this computer calculated one step."""
         del took_ns  # a program that is worked out cycle by cycle has use for it
 
     def output(self, now_ns: int) -> Words:

@@ -117,7 +117,7 @@ class MailboxProgram:
         return self.ownership.holder
 
     def write(self, first: int, words: Sequence[int], now_ns: int) -> None:
-        """Take what a client writes; it is looked at in the next cycle."""
+        """Accept a client's write; the next cycle reads it."""
         self.inbox.write(first, words)
         self._plan_look(now_ns)
 
@@ -141,7 +141,7 @@ class MailboxProgram:
         self._plan_look(now_ns)
 
     def seize(self, now_ns: int) -> None:
-        """Let a client take the mailbox that nobody here knows, because a person insists."""
+        """Let an unknown client take the mailbox, because a person insists."""
         self.ownership.seize(now_ns)
         self.jobs.end_moving(ErrorClass.NOT_OWNER)
 
@@ -222,7 +222,7 @@ class MailboxProgram:
         return CommandResult(self._group.halt()) if leaves and self.jobs.moving else ok()
 
     def _supervise(self, now_ns: int) -> None:
-        """Halt what moves when nobody stands behind it any more; the tool stays."""
+        """Halt what moves when nobody supervises it any more; the tool stays."""
         moving = self.jobs.moving
         self._watch.watch(moving=bool(moving), now_ns=now_ns)
         if not moving:
@@ -237,7 +237,7 @@ class MailboxProgram:
         self._watch.watch(moving=bool(self.jobs.moving), now_ns=now_ns)
 
     def _reason_to_end(self, now_ns: int) -> ErrorClass:
-        """Return why nothing may go on moving, NONE when it may."""
+        """Return why nothing may continue moving, NONE when it may."""
         if not self.permitted:
             return ErrorClass.NOT_PERMITTED
         deadline_ns = self._watch.deadline_ns

@@ -1,4 +1,4 @@
-"""What a PLC keeps over a restart: its number, the tool slots, and two counters."""
+"""What a PLC retains over a restart: its number, the tool slots, and two counters."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -42,7 +42,7 @@ class RetainedMemory:
         self._slots = dict.fromkeys(SLOTS, Slot())
 
     def slot(self, number: int) -> Slot:
-        """Return what a slot holds."""
+        """Return the content of a slot."""
         return self._slots[number]
 
     def defined(self) -> dict[int, Slot]:
@@ -60,7 +60,7 @@ class RetainedMemory:
         self._slots[number] = slot
 
     def clear(self, number: int) -> None:
-        """Empty a slot; an empty one is not changed, nor counted."""
+        """Empty a slot; an empty one is neither changed nor counted."""
         slot = self._slots[number]
         if slot.defined:
             self._slots[number] = Slot(next_number(slot.counter))
@@ -77,7 +77,7 @@ class RetainedMemory:
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Take over what :meth:`to_state` gave.
+        """Restore what :meth:`to_state` returned.
 
         Raises:
             KeyError, TypeError, ValueError: It is no such state.

@@ -153,7 +153,7 @@ class SoftMotionSimulator(HostedDevice):
         return self.plc.group.motions
 
     def restart(self) -> None:
-        """Start the PLC anew; what is retained stays."""
+        """Restart the PLC; what is retained stays."""
         self.panel.restart()
 
     def advance(self, now_ns: int) -> None:
@@ -166,7 +166,7 @@ class SoftMotionSimulator(HostedDevice):
         self._step(max(now_ns, self.now_ns))
 
     def _presently_ns(self) -> int:
-        """The host's own time, which goes on while this computer works."""
+        """The host's own time, which passes while this computer works."""
         return self.now_ns if self.present_ns is None else self.present_ns()
 
     def next_change(self) -> int | None:

@@ -94,7 +94,7 @@ class ToolDesk:
         return kinematics_word(_code(position), _code(orientation) if orientation else 0)
 
     def forget(self) -> None:
-        """The group has no tool any more."""
+        """Forget the tool: the group has none any more."""
         self.selected = 0
         self._applied = self._group.tool
 
@@ -104,7 +104,7 @@ class ToolDesk:
         self._apply(number, self._memory.slot(number).tool, "nozzle")
 
     def preselect(self, number: int) -> None:
-        """Put the tool of a slot in force past the mailbox; 0 for none."""
+        """Select the tool of a slot outside the mailbox; 0 for none."""
         if number:
             slot = self._memory.slot(number)
             self._apply(number, slot.tool, slot.name)
@@ -112,7 +112,7 @@ class ToolDesk:
             self.forget()
 
     def set_tool(self) -> Answer:
-        """Return the tool in force for movements to come."""
+        """Return the tool for movements to come."""
         return self._answer(self._group.tool)
 
     def _write(self, command: Command) -> CommandResult:

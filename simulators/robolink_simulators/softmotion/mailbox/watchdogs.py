@@ -47,7 +47,7 @@ class ClientWatch:
 
     @property
     def deadline_ns(self) -> int | None:
-        """When patience ends, ``None`` while nothing is supervised."""
+        """When the time-out ends, ``None`` while nothing is supervised."""
         if self._since_ns is None:
             return None
         heard_ns = max(self._since_ns, self._heard_ns)
@@ -58,7 +58,7 @@ _NS_PER_MS: Final = 1_000_000
 
 
 class FieldbusWatchdog:
-    """Knows when a fieldbus gives its clients up (documented, docs/reference/softmotion.md 4.1).
+    """Decides when a fieldbus gives its clients up (documented, docs/reference/softmotion.md 4.1).
 
     It runs by the clock: nobody has to ask for anything for it to expire.
 
@@ -84,7 +84,7 @@ class FieldbusWatchdog:
         return self._wire_time.simulated_at(self._heard_ns + self._patience_ns)
 
     def expires(self, now_ns: int) -> bool:
-        """Tell whether it expires now; once until the next request."""
+        """Return whether it expires now; once until the next request."""
         due_ns = self.deadline_ns
         if due_ns is None or now_ns < due_ns:
             return False

@@ -102,7 +102,7 @@ class ExecutedMailbox:
 
     @property
     def capabilities(self) -> Capability:
-        """What the program can be told."""
+        """What the program supports."""
         return Capability(self.words[_CAPABILITIES])
 
     @property
@@ -130,14 +130,14 @@ class ExecutedMailbox:
         self._scanned_ns = now_ns // self._cycle_ns * self._cycle_ns - self._cycle_ns
 
     def tell_before(self, command: Words) -> None:
-        """Have a command carried out before time begins, as somebody did earlier today."""
+        """Carry out a command before time begins, as somebody did earlier today."""
         self.inbox.write(0, command)
         for _ in range(_SETTLE_CYCLES):
             self._scan(self._scanned_ns)
         self.inbox.zero()
 
     def seize(self, now_ns: int) -> None:
-        """Let a client take the mailbox that nobody here knows, because a person insists."""
+        """Let an unknown client take the mailbox, because a person insists."""
         self.refresh(now_ns)
         before = self.inbox.words
         command = Command(0xFFFF, Opcode.OWNERSHIP, operands=(1, 1, 0, 0), owner=_A_STRANGER)
@@ -147,7 +147,7 @@ class ExecutedMailbox:
         self._restless = True
 
     def write(self, first: int, words: Words, now_ns: int) -> None:
-        """Take what a client writes; the program sees it in the next cycle."""
+        """Accept a client's write; the program sees it in the next cycle."""
         self.refresh(now_ns)
         self.inbox.write(first, words)
         self._restless = True
@@ -164,7 +164,7 @@ class ExecutedMailbox:
             self._catch_up(now_ns)
 
     def refresh(self, now_ns: int) -> None:
-        """Execute the cycle that began last, unless it has been, because somebody looks."""
+        """Execute the cycle that began last, unless done, because somebody reads."""
         self._catch_up(now_ns)
         self._left_out = FIRST_LEFT_OUT
 
@@ -174,7 +174,7 @@ class ExecutedMailbox:
             self._scan(began_ns)
 
     def keep_pace(self, took_ns: int) -> None:
-        """Leave out cycles when one was worked out in more than half of the period.
+        """Skip cycles when one took more than half of the period to calculate.
 
         Args:
             took_ns: The simulated time that went by meanwhile.
@@ -184,12 +184,12 @@ class ExecutedMailbox:
             self._overrun = 2 * took_ns // self._cycle_ns
 
     def next_change(self, now_ns: int) -> int | None:
-        """Return when the next cycle is due that is not left out."""
+        """Return when the next cycle is due that is not skipped."""
         return max(self._due_ns, (now_ns // self._cycle_ns + 1) * self._cycle_ns)
 
     @property
     def _due_ns(self) -> int:
-        """When the next cycle begins that is not left out; past when the program stood still."""
+        """When the next cycle begins that is not skipped; past when the program was stopped."""
         waits = 1 if self._restless else self._left_out
         return self._scanned_ns + max(waits, 1 + self._overrun) * self._cycle_ns
 
@@ -217,7 +217,7 @@ class ExecutedMailbox:
                 self._group.outputs.switch(number, on)
 
     def _judge_rest(self) -> None:
-        """A cycle may be left out when this one was like the one before and nothing goes on."""
+        """Skip a cycle when this one was like the one before and nothing is in progress."""
         words = tuple(self.structured.value("outbox"))
         still = (*words[:_HEARTBEAT], *words[_HEARTBEAT + 1 : _CRC])
         calls, seen = self._calls(), self._seen

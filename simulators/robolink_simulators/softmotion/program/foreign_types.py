@@ -45,7 +45,7 @@ _MEMBERS: Final[Mapping[str, ErrorKind]] = {
 
 
 class ErrorNumbers:
-    """One number for each complaint.
+    """One number for each error.
 
     Args:
         known: The numbers that the options give; 0 for those that nobody knows.
@@ -60,7 +60,7 @@ class ErrorNumbers:
         self._numbers[ErrorKind.NO_ORIENTATION_IMAGE] = both
 
     def number(self, error: SmcError) -> int:
-        """Return the ErrorID of a complaint; a drive's own number stays."""
+        """Return the ErrorID of an error; a drive's own number stays."""
         return error.number or self._numbers[error.kind]
 
     def members(self) -> Mapping[str, int]:

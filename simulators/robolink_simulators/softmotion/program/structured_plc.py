@@ -97,7 +97,7 @@ class ProgramMemory(RetainedMemory):
         self._program.put(_TOOL_CHANGED, changed)
 
     def slot(self, number: int) -> Slot:
-        """Return what a slot holds."""
+        """Return the content of a slot."""
         counter, filled, tool, words = self._held(number)
         letters = b"".join(word.to_bytes(2, "little") for word in words)
         name = letters.partition(b"\0")[0].decode("latin-1")
@@ -115,13 +115,13 @@ class ProgramMemory(RetainedMemory):
         self._put(number, Slot(counter, defined=True, tool=tool, name=name))
 
     def clear(self, number: int) -> None:
-        """Empty a slot; an empty one is not changed, nor counted."""
+        """Empty a slot; an empty one is neither changed nor counted."""
         slot = self.slot(number)
         if slot.defined:
             self._put(number, Slot(slot.counter % 0xFFFF + 1))
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Take over what ``to_state`` gave.
+        """Restore what ``to_state`` returned.
 
         Raises:
             KeyError, TypeError, ValueError: It is no such state.
@@ -203,7 +203,7 @@ class StructuredPlc(Plc):
         self._take_over()
 
     def make_ready(self, tool: CoordRef) -> None:
-        """Enable the group; somebody takes the mailbox, selects slot 1 and gives it back."""
+        """Enable the group; somebody takes the mailbox, selects slot 1 and releases it."""
         if self.group.state is SmcGroupState.DISABLED:
             self.group.enable()
         x, y, z, a, b, c = self._units.given(tool)
@@ -222,7 +222,7 @@ class StructuredPlc(Plc):
         self._take_over()
 
     def lay_words(self, order: WordOrder) -> None:
-        """Refuse: a program lays its words as its text says."""
+        """Refuse: the text of the program decides the order of its words."""
         del order
         raise _not_in_a_program()
 
@@ -232,17 +232,17 @@ class StructuredPlc(Plc):
         raise _not_in_a_program()
 
     def freeze(self, now_ns: int) -> None:
-        """Stop the mailbox program; what moves goes on."""
+        """Stop the mailbox program; what moves continues."""
         super().freeze(now_ns)
         self._executed.stands = True
 
     def thaw(self) -> None:
-        """Let the mailbox program go on."""
+        """Continue the mailbox program."""
         super().thaw()
         self._executed.stands = False
 
     def keep_pace(self, took_ns: int) -> None:
-        """Let the program leave out cycles on a computer that is too slow for all of them."""
+        """Let the program skip cycles on a computer that is too slow for all of them."""
         self._executed.keep_pace(took_ns)
 
     def output(self, now_ns: int) -> Words:

@@ -213,7 +213,7 @@ class EndRules:
             )
 
 
-_PROOFS: Final = ("verified", "proved, and kept by the program")
+_PROOFS: Final = ("verified", "tested, and kept by the program")
 """What the record says of a value that was proved: by robolink, and by a program's touches."""
 
 _DOUBT: Final = re.compile(r"The registers of tool (\d+) hold ")

@@ -1,4 +1,4 @@
-"""calibrate METHOD: measure a tool offset, propose it, write it, prove it.
+"""calibrate METHOD: measure a tool offset, propose it, write it, test it.
 
 Every method runs in one frame (``measuring``): plan and limits, consent, measurement, proposal with
 interval and verdict, question, write, proof, report. A method only says how it measures, and its

@@ -37,7 +37,7 @@ from robolink_cli.views.fit import judged_payload, report_payload
 
 
 class _PosesListener(CalibrationListener):
-    """Shows what the poses say, warns of another tool, and asks before the write."""
+    """Shows the result of the poses, warns of another tool, and asks before the write."""
 
     def __init__(
         self,
@@ -138,7 +138,7 @@ def _calibrate(
     method: PoseMethod,
     order: Order | None,
 ) -> Mapping[str, object]:
-    """Carry it out, or look what it would do; return the document."""
+    """Carry it out, or show what it would do; return the document."""
     with reporting(frame.report, controller) as draft:
         remark_on_pin(frame, controller)
         # A pin that is kept needs its height.

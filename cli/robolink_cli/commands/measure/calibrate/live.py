@@ -1,4 +1,4 @@
-"""A calibration in which the robot moves: plan, consent, measurement, proposal, write, proof."""
+"""A calibration in which the robot moves: plan, consent, measurement, proposal, write, test."""
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -45,7 +45,7 @@ from robolink_cli.views.fit import (
 
 
 class CalibrationListener(Listener):
-    """Shows a calibration as it goes, and collects it for a report.
+    """Shows the progress of a calibration, and collects it for a report.
 
     Attributes:
         impact: What the change means for taught points, once it was proposed.
@@ -61,12 +61,12 @@ class CalibrationListener(Listener):
         self.impact: Impact | None = None
 
     def read_points(self, controller: Controller) -> None:
-        """Read the taught points on which the change is to be judged."""
+        """Read the taught points at which the change is judged."""
         if self._request is not None:
             self._points = self._request.read(controller)
 
     def wrote(self, receipt: ToolReceipt) -> None:
-        """Note it for the report, and tell whoever is guided."""
+        """Note it for the report, and show it to a guided person."""
         tell_written(receipt)
         self._draft.note_result(receipt)
 
@@ -75,13 +75,13 @@ class CalibrationListener(Listener):
         self._draft.note_result(result)
 
     def note_proved(self, done: ChangeReport) -> None:
-        """Note the statement that stands after the turn test, a wider one included."""
+        """Note the statement that is valid after the turn test, a wider one included."""
         for report in done.tools:
             if report.verification is not None:
                 self._draft.note_result(report.verification)
 
     def propose(self, proposal: Proposal, *, source: str, warnings: tuple[str, ...]) -> None:
-        """Show the proposal, the verdict, and what it means for taught points."""
+        """Show the proposal, the verdict, and its effect at taught points."""
         self.impact = judge(self._points, old=proposal.before, new=proposal.offset)
         desk = current_desk()
         if desk is not None and self.impact is not None:
@@ -124,7 +124,7 @@ def calibrate_live(frame: CalibrationRequest, source: Callable[[Controller], Tip
         CalibrationError: A measurement is not trusted; nothing was written.
         DeclinedError: A person said no, or nobody could be asked.
         LimitError: The foreseen course leads outside the limits; nothing was moved.
-        VerifyError: The tip drifts too far; the old value was put back.
+        VerifyError: The tip drifts too far; the old value was restored.
     """
     # An order comes from a program, also where that has a terminal.
     alone = frame.assist is None and not frame.dry_run and frame.order is None
@@ -157,7 +157,7 @@ def _calibrate(frame: CalibrationRequest, source: Callable[[Controller], TipSour
 def _measure(
     controller: Controller, frame: CalibrationRequest, plan: ChangePlan, order: Order | None
 ) -> Mapping[str, object]:
-    """Carry it out, or look how it would go; return the document."""
+    """Carry it out, or preview it; return the document."""
     with reporting(frame.report, controller) as draft:
         remark_on_pin(frame, controller)
         if frame.dry_run:
@@ -170,7 +170,7 @@ def _measure(
 
 
 def _agree(controller: Controller, frame: CalibrationRequest, plan: ChangePlan) -> None:
-    """Have the person agree; refuse before that what would be refused later, and back up.
+    """Let the person agree; refuse what would be refused later, and back up.
 
     Raises:
         CalibrationError: A camera is not there, or means nothing.
@@ -204,7 +204,7 @@ def _change(
     listener: _LiveListener,
     order: Order | None,
 ) -> dict[str, object]:
-    """Measure, propose, write, verify; return the document of the whole."""
+    """Measure, propose, write, test; return the document of the whole."""
     listener.read_points(controller)
     with operator_at(frame.assist, lambda: frame.tool, controller.clock) as operator:
         change = NozzleChange(

@@ -1,4 +1,4 @@
-"""The command of a calibration method, made from what the method declares."""
+"""The command of a calibration method, made from the method's declaration."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, Final, Literal
@@ -42,7 +42,7 @@ _CELL_KEYS: Final = {
 
 
 def calibration_options(function: Callable[..., None]) -> Callable[..., int | None]:
-    """Add the options of the frame; the method gets a ``CalibrationRequest`` and its own.
+    """Add the common options; the method gets a ``CalibrationRequest`` and its own.
 
     Limits that nobody typed are taken from the cell, for the method's own options too.
     """
@@ -124,14 +124,14 @@ def command_of(method: AnyMethod) -> click.Command:
 
 
 def _of_the_place(method: AnyMethod) -> list[Decorator]:
-    """Return the options that say where it is measured, and with which poses."""
+    """Return the options for the place of the measurement, and its poses."""
     options: list[Decorator] = [sigma_option, _station_option(method)]
     if method.needs.place is not None:
         options.append(
             motion_option(
                 "--at",
                 metavar="X,Y,Z",
-                help=declared("Where the station is, in the base; default: its place on record."),
+                help=declared("Where the station is, in the base; default: its recorded place."),
             )
         )
     if method.from_poses is not None and method.pose_help is not None:
@@ -158,7 +158,7 @@ def _station_option(method: AnyMethod) -> Decorator:
 
 
 def _option(field: ParameterField) -> Decorator:
-    """Return what adds the option of a parameter."""
+    """Return a decorator that adds the option of a parameter."""
     kind = motion_option if field.option.moves else click.option
     default = field.option.default_or(field.default)
     if field.option.is_choice or field.kind is bool:
@@ -193,7 +193,7 @@ def _check(
     sigma_mm: float | None,
     poses: PoseSource | None,
 ) -> Check:
-    """Return what is known beside the parameters: limits that were typed, not those of the cell."""
+    """Return what is known besides the parameters: typed limits, not those of the cell."""
     given, criteria = _typed(), frame.criteria
     stated = StatedLimits(
         sigma_mm=sigma_mm,
@@ -250,7 +250,7 @@ def _value(field: ParameterField, typed: Any) -> object:  # noqa: ANN401 - what 
 
 
 def _typed() -> frozenset[str]:
-    """Return the names of the options that stand on the command line."""
+    """Return the names of the options on the command line."""
     context = click.get_current_context()
     source = context.get_parameter_source
     return frozenset(name for name in context.params if source(name) is ParameterSource.COMMANDLINE)

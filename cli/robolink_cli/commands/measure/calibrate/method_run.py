@@ -1,4 +1,4 @@
-"""A method with its parameters, in the frame of a calibration: measured, or from poses."""
+"""A method with its parameters, as a calibration: measured, or from poses."""
 
 from dataclasses import replace
 from math import isfinite

@@ -1,4 +1,4 @@
-"""What one calibration was asked for, whatever the method, and the two ways it goes."""
+"""What one calibration was asked for, whatever the method, and its two kinds."""
 
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, Final
@@ -47,12 +47,12 @@ class CalibrationRequest:
         tool: Number of the tool.
         criteria: Acceptance limits of a measurement.
         limits: Where and how fast the robot may go.
-        verify: Whether to prove the new tip after the write.
+        verify: Whether to test the new tip after the write.
         assist: A simulator's stand-in for the person.
         impact: Taught points on which the change is judged.
         report: Where a page about it is wanted.
         dry_run: Whether it is only looked at.
-        yes: Whether questions are answered beforehand.
+        yes: Whether questions are answered in advance.
         pin: Name of the pin that is touched; empty where nobody named one.
         finds_pin: Whether the method finds the pin itself, so that it need not be known.
         length: What is done where the touches show that the tip is longer or shorter.
@@ -79,7 +79,7 @@ class CalibrationRequest:
     order: str | None = None
 
     def at(self, station: str) -> "CalibrationRequest":
-        """Return the same at a station of that name, which goes on record."""
+        """Return the same at a station of that name, which is recorded."""
         return replace(self, context=self.context._replace(station=station))
 
     def at_pin(self, station: str | None, *, finds_pin: bool = True) -> "CalibrationRequest":
@@ -92,7 +92,7 @@ class CalibrationRequest:
         return replace(self.at(station or ""), pin=station or "", finds_pin=finds_pin)
 
     def require_something_to_show(self) -> None:
-        """Refuse to show in a dry run what only a measurement can give.
+        """Refuse a dry run that would show what only a measurement can give.
 
         Raises:
             ConfigError: An impact or a report is wanted.
@@ -101,7 +101,7 @@ class CalibrationRequest:
             _refuse_to_show_nothing(self.impact, self.report)
 
     def plan(self, source: "TipSource", controller: "Controller") -> "ChangePlan":
-        """Return what is to be done with the measurements of ``source``."""
+        """Return the plan for the measurements of ``source``."""
         from robolink.calibration_run import ChangePlan
         from robolink.model import AnsweredBy
 
@@ -114,11 +114,11 @@ class CalibrationRequest:
         )
 
     def _stated(self) -> "Station | None":
-        """Return the station as the cell file has it, if it does."""
+        """Return the station in the cell file, if there is one."""
         return find_stations(self.context.cell, ()).get(self.context.station)
 
     def _rows(self, controller: "Controller") -> "dict[str, RowFact]":
-        """Return what the cell file states of the rows of the budget."""
+        """Return the rows of the budget that the cell file states."""
         from robolink.accuracy import stated_rows
 
         cell, name = self.context.cell, self.context.station
@@ -128,12 +128,12 @@ class CalibrationRequest:
     def tool_plan(
         self, source: "TipSource", controller: "Controller", *, verify: bool
     ) -> "ToolPlan":
-        """Return what is to be done about the tool.
+        """Return the plan for the tool.
 
         Args:
             source: Where its measurement comes from.
             controller: The controller, whose record tells of the station.
-            verify: Whether the new tip is proved after the write.
+            verify: Whether the new tip is tested after the write.
         """
         from robolink.calibration_run import ToolPlan
 
@@ -223,7 +223,7 @@ def request_from(
     yes: Yes = False,
     dry_run: DryRun = False,
 ) -> CalibrationRequest:
-    """Return the frame that the options of a command describe.
+    """Return the request that the options of a command describe.
 
     A larger ``max_change_mm`` than the cell's own takes an engineer: the nozzle change heeds the
     limits of its controller.
@@ -286,7 +286,7 @@ def _require_tool(tool: int) -> None:
 
 
 def _refuse_to_show_nothing(impact: ImpactRequest | None, report: ReportRequest | None) -> None:
-    """Refuse to show in a dry run what only a measurement can give."""
+    """Refuse a dry run that would show what only a measurement can give."""
     given = "--impact" if impact is not None else "--report" if report is not None else None
     if given is not None:
         raise ConfigError(
@@ -300,7 +300,7 @@ def _refuse_to_show_nothing(impact: ImpactRequest | None, report: ReportRequest 
 def station_at(
     frame: CalibrationRequest, controller: Controller, kind: StationKind, *, stated: bool = False
 ) -> Station:
-    """Return the station that the frame names, and say what there is to know about it.
+    """Return the station of the request, and show what a person must know about it.
 
     Args:
         frame: What was asked for.
@@ -323,7 +323,7 @@ def station_at(
 
 
 def remark_on_pin(frame: CalibrationRequest, controller: Controller) -> None:
-    """Say what there is to know about the pin that a calibration names.
+    """Show what a person must know about the pin that a calibration names.
 
     A name that nobody knows yet is no mistake: the calibration finds the pin.
 

@@ -1,4 +1,4 @@
-"""How the values of a method's parameters are typed: numbers in their limits, lists, lines."""
+"""How a person types a method's parameters: numbers in their limits, lists, lines."""
 
 import dataclasses
 import math
@@ -31,7 +31,7 @@ def type_of(field: ParameterField) -> click.ParamType[Any]:
 
 
 def is_repeated(field: ParameterField) -> bool:
-    """Tell whether the option is given once for each part of the value."""
+    """Return whether the option is given once for each part of the value."""
     arguments = get_args(field.kind)
     if get_origin(field.kind) is not tuple or arguments[1:] != (Ellipsis,):
         return False

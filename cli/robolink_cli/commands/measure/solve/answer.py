@@ -1,4 +1,4 @@
-"""Solving a case, or a file of them, without any robot."""
+"""Solves a case, or a file of them, without any robot."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -107,7 +107,7 @@ def solve_document(node: Node) -> dict[str, object]:
 
 
 def _answer(value: object, path: str) -> dict[str, object]:
-    """Return the answer to one of many cases; what is wrong with it ends no other."""
+    """Return the answer to one of many cases; its errors end no other."""
     named = value if isinstance(value, dict) else {}
     head = {name: named[name] for name in ("id", "method") if isinstance(named.get(name), str)}
     try:
@@ -152,7 +152,7 @@ def solve_case(node: Node) -> dict[str, object]:
 
 
 def _with_accuracy(found: Mapping[str, object], facts: AccuracyFacts) -> dict[str, object]:
-    """Return an answer in which each result has what it is accurate to, those inside of it too."""
+    """Return an answer in which each result, also a nested one, has its accuracy."""
     told: dict[str, object] = {}
     for name, value in found.items():
         if name == SOLVED and isinstance(value, CalibrationResult):

@@ -1,4 +1,4 @@
-"""What stands in a case: every value knows its path, and no unknown name is passed over."""
+"""The content of a case: every value knows its path, and unknown names are refused."""
 
 import math
 from collections.abc import Callable, Iterator, Mapping
@@ -29,7 +29,7 @@ _FRAMES: Final = ("tools", "locals")
 
 @dataclass(frozen=True, slots=True)
 class KnownFrames:
-    """Values of the tools and locals that poses of a case may have been taken in.
+    """Values of the tools and locals in which poses of a case may have been taken.
 
     Attributes:
         tools: Offsets by number.
@@ -70,7 +70,7 @@ class Node:
         return iter(self._value)
 
     def is_object(self, name: str) -> bool:
-        """Tell whether an object stands under ``name``; elsewhere the name may mean another."""
+        """Return whether ``name`` holds an object; elsewhere the name may mean another."""
         return isinstance(self._value.get(name), dict)
 
     def at(self, name: str) -> str:
@@ -78,7 +78,7 @@ class Node:
         return f"{self.path}.{name}" if self.path else name
 
     def raw(self, name: str) -> object:
-        """Return whatever stands under ``name``.
+        """Return the value under ``name``, whatever it is.
 
         Raises:
             ConfigError: There is nothing.
@@ -89,7 +89,7 @@ class Node:
         return self._value[name]
 
     def ignore(self, *names: str) -> None:
-        """Know names that mean nothing to a solver."""
+        """Accept names that mean nothing to a solver."""
         self._read.update(names)
 
     def number(self, name: str) -> float:
@@ -111,7 +111,7 @@ class Node:
         return self.number(name) if name in self._value else default
 
     def text(self, name: str, *allowed: str) -> str:
-        """Return one of the words that are allowed.
+        """Return one of the allowed words.
 
         Raises:
             ConfigError: It is another.
@@ -143,7 +143,7 @@ class Node:
         return Node(self.raw(name), self.at(name), self.frames)
 
     def items(self, name: str) -> Iterator[tuple[object, str]]:
-        """Yield what stands in the list under ``name``, each with its path."""
+        """Yield the items of the list under ``name``, each with its path."""
         value = self.raw(name)
         if not isinstance(value, list):
             raise unusable(self.at(name), tr("expected: a list"))
@@ -163,7 +163,7 @@ class Node:
         return [cast("T", _READERS[kind](child)) for child in self.children(name)]
 
     def call(self, function: "Callable[..., T]", names: str, **known: object) -> T:
-        """Return what a function answers to what stands under these names.
+        """Call a function with the values under these names.
 
         Each is read as the annotation of its parameter says; where it is missing, the parameter
         keeps its default. A parameter ``z_mm`` or ``v_deg`` may be called ``z`` or ``v``.
@@ -185,13 +185,13 @@ class Node:
         return function(**known)
 
     def made(self, kind: "Callable[..., T]", names: str, **known: object) -> T:
-        """Return what :meth:`call` makes of this object, in which no other name may stand."""
+        """Return the result of :meth:`call` for this object, which may hold no other name."""
         found = self.call(kind, names, **known)
         self.finish()
         return found
 
     def _value_of(self, name: str, kind: Any) -> object:  # noqa: ANN401 - whatever annotates
-        """Return what stands under ``name`` as a value of a type, or of a type or ``None``."""
+        """Return the value under ``name`` as a value of a type, or of a type or ``None``."""
         parts = get_args(kind)
         if type(None) in parts:
             return self._value_of(name, parts[0])
@@ -203,7 +203,7 @@ class Node:
         return plain(name) if plain else _READERS[kind](self.child(name))
 
     def finish(self) -> None:
-        """Refuse what nobody asked for.
+        """Refuse names that nobody asked for.
 
         Raises:
             ConfigError: Names the first unknown path.
@@ -258,7 +258,7 @@ def read_pose(node: Node) -> Pose:
 
 
 def read_facts(node: Node) -> cal.AccuracyFacts:
-    """Return what a case states of the rows of its budget.
+    """Return the stated rows of a case's budget.
 
     Each row is a positive half width by its key; ``months`` says how long ago the station was
     learnt, ``by_contact`` whether an input showed each touch.
@@ -286,7 +286,7 @@ def _positive(node: Node, name: str) -> float:
 
 
 def read_frames(node: Node) -> None:
-    """Read the values of ``tools`` and ``locals`` that the poses of a case are given in."""
+    """Read the values of ``tools`` and ``locals`` in which the poses of a case are given."""
     node.frames = KnownFrames(
         *(_by_number(node.child(name)) if node.is_object(name) else {} for name in _FRAMES)
     )
@@ -323,7 +323,7 @@ def read_offset(node: Node) -> ToolOffset:
 
 
 def read_place(node: Node, axes: str = "") -> tuple[float, ...]:
-    """Return the coordinates of a place on these axes, mm; else x, y and, if it is given, z."""
+    """Return the coordinates of a place on these axes, mm; else x, y and, if given, z."""
     place = tuple(map(node.number, axes or ("xyz" if "z" in node else "xy")))
     node.finish()
     return place
@@ -394,7 +394,7 @@ _READERS: Final["Mapping[object, Callable[[Node], object]]"] = {
 
 
 def unusable(path: str, why: str) -> ConfigError:
-    """Return the error for a file that is not laid out as it should be."""
+    """Return the error for a file with a wrong layout."""
     return ConfigError(
         tr("{path}: {why}.", path=path or tr("the file"), why=why),
         remedy=tr("docs/solvers.md shows what each method takes."),

@@ -1,4 +1,4 @@
-"""What ``solve`` takes of what lasts: lengths, stations, chains, studies and control charts."""
+"""Cases of ``solve`` over time: lengths, stations, chains, studies and control charts."""
 
 from itertools import product
 from typing import Final, cast
@@ -42,7 +42,7 @@ def length_change(node: Node) -> Payload:
 
 
 def station_shift(node: Node) -> Payload:
-    """By how much a station seems to have moved, tool by tool."""
+    """How far a station seems to have moved, tool by tool."""
     shifts = [_shift(child) for child in node.children("shifts")]
     if not shifts:
         raise unusable(node.at("shifts"), tr("expected: at least one shift"))

@@ -1,4 +1,4 @@
-"""What ``solve`` takes of poses: on one point, to prove an offset with, and none yet."""
+"""Cases of ``solve`` with poses: on one point, for a turn test, and none yet."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -23,7 +23,7 @@ from robolink_cli.views.solve import result_payload
 
 @dataclass(frozen=True, slots=True)
 class _Given:
-    """What every method of this module takes.
+    """The values that every method of this module takes.
 
     Attributes:
         poses: Flange poses, converted where tools and locals are known.
@@ -41,7 +41,7 @@ class _Given:
     planar: bool = False
 
     def solved(self, solver: Callable[..., CalibrationResult], **more: object) -> CalibrationResult:
-        """Return the result, in whose units nothing is suspect."""
+        """Return the result, unless its units are suspect."""
         mixed = not (self.as_taught and self.planar)
         result = solver(self.poses, allow_mixed_hand=mixed, **{**self.options, **more})
         cal.require_stored_scale(result, self.stored)
@@ -87,7 +87,7 @@ def pivot_robust(node: Node) -> Payload:
 
 
 def six_point(node: Node) -> Payload:
-    """A pivot and two ways along the tool's axes."""
+    """A pivot and two moves along the tool's axes."""
     result = node.call(cal.solve_six_point, "second_is pivot_poses along_x second start sigma_mm")
     return result_payload(result) | json_fields(result, "off_square_deg")
 
@@ -111,7 +111,7 @@ def joint(node: Node) -> Payload:
 
 
 def verify(node: Node) -> Payload:
-    """Flange poses on one point, with the offset that is to be proved."""
+    """Flange poses on one point, with the offset to test."""
     result = node.call(cal.verify_drift, "poses offset tolerance_mm")
     return {
         "codes": [*result.warnings, *([] if result.passed else ["large_drift"])],
@@ -121,7 +121,7 @@ def verify(node: Node) -> Payload:
 
 
 def suggest_poses(node: Node) -> Payload:
-    """The poses that tell the most."""
+    """The most informative poses."""
     plan = node.call(
         cal.suggest_poses,
         "taken",
@@ -138,7 +138,7 @@ def suggest_poses(node: Node) -> Payload:
 
 
 def uncertainty_budget(node: Node) -> Payload:
-    """Sources of uncertainty, and what they come to."""
+    """Sources of uncertainty, and their sum."""
     rows, unknown, values = [], [], []
     for child in node.children("rows"):
         row = _row(child)
@@ -249,7 +249,7 @@ def _row(node: Node) -> "cal.BudgetRow | None":
 
 
 def _standard_uncertainty(node: Node, shape: str) -> float | None:
-    """Return the standard uncertainty that a row states, mm, in whichever way it does.
+    """Return the standard uncertainty that a row states in any form, mm.
 
     ``u_mm``; ``half_width_mm`` with a distribution; the same with ``_deg`` and ``lever_mm``, with
     ``_K`` and ``alpha_per_K`` and ``length_mm``, or ``u_scale`` and ``distance_mm``.

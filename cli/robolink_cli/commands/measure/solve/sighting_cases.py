@@ -1,4 +1,4 @@
-"""What ``solve`` takes of cameras, boards, light beams and orientations."""
+"""Cases of ``solve`` with cameras, boards, light beams and orientations."""
 
 from robolink import calibration as cal
 from robolink.messages import tr
@@ -61,7 +61,7 @@ def board_fit(node: Node) -> Payload:
 
 
 def crossed_beams(node: Node) -> Payload:
-    """Travels through two beams whose places are known."""
+    """Moves through two beams whose places are known."""
     from robolink.methods.beams.crossings import require_straight  # numpy, late
 
     beams = node.each("beams", cal.Beam)
@@ -120,7 +120,7 @@ def orientation(node: Node) -> Payload:
 
 
 def _known_tip(node: Node) -> Payload:
-    """Return what is stored of a tip, and its height where that is known.
+    """Return the stored tip, and its height if that is known.
 
     A stored offset without Z says nothing about the height; ``stored_z_sigma_mm`` says how sure
     the Z is.

@@ -1,4 +1,4 @@
-"""What ``solve`` takes of touches: how they were made, and pins and surfaces that were touched."""
+"""Cases of ``solve`` with touches: how they were made, and the touched pins and surfaces."""
 
 from typing import Final
 
@@ -79,7 +79,7 @@ def touch_evidence(node: Node) -> Payload:
 
 
 def verify_evidence(node: Node) -> Payload:
-    """A proof: where the tip should have been, where the robot stopped, where the tip was found."""
+    """A turn test: where the tip should have been, where the robot stopped, where it was found."""
     tolerance, u = node.number("tolerance_mm"), node.number_or("u_drift_mm", cal.PERSON_U_DRIFT_MM)
     resolution = node.number_or("resolution_mm", 0.001)
     if tolerance <= 0 or u < 0:

@@ -1,4 +1,4 @@
-"""Operators, and expressions as closures: looked at once, then worked out as often as needed.
+"""Operators, and expressions as closures: analysed once, then calculated as often as needed.
 
 Operators of expressions (docs/reference/spel.md 3.1).
 
@@ -139,7 +139,7 @@ def _power(base: Number, exponent: Number) -> Number:
 
 
 class Surroundings(Protocol):
-    """What an expression is worked out in: the command window, or a task.
+    """The place where an expression is calculated: the command window, or a task.
 
     Attributes:
         session: What expressions can reach.
@@ -160,7 +160,7 @@ class Surroundings(Protocol):
         ...
 
     def of_the_project(self, name: str) -> Value:
-        """Return what a name of the project stands for."""
+        """Return the meaning of a name of the project."""
         ...
 
 
@@ -178,14 +178,14 @@ _OF_ANY_ROBOT: Final = frozenset({"insidebox", "insideplane"})
 
 
 class Scope(Protocol):
-    """What names stand for where an expression stands."""
+    """The meaning of names where an expression stands."""
 
     def named(self, name: str, arguments: Sequence[Expression] | None) -> Run | None:
-        """Return what a name of the program's own stands for, ``None`` if it is not one."""
+        """Return the meaning of the program's own name, ``None`` if it is not one."""
         ...
 
     def unknown(self, name: str, arguments: Sequence[Expression] | None) -> Run:
-        """Return what a name stands for that the language does not know.
+        """Return the meaning of a name that the language does not know.
 
         Raises:
             Refusal: Nothing is called so.
@@ -194,7 +194,7 @@ class Scope(Protocol):
 
 
 def closure(expression: Expression, scope: Scope) -> Run:
-    """Return what works an expression out.
+    """Return a function that calculates an expression.
 
     Raises:
         Refusal: It makes no sense whatever the values are.
@@ -295,7 +295,7 @@ def _named(name: str, arguments: tuple[Expression, ...] | None, scope: Scope) ->
 
 
 def _names_a_point(argument: Expression) -> bool:
-    """Tell whether PNumber is given a point itself, and not a text with its label."""
+    """Return whether PNumber is given a point itself, and not a text with its label."""
     if isinstance(argument, Name):
         return argument.arguments is None and not argument.name.endswith("$")
     return isinstance(argument, PointExpression)

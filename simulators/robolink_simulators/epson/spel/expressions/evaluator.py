@@ -59,7 +59,7 @@ _MOST_REMEMBERED: Final = 2000
 
 
 class WindowScope:
-    """What names stand for in the command window: points by their labels, and variables."""
+    """The meaning of names in the command window: points by their labels, and variables."""
 
     def named(self, name: str, arguments: Sequence[Expression] | None) -> None:  # noqa: ARG002
         """Know no names before those of the language."""
@@ -77,7 +77,7 @@ class WindowScope:
 
 
 class Evaluator:
-    """Works parsed expressions out against one session.
+    """Calculates parsed expressions for one session.
 
     Attributes:
         session: What expressions can reach.
@@ -96,7 +96,7 @@ class Evaluator:
         self._remembered: dict[int, tuple[Expression, Run]] = {}
 
     def value(self, expression: Expression) -> Value:
-        """Return what an expression is worth now.
+        """Return the present value of an expression.
 
         Raises:
             Refusal: It cannot be evaluated.
@@ -112,11 +112,11 @@ class Evaluator:
         raise SpelRefusal(RefusalKind.NOT_SIMULATED, f"Port {channel} of the command window")
 
     def carries(self, statement: object) -> bool:  # noqa: ARG002
-        """Tell whether a statement that it has begun is still being carried out by it."""
+        """Return whether a statement that it has begun is still being carried out by it."""
         return True
 
     def closure(self, expression: Expression) -> Run:
-        """Return what works an expression out; the last ones are remembered.
+        """Return a function that calculates an expression; the last ones are stored.
 
         Raises:
             Refusal: It makes no sense here.
@@ -131,7 +131,7 @@ class Evaluator:
         return run
 
     def shown(self, expression: Expression) -> Value:
-        """Return what an expression is worth to Print; AglToPls shows as pulses there."""
+        """Return the value of an expression for Print; AglToPls shows as pulses there."""
         match expression:
             case PointExpression(PointFunction("agltopls", arguments), 0, None, ()):
                 self.value(expression)

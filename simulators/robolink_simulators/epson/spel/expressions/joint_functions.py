@@ -1,4 +1,4 @@
-"""Functions of joint values and pulses, and of the flags that tell arms apart.
+"""Functions of joint values and pulses, and of the flags that distinguish arm postures.
 
 Source: docs/reference/spel.md 5.1, 5.3.
 """
@@ -167,7 +167,7 @@ def _standing(machine: Machine, target: Point, near: Joints) -> Joints:
 
 
 def _inside(model: RobotModel, joints: Joints) -> list[Joints]:
-    """Return the joints in the turns near them that their ranges hold."""
+    """Return the joints in the nearest turns within their ranges."""
     turns = (-360.0, 0.0, 360.0)
     held = list[Joints]()
     for by1, by4, by6 in product(turns, turns, turns):

@@ -1,4 +1,4 @@
-"""Functions that look at the robot, its tools, points and bits."""
+"""Functions that read the robot, its tools, points and bits."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -116,7 +116,7 @@ def _decimal(session: Session, arguments: Arguments) -> Value:
 
 
 def _label_of(session: Session, arguments: Arguments) -> Value:
-    """Return IOLabel$(type, width, number), nothing where there is none."""
+    """Return IOLabel$(type, width, number), empty without one."""
     place = tuple(as_integer(argument) for argument in arguments)
     for label in session.machine.io_labels.values():
         if (label.kind, label.width, label.number) == place:
@@ -139,7 +139,7 @@ def _point_number(session: Session, arguments: Arguments) -> Value:
 
 
 def _label_of_point(points: PointTable, number: int) -> Value:
-    """Return the label of a point, nothing where it has none."""
+    """Return the label of a point, empty without one."""
     return next((name for name, at in points.labels().items() if at == number), "")
 
 
@@ -341,7 +341,7 @@ def _found_position(session: Session, _: Arguments) -> Point:
 
 
 def _latched_position(session: Session, arguments: Arguments) -> Point:
-    """LatchPos([WithToolArm | WithoutToolArm[, number]]): of the tool in force, or Tool 0."""
+    """LatchPos([WithToolArm | WithoutToolArm[, number]]): of the selected tool, or Tool 0."""
     robot, numbers = session.machine.robot, [as_integer(argument) for argument in arguments]
     bare, number = (*numbers, 0, 1)[:2] if len(numbers) != 1 else (numbers[0], 1)
     if bare not in (0, 1):

@@ -102,7 +102,7 @@ TORQUE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
 def _time_to(session: Session, arguments: Sequence[Value]) -> Value:
     """Return PTPTime(point, arm, tool) in seconds from where the arm stands, 0 out of reach.
 
-    In low power the tool in force counts for the speed of the tip (assumed).
+    In low power the selected tool counts for the speed of the tip (assumed).
     """
     machine, target = session.machine, as_point(arguments[0])
     arm, tool = (as_integer(argument) for argument in arguments[1:])
@@ -122,7 +122,7 @@ def _time_to(session: Session, arguments: Sequence[Value]) -> Value:
 
 
 def _short_enough(session: Session, arguments: Sequence[Value]) -> Value:
-    """Tell whether PTPBoost counts for the motion from here to a point."""
+    """Return whether PTPBoost applies to the motion from here to a point."""
     machine = session.machine
     joints = machine.robot.joints_for(as_point(arguments[0]))
     return is_short(go_leg(machine, machine.arm.joints, joints))
@@ -160,7 +160,7 @@ def turned_tool(session: Session, arguments: Sequence[Value]) -> Value:
 
 
 LEAST_TURN_DEG: Final = 0.001
-"""Assumed: a tool that turns by less does not turn."""
+"""Assumed: a smaller turn counts as none."""
 
 
 def turn_deg(machine: Machine, start: Pose, end: Pose) -> float:

@@ -1,4 +1,4 @@
-"""Functions about what a robot is told once and keeps.
+"""Functions about a robot's retained settings.
 
 Arm, ArmDef and ArmSet, the functions (docs/reference/spel.md 6.2).
 
@@ -68,7 +68,7 @@ ANY_ROBOT: Final = "all"
 
 
 def _robot(session: Session, arguments: Arguments, at: int) -> DrivenRobot:
-    """Return the robot whose number is an argument, else the one in force."""
+    """Return the robot whose number is an argument, else the current one."""
     machine = session.machine
     return machine.numbered(as_integer(arguments[at])) if len(arguments) > at else machine.robot
 

@@ -1,4 +1,4 @@
-"""Functions that tell the state of the controller, its errors and its waits.
+"""Functions that report the state of the controller, its errors and its waits.
 
 Source: docs/reference/spel.md 4.4, 9.
 

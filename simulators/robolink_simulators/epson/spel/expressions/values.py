@@ -81,7 +81,7 @@ def as_point(value: Value) -> Point:
 
 
 def truth(value: Value) -> bool:
-    """Tell whether a condition holds: anything that is not zero.
+    """Return whether a condition is true: anything that is not zero.
 
     Raises:
         Refusal: A string or a point.

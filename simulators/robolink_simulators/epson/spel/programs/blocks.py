@@ -53,7 +53,7 @@ class BlockCompiler:
         self._open: list[_Block] = []
 
     def compile(self, node: object) -> bool:
-        """Compile a line if it is about a block; tell whether it was.
+        """Compile a line if it is about a block; return whether it was.
 
         Raises:
             ProgramFault: It stands where it cannot.
@@ -113,7 +113,7 @@ class BlockCompiler:
     def _innermost(self, word: str) -> _Block:
         if not self._open or self._open[-1].word != word:
             wanted = (_ENDS[self._open[-1].word],) if self._open else ()
-            raise self._emitter.fault(tr("nothing that this belongs to is open"), expected=wanted)
+            raise self._emitter.fault(tr("no open block that this belongs to"), expected=wanted)
         return self._open[-1]
 
     def _branch(self, block: _Block, condition: Expression) -> None:

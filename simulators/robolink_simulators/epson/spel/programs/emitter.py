@@ -94,7 +94,7 @@ class Emitter:
         return ProgramFault(self.place, text, expected=expected)
 
     def run(self, expression: Expression) -> Run:
-        """Return what works an expression out; the calls in it are emitted first.
+        """Return a function that calculates an expression; the calls in it are emitted first.
 
         Raises:
             ProgramFault: It makes no sense.
@@ -102,7 +102,7 @@ class Emitter:
         return self.checked(self.hoisted(expression))
 
     def checked(self, expression: Expression) -> Run:
-        """Return what works an expression without calls out.
+        """Return a function that calculates an expression without calls.
 
         Raises:
             ProgramFault: It makes no sense.
@@ -138,7 +138,7 @@ class Emitter:
         return replace(node, **new)
 
     def is_call(self, name: Name) -> bool:
-        """Tell whether a name calls a function of the project here."""
+        """Return whether a name calls a function of the project here."""
         if name.name not in self.functions:
             return False
         if name.name == self.function.name:

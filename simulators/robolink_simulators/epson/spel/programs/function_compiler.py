@@ -340,7 +340,7 @@ class FunctionCompiler:
         emitter.emit(carry_out(prepared))
 
     def _check(self, node: object) -> None:
-        """Look at every expression in a statement, so that what is wrong is told at the build."""
+        """Check every expression in a statement, so that errors are reported at the build."""
         if isinstance(node, tuple):
             for part in node:
                 self._check(part)
@@ -366,12 +366,12 @@ def clear_for_error(task: SpelTask) -> None:
 
 
 def carry_out(statement: Statement) -> Operation:
-    """Hand a statement to what carries those of the command window out."""
+    """Pass a statement to the executor of the command window."""
     return lambda _: statement
 
 
 def without_forced(statement: KeywordStatement) -> KeywordStatement:
-    """Return a statement without ``Forced``: what it allows is told by the kind of the task."""
+    """Return a statement without ``Forced``: the kind of the task decides what it allows."""
     if statement.arguments and statement.arguments[-1] == Name("forced"):
         return replace(statement, arguments=statement.arguments[:-1])
     return statement

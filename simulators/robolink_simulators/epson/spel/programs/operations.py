@@ -30,7 +30,7 @@ SWITCHED: Final = object()
 
 
 def condition_holds(value: Value) -> bool:
-    """Tell whether the condition of a branch or a loop holds; an empty text does not.
+    """Return whether the condition of a branch or a loop is true; an empty text is not.
 
     Source: docs/reference/spel.md 4.2, 4.3.
     """
@@ -38,7 +38,7 @@ def condition_holds(value: Value) -> bool:
 
 
 def jump(target: JumpTarget) -> Operation:
-    """Go on elsewhere."""
+    """Continue elsewhere."""
 
     def go(t: SpelTask) -> None:
         t.pc = target.pc
@@ -47,7 +47,7 @@ def jump(target: JumpTarget) -> Operation:
 
 
 def jump_if(condition: Run, target: JumpTarget, *, holds: bool) -> Operation:
-    """Go on elsewhere if the condition holds, or if it does not."""
+    """Continue elsewhere if the condition is true, or if it is not."""
 
     def go(t: SpelTask) -> None:
         value = condition(t)
@@ -109,7 +109,7 @@ def keep(slot: int, value: Run) -> Operation:
 
 
 def case(slot: int, sign: str, value: Run, other: JumpTarget) -> Operation:
-    """Go on with the next Case unless the value kept compares so."""
+    """Continue with the next Case unless the stored value compares so."""
 
     def go(t: SpelTask) -> None:
         if not binary(sign, t.results[slot], value(t)):
@@ -126,7 +126,7 @@ def for_start(
     *,
     at_top: bool,
 ) -> Operation:
-    """Begin a For: the end and the step are worked out once."""
+    """Begin a For: the end and the step are calculated once."""
     start, end, step = ends
 
     def go(t: SpelTask) -> None:
@@ -180,7 +180,7 @@ def leave(t: SpelTask) -> object:
 
 
 def go_sub(target: JumpTarget) -> Operation:
-    """Go on elsewhere until Return."""
+    """Continue elsewhere until Return."""
 
     def go(t: SpelTask) -> None:
         if len(t.frame.returns) >= DEEPEST_CALL:
@@ -199,7 +199,7 @@ def go_back(t: SpelTask) -> None:
 
 
 def on_error(target: JumpTarget | None) -> Operation:
-    """Say where errors of this function and of those that it calls are dealt with."""
+    """Set where errors of this function, and of those that it calls, are handled."""
 
     def go(t: SpelTask) -> None:
         t.frame.handler = target
@@ -208,7 +208,7 @@ def on_error(target: JumpTarget | None) -> Operation:
 
 
 def error_resume(target: JumpTarget | None, *, following: bool) -> Operation:
-    """Go back from where an error was dealt with."""
+    """Return from where an error was handled."""
 
     def go(t: SpelTask) -> None:
         failed, t.frame.failed_pc = t.frame.failed_pc, None
@@ -234,7 +234,7 @@ def redim(reference: Reference, bounds: Sequence[Run], *, keep_values: bool) -> 
 
 
 def refuse(kind: RefusalKind, text: str) -> Operation:
-    """Refuse a statement each time it is come to."""
+    """Refuse a statement each time it is reached."""
 
     def go(_: SpelTask) -> Any:  # noqa: ANN401 - nothing is returned
         raise SpelRefusal(kind, text)

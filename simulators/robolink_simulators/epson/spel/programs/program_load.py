@@ -1,4 +1,4 @@
-"""A project put into a controller: points and labels first, then the programs that name them."""
+"""Loads a project into a controller: points and labels first, then the programs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -29,7 +29,7 @@ USER_ERRORS: Final = "UserErrors.dat"
 
 @dataclass(slots=True)
 class ProjectData:
-    """What a project says beside its programs.
+    """The content of a project besides its programs.
 
     Attributes:
         points: Points by their numbers.
@@ -65,7 +65,7 @@ class ProjectData:
 def project_data(
     programs: Sequence[Path], points: Sequence[Path] = (), encoding: str | None = None
 ) -> ProjectData:
-    """Return what a project says beside its programs.
+    """Return the content of a project besides its programs.
 
     Beside a program IOLabels.dat and UserErrors.dat are read.
 
@@ -123,7 +123,7 @@ def load_project(
     points: Sequence[Path] = (),
     encoding: str | None = None,
 ) -> SpelProject:
-    """Build a project and put its points, labels and preserved variables into a controller.
+    """Build a project and load its points, labels and preserved variables into a controller.
 
     The arguments are those of :func:`project_data`.
 
@@ -175,7 +175,7 @@ def _in_the_background(project: SpelProject, names: str) -> tuple[CompiledFuncti
 
 @dataclass(frozen=True, slots=True)
 class CheckedProject:
-    """A project that was built for its faults alone.
+    """A project that was built only to find its errors.
 
     Attributes:
         data: What it says beside its programs.
@@ -194,7 +194,7 @@ def check_project(
     options: EpsonOptions | None = None,
     encoding: str | None = None,
 ) -> CheckedProject:
-    """Build a project for its faults alone; without point files those beside it are read.
+    """Build a project only to find its errors; without point files those beside it are read.
 
     Raises:
         ConfigError: A file cannot be read.

@@ -1,4 +1,4 @@
-"""Files to a project: every function compiled, or every fault told (docs/reference/spel.md 16).
+"""Files to a project: every function compiled, or every error reported (docs/reference/spel.md 16).
 
 The list of files of a project, as RC+ writes it in a .sprj file (docs/reference/spel.md 16).
 
@@ -315,7 +315,7 @@ class ProjectBuilder:
         return FunctionScope(self._project, module, undeclared=undeclared, labels=self._labels)
 
     def _announce(self, outline: _Outline) -> None:
-        """Let a function be known to the others before any is compiled."""
+        """Make a function known to the others before any is compiled."""
         header, scope = outline.header, self._scope(outline.module)
         # A function without a type gives a number nobody reads.
         kind = self._types[header.type_name or "integer"]

@@ -1,4 +1,4 @@
-"""What names stand for inside a function: its own variables first, then wider ones.
+"""The meaning of names inside a function: its own variables first, then wider ones.
 
 Order (inferred): local, module, global, the functions that know the task, then the language.
 """
@@ -59,7 +59,7 @@ class FunctionScope:
         return None if known is None else known[0]
 
     def holds(self, name: str) -> bool:
-        """Tell whether a name is a variable's here."""
+        """Return whether a name is a variable's here."""
         return name in self.slots or self.shared(name) is not None
 
     def kind(self, name: str) -> DataType | None:
@@ -70,7 +70,7 @@ class FunctionScope:
         return None if variable is None else variable.kind
 
     def is_array(self, name: str) -> bool:
-        """Tell whether a name is an array's here."""
+        """Return whether a name is an array's here."""
         if name in self.slots:
             return self.variables[self.slots[name]].array
         variable = self.shared(name)
@@ -85,7 +85,7 @@ class FunctionScope:
         return None if variable is None else lambda _: variable
 
     def named(self, name: str, arguments: Sequence[Expression] | None) -> Run | None:
-        """Return what a variable holds, or what a function of tasks tells."""
+        """Return the value of a variable, or of a function about tasks."""
         if name in self.slots and (arguments is None or self.is_array(name)):
             return self._local(self.slots[name], name, arguments)
         variable = self.shared(name)

@@ -390,7 +390,7 @@ def _function(emitter: Emitter, node: Trap) -> CompiledFunction | None:
 
 
 def _told_of_error(function: CompiledFunction) -> bool:
-    """Tell whether a function takes what Trap Error tells."""
+    """Return whether a function takes the values of Trap Error."""
     count = len(TOLD_OF_ERROR)
     kinds = [slot.kind.name for slot in function.variables[1 : 1 + function.parameters]]
     alone = not any(function.by_reference) and not any(function.arrays)

@@ -174,7 +174,7 @@ def _clear_graphics(emitter: Emitter, node: VisionStatement) -> Operation:  # no
 
 
 def _calibrate(emitter: Emitter, node: VisionStatement) -> Operation:
-    """``VCal name``: the robot goes to each taught pose, with the tool in force."""
+    """``VCal name``: the robot goes to each taught pose, with the selected tool."""
     name = named(emitter, node.items[0])
 
     def go(t: SpelTask) -> TaskWait:

@@ -140,7 +140,7 @@ _SAME_MM: Final = 1e-6
 
 
 def require_within_limits(session: Session, legs: Sequence[Leg], targets: Sequence[Leg]) -> None:
-    """Hold a motion back that XYLim does not allow.
+    """Refuse a motion that XYLim does not allow.
 
     The ends at targets count, and by mode 1 the whole way; a robot that stands outside may come
     nearer (documented).

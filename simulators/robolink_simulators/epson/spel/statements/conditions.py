@@ -60,7 +60,7 @@ _OF_INPUTS: Final = frozenset({"sw", "in", "inw", "inbcd", "inreal"})
 
 
 def follows_robot(names: frozenset[str], machine: Machine) -> bool:
-    """Tell whether what a condition asks for may change because a robot moves.
+    """Return whether the values of a condition may change because a robot moves.
 
     Args:
         names: Those in the condition.
@@ -70,7 +70,7 @@ def follows_robot(names: frozenset[str], machine: Machine) -> bool:
 
 
 def is_condition(expression: Expression) -> bool:
-    """Tell whether Wait waits for it to hold, and does not take it for a number of seconds.
+    """Return whether Wait waits for a condition, and does not read it as a number of seconds.
 
     A comparison, a logical operation and a bare event are conditions (documented,
     docs/reference/spel.md 4.6); everything else is a time.
@@ -87,7 +87,7 @@ def is_condition(expression: Expression) -> bool:
 
 
 class Waiting:
-    """A Wait under way.
+    """A Wait in progress.
 
     Args:
         evaluator: What evaluates the condition. What is compared with is worked out once, when
@@ -109,12 +109,12 @@ class Waiting:
         self.restart(start_ns)
 
     def restart(self, now_ns: int) -> None:
-        """Begin its time anew, as after a pause (docs/reference/spel.md 4.6)."""
+        """Restart its time, as after a pause (docs/reference/spel.md 4.6)."""
         seconds = self._seconds
         self._end_ns = NEVER_NS if seconds is None else now_ns + round(seconds * NS_PER_S)
 
     def holds(self) -> bool:
-        """Tell whether the condition holds now.
+        """Return whether the condition is true now.
 
         Raises:
             Refusal: It cannot be evaluated.
@@ -122,7 +122,7 @@ class Waiting:
         return truth(self._evaluator.value(self._condition))
 
     def next_poll_ns(self, seen_ns: int) -> int:
-        """Return when it has to be looked at again."""
+        """Return when it has to be checked again."""
         try:
             if self.holds():
                 return seen_ns + 1  # switched just now
@@ -136,7 +136,7 @@ class Waiting:
         return look_ns
 
     def is_over(self, now_ns: int) -> bool:
-        """Tell whether it ends, and note for TW how.
+        """Return whether it ends, and note for TW how.
 
         Raises:
             Refusal: TMOut's time ran out (documented: error 2280).
@@ -237,7 +237,7 @@ class Watch:
         self._edge_ns: int | None = None
 
     def holds(self, instant_ns: int) -> bool:
-        """Tell whether the condition holds at an instant of the motion under way.
+        """Return whether the condition is true at an instant of the motion in progress.
 
         Raises:
             Refusal: It cannot be evaluated.
@@ -246,7 +246,7 @@ class Watch:
             return truth(self._evaluator.value(self._condition))
 
     def foresee(self, start_ns: int, end_ns: int) -> None:
-        """Find out when the motion that has just been started meets the condition."""
+        """Find out when the motion that has just started meets the condition."""
         machine = self._evaluator.session.machine
         if not follows_robot(names_in(self._condition), machine):
             return
@@ -266,7 +266,7 @@ class Watch:
         return self._edge_ns
 
     def meet(self, instant_ns: int) -> int | None:
-        """Stop, or note the place; return when the robot rests if it stops."""
+        """Stop, or note the place; return when the robot has stopped, if it does."""
         machine = self._evaluator.session.machine
         if self.stops:
             machine.till_met = True
@@ -281,7 +281,7 @@ class Watch:
         return _inputs_alone(self._condition)
 
     def value_and_inputs(self, instant_ns: int) -> tuple[bool, InputsAsked]:
-        """Return whether the condition holds, and the inputs on which that hangs.
+        """Return whether the condition is true, and the inputs on which that depends.
 
         Raises:
             Refusal: It cannot be evaluated.
@@ -290,12 +290,12 @@ class Watch:
             return self.holds(instant_ns), asked
 
     def still(self, asked: InputsAsked, instant_ns: int) -> bool:
-        """Tell whether those inputs show at an instant what they showed."""
+        """Return whether those inputs show at an instant what they showed."""
         return self._evaluator.session.machine.inputs.show(asked, instant_ns)
 
 
 class _Scan:
-    """Looks at a condition again and again while nothing but the robot moves.
+    """Checks a condition repeatedly while nothing but the robot moves.
 
     An expression of inputs alone is worked out anew only when an input that it asked for has
     changed: of the thousands of instants of a slow search all but a few are alike. What else it
@@ -309,7 +309,7 @@ class _Scan:
         self._asked: InputsAsked | None = None
 
     def holds(self, instant_ns: int) -> bool:
-        """Tell whether the condition holds at an instant of the motion under way."""
+        """Return whether the condition is true at an instant of the motion in progress."""
         if not self._inputs_alone:
             return self._watch.holds(instant_ns)
         if self._asked is None or not self._watch.still(self._asked, instant_ns):
@@ -318,7 +318,7 @@ class _Scan:
 
 
 class DescentWatch:
-    """The Sense of a Jump: looked at once, just before the descent (documented).
+    """The Sense of a Jump: checked once, just before the descent (documented).
 
     Args:
         evaluator: What evaluates the condition.
@@ -334,11 +334,11 @@ class DescentWatch:
         self._at_ns = at_ns
 
     def edge_after(self, seen_ns: int) -> int | None:
-        """Return when the look is due."""
+        """Return when the check is due."""
         return max(self._at_ns, seen_ns)
 
     def meet(self, instant_ns: int) -> int | None:
-        """Look; stop above the target, or go on."""
+        """Check; stop above the target, or continue."""
         session = self._evaluator.session
         session.machine.sensed = truth(self._evaluator.value(self._condition))
         if not session.machine.sensed:

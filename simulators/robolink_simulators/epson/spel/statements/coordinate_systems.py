@@ -1,4 +1,4 @@
-"""Statements about what coordinates count from: Base, Local, Pallet, Arm.
+"""Statements about the origins of coordinates: Base, Local, Pallet, Arm.
 
 Coordinate systems from taught points: Local and Plane by three, Local by two pairs.
 
@@ -137,7 +137,7 @@ def _no_direction() -> SpelRefusal:
 
 
 def _base(evaluator: Evaluator, command: KeywordStatement) -> str:
-    """Move the base, or show where it stands.
+    """Move the base, or show where it is.
 
     The layout of what is shown is not in the reference: as ArmSet prints (assumed). A place is told
     in the robot's own system (documented); points of the three-point form are where they are by the

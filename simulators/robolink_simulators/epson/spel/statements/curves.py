@@ -274,7 +274,7 @@ def _control_point(machine: Machine, curve: FreeCurve) -> Frame | None:
 
 
 def _smooth_way(machine: Machine, curve: FreeCurve) -> SmoothWay:
-    """Return the way of the tip, or of the control point over the workpiece."""
+    """Return the path of the tip, or of the control point over the workpiece."""
     closed, point = curve.places[0] == curve.places[-1], _control_point(machine, curve)
     if not machine.model.six_axes and point is None:
         way = through(curve.places, closed=closed)
@@ -285,7 +285,7 @@ def _smooth_way(machine: Machine, curve: FreeCurve) -> SmoothWay:
 
 
 def curve_leg(evaluator: Evaluator, motion: MotionStatement) -> Leg:
-    """Plan CVMove, and switch outputs on its way.
+    """Plan CVMove, and switch outputs along it.
 
     Raises:
         Refusal: No such curve, the tip stands elsewhere than at its first point (what CVMove does
@@ -349,7 +349,7 @@ def _pose(place: Place) -> Pose:
 
 
 def _is_off(tip: Pose, place: Place) -> bool:
-    """Tell whether the tip stands elsewhere than at a place, or turned otherwise."""
+    """Return whether the tip is elsewhere than at a place, or turned differently."""
     here = tip.coordinates()
     if len(place) < SIX_AXES:
         return math.dist(place, here[: len(place)]) > _SAME

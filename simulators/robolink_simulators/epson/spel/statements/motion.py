@@ -57,7 +57,7 @@ _SAME_NS = 1000
 
 
 def blends(machine: Machine, motion: MotionStatement) -> bool:
-    """Tell whether the next statement need not wait for the end of a motion."""
+    """Return whether the next statement need not wait for the end of a motion."""
     if motion.options.until is not None:
         return False
     return "cp" in motion.options.words or machine.settings.continuous_path
@@ -80,7 +80,7 @@ def fall_ns(leg: Leg) -> int:
 
 
 def rest_of_way(machine: Machine, leg: Leg) -> Leg:
-    """Return the way from where the arm stands to where a leg was to end."""
+    """Return the path from where the arm is to where a leg was to end."""
     end = leg.joints_at(leg.duration_ns)
     if isinstance(leg, JointLeg | ArchedLeg):
         return go_leg(machine, machine.arm.joints, end)
@@ -310,7 +310,7 @@ def _points(evaluator: Evaluator, motion: MotionStatement) -> list[Point]:
 
 
 def require_drives(machine: Machine) -> None:
-    """Hold a motion back that the drives would not carry out.
+    """Refuse a motion that the drives would not carry out.
 
     Raises:
         Refusal: The motors are off, a joint is free (documented for SFree, but not its number), or

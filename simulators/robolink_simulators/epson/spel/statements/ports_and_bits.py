@@ -99,7 +99,7 @@ def set_latch(evaluator: Evaluator, command: KeywordStatement) -> None:
 
 
 def _enable_latch(evaluator: Evaluator, command: KeywordStatement) -> str:
-    """LatchEnable On or Off, or what it is; how that is shown is assumed."""
+    """LatchEnable On or Off, or show it; the format is assumed."""
     latch = evaluator.session.machine.robot.latch
     if not command.arguments:
         return ("ON" if latch.enabled else "OFF") + CRLF

@@ -1,1 +1,1 @@
-"""SPEL+ tasks: programs under way, side by side, in simulated time."""
+"""SPEL+ tasks: programs in progress, side by side, in simulated time."""

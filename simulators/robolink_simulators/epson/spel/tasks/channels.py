@@ -1,4 +1,4 @@
-"""What Print #, Input # and their kin reach: ports by number, files, the window of a person.
+"""The targets of Print #, Input # and their kin: ports by number, files, a person's window.
 
 Files 30 to 63 that the tasks of a controller have open (docs/reference/spel.md 18).
 
@@ -106,7 +106,7 @@ class OpenFiles:
         return free
 
     def flush(self, number: int, task: "SpelTask") -> None:
-        """Write what is kept back (Flush)."""
+        """Write the buffered data (Flush)."""
         self._of(number, task).stream.flush()
 
     def seek(self, number: int, position: int, task: "SpelTask") -> None:
@@ -120,7 +120,7 @@ class OpenFiles:
         self._of(number, task).stream.seek(position)
 
     def at_end(self, number: int, task: "SpelTask") -> bool:
-        """Tell whether nothing is left to read (Eof)."""
+        """Return whether nothing is left to read (Eof)."""
         return self.waiting_bytes(number, task) == 0
 
     def require_binary(self, number: int, task: "SpelTask") -> None:
@@ -137,7 +137,7 @@ class OpenFiles:
         return 0.0
 
     def connected(self, number: int) -> bool:
-        """Tell that nothing will come from elsewhere.
+        """Return that nothing will come from elsewhere.
 
         Raises:
             Refusal: It is not open.
@@ -146,7 +146,7 @@ class OpenFiles:
         return False
 
     def foreign(self, number: int, task: "SpelTask") -> bool:
-        """Tell whether a file is not this task's."""
+        """Return whether a file belongs to another task."""
         return self._number(number).owner is not task
 
     def waiting_bytes(self, number: int, task: "SpelTask") -> int:
@@ -294,11 +294,11 @@ class OperatorWindow:
         return 0.0
 
     def connected(self, number: int) -> bool:  # noqa: ARG002 - as a port tells it
-        """Tell whether somebody may answer."""
+        """Return whether somebody may answer."""
         return not self._closed
 
     def foreign(self, number: int, task: "SpelTask") -> bool:  # noqa: ARG002 - as a port tells it
-        """Tell that the window is every task's."""
+        """Return that the window belongs to every task."""
         return False
 
     def write(self, number: int, text: str, task: "SpelTask", *, ends: bool) -> None:  # noqa: ARG002
@@ -326,11 +326,11 @@ class OperatorWindow:
         return 0
 
     def require_binary(self, number: int, task: "SpelTask") -> None:
-        """Let the statement find out by itself; see :meth:`bytes`."""
+        """Let the statement find out itself; see :meth:`bytes`."""
 
 
 class NumberedChannels:
-    """What Print #, Input # and their kin reach.
+    """The targets of Print #, Input # and their kin.
 
     Args:
         ports: The ports of the controller.
@@ -353,13 +353,13 @@ class NumberedChannels:
         self._keeps_ports = keeps_ports
 
     def of(self, number: int) -> Ports | OpenFiles | OperatorWindow:
-        """Return what a number belongs to; a number of nothing is a port that there is not."""
+        """Return the channel of a number; an unused number is a port that does not exist."""
         if number in WINDOW_NUMBERS:
             return self.window
         return self.files if number in FILE_NUMBERS else self.ports
 
     def close_of(self, task: "SpelTask") -> None:
-        """Close what a task that is over had open."""
+        """Close what a finished task had open."""
         self.files.close_of(task)
         if not self._keeps_ports:
             self.ports.close_of(task)

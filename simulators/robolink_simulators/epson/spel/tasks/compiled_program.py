@@ -1,4 +1,4 @@
-"""What a program is after its build: functions as rows of operations, variables, labels."""
+"""A program after its build: functions as rows of operations, variables, labels."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field

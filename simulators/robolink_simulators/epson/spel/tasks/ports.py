@@ -23,7 +23,7 @@ COM_NUMBERS: Final = (*range(1, 5), *range(1001, 1009))
 
 @dataclass(frozen=True, slots=True)
 class SerialFormat:
-    """What SetCom says of the characters.
+    """The format of the characters, from SetCom.
 
     Attributes:
         baud: Bits per second.
@@ -39,7 +39,7 @@ class SerialFormat:
 
 
 class SerialLink:
-    """A serial line that answers as a socket does which does not block.
+    """A serial line that answers like a non-blocking socket.
 
     Args:
         number: Of the port, for messages.
@@ -107,7 +107,7 @@ Address = tuple[str, int]
 
 
 class PortLink(Protocol):
-    """What a port asks of a connection: what a socket has."""
+    """What a port needs of a connection: the methods of a socket."""
 
     def setblocking(self, flag: bool, /) -> None:
         """See ``socket.socket.setblocking``."""
@@ -141,7 +141,7 @@ def dialled(address: Address) -> PortLink:
 
 @dataclass(slots=True)
 class PortSettings:
-    """What SetNet says of a port.
+    """The settings of a port, from SetNet.
 
     Attributes:
         address: Host and TCP port.
@@ -265,11 +265,11 @@ class Ports:
 
     @property
     def in_use(self) -> bool:
-        """Whether any port is open: then the time outside matters."""
+        """Whether any port is open: then real time matters."""
         return any(port.is_open for port in self._ports.values())
 
     def connected(self, number: int) -> bool:
-        """Tell whether there is another end.
+        """Return whether the other end exists.
 
         Raises:
             Refusal: The port is not open.
@@ -357,11 +357,11 @@ class Ports:
         return taken
 
     def foreign(self, number: int, task: "SpelTask") -> bool:
-        """Tell whether a port is not this task's."""
+        """Return whether a port belongs to another task."""
         return self._port(number).owner is not task
 
     def require_binary(self, number: int, task: "SpelTask") -> None:
-        """Let bytes pass: every port carries them."""
+        """Accept bytes: every port carries them."""
 
     def _of(self, number: int, task: "SpelTask") -> _Port:
         port = self._port(number)
@@ -423,7 +423,7 @@ class Ports:
             self._lose(port)
 
     def _connect(self, number: int, port: _Port) -> None:
-        """See whether the other end has answered; try again if it was not there."""
+        """Check whether the other end has answered; try again if it was not there."""
         if port.link is None or isinstance(port.link, SerialLink):
             return
         error = port.link.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR)
@@ -437,7 +437,7 @@ class Ports:
         port.connected = True
 
     def _lose(self, port: _Port) -> None:
-        """Note that the other end is gone; a server takes the next one."""
+        """Note that the other end is gone; a server accepts the next one."""
         port.connected = False
         if port.listener is not None and port.link is not None:
             port.link.close()

@@ -1,4 +1,4 @@
-"""Lets the tasks of a program go on side by side in simulated time, statement by statement."""
+"""Runs the tasks of a program side by side in simulated time, statement by statement."""
 
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -87,7 +87,7 @@ class TaskTable:
 
     @contextmanager
     def robot_of(self, task: SpelTask) -> Iterator[None]:
-        """Put the robot in force that a task has chosen; the command window keeps its own."""
+        """Make a task's robot the current one; the command window keeps its own."""
         machine = self._machine
         kept, machine.robot_number = machine.robot_number, task.robot_number
         try:
@@ -103,7 +103,7 @@ class TaskTable:
                 task.pause(now_ns)
 
     def resume(self, now_ns: int) -> None:
-        """Let them go on."""
+        """Continue them."""
         self.paused = False
         for task in self._pausing():
             task.now_ns = max(task.now_ns, now_ns)
@@ -116,7 +116,7 @@ class TaskTable:
 
     @property
     def only_background(self) -> bool:
-        """Whether nothing but background tasks is left, or nothing at all."""
+        """Whether only background tasks are left, or nothing."""
         return all(task.kind is TaskKind.BACKGROUND for task in self.tasks.values())
 
 
@@ -200,7 +200,7 @@ class ProgramRunner:
         return self.begin_main(function, now_ns)
 
     def begin_main(self, function: CompiledFunction, now_ns: int) -> SpelTask:
-        """Begin the tasks of a program by its first; Restart takes it again.
+        """Begin the tasks of a program with its first; Restart uses it again.
 
         Raises:
             Refusal: No task is free.
@@ -213,7 +213,7 @@ class ProgramRunner:
         return self.begin(function, [], TaskKind.NORMAL, None, now_ns)
 
     def begin_background(self, now_ns: int) -> None:
-        """Begin the background tasks of the project, as a controller does that was switched on."""
+        """Begin the project's background tasks, as a controller does after it is switched on."""
         for function in self.project.background:
             self.begin(function, [], TaskKind.BACKGROUND, None, now_ns)
 
@@ -273,13 +273,13 @@ class ProgramRunner:
         return due_ns if task.waiting is not None else due_ns + BURST_NS
 
     def show(self, text: str) -> None:
-        """Show what Print says."""
+        """Show what Print prints."""
         self.console.append(text)
         if self.on_print is not None:
             self.on_print(text)
 
     def give_up(self, task: SpelTask, failure: TaskFailure) -> None:
-        """End a task by an error that it did not deal with, and what such an error ends."""
+        """End a task by an unhandled error, and what such an error ends."""
         task.ended = True
         self.failure = failure
         self.session.machine.halt(task.now_ns)
@@ -299,26 +299,26 @@ class ProgramRunner:
         task.ended = True
 
     def turn_to(self, state: Task) -> None:
-        """Pause or go on, as a task asks for."""
+        """Pause or continue, at a task's request."""
         if self._condition.task is not Task.NONE:
             self._condition.task = state
             self._heed()
 
     def quit_all(self) -> None:
-        """End all but background tasks, and put the motion parameters back."""
+        """End all except background tasks, and reset the motion parameters."""
         for task in self.tasks.values():
             if task.kind is not TaskKind.BACKGROUND:
                 self.end(task)
         self.session.machine.reset_motion_parameters()
 
     def end_others(self, task: SpelTask) -> None:
-        """End all but background tasks and the one that asks for it (Reset Error)."""
+        """End all except background tasks and the requesting one (Reset Error)."""
         for other in self.tasks.values():
             if other is not task and other.kind is not TaskKind.BACKGROUND:
                 self.end(other)
 
     def start_again(self, now_ns: int) -> None:
-        """End all but background tasks, without Trap Abort, and begin what ran last (Restart).
+        """End all except background tasks, without Trap Abort, and begin what ran last (Restart).
 
         Raises:
             Refusal: The emergency stop or an error stands, or nothing has run yet.
@@ -333,7 +333,7 @@ class ProgramRunner:
         self.begin_main(self._main, now_ns)
 
     def _heed(self) -> None:
-        """Do what the controller's state asks for since it was looked at last."""
+        """React to changes of the controller's state since the last check."""
         state, now_ns = self._condition.task, self._seen_ns
         if state is not Task.NONE or not self.tasks:
             self._stopped_by = None
@@ -354,7 +354,7 @@ class ProgramRunner:
             self.table.resume(now_ns)
 
     def _stop(self, *, background: bool) -> None:
-        """End the normal tasks; with ``background``, those go on that stops do not touch."""
+        """End the normal tasks; with ``background``, those continue that stops do not affect."""
         self.session.machine.halt(self._seen_ns)
         kept = {TaskKind.BACKGROUND}
         if background:
@@ -364,7 +364,7 @@ class ProgramRunner:
                 task.ended = True
 
     def _tidy(self) -> None:
-        """Forget tasks that are over, and what they held."""
+        """Forget finished tasks, and what they held."""
         over = [task for task in self.tasks.values() if task.ended]
         for task in over:
             del self.tasks[task.task_number]
@@ -376,7 +376,7 @@ class ProgramRunner:
             self.traps.happen("finish", self._seen_ns)
 
     def forget(self) -> None:
-        """Switch off: no task is there any more, every port is closed."""
+        """Switch off: no task is left, every port is closed."""
         self.tasks.clear()
         self.sharing = TaskSharing()
         self.traps.clear()
@@ -399,7 +399,7 @@ def run_to_end(
     most_s: float,
     clock: Clock | None = None,
 ) -> bool:
-    """Let time pass until every task is over; tell whether that came in time.
+    """Let time pass until every task has ended; return whether that came in time.
 
     Nobody waits for simulated time: it goes on to what happens next. Only while a port is open
     does it pass as fast as outside, because another program may have to answer.

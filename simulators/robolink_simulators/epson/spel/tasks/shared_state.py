@@ -32,7 +32,7 @@ class TaskSharing:
         self._timers: dict[int, int] = {}
 
     def may_lock(self, number: int, task: SpelTask) -> bool:
-        """Tell whether a lock is free.
+        """Return whether a lock is free.
 
         Raises:
             Refusal: The task holds it already (documented; its number is not).
@@ -47,7 +47,7 @@ class TaskSharing:
         self._locks[number] = task
 
     def unlock(self, number: int, task: SpelTask) -> None:
-        """Give a lock back.
+        """Release a lock.
 
         Raises:
             Refusal: Another task holds it, or none (documented that only its owner can).
@@ -65,22 +65,22 @@ class TaskSharing:
         raise out_of_range("No lock is free")
 
     def release(self, task: SpelTask) -> None:
-        """Give back what an ended task held."""
+        """Release what an ended task held."""
         self._locks = {n: holder for n, holder in self._locks.items() if holder is not task}
         for tasks in self._waiting_for.values():
             if task in tasks:
                 tasks.remove(task)
 
     def await_signal(self, number: int, task: SpelTask) -> None:
-        """Begin to wait: a signal that came before is lost (documented)."""
+        """Start to wait: an earlier signal is lost (documented)."""
         self._waiting_for.setdefault(checked_number(number), []).append(task)
 
     def signalled(self, number: int, task: SpelTask) -> bool:
-        """Tell whether the signal has come since the task began to wait."""
+        """Return whether the signal has come since the task started to wait."""
         return task not in self._waiting_for.get(number, [])
 
     def cease(self, number: int, task: SpelTask) -> None:
-        """Wait no longer."""
+        """Stop waiting."""
         if not self.signalled(number, task):
             self._waiting_for[number].remove(task)
 

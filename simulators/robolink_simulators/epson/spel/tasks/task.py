@@ -1,4 +1,4 @@
-"""One task: where it is in which function, what it remembers, and what interrupts it.
+"""One task: its place in which function, its memory, and what interrupts it.
 
 Trap: what interrupts a task when something happens (docs/reference/spel.md 4.7).
 """
@@ -31,7 +31,7 @@ DEEPEST_CALL: Final = 200
 
 
 class TaskKind(StrEnum):
-    """How a task goes on when the controller stops (docs/reference/spel.md 4.5)."""
+    """How a task continues when the controller stops (docs/reference/spel.md 4.5)."""
 
     NORMAL = "normal"
     NO_PAUSE = "nopause"
@@ -41,7 +41,7 @@ class TaskKind(StrEnum):
 
 
 class TaskState(IntEnum):
-    """What TaskState tells."""
+    """The values of TaskState."""
 
     NONE = 0
     RUNNING = 1
@@ -53,7 +53,7 @@ class TaskState(IntEnum):
 
 @dataclass(slots=True)
 class CallFrame:
-    """A function under way.
+    """A function in progress.
 
     Attributes:
         function: Which.
@@ -104,7 +104,7 @@ class TaskFailure:
 
 
 class SpelTask(Evaluator):
-    """A task; the runner lets it go on.
+    """A task; the runner continues it.
 
     Attributes:
         task_number: 1 to 32, 65 to 80 in the background, 257 to 267 for traps.
@@ -155,7 +155,7 @@ class SpelTask(Evaluator):
 
     @property
     def held_by_pause(self) -> bool:
-        """Whether nothing of it goes on in a pause; QP Off lets a motion under way end."""
+        """Whether nothing of it continues in a pause; QP Off lets a motion in progress end."""
         ends = isinstance(self.waiting, StatementWait) and self.waiting.finishing
         return self.kind is TaskKind.NORMAL and not ends
 
@@ -179,7 +179,7 @@ class SpelTask(Evaluator):
             waiting.suspend(now_ns)
 
     def carries(self, statement: object) -> bool:
-        """Tell whether it still waits for a statement that it has begun."""
+        """Return whether it still waits for a statement that it has begun."""
         waiting = self.waiting
         if isinstance(waiting, WaitSequence):
             waiting = waiting.present
@@ -188,12 +188,12 @@ class SpelTask(Evaluator):
 
     @property
     def present_ns(self) -> int:
-        """The instant of what is being carried out, inside ``!...!`` too."""
+        """The instant of what is being carried out, also inside ``!...!``."""
         return max(self.now_ns, self.session.machine.arm.now_ns)
 
     @property
     def state(self) -> TaskState:
-        """What TaskState tells of it."""
+        """Its TaskState."""
         if self.ended:
             return TaskState.NONE
         if self.halted:
@@ -206,7 +206,7 @@ class SpelTask(Evaluator):
         return self.frames[0].function.spelled if self.frames else ""
 
     def enter(self, function: CompiledFunction, given: list[Variable], slot: int) -> None:
-        """Go on in a function.
+        """Continue in a function.
 
         Raises:
             Refusal: Functions call each other too deeply.
@@ -234,7 +234,7 @@ class SpelTask(Evaluator):
         self._take_up(caller)
 
     def turn(self) -> TaskWait:
-        """Return a wait that is over at once, after the other tasks have had their turn."""
+        """Return a wait that ends at once, after the other tasks have had their turn."""
         return WaitUntil(lambda: True, lambda: None)
 
     def write_to(self, channel: int, text: str, *, ends: bool) -> None:
@@ -246,7 +246,7 @@ class SpelTask(Evaluator):
         self.runner.channels.of(channel).write(channel, text, self, ends=ends)
 
     def unwind(self, depth: int, pc: int) -> None:
-        """Go on at an operation of a function that is under way, leaving those it called."""
+        """Continue at an operation of a function in progress, leaving those that it called."""
         del self.frames[depth + 1 :]
         self.frames[depth].pc = pc
         self._take_up(self.frames[depth])
@@ -270,7 +270,7 @@ class SpelTask(Evaluator):
             raise SpelRefusal(RefusalKind.EXCESSIVE_LOOP, "Excessive loop detected")
 
     def fail(self, number: int, text: str, robot: int = 0) -> bool:
-        """Take an error: go to where it is dealt with; tell whether there is such a place.
+        """Handle an error: go to its handler; return whether there is one.
 
         Args:
             number: What Err tells.
@@ -335,21 +335,21 @@ class Traps:
         self._events: dict[str, CompiledFunction] = {}
 
     def set(self, number: int, trap: SetTrap | None) -> None:
-        """Set a trap, or take it away."""
+        """Set a trap, or remove it."""
         if trap is None:
             self._conditions.pop(number, None)
         else:
             self._conditions[number] = trap
 
     def on_event(self, event: str, function: CompiledFunction | None) -> None:
-        """Say what an event starts; nothing any more without a function."""
+        """Set the function that an event starts; without one, nothing."""
         if function is None:
             self._events.pop(event, None)
         else:
             self._events[event] = function
 
     def forget(self, task: SpelTask) -> None:
-        """Take away the traps of a task that is over, but those that start another (documented)."""
+        """Remove the traps of a finished task, except those that start another (documented)."""
         self._conditions = {
             n: trap
             for n, trap in self._conditions.items()
@@ -357,12 +357,12 @@ class Traps:
         }
 
     def clear(self) -> None:
-        """Take all away."""
+        """Remove all."""
         self._conditions.clear()
         self._events.clear()
 
     def happen(self, event: str, now_ns: int, about: Sequence[int] = ()) -> None:
-        """Start what an event starts.
+        """Start the function of an event.
 
         Args:
             event: What happens.
@@ -374,7 +374,7 @@ class Traps:
             self._start(function, now_ns, about)
 
     def poll(self, now_ns: int) -> None:
-        """Fire the traps whose condition holds; each fires once (documented)."""
+        """Fire the traps whose condition is true; each fires once (documented)."""
         for number, trap in list(self._conditions.items()):
             if trap.task.ended and not trap.starts:
                 continue
@@ -386,7 +386,7 @@ class Traps:
                 self._fire(trap, now_ns)
 
     def next_poll_ns(self, seen_ns: int) -> int | None:
-        """Return when to look again because a robot moves, ``None`` where nothing asks for that."""
+        """Return when to check again because a robot moves, ``None`` if nothing needs that."""
         machine = self._runner.session.machine
         following = any(follows_robot(trap.names, machine) for trap in self._conditions.values())
         return seen_ns + LOOK_NS if following and machine.moving else None

@@ -140,7 +140,7 @@ _OF_TASKS: Final = frozenset({"taskstate", "taskdone", "taskinfo", "taskinfo$"})
 
 
 def task_function(name: str, arguments: Sequence[Expression] | None, scope: Scope) -> Run | None:
-    """Return what a function of tasks tells, ``None`` if a name is none.
+    """Return a function about tasks, ``None`` if a name is none.
 
     Raises:
         Refusal: It does not take so many arguments.

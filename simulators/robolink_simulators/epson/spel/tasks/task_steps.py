@@ -1,4 +1,4 @@
-"""Carries out what tasks do, operation by operation, as far as they may.
+"""Carries out the operations of tasks, as far as they may.
 
 What a task may not do that goes on through an emergency stop, or in the background.
 
@@ -36,7 +36,7 @@ BOUND: Final = frozenset({TaskKind.NO_ABORT, TaskKind.BACKGROUND})
 
 
 def forbidden_in(kind: TaskKind, statement: Statement) -> bool:
-    """Tell whether a task of a kind may not carry a statement out."""
+    """Return whether a task of a kind may not carry a statement out."""
     if kind not in BOUND:
         return False
     match statement:
@@ -50,7 +50,7 @@ def forbidden_in(kind: TaskKind, statement: Statement) -> bool:
 
 
 def require_unbound(task: SpelTask) -> None:
-    """Refuse what tasks may not that go on through an emergency stop, or in the background.
+    """Refuse statements that emergency-proof and background tasks may not use.
 
     Raises:
         Refusal: It is one of those.
@@ -60,7 +60,7 @@ def require_unbound(task: SpelTask) -> None:
 
 
 def require_advanced(task: SpelTask) -> None:
-    """Refuse Cont, Reset Error and StartMain where the preference does not let programs say them.
+    """Refuse Cont, Reset Error and StartMain if the preference forbids them to programs.
 
     Source: docs/reference/spel.md 4.5.
 
@@ -72,7 +72,7 @@ def require_advanced(task: SpelTask) -> None:
 
 
 class TaskSteps:
-    """Lets one task at a time go on.
+    """Continues one task at a time.
 
     Args:
         runner: Whose tasks they are: a ``ProgramRunner``, which makes this. It is shown what
@@ -118,7 +118,7 @@ class TaskSteps:
             self._runner.on_statement(task, place.file, place.line, text)
 
     def _take_up(self, task: SpelTask, outcome: object) -> bool:
-        """Deal with what an operation gave; tell whether the task goes on at once."""
+        """Handle the result of an operation; return whether the task continues at once."""
         if isinstance(outcome, Statement):
             waiting: TaskWait = StatementWait(self.carried_out(task, outcome))
         elif isinstance(outcome, (WaitUntil, WaitSequence, StatementWait)):
@@ -149,7 +149,7 @@ class TaskSteps:
         return StatementExecution(task, (statement,), task.now_ns)
 
     def poll(self, task: SpelTask, waiting: TaskWait, now_ns: int) -> None:
-        """Look at what a task waits for, and let it go on if that is over."""
+        """Check what a task waits for, and continue the task if that is over."""
         task.waiting = waiting
         try:
             over = waiting.poll(max(now_ns, task.now_ns))
@@ -174,7 +174,7 @@ class TaskSteps:
             self._fail(task, execution.error.number, execution.error.text, robot)
 
     def fail(self, task: SpelTask, refusal: SpelRefusal) -> None:
-        """Let a task meet an error: where it deals with it, or at its end."""
+        """Give a task an error: at its handler, or at its end."""
         if isinstance(refusal, RaisedError):
             self._fail(task, refusal.number, refusal.text)
         else:

@@ -1,4 +1,4 @@
-"""What a task waits for: a statement that takes time, a signal, a lock, a port."""
+"""Waits of a task: a statement that takes time, a signal, a lock, a port."""
 
 from collections.abc import Callable, Iterator
 from typing import Final, Protocol
@@ -17,11 +17,11 @@ class TaskWait(Protocol):
     """Something that a task waits for."""
 
     def next_poll_ns(self, seen_ns: int) -> int:
-        """Return when it has to be looked at again; nothing came before ``seen_ns``."""
+        """Return when it has to be checked again; nothing came before ``seen_ns``."""
         ...
 
     def poll(self, now_ns: int) -> bool:
-        """Look at it; tell whether it is over.
+        """Check it; return whether it is over.
 
         Raises:
             Refusal: It ended with an error.
@@ -33,7 +33,7 @@ class TaskWait(Protocol):
         ...
 
     def resume(self, now_ns: int) -> None:
-        """Let it go on."""
+        """Continue it."""
         ...
 
 
@@ -51,7 +51,7 @@ class StatementWait:
         self.finishing = False
 
     def next_poll_ns(self, seen_ns: int) -> int:
-        """Return when something of it happens next."""
+        """Return when the next part of it happens."""
         return self.execution.next_poll_ns(seen_ns)
 
     def poll(self, now_ns: int) -> bool:
@@ -65,14 +65,14 @@ class StatementWait:
         self.execution.suspend(now_ns)
 
     def resume(self, now_ns: int) -> None:
-        """Go on with its motion, or begin its time anew."""
+        """Continue its motion, or restart its time."""
         if not self.finishing:
             self.execution.resume(now_ns)
         self.finishing = False
 
 
 class WaitSequence:
-    """Waits that follow each other; between two of them something is done.
+    """Waits that follow each other, with actions in between.
 
     Args:
         steps: Gives the next wait once the one before is over. There is at least one.
@@ -87,7 +87,7 @@ class WaitSequence:
         return self._present.next_poll_ns(seen_ns)
 
     def poll(self, now_ns: int) -> bool:
-        """Look at the present one, and at those after it that are over at once."""
+        """Check the present one, and those after it that end at once."""
         while self._present.poll(now_ns):
             following = next(self._steps, None)
             if following is None:
@@ -100,12 +100,12 @@ class WaitSequence:
         self._present.suspend(now_ns)
 
     def resume(self, now_ns: int) -> None:
-        """Let the present one go on."""
+        """Continue the present one."""
         self._present.resume(now_ns)
 
     @property
     def present(self) -> TaskWait:
-        """The one that is waited for now."""
+        """The present wait."""
         return self._present
 
 

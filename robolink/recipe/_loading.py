@@ -185,9 +185,9 @@ def _missing(key: str) -> str:
 RECIPE_FILE: Final = FileKind(
     named=lambda path: tr("The recipe {path}", path=path),
     unreadable_remedy=lambda: tr(
-        "docs/recipes.md shows what a recipe looks like. Nothing was sent."
+        "Nothing was sent. Give a recipe file; docs/recipes.md shows one."
     ),
-    wrong_remedy=lambda: tr("Correct it; docs/recipes.md explains every key. Nothing was sent."),
+    wrong_remedy=lambda: tr("Nothing was sent. Correct it; docs/recipes.md explains every key."),
 )
 
 

@@ -250,5 +250,5 @@ def _narrow(text: str) -> str:
 def _no_step(word: str) -> ConfigError:
     return ConfigError(
         tr("{word!r} is not a step. A step is x+0.1: axis, sign, number, with a point.", word=word),
-        remedy=tr("Axes are x, y, z and u, for example x+0.1 z-0.5. Nothing moved."),
+        remedy=tr("Nothing moved. Type steps along x, y, z or u, for example x+0.1 z-0.5."),
     )

@@ -381,8 +381,8 @@ def _refused(code: int) -> LoginRefusedError:
         tr("The controller refused the login (code {code}).", code=code),
         code=code,
         remedy=tr(
-            "Give the password that is set on the controller's Remote Ethernet page: "
-            "{password}. No second attempt was made.",
+            "robolink did not try again. Give the password of the controller's Remote Ethernet "
+            "page: {password}.",
             password=remedy_word(RemedyWord.PASSWORD),
         ),
         request="Login",

@@ -203,8 +203,7 @@ class LeaseView:
                 sign=last_sign,
             ),
             remedy=tr(
-                "Nothing was sent. Wait until it has finished ({wait}), or end it; if it does not "
-                "respond for {seconds:.0f} s you can take over.",
+                "Wait ({wait}). After {seconds:.0f} s without a response you can take over.",
                 wait=remedy_word(RemedyWord.WAIT),
                 seconds=LEASE_S,
             ),

@@ -189,16 +189,14 @@ def require_base_of(controller: Controller, station: Station) -> None:
         return
     raise NotReadyError(
         tr(
-            "Station {id} was learnt with the controller's base (Base) at {before}; "
-            "it is at {now} now, so the place on record is somewhere else.",
+            "Station {id} was learnt with Base at {before}; now Base is at {now}.",
             id=station.id,
             before=_shown(station.base),
             now=_shown(now),
         ),
         reason=NotReadyReason.OTHER_BASE,
         remedy=tr(
-            "Set Base as it was, or learn the station in this one with 'robolink cell station "
-            "learn {id}'.",
+            "Set Base as it was, or learn it again: robolink cell station learn {id}",
             id=station.id,
         ),
         controller=controller.identity,

@@ -87,7 +87,7 @@ def furnish(folder: Path) -> None:
         (folder / name).chmod(mode)
 
 
-def answers(folder: Path) -> list[Answer]:
+def answers(folder: Path, seed: int = SEED) -> list[Answer]:
     """Type every line in a folder of its own; return the answers."""
     furnish(folder)
     simulators = {
@@ -101,7 +101,7 @@ def answers(folder: Path) -> list[Answer]:
     os.chdir(folder)
     try:
         typed(Wrong("", "", ("-c", CELL, "tool", "backup", "tools.json")), port, folder)
-        return [typed(one, port, folder) for one in wrong_commands(SEED)]
+        return [typed(one, port, folder) for one in wrong_commands(seed)]
     finally:
         os.chdir(before)
         close_files()
@@ -156,19 +156,29 @@ LONGEST_SENTENCE = 24
 CODES = {2, 3, 5}
 
 
+LISTED = re.compile(r"(?<=:)(\n    .*)+")
+"""What is wrong with a file, a line each, below what happened."""
+
+MOST_LISTED = 11
+
+
 def faults(one: Answer) -> list[str]:
     """Return what is wrong with the form of an answer."""
-    what, *rest = one.err.rstrip("\n").split("\n  ")
+    listed = [line[1:] for line in re.findall(r"\n    .*", one.err)]
+    told = Answer(one.wrong, one.code, one.out, LISTED.sub("", one.err))
+    what, *rest = told.err.rstrip("\n").split("\n  ")
     do = rest[-1] if rest else ""
     sentences = re.split(r"(?<=[.?:;])\s", f"{what} {' '.join(rest)}")
     found = {
         f"ends with {one.code}": one.code not in CODES,
         "shows something on stdout": one.out != "",
         "does not begin with what happened": not what.startswith("robolink: "),
-        "does not end a sentence": not what.endswith((".", "?")),
+        "does not end a sentence": not what.endswith((".", "?") if not listed else ":"),
         "does not say what to do": not DOES.search(do),
         "is in parts that stand": not 1 <= len(rest) <= 2,
-        f"takes {len(one.lines)} lines": len(one.lines) > LINES,
+        f"takes {len(told.lines)} lines": len(told.lines) > LINES,
+        "lists too much": len(listed) > MOST_LISTED
+        or any(within(line, COLUMNS).count("\n") > 3 for line in listed),
         "is wider than the terminal": max(map(columns, one.lines)) > COLUMNS,
         "is not plain": UNPLAIN.search(one.err) is not None,
         "has a long sentence": max(len(s.split()) for s in sentences) > LONGEST_SENTENCE,
@@ -217,6 +227,7 @@ def test_each_answer_says_what_happened_what_stands_and_what_to_do(found):
         ("robolink: No\n  Name another.\n", "does not end a sentence"),
         ("robolink: KeyError: 1.\n  Name another.\n", "is not plain"),
         ("robolink: No.\n  Nothing moved.\n  Wait.\n  Name it.\n", "is in parts that stand"),
+        ("robolink: 2 errors:\n" + "    a: bad\n" * 12 + "  Correct it.\n", "lists too much"),
     ],
 )
 def test_an_answer_of_another_form_is_found(err, fault):
@@ -224,6 +235,17 @@ def test_an_answer_of_another_form_is_found(err, fault):
     right = "robolink: No file a.\n  Nothing moved.\n  Name another: robolink status\n"
     assert faults(Answer(Wrong("", "", ()), 2, "", right)) == []
     assert faults(Answer(Wrong("", "", ()), 70, "", right)) == ["ends with 70"]
+    listed = "robolink: a has 2 errors:\n    line 1, b: is missing\n    c: is 0\n  Correct it.\n"
+    assert faults(Answer(Wrong("", "", ()), 2, "", listed)) == []
+
+
+@pytest.mark.soak
+@pytest.mark.parametrize("seed", range(60))
+def test_each_answer_to_other_lines_has_that_form(tmp_path, state_folder, seed):
+    folder = tmp_path / "work"
+    folder.mkdir()
+    wrong = [f"{one.wrong.words}: {faults(one)}" for one in answers(folder, seed) if faults(one)]
+    assert not wrong, f"{len(wrong)} answers:\n" + "\n".join(wrong)
 
 
 def test_the_table_of_answers_is_the_one_that_was_looked_over(found):

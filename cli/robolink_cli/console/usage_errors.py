@@ -14,6 +14,7 @@ from click.core import ParameterSource
 from click.exceptions import NoSuchCommand
 
 from robolink.messages import joined, tr
+from robolink_cli.console.tables import SCREEN, within
 
 EXAMPLES: Final = {
     "a": "1",
@@ -49,6 +50,7 @@ EXAMPLES: Final = {
 }
 """A value of each parameter that must be given, by its name, or by the command's and its."""
 
+_MOST_LINES: Final = 3
 _LONGEST_VALUE: Final = 40
 _LONGEST_LIST: Final = 72
 _MINUS: Final = re.compile(r"-[\d.]+")
@@ -152,9 +154,19 @@ def _wrong_option(error: click.BadOptionUsage, context: click.Context | None) ->
         )
     found = [] if context is None else [one for one in context.command.params if option in one.opts]
     needed = _needed(found[0].type) if found else ""
-    helps = [one.help for one in found if isinstance(one, click.Option) and one.help]
-    said = [tr("{option} needs a value.", option=option), *map(_first_sentence, helps)]
-    return joined(" ", said), joined(" ", (*([needed] if needed else []), _help(context)))
+    do = joined(" ", (*([needed] if needed else []), _help(context)))
+    said = tr("{option} needs a value.", option=option)
+    for one in found:
+        if isinstance(one, click.Option) and one.help:
+            longer = joined(" ", (said, _first_sentence(one.help)))
+            said = longer if _fits(longer, do) else said
+    return said, do
+
+
+def _fits(said: str, do: str) -> bool:
+    """Tell whether an answer takes three lines of a narrow terminal."""
+    shown = within(f"robolink: {said}\n  {do}", SCREEN)
+    return shown.count("\n") < _MOST_LINES
 
 
 def _needed(kind: "click.ParamType[Any]") -> str:

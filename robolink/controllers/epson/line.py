@@ -366,10 +366,10 @@ def as_shown(request: Request) -> str:
 
 def _unanswered(controller: str) -> LoginUnansweredError:
     return LoginUnansweredError(
-        tr("{identity} can be reached, but does not answer the login.", identity=controller),
+        tr("{identity} does not answer the login.", identity=controller),
         remedy=tr(
-            "Only one client may be logged in: close the other one, or wait for it ({wait}). If "
-            "there is none, check that this port is the controller's Remote Ethernet port.",
+            "Only one client may be logged in: close the other, or wait for it ({wait}). If "
+            "there is none: check the port of Remote Ethernet.",
             wait=remedy_word(RemedyWord.WAIT),
         ),
         request="Login",

@@ -81,13 +81,12 @@ class ValueChange(MarkedCommand[ValueT]):
         if not self._same(found, requested):
             raise ReadBackError(
                 tr(
-                    "The controller accepted {request}, but it reads back as {found!r} "
-                    "instead of {requested!r}.",
+                    "{request} was accepted, but reads back as {found!r}, not {requested!r}.",
                     request=request,
                     found=found,
                     requested=requested,
                 ),
-                remedy=tr("A program or the PLC may also set it. Nothing was repeated."),
+                remedy=tr("robolink did not repeat it. Find what else sets it."),
                 request=request,
             )
         return ValueReceipt(request, before, requested, found, skipped=False)

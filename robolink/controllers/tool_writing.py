@@ -187,7 +187,7 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
     def _differs(self, found: ToolOffset | None) -> ReadBackError:
         return ReadBackError(
             tr(
-                "Tool {tool} was written {requested}, but reads {found}.",
+                "Tool {tool} was written {requested}, but reads back as {found}.",
                 tool=self.tool,
                 requested=describe_offset(self.requested),
                 found=describe_offset(found),

@@ -203,7 +203,7 @@ class LeaseView:
                 sign=last_sign,
             ),
             remedy=tr(
-                "Wait ({wait}). After {seconds:.0f} s without a response you can take over.",
+                "Nothing was sent. Wait ({wait}), or take over after {seconds:.0f} s of silence.",
                 wait=remedy_word(RemedyWord.WAIT),
                 seconds=LEASE_S,
             ),

@@ -170,7 +170,7 @@ def tool_changed(
     """
     return ToolChangedError(
         tr(
-            "Nothing was written: tool {tool} holds {found}, not {expected} as expected.",
+            "Tool {tool} holds {found}, not {expected} as expected; nothing was written.",
             tool=tool,
             found=describe_offset(found),
             expected=describe_offset(expected),

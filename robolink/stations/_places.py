@@ -226,6 +226,5 @@ def _unknown(station: Station, what: str) -> ConfigError:
         remedy=tr(
             "Calibrate there ({calibrate}), or state it in the cell file.",
             calibrate=remedy_word(RemedyWord.CALIBRATE_AT, station=station.id),
-            id=station.id,
         ),
     )

@@ -17,19 +17,23 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+from babel.messages.pofile import read_po
 from robolink_cli import main
 from robolink_cli.console.tables import columns, within
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.hosting.in_process.epson import register, unregister
 
+from robolink import locale
 from robolink.journal import close_files
 from robolink.model import Secret
+from tests._commands import run_command
 from tests.cli._wrong_commands import CELL, CONTROLLERS, KINDS, Wrong, leaves, wrong_commands
 from tests.cli.test_commands_bad_input import closed_port
 
 SEED = 36
 TABLE = Path(__file__).with_name("wrong_commands.txt")
 COLUMNS, LINES = 80, 3
+CLICK_IN_CHINESE = Path(locale.__file__).parent / "zh_CN" / "LC_MESSAGES" / "click.po"
 
 CELLS = """
 [cells.line3]
@@ -252,6 +256,29 @@ def test_the_table_of_answers_is_the_one_that_was_looked_over(found):
     assert table(found) == TABLE.read_text(encoding="utf-8"), (
         "read what changed: python -m tests.cli.test_wrong_commands"
     )
+
+
+@pytest.mark.parametrize(
+    ("words", "template"),
+    [
+        (("tool", "get", "ten"), "{value!r} is not a valid {number_type}."),
+        (("robot", "io", "set", "70000", "on"), "{value} is not in the range {range}."),
+        (("tool", "list", "now"), "Got unexpected extra argument ({args})"),
+        (("robot", "motors", "onx"), "{value!r} is not one of {choices}."),
+        (("tool", "list", "--published=1"), "Option {name!r} does not take a value."),
+        (("tool", "compare", "."), "{name} {filename!r} is a directory."),
+    ],
+)
+def test_click_s_own_words_are_not_shown_in_chinese_either(state_folder, words, template):
+    with CLICK_IN_CHINESE.open("rb") as file:
+        messages = [one for one in read_po(file) if template in one.id]
+    said = messages[0].string
+    said = said if isinstance(said, str) else str((said or [""])[0])
+    longest = max(re.split(r"{[^}]*}", said), key=len).strip()
+    assert not longest.isascii(), "click's sentence is not translated"
+    ended = run_command("--lang", "zh", *words)
+    assert ended.code == 2
+    assert longest not in ended.err
 
 
 def _made_anew() -> None:

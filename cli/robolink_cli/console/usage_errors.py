@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import click
 from click.core import ParameterSource
-from click.exceptions import NoSuchCommand
+from click.exceptions import NoArgsIsHelpError, NoSuchCommand
 
 from robolink.messages import joined, tr
 from robolink_cli.console.tables import SCREEN, within
@@ -79,7 +79,7 @@ def usage_sentences(error: click.ClickException) -> tuple[str, str]:
             return _wrong_value(error.message, error.param, context)
         case click.BadOptionUsage():
             return _wrong_option(error, context)
-    if error.message == gettext("Missing command."):
+    if isinstance(error, NoArgsIsHelpError) or error.message == gettext("Missing command."):
         return tr("A command is missing."), _help(context)
     if context is not None and (words := _extra_words(error.message)):
         return tr("Too many words: {words}.", words=_cut(words)), tr(

@@ -138,7 +138,7 @@ def unintelligible(
 def mismatched(identity: str, request: ModbusRequest) -> RemoteProtocolError:
     """Return the error for an answer to another request than the one it claims."""
     return RemoteProtocolError(
-        tr("{identity} answers another question.", identity=identity),
+        tr("{identity} answered something other than asked.", identity=identity),
         remedy=tr(
             "Check the unit in the URL ({unit}), and for a second device at this address.",
             unit=request.unit,

@@ -33,7 +33,7 @@ def ended_unanswered(url: str) -> TransportBrokenError:
     """Return the error of a connection that ended before the answer was whole."""
     return TransportBrokenError(
         tr("The connection to {url} ended without an answer.", url=url),
-        remedy=tr("Before you repeat it, look whether it was done. Is the simulator running?"),
+        remedy=tr("Look whether it was done before you repeat it. Is the simulator running?"),
     )
 
 

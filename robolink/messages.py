@@ -19,6 +19,7 @@ __all__ = [
     "in_english",
     "install",
     "joined",
+    "known_names",
     "plain",
     "spoken",
     "tr",
@@ -96,6 +97,45 @@ def joined(between: str, sentences: Iterable[str]) -> str:
 def in_english(text: str) -> str:
     """Return the English of a text that a person was shown, for a record."""
     return text.english if isinstance(text, Translated) else text
+
+
+_MOST: Final = 100
+"""Characters of a list of names that is shown whole."""
+
+_SHOWN: Final = 50
+"""Characters of a longer one that are shown: a list of 200 names is no answer."""
+
+
+def known_names(names: Iterable[object], typed: object = "") -> str:
+    """Return the sentence that says which names there are.
+
+    Args:
+        names: All that could be given.
+        typed: What was given instead; of many names, those that look like it are told.
+
+    Example:
+        >>> from robolink.messages import known_names
+        >>> known_names(["line3", "line4"], "north")
+        'Choose one of these: line3, line4.'
+        >>> known_names([f"option_{n}" for n in range(200)], "opton_17")
+        'Did you mean option_17, option_197?'
+    """
+    from difflib import get_close_matches  # here, because a stop needs none
+
+    texts = [str(name) for name in names]
+    if not texts:
+        return tr("There are none here.")
+    listed = ", ".join(texts)
+    if len(listed) <= _MOST:
+        return tr("Choose one of these: {names}.", names=listed)
+    folded = {text.casefold(): text for text in texts}
+    wanted = str(typed).casefold()
+    near = get_close_matches(wanted, folded, n=2, cutoff=0.7)
+    near = near or [one for one in folded if wanted and wanted in one][:2]
+    if near:
+        return tr("Did you mean {names}?", names=", ".join(folded[one] for one in near))
+    shown = listed[:_SHOWN].rpartition(", ")[0]
+    return tr("Choose one of {count}: {names} ...", count=len(texts), names=shown)
 
 
 def plain(value: object) -> object:

@@ -14,7 +14,7 @@ from typing import Final, Protocol, cast
 from urllib.parse import parse_qs, urlsplit
 
 from robolink.errors import CalibrationError, ConfigError, OutcomeUnknownError, StoppedError
-from robolink.messages import tr
+from robolink.messages import joined, known_names, tr
 from robolink.model import TIP, Controller, LookingController, Spot, SpotUnit, TipSensor
 from robolink.plug_ins import PlugInError, find_plug_in
 
@@ -378,10 +378,12 @@ def _opener(url: str) -> SensorOpener:
         raise CalibrationError(
             "sensor_not_found",
             tr("No sensor is called {url!r}.", url=sensor_name(url)),
-            remedy=tr(
-                "Name it in the cell file under sensors, or install the package that "
-                "provides it. These are known: {known}.",
-                known=", ".join(known),
+            remedy=joined(
+                " ",
+                (
+                    known_names(known, sensor_name(url)),
+                    tr("Name others in the cell file under sensors, or install their package."),
+                ),
             ),
         )
     return cast(SensorOpener, found)

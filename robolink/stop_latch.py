@@ -283,7 +283,7 @@ def require_wait(wait_s: float) -> float:
         raise ConfigError(
             tr("A wait of {seconds} s is not possible.", seconds=wait_s),
             remedy=tr(
-                "Give 0 to {most:g} seconds; 0 means: do not wait. Nothing was sent.",
+                "Nothing was sent. Give 0 to {most:g} seconds; 0 means: do not wait.",
                 most=LONGEST_WAIT_S,
             ),
         )

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, cast
 
 import click
 
-from robolink.messages import joined, spoken, tr
+from robolink.messages import spoken, tr
 from robolink_cli.console.help_pages import in_language
 from robolink_cli.console.render import note
 
@@ -71,32 +71,25 @@ class LazyGroup(click.Group):
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return the typed command; report a former name."""
-        try:
-            found = super().resolve_command(ctx, args)
-        except click.exceptions.NoSuchCommand as error:
-            # click looks among the commands that are loaded only.
-            said, names = error.message, self.list_commands(ctx)
-            names += self._unlisted.keys() - self.renamed.keys()
-            if grouped := self._groups_with(ctx, error.command_name):
-                hints = (tr("Did you mean 'robolink {command}'?", command=one) for one in grouped)
-                said, names = joined(" ", (said, *hints)), []
-            raise click.exceptions.NoSuchCommand(
-                error.command_name, said, names, error.ctx
-            ) from None
+        found = super().resolve_command(ctx, args)
         if args[0] in self.renamed and not ctx.resilient_parsing and sys.stderr.isatty():
             typed = " ".join([*ctx.command_path.split()[1:], args[0]])
             now = self.renamed[args[0]][1]
             note(tr("{old} is now called {new}.", old=typed, new=now))
         return found
 
-    def _groups_with(self, ctx: click.Context, typed: str) -> list[str]:
+    def typed_names(self, ctx: click.Context) -> list[str]:
+        """Return the names of today: those that are listed, and those that are not."""
+        return [*self.list_commands(ctx), *(self._unlisted.keys() - self.renamed.keys())]
+
+    def groups_with(self, ctx: click.Context, typed: str) -> list[str]:
         """Return the commands of that name in groups whose one-line help names it."""
         found = []
         for group, (_, summary) in self.lazy.items():
             if typed in summary.split():
                 command = self.get_command(ctx, group)
                 if isinstance(command, click.Group) and typed in command.list_commands(ctx):
-                    found.append(" ".join([*ctx.command_path.split()[1:], group, typed]))
+                    found.append(" ".join([ctx.command_path, group, typed]))
         return found
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

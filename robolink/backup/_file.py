@@ -327,15 +327,11 @@ def keep_first_backup(
     except (OSError, ConfigError) as error:
         raise ConfigError(
             tr(
-                "The tools as they are now cannot be saved in {path}: {cause}",
+                "robolink cannot back up the tools in {path}: {cause}.",
                 path=path,
                 cause=error,
             ),
-            remedy=tr(
-                "Nothing was written: the first write to a controller needs a backup. "
-                "Make that folder writable, or name another one with "
-                "ROBOLINK_STATE_DIR."
-            ),
+            remedy=tr("Nothing was written. Make it writable, or set ROBOLINK_STATE_DIR."),
             controller=controller.identity,
         ) from error
     tell(

@@ -143,9 +143,8 @@ def require_inside(controller: Controller, steps: Sequence[PlannedStep]) -> None
             raise LimitError(
                 tr("{step} {refusal}", step=step.text, refusal=step.refusal),
                 remedy=tr(
-                    "The allowed area is centred on the robot's start position: jog the "
-                    "tip closer to the station ('robolink robot jog'), or widen the area. "
-                    "If the arm cannot reach, move the station, or turn the tool another way."
+                    "Jog the tip closer to the station, or widen the allowed area. If the arm "
+                    "cannot reach: move the station."
                 ),
                 controller=controller.identity,
             )

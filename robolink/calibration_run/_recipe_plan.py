@@ -317,9 +317,7 @@ def find_reference(controller: Controller, tool: int, station: str) -> Reference
             value=describe_offset(newest.value),
         ),
         remedy=tr(
-            "The tool changed since the reference. Write the value of the reference back, "
-            "or record a new reference with {reference} and the nozzle that fits the "
-            "stored value.",
+            "Write that value back, or record a new reference with {reference}.",
             reference=remedy_word(RemedyWord.REFERENCE),
         ),
     )

@@ -412,9 +412,6 @@ def _require_own_numbers(controller: Controller, loaded: "LoadedRecipe") -> None
         return
     raise ConfigError(
         tr("The numbers in {path} are for a simulated cell.", path=loaded.path),
-        remedy=tr(
-            "Enter stations, poses, box and limits of this cell, then delete the line "
-            "'numbers'. Nothing was moved or written."
-        ),
+        remedy=tr("Nothing moved. Enter this cell's numbers, then delete the line 'numbers'."),
         controller=controller.identity,
     )

@@ -14,7 +14,7 @@ from robolink.errors import ConfigError
 from robolink.files.durable import write_whole
 from robolink.files.key_problems import is_not_known, sentence
 from robolink.files.toml import Problem
-from robolink.messages import tr
+from robolink.messages import known_names, tr
 from robolink.model import ChangeLimits
 
 if TYPE_CHECKING:
@@ -156,7 +156,7 @@ def find_cell(name: str) -> Cell:
     if name in cells:
         return cells[name]
     if cells:
-        remedy = tr("These are known: {names}.", names=", ".join(cells))
+        remedy = known_names(cells, name)
     else:
         remedy = tr(
             "No cell file was found; 'robolink cell files' shows where robolink looks for "
@@ -373,7 +373,7 @@ def content_with_cell(path: Path, name: str, said: Mapping[str, str | float]) ->
         raise ConfigError(
             tr("{path} has a cell {name} already.", path=path, name=name),
             remedy=tr(
-                "Choose another name, or change that cell in an editor. Nothing was written."
+                "Nothing was written. Choose another name, or change that cell in an editor."
             ),
         )
     rows = [f"[cells.{_quoted(name)}]", *(f"{key} = {_quoted(one)}" for key, one in said.items())]

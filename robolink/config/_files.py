@@ -56,7 +56,7 @@ def config_files() -> tuple[ConfigFile, ...]:
 CELL_FILE: Final = FileKind(
     named=lambda path: tr("The cell file {path}", path=path),
     unreadable_remedy=lambda: tr("'robolink cell files' shows the files that robolink reads."),
-    wrong_remedy=lambda: tr("Correct it, then run 'robolink cell validate'. Nothing was sent."),
+    wrong_remedy=lambda: tr("Nothing was sent. Correct it, then run 'robolink cell validate'."),
 )
 
 

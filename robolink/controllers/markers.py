@@ -448,13 +448,12 @@ class MarkerStore:
         self._under_way.clear()
         doubt = OutcomeUnknownError(
             tr(
-                "No clear answer came to {request!r}: it may or may not have run ({cause})",
+                "No clear answer came to {request!r}: it may or may not have run ({cause}).",
                 request=request,
                 cause=error.what,
             ),
             remedy=tr(
-                "It was not sent again. Look at the robot. Next: 'robolink recover'. The "
-                "robot stays blocked until then."
+                "Not sent again; the robot stays blocked. Look at it. Next: 'robolink recover'."
             ),
             controller=self._identity,
             request=request,

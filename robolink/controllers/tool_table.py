@@ -363,7 +363,7 @@ def _require_offset(offset: object) -> None:
     if not isinstance(offset, ToolOffset):
         raise ConfigError(
             tr("An offset is a ToolOffset, not {given}.", given=type(offset).__name__),
-            remedy=tr("Write ToolOffset(x, y, z, u, v, w), in mm and degrees. Nothing was sent."),
+            remedy=tr("Nothing was sent. Write ToolOffset(x, y, z, u, v, w), in mm and degrees."),
         )
 
 
@@ -371,7 +371,7 @@ def _require_expected(expected: object) -> None:
     if expected is not None and expected is not ANY and not isinstance(expected, ToolOffset):
         raise ConfigError(
             tr("The expected value is a ToolOffset, None or ANY, not {given}.", given=expected),
-            remedy=tr("Give what read() returned before. Nothing was sent."),
+            remedy=tr("Nothing was sent. Give what read() returned before."),
         )
 
 

@@ -187,13 +187,13 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
     def _differs(self, found: ToolOffset | None) -> ReadBackError:
         return ReadBackError(
             tr(
-                "Tool {tool} was written as {requested}, but reads back as {found}.",
+                "Tool {tool} was written {requested}, but reads back as {found}.",
                 tool=self.tool,
                 requested=describe_offset(self.requested),
                 found=describe_offset(found),
             ),
             remedy=tr(
-                "Do not run the cell with it. Before the write it held {before}.",
+                "Do not use it. It held {before} before.",
                 before=describe_offset(self.before),
             ),
         )

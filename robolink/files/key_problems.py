@@ -6,9 +6,12 @@ out about it, never from the value itself.
 
 from collections.abc import Iterable
 from difflib import get_close_matches
-from typing import Any
+from typing import Any, Final
 
 from robolink.messages import tr
+
+_SHOWN: Final = 100
+"""Characters of a list of keys that are shown."""
 
 
 def is_not_known(key: str, table: Iterable[str]) -> str:
@@ -22,7 +25,10 @@ def is_not_known(key: str, table: Iterable[str]) -> str:
     close = get_close_matches(key, names, n=1)
     if close:
         return tr("is not known; did you mean {name}?", name=close[0])
-    return tr("is not known; these are: {names}", names=", ".join(names))
+    listed = ", ".join(names)
+    if len(listed) > _SHOWN:
+        listed = f"{listed[:_SHOWN].rpartition(', ')[0]} ..."
+    return tr("is not known; these are: {names}", names=listed)
 
 
 def one_of(values: Iterable[str]) -> str:

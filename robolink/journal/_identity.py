@@ -167,14 +167,11 @@ def _told_twice(who: Who, first: Identity) -> Identity:
             return told[-1]
     raise RemoteProtocolError(
         tr(
-            "{address} identified itself differently each time it was asked: {names}.",
+            "{address} names itself differently each time: {names}.",
             address=first.address,
             names=", ".join(one.name for one in told),
         ),
-        remedy=tr(
-            "Nothing was recorded or changed. Find what corrupts the answers (cable, "
-            "converter, a second program), then try again."
-        ),
+        remedy=tr("Nothing was changed. Check cable, converter and other programs; try again."),
     )
 
 

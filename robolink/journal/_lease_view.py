@@ -203,8 +203,7 @@ class LeaseView:
                 sign=last_sign,
             ),
             remedy=tr(
-                "Nothing was sent. Wait until it has finished ({wait}), or end it; if it does not "
-                "respond for {seconds:.0f} s you can take over.",
+                "Nothing was sent. Wait ({wait}), or take over after {seconds:.0f} s of silence.",
                 wait=remedy_word(RemedyWord.WAIT),
                 seconds=LEASE_S,
             ),

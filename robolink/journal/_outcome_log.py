@@ -271,12 +271,11 @@ class JournalOutcomeLog:
         except OSError as error:
             raise JournalError(
                 tr(
-                    "The place of this controller's record could not be stored: {cause}",
+                    "robolink cannot store the place of its record: {cause}.",
                     cause=error,
                 ),
                 remedy=tr(
-                    "Make the state folder writable, or name another one with "
-                    "ROBOLINK_STATE_DIR. Then run 'robolink recover' again."
+                    "Make the folder writable, or set ROBOLINK_STATE_DIR. Next: robolink recover"
                 ),
                 controller=name,
             ) from error

@@ -188,15 +188,13 @@ def _require_local(path: Path) -> None:
     if kind is not None:
         raise JournalError(
             tr(
-                "The journal {path} would be on a network share ({kind}), where two computers can "
-                "write at once and damage its database.",
+                "The journal {path} is on a network share ({kind}), where two computers could "
+                "damage it.",
                 path=path,
                 kind=kind,
             ),
             remedy=tr(
-                "In ROBOLINK_JOURNAL, name a file on a disk of this computer or, for several "
-                "computers, a PostgreSQL database. If the journal has entries, first copy it "
-                "there, with its -wal file, while no program uses it."
+                "In ROBOLINK_JOURNAL, name a local file or PostgreSQL. Moving: docs/journal.md"
             ),
         )
 

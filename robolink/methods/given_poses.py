@@ -62,13 +62,10 @@ def were_held(context: MeasurementContext, *, stated: bool) -> bool:
     if said is False:
         raise CalibrationError(
             "axes_free",
-            tr(
-                "These poses were taught with released axes (SFREE), so they are not where "
-                "the tip touched."
-            ),
+            tr("These poses were taught with released axes (SFREE)."),
             remedy=tr(
-                "Nothing was written. Switch the motors on (no SFREE), bring the tip onto the pin "
-                "by jogging, and teach them again."
+                "Nothing was written. Switch the motors on, jog the tip onto the pin, and teach "
+                "them again."
             ),
         )
     return said is True

@@ -13,7 +13,7 @@ from importlib import import_module, metadata
 from typing import Final, cast
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import known_names, tr
 from robolink.methods.method import AnyMethod
 from robolink.plug_ins import PlugInError, find_plug_in
 
@@ -74,7 +74,7 @@ def find_method(name: str) -> AnyMethod:
     if found is None:
         raise ConfigError(
             tr("There is no calibration method {name!r}.", name=name),
-            remedy=tr("These are known: {names}.", names=", ".join(method_names())),
+            remedy=known_names(method_names(), name),
         )
     return cast(AnyMethod, found)
 

@@ -286,13 +286,22 @@ def describe_outcome(outcome: ControllerOutcome, *, settles: bool = True) -> str
         settles: Whether to say which command settles it; not where that is said besides.
     """
     parts = [_movement(outcome), *_writes(outcome), _selection(outcome)]
-    if not settles:
-        return joined(" ", parts)
-    if outcome.left_open and outcome.reset_first:
-        parts.append(tr("Next: robolink robot reset, then robolink recover."))
-    elif outcome.left_open:
-        parts.append(tr("Next: robolink recover."))
+    if settles and (command := settling_command(outcome)):
+        parts.append(command)
     return joined(" ", parts)
+
+
+def settling_command(outcome: ControllerOutcome) -> str:
+    """Return the sentence that says which command settles what was left open; empty where none is.
+
+    Args:
+        outcome: What stands.
+    """
+    if not outcome.left_open:
+        return ""
+    if outcome.reset_first:
+        return tr("Next: robolink robot reset, then robolink recover.")
+    return tr("Next: robolink recover.")
 
 
 def _movement(outcome: ControllerOutcome) -> str:

@@ -186,15 +186,12 @@ def tool_changed(
     """
     return ToolChangedError(
         tr(
-            "Tool {tool} holds {found}, not the expected {expected}; nothing was written.",
+            "Tool {tool} holds {found}, not {expected} as expected; nothing was written.",
             tool=tool,
             found=describe_offset(found),
             expected=describe_offset(expected),
         ),
-        remedy=tr(
-            "The usual causes: a program that runs TLSet at its start, the pendant, a "
-            "restored project. Read the tool again, then decide."
-        ),
+        remedy=tr("Read the tool again. Find what set it: TLSet, the pendant, a restored project."),
         controller=controller,
         request=request,
     )

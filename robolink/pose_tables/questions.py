@@ -43,8 +43,8 @@ def which_columns(numeric: Sequence[bool], rows: Sequence[Sequence[float]] = ())
     if not written:
         return OpenQuestion("columns", what, tr("Name each with {columns}.", columns=columns))
     remedy = tr(
-        "Name each with {columns}, for example {readings}; '-' skips one. Joint values are no "
-        "poses.",
+        "Name each with {columns}, for example {readings}; '-' skips one. Joint values do not "
+        "count.",
         columns=columns,
         readings=written,
     )

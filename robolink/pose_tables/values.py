@@ -267,7 +267,7 @@ def unclear(path: Path, questions: Sequence[OpenQuestion]) -> AmbiguousPosesErro
     """Return the error for a file that leaves something open."""
     whats = joined("; ", (question.what for question in questions))
     return AmbiguousPosesError(
-        tr("{path} does not say everything: {what}.", path=path, what=whats),
+        tr("{path} is not clear: {what}.", path=path, what=whats),
         asks=tuple(question.about for question in questions),
         remedy=joined(" ", (question.remedy for question in questions)),
     )

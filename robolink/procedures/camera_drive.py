@@ -317,14 +317,13 @@ class CameraDrive:
             raise CalibrationError(
                 "far_off",
                 tr(
-                    "What the camera found is {away:.2f} mm from where it is "
-                    "expected, limit {limit:g} mm.",
+                    "The spot is {away:.2f} mm from where it should be, limit {limit:g} mm.",
                     away=away_mm,
                     limit=self.plan.search_mm,
                 ),
                 remedy=tr(
-                    "Look at the picture: is it the tip? Check the number of the tool, its stored "
-                    "offset, and what a pixel means."
+                    "Look at the picture: is it the tip? Check tool number, offset and mm per "
+                    "pixel."
                 ),
             )
 

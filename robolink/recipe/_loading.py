@@ -163,17 +163,13 @@ def _missing(key: str) -> str:
     match key:
         case "basis":
             return tr(
-                "is missing, and it has to be decided, because taught points agree only with the "
-                'tool value that they were taught with. Write "difference" to move the stored '
-                "value by how much the tip moved against the reference of the same tool at the "
-                "same station (the first run only records that reference, with the nozzle still "
-                'on with which the points were taught), or "absolute" to write what was measured.'
+                'is missing: write "difference" where taught points have to stay right, else '
+                '"absolute"'
             )
         case "z":
             return tr(
-                'is missing: write "kept" when the new nozzle is as long as the old one (the '
-                'person confirms it each time), "typed" when the person enters Z each time, or '
-                '"measured" when the touch of the pin gives it'
+                'is missing: write "kept" (as long as before), "typed" (a person enters it) or '
+                '"measured"'
             )
         case "tools":
             return tr("is missing: write one [[tools]] table for each tool")
@@ -185,9 +181,9 @@ def _missing(key: str) -> str:
 RECIPE_FILE: Final = FileKind(
     named=lambda path: tr("The recipe {path}", path=path),
     unreadable_remedy=lambda: tr(
-        "docs/recipes.md shows what a recipe looks like. Nothing was sent."
+        "Nothing was sent. Give a recipe file; docs/recipes.md shows one."
     ),
-    wrong_remedy=lambda: tr("Correct it; docs/recipes.md explains every key. Nothing was sent."),
+    wrong_remedy=lambda: tr("Nothing was sent. Correct it; docs/recipes.md explains every key."),
 )
 
 

@@ -137,16 +137,13 @@ def compare(register_map: RegisterMap, found: Found, value: MapValue, shown: str
     if digits < needed:
         raise ConfigError(
             tr(
-                "{shown!r} has too few digits to confirm {key}: type at least {count} after the "
-                "point.",
+                "{shown!r} cannot confirm {key}: at least {count} digits after the point are "
+                "needed.",
                 shown=text,
                 key=value,
                 count=needed,
             ),
-            remedy=tr(
-                "Type all digits, zeros too. If the screen shows fewer, compare a test value: run "
-                "it on a terminal."
-            ),
+            remedy=tr("Type zeros too. If the screen shows fewer: compare a test value there."),
         )
     return _telling(found, value, text, typed, digits)
 

@@ -343,5 +343,5 @@ def _printable(text: str) -> str:
 def _unusable(path: Path, why: str) -> ConfigError:
     return ConfigError(
         tr("The register list {path} cannot be used: {why}.", path=path, why=why),
-        remedy=tr("docs/plc-maps.md shows the columns. Nothing was written."),
+        remedy=tr("Nothing was written. Give a list with the columns of docs/plc-maps.md."),
     )

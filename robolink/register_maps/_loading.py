@@ -33,8 +33,8 @@ if TYPE_CHECKING:
 
 MAP_FILE: Final = FileKind(
     named=lambda path: tr("The PLC map {path}", path=path),
-    unreadable_remedy=lambda: tr("docs/plc-maps.md shows what a map looks like. Nothing was sent."),
-    wrong_remedy=lambda: tr("Correct it; docs/plc-maps.md explains every key. Nothing was sent."),
+    unreadable_remedy=lambda: tr("Nothing was sent. Give a map file; docs/plc-maps.md shows one."),
+    wrong_remedy=lambda: tr("Nothing was sent. Correct it; docs/plc-maps.md explains every key."),
 )
 
 

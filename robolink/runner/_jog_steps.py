@@ -141,14 +141,12 @@ def typed_pose(text: str, here: Pose, settings: RunSettings) -> Pose:
     if away_mm > TYPED_AWAY_MM or away_deg > TYPED_AWAY_DEG:
         raise LimitError(
             tr(
-                "That is {mm:.2f} mm and {deg:.1f} degrees from the controller's position "
-                "of the tool. It was not recorded.",
+                "That is {mm:.2f} mm and {deg:.1f} degrees from where the controller has the tool.",
                 mm=away_mm,
                 deg=away_deg,
             ),
             remedy=tr(
-                "A typed pose may differ by {mm:g} mm and {deg:g} degrees, because the "
-                "robot moves by it.",
+                "robolink did not record it. Type one within {mm:g} mm and {deg:g} degrees.",
                 mm=TYPED_AWAY_MM,
                 deg=TYPED_AWAY_DEG,
             ),
@@ -250,5 +248,5 @@ def _narrow(text: str) -> str:
 def _no_step(word: str) -> ConfigError:
     return ConfigError(
         tr("{word!r} is not a step. A step is x+0.1: axis, sign, number, with a point.", word=word),
-        remedy=tr("Axes are x, y, z and u, for example x+0.1 z-0.5. Nothing moved."),
+        remedy=tr("Nothing moved. Type steps along x, y, z or u, for example x+0.1 z-0.5."),
     )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 
 from robolink.controllers.softmotion.controller import MACHINE_WAITS
 from robolink.errors import CalibrationError, ConfigError, LeaseHeldError, RobolinkError
-from robolink.messages import tr
+from robolink.messages import known_names, tr
 from robolink.model import Controller, EntryKind, NewEntry, Pose, ToolOffset, plain_offset
 from robolink.serving._callback_journal import CALLED_BACK
 from robolink.serving._callback_limits import CallbackLimits, believed
@@ -60,7 +60,7 @@ class PermitPlan:
         if self.method not in PERMIT_METHODS:
             raise ConfigError(
                 tr("There is no calibration method {name!r}.", name=self.method),
-                remedy=tr("Choose one of {names}.", names=", ".join(PERMIT_METHODS)),
+                remedy=known_names(PERMIT_METHODS),
             )
         if self.touches < LEAST_TOUCHES or self.proofs < LEAST_PROOFS:
             raise ConfigError(

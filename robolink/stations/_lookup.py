@@ -7,7 +7,7 @@ from typing import Final
 from robolink.calibration import ACCURACY_ROWS
 from robolink.config import Cell
 from robolink.errors import ConfigError, NotReadyError, NotReadyReason, RobolinkError
-from robolink.messages import tr
+from robolink.messages import joined, known_names, tr
 from robolink.model import Controller, EntryKind, Recorded, from_fields
 from robolink.stations._station import Station, StationKind, apart_mm, station_of
 
@@ -83,13 +83,14 @@ def find_station(
     stations = find_stations(cell, entries)
     found = stations.get(name)
     if found is None:
-        known = ", ".join(sorted(stations)) or tr("none")
         raise ConfigError(
             tr("There is no station {name!r} here.", name=name),
-            remedy=tr(
-                "These are known: {known}. Declare it in the cell file as "
-                "[cells.NAME.stations.ID], or learn it with 'robolink cell station learn'.",
-                known=known,
+            remedy=joined(
+                " ",
+                (
+                    known_names(sorted(stations), name),
+                    tr("To learn it: robolink cell station learn"),
+                ),
             ),
         )
     if kind is not None and found.kind is not kind:
@@ -188,16 +189,14 @@ def require_base_of(controller: Controller, station: Station) -> None:
         return
     raise NotReadyError(
         tr(
-            "Station {id} was learnt with the controller's base (Base) at {before}; "
-            "it is at {now} now, so the place on record is somewhere else.",
+            "Station {id} was learnt with Base at {before}; now Base is at {now}.",
             id=station.id,
             before=_shown(station.base),
             now=_shown(now),
         ),
         reason=NotReadyReason.OTHER_BASE,
         remedy=tr(
-            "Set Base as it was, or learn the station in this one with 'robolink cell station "
-            "learn {id}'.",
+            "Set Base as it was, or learn it again: robolink cell station learn {id}",
             id=station.id,
         ),
         controller=controller.identity,

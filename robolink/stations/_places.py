@@ -224,10 +224,7 @@ def _unknown(station: Station, what: str) -> ConfigError:
     return ConfigError(
         tr("Station {id}: {what} must be known first.", what=what, id=station.id),
         remedy=tr(
-            "Make a full calibration there ({calibrate}), learn it with "
-            "'robolink cell station learn "
-            "{id}', or state it in the cell file.",
+            "Calibrate there ({calibrate}), or state it in the cell file.",
             calibrate=remedy_word(RemedyWord.CALIBRATE_AT, station=station.id),
-            id=station.id,
         ),
     )

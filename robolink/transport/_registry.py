@@ -10,7 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, Protocol, cast
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import known_names, tr
 from robolink.plug_ins import PlugInError, find_plug_in
 from robolink.timing import Clock
 from robolink.transport._mailbox_link import MailboxLink
@@ -170,6 +170,6 @@ def _load(link: LinkUrl, media: Mapping[str, tuple[str, str]]) -> Callable[..., 
         known |= metadata.entry_points(group=TRANSPORTS_GROUP).names
         raise ConfigError(
             tr("robolink has no connection of the kind {scheme!r}.", scheme=link.scheme),
-            remedy=tr("These are known: {known}.", known=", ".join(sorted(known))),
+            remedy=known_names(sorted(known), link.scheme),
         )
     return cast(Callable[..., Any], found)

@@ -18,7 +18,7 @@ from typing import Final, TypeVar
 from urllib.parse import parse_qsl, urlsplit
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import known_names, tr
 from robolink.remedy_words import RemedyWord, remedy_word
 
 _PSEUDO_TERMINAL: Final = re.compile(r"/dev/pts/\d+|/dev/ttys\d+")
@@ -116,7 +116,7 @@ def parse_url(text: str) -> LinkUrl:
         raise ConfigError(
             tr("A controller URL must not carry a user name or password."),
             remedy=tr(
-                "Remove it, and give it like this: {password}.",
+                "Remove it. Give the password by {password}.",
                 password=remedy_word(RemedyWord.PASSWORD),
             ),
         )
@@ -141,7 +141,7 @@ def parse_url(text: str) -> LinkUrl:
             raise ConfigError(
                 tr("A controller URL must not carry a password."),
                 remedy=tr(
-                    "Remove it, and give it like this: {password}.",
+                    "Remove it. Give the password by {password}.",
                     password=remedy_word(RemedyWord.PASSWORD),
                 ),
             )
@@ -226,13 +226,10 @@ class UrlOptions:
     def finish(self) -> None:
         """Refuse options that nobody has taken."""
         if self._left:
+            unknown = next(iter(self._left))
             raise ConfigError(
-                tr(
-                    "A {scheme} URL has no option {name!r}.",
-                    scheme=self._scheme,
-                    name=next(iter(self._left)),
-                ),
-                remedy=tr("These are known: {known}.", known=", ".join(self._known)),
+                tr("A {scheme} URL has no option {name!r}.", scheme=self._scheme, name=unknown),
+                remedy=known_names(self._known, unknown),
             )
 
 

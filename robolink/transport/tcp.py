@@ -162,9 +162,8 @@ def _connect_error(error: OSError, url: LinkUrl, timeout_s: float) -> ConnectErr
     if isinstance(error, ConnectionRefusedError):
         what = tr("{identity} refuses connections.", identity=url.identity)
         remedy = tr(
-            "The machine is there, but nothing listens on this port. Check the port "
-            "number, and that the controller's remote control, or its Modbus server, "
-            "is switched on."
+            "The machine is there; nothing listens on this port. Check the port number, and "
+            "that remote control, or the Modbus server, is switched on."
         )
     elif isinstance(error, TimeoutError):
         what = tr(

@@ -33,10 +33,7 @@ def ended_unanswered(url: str) -> TransportBrokenError:
     """Return the error for a connection that ended before the answer was whole."""
     return TransportBrokenError(
         tr("The connection to {url} ended without an answer.", url=url),
-        remedy=tr(
-            "If the simulator still runs, look whether it was done before you repeat it; "
-            "otherwise start it again."
-        ),
+        remedy=tr("Look whether it was done before you repeat it. Is the simulator running?"),
     )
 
 
@@ -54,8 +51,6 @@ def is_silent(url: str, timeout_s: float) -> TransportTimeoutError:
 def is_no_simulator(url: str) -> RemoteProtocolError:
     """Return the error for an answer that no simulator gives."""
     return RemoteProtocolError(
-        tr("Something answers on {url}, but it is no simulator of robolink.", url=url),
-        remedy=tr(
-            "Take the URL that 'robolink sim' prints; another program may have this port now."
-        ),
+        tr("{url} answers, but is no robolink simulator.", url=url),
+        remedy=tr("Give the URL of a simulator; 'robolink sim' prints it."),
     )

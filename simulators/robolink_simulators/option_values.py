@@ -6,7 +6,7 @@ from functools import lru_cache
 from typing import Any, Final, Literal, get_args, get_origin, get_type_hints
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import known_names, tr
 
 _TRUTH: Final = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
 MOST_OF_AN_OPTION: Final = 1e12
@@ -28,7 +28,7 @@ def require_known(given: Iterable[str], known: Sequence[str], *, kind: str) -> N
     if unknown:
         raise ConfigError(
             tr("The {kind} simulator has no option {name!r}.", kind=kind, name=unknown[0]),
-            remedy=tr("These are known: {names}.", names=", ".join(known)),
+            remedy=known_names(known, unknown[0]),
         )
 
 

@@ -230,7 +230,7 @@ def test_spots_of_one_width(radius_px, usual_px, same):
 def test_each_refusal_says_what_was_seen_and_what_to_look_after():
     still = tip_did_not_move(SeenMovement(KNOWN, (0.001, 0.0), 0.003), in_mm=True)
     assert "moved 1.41 mm, the spot 0.00 mm." in still.what
-    assert "spot on the window" in still.remedy
+    assert "Clean window and tip" in still.remedy
     assert "2.0 pixels" in tip_did_not_move(SeenMovement(KNOWN, (2, 0), 0.1), in_mm=False).what
     assert "one place only" in tip_did_not_move(None, in_mm=True).what
     assert "turned by +10.0 degrees" in camera_changed(seen_by(turned(10.0))).what

@@ -195,7 +195,7 @@ def test_no_write_is_made_when_the_first_backup_cannot_be_stored(
     written = simulator.machine.flash_writes
     code, _, err = run(*command)
     assert code == 2
-    assert "cannot be saved" in err
+    assert "cannot back up" in err
     assert simulator.machine.flash_writes == written
 
 

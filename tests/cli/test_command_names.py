@@ -342,10 +342,10 @@ def test_the_first_page_has_at_most_twelve_entries_and_names_what_is_there(capsy
 @pytest.mark.parametrize(
     ("typed", "offered"),
     [
-        (["chnage"], "'change'"),
-        (["tool", "lst"], "'list'"),
-        (["robot", "rset"], "'reset'"),
-        (["recieps"], "'recipe'"),
+        (["chnage"], "robolink change?"),
+        (["tool", "lst"], "robolink tool list?"),
+        (["robot", "rset"], "robolink robot reset?"),
+        (["recieps"], "robolink recipe?"),
         (["xyzzy"], ""),
     ],
 )
@@ -369,9 +369,8 @@ def test_a_name_that_is_mistyped_gets_one_of_today_suggested(typed, offered, cap
 def test_a_command_of_a_group_is_named_where_its_group_was_left_out(typed, named, capsys):
     assert (main.run([typed]) == 2) or typed == "motors", "that one has an older, shorter name"
     said = capsys.readouterr().err
-    assert said.count("Did you mean 'robolink ") == len(named)
-    for one in named:
-        assert f"Did you mean 'robolink {one}'?" in said
+    meant = ", ".join(f"robolink {one}" for one in named)
+    assert (f"Did you mean {meant}?" in said) is bool(named)
 
 
 def test_the_first_page_names_the_pages_and_the_recipes(capsys):

@@ -105,7 +105,7 @@ def test_no_command_and_no_error_fails_for_want_of_a_character(tmp_path, encodin
     shown = (done.stdout + done.stderr).decode(encoding)  # raises if it is something else
     assert "Traceback" not in shown
     known = "三号线" if encoding == "cp936" else r"\u4e09\u53f7\u7ebf"
-    assert f"These are known: {known}, wrong-robot." in shown
+    assert f"Choose one of these: {known}, wrong-robot." in shown
     assert r"\U0001f916" in shown
 
 

@@ -226,7 +226,7 @@ def ended(command, simulator, capsys):
 def test_the_last_line_says_what_stands_what_was_written_and_what_is_selected(ended, number):
     code, out, err = ended(lambda _controller: signal.raise_signal(number))
     assert (code, out) == (CODES[number], "")
-    assert err.splitlines()[-1] == "Nothing moved. Nothing was written. Tool 1 is selected."
+    assert err.splitlines()[-1] == "  Nothing moved. Nothing was written. Tool 1 is selected."
 
 
 @pytest.mark.usefixtures("signals_of_a_terminal")
@@ -238,7 +238,7 @@ def test_a_tool_that_was_written_before_is_named(ended):
     code, _, err = ended(act)
     assert code == 143
     assert err.splitlines()[-1] == (
-        "Nothing moved. Tool 3 now holds X 1.500 Y 2.500 Z 3.500 U 0.000; before, it held "
+        "  Nothing moved. Tool 3 now holds X 1.500 Y 2.500 Z 3.500 U 0.000; before, it held "
         "undefined. Tool 1 is selected."
     )
 
@@ -253,7 +253,7 @@ def test_what_nobody_is_left_to_read_is_on_record(ended):
     assert code == 129
     found = []
     ended(lambda controller: found.extend(controller.outcomes.recorded(kinds=[EntryKind.DECISION])))
-    assert found[0].verdict == err.splitlines()[-1]
+    assert found[0].verdict == err.splitlines()[-1].strip()
     assert found[0].details == {"ended_by": "SIGHUP"}
 
 

@@ -74,7 +74,10 @@ def test_what_is_refused_stands_in_the_log_with_its_exit_code(cell, tmp_path):
         (["--log-file", "no/such/folder"], "cannot be written"),
         (["--log-file", "."], "cannot be written"),
         (["--log-level", "debug"], "Give --log-file FILE too"),
-        (["--log-file", "day.log", "--log-level", "loud"], "Give debug, info, warning, error"),
+        (
+            ["--log-file", "day.log", "--log-level", "loud"],
+            "Choose one of these: debug, info, warning, error",
+        ),
     ],
 )
 def test_a_log_that_cannot_be_refuses_a_command_before_anything_is_sent(

@@ -205,7 +205,7 @@ def test_on_a_terminal_the_person_is_asked_and_may_leave(shown, serve, person):
     asks = person(plc, None, "-5", "-5.44", "q")
     code, _, err = shown(*check)
     assert code == 9
-    assert "type at least 2 after the point" in err
+    assert "at least 2 digits after the point" in err
     assert "are recorded" in err
     asks = person(plc, "3.21", None, "", "-75.07\n", "4.000")
     code, out, _ = shown(*check)

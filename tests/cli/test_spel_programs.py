@@ -293,8 +293,8 @@ def test_a_function_says_first_what_the_project_keeps_outside(ended, program):
 
 def test_the_robot_that_nobody_named_is_named_when_a_point_is_out_of_reach(ended, program):
     path = program("Function main\n  Go XY(900, 0, 0, 0)\nFend\n")
-    assert "the program ran on T6-602S" in ended("spel", "run", path).err
-    assert "the program ran on" not in ended("spel", "run", path, "--robot", "T6-602S").err
+    assert "The program ran on T6-602S" in ended("spel", "run", path).err
+    assert "The program ran on" not in ended("spel", "run", path, "--robot", "T6-602S").err
 
 
 def test_a_served_controller_is_prepared_before_it_is_served(program):

@@ -150,7 +150,7 @@ def test_without_a_place_for_it_there_is_no_backup_and_an_error(kept, tmp_path, 
     (tmp_path / "file").write_text("in the way")
     with kept() as controller:
         monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "file"))
-        with pytest.raises(ConfigError, match="cannot be saved"):
+        with pytest.raises(ConfigError, match="cannot back up"):
             keep_first_backup(controller)
 
 

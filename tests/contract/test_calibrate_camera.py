@@ -111,7 +111,7 @@ def test_a_spot_that_stands_still_ends_with_7_and_in_the_proof_with_8(desk):
         code, document, messages = opened.run("calibrate", "camera", *usual)
         assert code == exit_code, messages
         assert document["error"]["code"] == "tip_did_not_move"
-        assert "a spot on the window" in document["error"]["remedy"]
+        assert "Clean window and tip" in document["error"]["remedy"]
         assert opened.cell.stored.rounded(3) == stored.rounded(3)
 
 

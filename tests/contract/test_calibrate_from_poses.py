@@ -151,11 +151,11 @@ def test_points_are_a_method_of_their_own(command, simulator, points, more, firs
 @pytest.mark.parametrize(
     ("words", "code", "said"),
     [
-        ((), 2, "Missing option '--points'"),
+        ((), 2, "--points is missing"),
         (("--points", "901,902", "--speed", "5"), 2, "--speed is for movements"),
         (("--points", "901,902,951"), 2, "--points: must hold two points; more are for"),
         (("--points", "901,902", "--method", "n-angle"), 2, "--points: must hold three points"),
-        (("--points", "901,902", "--pose", "1,2,3"), 2, "No such option"),
+        (("--points", "901,902", "--pose", "1,2,3"), 2, "No option --"),
     ],
 )
 def test_the_method_points_takes_points_and_nothing_else(command, simulator, words, code, said):

@@ -110,7 +110,7 @@ def test_five_axes_are_told_that_a_level_plane_shows_one_direction_less(plc):
     code, document, _ = calibrate(simulator, "plane-touch")
     assert (code, document["error"]["code"]) == (7, "insufficient_rotation")
     assert "along Y of the flange" in document["error"]["what"]
-    assert "at an angle of 15 to 30 degrees" in document["error"]["remedy"]
+    assert "Tilt the plane 15 to 30 degrees" in document["error"]["remedy"]
     assert simulator.world.operator.touches == 3
     assert slot(simulator) == STORED
 

@@ -74,7 +74,7 @@ def control(port, **more):
 @pytest.mark.parametrize("answer", NOT_OURS.values(), ids=NOT_OURS)
 def test_what_is_no_simulator_is_called_that(answer):
     with answering(answer) as port, control(port) as client:
-        with pytest.raises(RemoteProtocolError, match="no simulator of robolink") as told:
+        with pytest.raises(RemoteProtocolError, match="no robolink simulator") as told:
             client.do("truth")
     assert str(port) in told.value.what
     assert "token" not in str(told.value)

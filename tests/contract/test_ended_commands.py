@@ -79,7 +79,7 @@ def test_a_reader_who_leaves_during_a_nozzle_change_ends_it_in_order(closed, tmp
             getattr(process, closed).close()
             assert process.wait(LONGEST_S) == 141
             if closed == "stdout":
-                last = process.stderr.read().splitlines()[-1]
+                last = process.stderr.read().splitlines()[-1].strip()
                 assert last.startswith("Every movement has ended."), last
                 assert last.endswith("Tool 1 is selected."), last
         assert not cell.simulator.status_flags().running

@@ -252,7 +252,7 @@ def test_a_length_beyond_what_the_map_allows_is_told_by_the_key_that_decides(tmp
             controller.tools.write(1, ToolOffset(1.5, 2.5, 120), expected=ANY)
         with (
             robolink.connect(host.url) as controller,
-            pytest.raises(RemoteProtocolError, match=r"120 mm, more than the 50 mm .*largest_mm"),
+            pytest.raises(RemoteProtocolError, match=r"120 mm; the map allows 50 mm .*largest_mm"),
         ):
             controller.tools.read(1)
 
@@ -263,4 +263,4 @@ def test_a_mailbox_says_by_number_how_many_registers_it_needs_at_once():
         pytest.raises(ConfigError, match="112 registers") as caught,
     ):
         robolink.connect(f"{host.url}{'&' if '?' in host.url else '?'}most_registers=61")
-    assert "64 in one write" in str(caught.value.remedy)
+    assert "64 in a write" in str(caught.value.remedy)

@@ -100,7 +100,7 @@ def test_the_assist_port_counts_and_changes_the_nozzle(assisted):
 @pytest.mark.parametrize(
     ("act", "parameters", "words"),
     [
-        ("dance", {}, "These are known"),
+        ("dance", {}, "Choose one of"),
         ("raise_error", {}, "whole number"),
         ("raise_error", {"number": "4002"}, "whole number"),
         ("set_input", {"number": 9000}, "no input 9000"),

@@ -139,7 +139,7 @@ def test_the_assist_port_pushes_buttons(assisted):
         assist.do("fail_axis", number=9)
     with pytest.raises(ConfigError, match="in error"):
         assist.jog_onto_pin()
-    with pytest.raises(ConfigError, match="These are known: look"):
+    with pytest.raises(ConfigError, match="Choose one of"):
         assist.do("dance")
 
 

@@ -138,7 +138,7 @@ def test_a_write_without_an_answer_is_settled_by_reading(cell, action, verdict, 
     with cell.connect(timeout_s=TIMEOUT_S) as controller:
         with pytest.raises(OutcomeUnknownError, match="WRITE_TOOL") as unknown:
             controller.tools.write(SCRATCH, NEW, expected=None)
-    assert "not sent again" in unknown.value.remedy
+    assert "Not sent again" in unknown.value.remedy
     assert len(cell.open_requests) == 1
     cell.clock.advance(OWNER_SILENCE_S)
     with cell.connect() as controller:

@@ -128,7 +128,7 @@ def test_a_line_that_is_too_slow_to_beat_moves_nothing_and_says_so(baud):
             lambda: group.require_able("the test"),
             group.resume,
         ):
-            with pytest.raises(ConfigError, match="too slow for movements") as caught:
+            with pytest.raises(ConfigError, match="too slow to move") as caught:
                 act()
             assert "9600" in caught.value.remedy
         assert controller.outcomes.open_markers() == ()

@@ -253,7 +253,7 @@ def test_a_person_does_what_the_script_says_when_the_wire_gives_the_cue(epson_si
 def test_no_command_is_run_on_a_cell_that_it_would_not_reach(epson_sim, softmotion_sim):
     """A simulator of that name would be made in its own process, and be written to instead."""
     for cell in (epson_sim, softmotion_sim):
-        with pytest.raises(ConfigError, match=r"lives in the process of the test.*epson_tcp"):
+        with pytest.raises(ConfigError, match=r"lives in the process of the test.*epson_cell"):
             cell.run("status")
 
 

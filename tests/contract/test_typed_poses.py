@@ -71,7 +71,11 @@ def test_a_typed_pose_that_is_wrong_leaves_the_old_value(cell):
 @pytest.mark.parametrize(
     ("typed", "verify", "said"),
     [
-        ("pose 5 0 0 0", True, "That is 5.00 mm and 0.0 degrees from the controller's position"),
+        (
+            "pose 5 0 0 0",
+            True,
+            "That is 5.00 mm and 0.0 degrees from where the controller has the tool",
+        ),
         ("pose 0 0 0 3", True, "That is 0.00 mm and 3.0 degrees from"),
         ("pose 0 0 0 0", False, "only at a touch that a turn test proves afterwards"),
     ],

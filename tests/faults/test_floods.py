@@ -121,12 +121,12 @@ def test_a_modbus_server_that_floods_is_named_at_once(stray):
     assert caught.value.remedy
     assert len(str(caught.value)) < 1000
     if stray == "frames of other requests":
-        assert "sends without an end" in caught.value.what
+        assert "bytes without an end" in caught.value.what
 
 
 @contextlib.contextmanager
 def flooded_line(flood: bytes, *, answers: bool) -> Iterator[str]:
-    """A pseudo terminal whose far end sends without an end, at once or after one request."""
+    """A pseudo terminal whose far end bytes without an end, at once or after one request."""
     far, near = os.openpty()
     tty.setraw(near)
     over = threading.Event()
@@ -176,7 +176,7 @@ def test_a_serial_line_that_floods_is_named_at_once(flood, answers):
     if not answers:
         assert "is never quiet" in what
     elif flood == "frames of another unit":
-        assert "sends without an end" in what
+        assert "bytes without an end" in what
 
 
 @pytest.mark.fault("F66")

@@ -94,7 +94,7 @@ def check_last_line(
     err: str, moved: int, held: tuple[ToolOffset, ToolOffset], writes: int, selected: int
 ) -> None:
     """It says what stands, what was written and what is selected, as it is past the wire."""
-    line, (old, now) = err.splitlines()[-1], held
+    line, (old, now) = err.splitlines()[-1].strip(), held
     assert line.startswith("Every movement has ended. " if moved else "Nothing moved. "), line
     if now != old:
         written = (

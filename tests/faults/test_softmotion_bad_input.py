@@ -84,7 +84,7 @@ def test_f33_another_word_order_is_named_and_nothing_is_written(order, meaning):
         with pytest.raises(RemoteProtocolError, match=r"\+0 registers") as refusal:
             cell.connect()
         assert meaning in refusal.value.what
-        assert "correct the response address" in refusal.value.remedy
+        assert "Correct the response address" in refusal.value.remedy
         check_nothing_was_written(cell)
 
 
@@ -94,7 +94,7 @@ def test_f34_a_shifted_map_is_named_with_its_shift_and_nothing_is_written():
         cell.url = cell.url.replace("response=3", "response=0")
         with pytest.raises(RemoteProtocolError, match=r"\+3 registers") as refusal:
             cell.connect()
-        assert "correct the response address in the URL" in refusal.value.remedy
+        assert "Correct the response address in the URL" in refusal.value.remedy
         check_nothing_was_written(cell)
 
 
@@ -150,7 +150,7 @@ def test_f30_a_watchdog_that_zeroes_a_command_before_the_plc_saw_it_leaves_it_no
         with cell.connect(timeout_s=TIMEOUT_S) as controller:
             with pytest.raises(OutcomeUnknownError, match="was not acknowledged") as unknown:
                 controller.tools.write(SCRATCH, NEW, expected=None)
-        assert "not sent again" in unknown.value.remedy
+        assert "Not sent again" in unknown.value.remedy
         with cell.connect() as controller:
             (finding,) = recover(controller).settled
         assert finding.verdict is Verdict.NOT_APPLIED

@@ -198,7 +198,7 @@ def test_what_differs_is_refused_however_little(shown):
 @pytest.mark.parametrize("shown", ["13", "12", "12.5", "+12,5"])
 def test_too_few_digits_confirm_nothing(shown):
     machine = Machine()
-    with pytest.raises(ConfigError, match="type at least 2 after") as refused:
+    with pytest.raises(ConfigError, match="at least 2 digits after") as refused:
         compare(machine.map, machine.found(), X, shown)
     assert not isinstance(refused.value, MapDiffersError)
 
@@ -233,7 +233,7 @@ def test_a_register_with_coarse_steps_needs_no_more_digits_than_it_has():
     tenths = replace(slot.components["u"], factor=0.1)
     coarse = replace(right, slots={1: replace(slot, components={**slot.components, "u": tenths})})
     assert compare(coarse, {U: 7.5}, U, "7.5")
-    with pytest.raises(ConfigError, match="type at least 1 after"):
+    with pytest.raises(ConfigError, match="at least 1 digits after"):
         compare(coarse, {U: 7.0}, U, "7")
 
 

@@ -376,7 +376,7 @@ def test_registers_that_do_not_keep_what_is_written_are_noticed(no_handshake):
 def test_all_zeros_are_a_lost_link_or_no_tool_as_the_map_says(no_handshake, level):
     no_handshake.program.memory.zero(RegisterTable.HOLDING)
     with no_handshake.connect() as controller:
-        with pytest.raises(RemoteProtocolError, match="link was lost"):
+        with pytest.raises(RemoteProtocolError, match="after a lost link"):
             controller.tools.read(1)
         with pytest.raises(ToolError, match="cannot be made undefined"):
             controller.tools.clear(1, expected=ANY)
@@ -404,7 +404,7 @@ def test_a_value_that_would_read_back_as_none_is_refused_before_it_is_sent(
             lambda: controller.tools.write(1, value, expected=before),
             lambda: controller.tools.preview_write(1, value),
         ):
-            with pytest.raises(LimitError, match=f"takes that for {meaning}") as refusal:
+            with pytest.raises(LimitError, match=f"takes for {meaning}") as refusal:
                 act()
             assert 'all_zero = "tool"' in refusal.value.remedy
         assert controller.tools.read(1) == before

@@ -139,7 +139,7 @@ def test_a_step_is_understood_however_it_is_spaced_and_signed(text, deltas):
 def test_what_could_be_meant_otherwise_is_not_guessed(text):
     with pytest.raises(
         ConfigError,
-        match=r"is not a step\. A step is x\+0\.1: axis, sign, number, with a point\. Axes are",
+        match=r"is not a step\. A step is x\+0\.1: axis, sign, number, with a point\. Nothing",
     ):
         parse_steps(text)
 

@@ -156,8 +156,8 @@ def test_a_robot_is_found_in_any_case():
 @pytest.mark.parametrize(
     ("name", "says"),
     [
-        ("C8-901S", "Is C8-C901S meant?"),
-        ("gx4-c351m", "Is GX4-C351"),
+        ("C8-901S", "Did you mean C8-C901S,"),
+        ("gx4-c351m", "Did you mean GX4-C351"),
         ("zzz", "C12-C1401C, "),
         ("C8-C901SW", "Choose C8-C901S, on a table"),
     ],

@@ -375,9 +375,9 @@ def test_what_makes_no_machine_is_refused_with_a_remedy(name, parameters):
 @pytest.mark.parametrize(
     ("name", "says"),
     [
-        ("kin_scara2_z", "Is Kin_Scara2_Z meant?"),
-        ("Kin_4AxesPalletizer", "Is Kin_4AxisPalletizer meant?"),
-        ("Kin_Gantry3+Kin_CAxsi", "Is Kin_Gantry3+Kin_CAxis meant?"),
+        ("kin_scara2_z", "Did you mean Kin_Scara2_Z"),
+        ("Kin_4AxesPalletizer", "Did you mean Kin_4AxisPalletizer?"),
+        ("Kin_Gantry3+Kin_CAxsi", "Did you mean Kin_Gantry3+Kin_CAxis"),
         ("Kin_CAxis", "Kin_Gantry3+Kin_CAxis"),
         ("Kin_Scara3_Z+Kin_CAxis", "Kin_Scara2_Z"),
         ("zzz", "module:Class"),

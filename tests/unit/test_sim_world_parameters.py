@@ -23,6 +23,7 @@ from robolink_simulators.hosting.in_process import softmotion as plc_in_process
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 from robolink.errors import ConfigError
+from robolink.messages import known_names
 from robolink.model import ToolOffset
 from robolink.transport import parse_url
 
@@ -290,7 +291,7 @@ def test_the_command_line_says_it_too():
     )
     with pytest.raises(ConfigError) as caught:
         world_from(["wind=3"])
-    assert all(name in caught.value.remedy for name in parameter_names())
+    assert caught.value.remedy == known_names(parameter_names(), "wind")
 
 
 def test_play_of_an_arm_that_was_placed_by_hand_is_that_of_its_last_way():

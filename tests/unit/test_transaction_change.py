@@ -80,7 +80,7 @@ def test_an_undefined_tool_is_defined_and_a_defined_one_cleared(cell, controller
 @pytest.mark.parametrize("place", [1, 2])
 def test_nothing_is_written_when_a_tool_holds_something_else(cell, controller, place):
     cell.put(place, OTHER)
-    with pytest.raises(ToolChangedError, match=r"holds X 1\.000 .* not the expected") as refused:
+    with pytest.raises(ToolChangedError, match=r"holds X 1\.000 .* as expected") as refused:
         change_tools(controller, wanted(1, 2))
     assert "Read the tool again" in refused.value.remedy
     assert cell.writes == 0

@@ -64,15 +64,14 @@ def require_expected_robot(controller: "Controller", cell: "Expected") -> None:
     if cell.robot.casefold() not in (model.casefold() for model in found):
         raise ConfigError(
             tr(
-                "The cell {cell} has a robot {expected}, but at {url} there is: {found}.",
+                "Cell {cell} needs robot {expected}; at {url} there is {found}.",
                 cell=cell.cell,
                 expected=cell.robot,
                 url=controller.identity,
                 found=", ".join(found) or tr("a robot that does not say its model"),
             ),
             remedy=tr(
-                "Check the address first. If the cell file is wrong, correct or remove "
-                "'robot' in {path}.",
+                "Check the address; else correct 'robot' in {path}.",
                 path=cell.robot_file,
             ),
         )
@@ -103,9 +102,8 @@ def nothing_named() -> ConfigError:
         return ConfigError(
             tr("No controller is named."),
             remedy=tr(
-                "Give -c CELL from a cell file, or -c URL, for example "
-                "-c epson+tcp://192.168.0.1:5000, or set ROBOLINK_CONTROLLER. To practise on a "
-                "simulated robot: robolink docs tutorial"
+                "Give -c CELL from a cell file, or -c URL such as epson+tcp://192.168.0.1:5000. "
+                "To practise on a simulated robot: robolink docs tutorial"
             ),
         )
     if len(names) == 1:

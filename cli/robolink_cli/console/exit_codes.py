@@ -1,16 +1,16 @@
 """The one place where errors become exit codes and text."""
 
-import io
 import os
 import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 import click
+from click.exceptions import NoArgsIsHelpError
 
 from robolink import errors
 from robolink.interrupts import EndedBy, Interrupted, ended_by
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink_cli.command_map import RENAMED
 from robolink_cli.console.output import hand_over, sentences, show
 from robolink_cli.console.render import dumps
@@ -198,19 +198,22 @@ def report(error: BaseException, *, as_json: bool, typed: Sequence[str] = ()) ->
         return code  # a list, cut off by its reader: no news to him
     if as_json:
         hand_over(error_document(error, typed))
-    elif isinstance(error, click.ClickException):
-        usage = io.StringIO()
-        error.show(file=usage)  # it repeats what was typed
-        show(sentences(usage.getvalue().rstrip("\n")), beside=True)
+        if isinstance(error, KeyboardInterrupt):  # whoever ended it may not be who reads that
+            show(sentences(joined(" ", filter(None, _stands(error, typed)))), beside=True)
+    elif isinstance(error, NoArgsIsHelpError):
+        show(sentences(error.message), beside=True)
     else:
         what, remedy = _sentences(error, typed)
         show(sentences(f"robolink: {what}"), beside=True)
-        if remedy:
-            show(sentences(f"  {remedy}"), beside=True)
-    if not as_json or isinstance(error, KeyboardInterrupt):
-        # Whoever ended it may not be who reads the document.
-        tell_outcome(error, typed)
+        stands, next_command = _stands(error, typed)
+        _tell(stands, joined(" ", filter(None, (remedy, next_command))))
     return code
+
+
+def _tell(*lines: str) -> None:
+    """Show what stands, and below it what to do."""
+    for line in filter(None, lines):
+        show(sentences(f"  {line}"), beside=True)
 
 
 def is_cut_off(error: BaseException) -> bool:
@@ -266,7 +269,9 @@ def _sentences(error: BaseException, typed: Sequence[str]) -> tuple[str, str]:
         left = outcome_after(error)
         return next_of(error.what, error, left, typed), next_of(error.remedy, error, left, typed)
     if isinstance(error, click.ClickException):
-        return error.format_message(), tr("For the options: robolink COMMAND --help")
+        from robolink_cli.console.usage_errors import usage_sentences
+
+        return usage_sentences(error)
     if isinstance(error, KeyboardInterrupt):
         return _ending_in_words(_ending(error)), ""
     if isinstance(error, (EOFError, click.Abort)):
@@ -290,16 +295,20 @@ def _plug_in(error: BaseException) -> "PlugInModule | None":
     return plug_in_module(error)
 
 
-def tell_outcome(error: BaseException, typed: Sequence[str] = ()) -> None:
-    """Say on stderr what stands; nothing of a command that had no controller, or only looked."""
+def _stands(error: BaseException, typed: Sequence[str]) -> tuple[str, str]:
+    """Return what stands, and which command settles it.
+
+    Both are empty for a command that had no controller, or only looked.
+    """
     from robolink.controller_outcome import UNTOUCHED, outcome_after
 
     outcome = outcome_after(error)
-    if outcome is not UNTOUCHED:
-        from robolink.model import describe_outcome  # here, because --help needs none
+    if outcome is UNTOUCHED:
+        return "", ""
+    from robolink.model import describe_outcome, settling_command  # --help needs none
 
-        told = next_of(describe_outcome(outcome), error, outcome, typed)
-        show(sentences(told), beside=True)
+    told = next_of(settling_command(outcome), error, outcome, typed)
+    return describe_outcome(outcome, settles=False), told
 
 
 def outcome_payload(outcome: "ControllerOutcome") -> dict[str, object]:

@@ -9,6 +9,7 @@ import inspect
 import re
 from collections.abc import Iterable, Iterator
 from gettext import gettext
+from types import TracebackType
 from typing import Any
 from weakref import WeakKeyDictionary
 
@@ -135,9 +136,20 @@ class WideHelpFormatter(click.HelpFormatter):
 
 
 class WideContext(click.Context):
-    """A context whose help pages are written in this way."""
+    """A context whose help pages are written in this way, and whose usage errors know it."""
 
     formatter_class = WideHelpFormatter
+
+    def __exit__(
+        self,
+        exc_type: type[BaseException] | None,
+        exc_value: BaseException | None,
+        tb: TracebackType | None,
+    ) -> bool | None:
+        """Leave the context; what was wrong with the command line is told with its command."""
+        if isinstance(exc_value, click.UsageError) and exc_value.ctx is None:
+            exc_value.ctx = self
+        return super().__exit__(exc_type, exc_value, tb)
 
 
 HelpSection = tuple[str, frozenset[str]]

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import known_names, tr
 from robolink.package_log import PackageLog
 from robolink_cli.console.render import LOG_LEVELS
 
@@ -47,7 +47,7 @@ def open_log_file(path: str, level: str) -> None:
     if level and level not in LOG_LEVELS:
         raise ConfigError(
             tr("{level!r} is not a level of a log.", level=level),
-            remedy=tr("Give {levels}.", levels=", ".join(LOG_LEVELS)),
+            remedy=known_names(LOG_LEVELS),
         )
     import logging
 

@@ -300,7 +300,7 @@ def _require_one_controller(context: click.Context, origin: str, value: object) 
     named = {origin, context.meta.get(_ORIGINS, {}).get("url")}
     if named == {"--controller", _CELL_OR_URL} and context.meta[GIVEN]["url"] != value:
         raise click.UsageError(
-            tr("Two controllers are named: name one, with -c or after the command.")
+            tr("Two controllers are named; name one of them, with -c or after the command.")
         )
 
 

@@ -65,8 +65,8 @@ def heed_selection(controller: "Controller", cell: "Expected | None", *, yes: bo
     if not doubt:
         return
     remedy = tr(
-        "Nothing moved. Another program or computer may have selected it. Select the right "
-        "tool: 'robolink tool select N'; the key 'tool' of the cell file names it."
+        "Nothing moved. Another program may have selected it. Select the right tool, the one "
+        "that the cell file names: robolink tool select N"
     )
     if yes or json_is_on() or not on_terminal():
         raise DeclinedError(doubt, remedy=remedy)

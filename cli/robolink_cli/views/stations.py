@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import known_names, tr
 from robolink.model import EntryKind, Recorded, json_fields
 from robolink.stations import Station, find_station, find_stations
 from robolink.timing import local_label
@@ -225,5 +225,5 @@ def _meant(robot: str, robots: Sequence[str]) -> str:
             return name
     raise ConfigError(
         tr("No robot {robot!r} is on record here.", robot=robot),
-        remedy=tr("These are known: {robots}.", robots=", ".join(robots) or tr("none")),
+        remedy=known_names(robots, robot),
     )

@@ -230,15 +230,11 @@ def _require_spread(pixels: Floats) -> None:
     raise CalibrationError(
         "rank_deficient",
         tr(
-            "What was seen spreads by {found:.1f} pixels only in one direction of the image, "
-            "limit {limit:g}: its scale and turn are unknown.",
+            "The spots spread only {found:.1f} pixels in one direction, limit {limit:g}.",
             found=rms_px,
             limit=LEAST_SPREAD_PX,
         ),
-        remedy=tr(
-            "Look at the pictures: does the spot move with the tip? Let the tip go "
-            "further, to places that are not in line."
-        ),
+        remedy=tr("Check that the spot moves with the tip. Move the tip further, both ways."),
     )
 
 

@@ -216,8 +216,8 @@ def tip_did_not_move(movement: SeenMovement | None, *, in_mm: bool) -> Calibrati
         )
     elif in_mm:
         what = tr(
-            "The camera's spot does not move with the tip: the robot moved {known:.2f} mm, "
-            "the spot {seen:.2f} mm in another direction, or differently each time.",
+            "The spot does not follow the tip: the robot moved {known:.2f} mm, the spot "
+            "{seen:.2f} mm another way.",
             known=movement.known_length_mm,
             seen=movement.seen_length,
         )
@@ -231,10 +231,7 @@ def tip_did_not_move(movement: SeenMovement | None, *, in_mm: bool) -> Calibrati
     return CalibrationError(
         "tip_did_not_move",
         what,
-        remedy=tr(
-            "Look at the picture: a spot on the window, a reflection or a wrong circle "
-            "does not move. Clean window and tip, check light and focus, then start again."
-        ),
+        remedy=tr("Look at the picture: is it dirt or a reflection? Clean window and tip."),
     )
 
 
@@ -243,17 +240,13 @@ def camera_changed(movement: SeenMovement) -> CalibrationError:
     return CalibrationError(
         "camera_changed",
         tr(
-            "The robot moved the tip by {known:.3f} mm; the camera saw {seen:.3f} mm, "
-            "turned by {turn:+.1f} degrees. Its scale, turn or mirror differ from its "
-            "calibration.",
+            "The robot moved the tip {known:.3f} mm; the camera saw {seen:.3f} mm, turned by "
+            "{turn:+.1f} degrees.",
             known=movement.known_length_mm,
             seen=movement.seen_length,
             turn=movement.turn_deg,
         ),
-        remedy=tr(
-            "Check camera, lens and mount, and that the picture shows the tip; then calibrate the "
-            "camera again."
-        ),
+        remedy=tr("Check lens, mount and picture, then calibrate the camera again."),
     )
 
 
@@ -262,12 +255,9 @@ def spot_changed(radius_px: float, usual_px: float) -> CalibrationError:
     return CalibrationError(
         "spot_changed",
         tr(
-            "The spot has a radius of {radius:.2f} px, but {usual:.2f} px in the other "
-            "looks: they show different things.",
+            "The spot has a radius of {radius:.2f} px; in the other pictures, {usual:.2f} px.",
             radius=radius_px,
             usual=usual_px,
         ),
-        remedy=tr(
-            "Look at the pictures: did the camera find the tip in all of them, in focus and clean?"
-        ),
+        remedy=tr("Look at the pictures: is it the tip in all of them, in focus and clean?"),
     )

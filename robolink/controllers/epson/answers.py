@@ -44,7 +44,7 @@ def _remedy(code: int) -> str:
             "Connect again to log in. If the controller refuses again, its firmware does "
             "not know the command."
         )
-    return tr("Nothing was repeated. Check the status before you continue.")
+    return tr("robolink did not repeat it. Check before you continue: robolink status")
 
 
 def status_from_flags(flags: StatusFlags, code: int) -> ControllerStatus:

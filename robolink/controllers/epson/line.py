@@ -366,10 +366,10 @@ def as_shown(request: Request) -> str:
 
 def _unanswered(controller: str) -> LoginUnansweredError:
     return LoginUnansweredError(
-        tr("{identity} can be reached, but does not answer the login.", identity=controller),
+        tr("{identity} does not answer the login.", identity=controller),
         remedy=tr(
-            "Only one client may be logged in: close the other one, or wait for it ({wait}). If "
-            "there is none, check that this port is the controller's Remote Ethernet port.",
+            "Only one client may be logged in: close the other, or wait for it ({wait}). If "
+            "there is none: check the port of Remote Ethernet.",
             wait=remedy_word(RemedyWord.WAIT),
         ),
         request="Login",
@@ -381,8 +381,8 @@ def _refused(code: int) -> LoginRefusedError:
         tr("The controller refused the login (code {code}).", code=code),
         code=code,
         remedy=tr(
-            "Give the password that is set on the controller's Remote Ethernet page: "
-            "{password}. No second attempt was made.",
+            "robolink did not try again. Give the password of the controller's Remote Ethernet "
+            "page: {password}.",
             password=remedy_word(RemedyWord.PASSWORD),
         ),
         request="Login",

@@ -126,6 +126,7 @@ class EpsonMotion:
                 session.close()
                 raise TransportTimeoutError(
                     tr("The controller did not report the end of the statement."),
+                    remedy=tr("Check cable and power of the controller, then try again."),
                     controller=session.identity,
                     request=self.statement,
                 )

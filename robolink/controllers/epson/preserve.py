@@ -99,8 +99,7 @@ class EpsonPreserver(Preserver):
                     second=second.shown(),
                 ),
                 remedy=tr(
-                    "Nothing was changed. Check the cable and all devices between this PC "
-                    "and the controller, and that no other program changes these settings."
+                    "Nothing was changed. Check the cable, and close other programs that set them."
                 ),
                 controller=self._epson.identity,
                 request=reason,

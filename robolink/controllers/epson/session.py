@@ -294,9 +294,7 @@ class EpsonSession(EpsonConversation):
                 event="***" if hidden else repr(event)[:_SHOWN],
             ),
             remedy=tr(
-                "robolink closed the connection, because later answers could be mixed up. "
-                "Connect again; if it happens twice, check for a second program on this "
-                "controller."
+                "robolink closed the connection. Connect again, and look for a second program."
             ),
         )
 

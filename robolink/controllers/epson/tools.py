@@ -125,7 +125,7 @@ class EpsonToolTable(ToolTableCore):
         return spel.parse_integer(self._window.printed(spel.print_selected_tool()))
 
     def _known(self, lowest: int) -> str:
-        return tr("EPSON controllers have tools {lowest} to 15.", lowest=lowest)
+        return tr("Choose a tool from {lowest} to 15.", lowest=lowest)
 
 
 class _FlashWrite(ToolWrite):

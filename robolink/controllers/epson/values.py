@@ -22,7 +22,7 @@ from robolink.controllers.driver_link import DriverPart, MarkedCommand
 from robolink.controllers.epson.link import EpsonLink
 from robolink.controllers.epson.session import as_sent
 from robolink.errors import ConfigError, ReadBackError, RejectedError, RemoteProtocolError
-from robolink.messages import tr
+from robolink.messages import known_names, tr
 from robolink.model import Marker, NewEntry, Value, ValueReceipt, ValueT
 from robolink.protocols import spel
 from robolink.protocols.epson_text import Reply, Request, VariableType
@@ -81,13 +81,12 @@ class ValueChange(MarkedCommand[ValueT]):
         if not self._same(found, requested):
             raise ReadBackError(
                 tr(
-                    "The controller accepted {request}, but it reads back as {found!r} "
-                    "instead of {requested!r}.",
+                    "{request} was accepted, but reads back as {found!r}, not {requested!r}.",
                     request=request,
                     found=found,
                     requested=requested,
                 ),
-                remedy=tr("A program or the PLC may also set it. Nothing was repeated."),
+                remedy=tr("robolink did not repeat it. Find what else sets it."),
                 request=request,
             )
         return ValueReceipt(request, before, requested, found, skipped=False)
@@ -357,7 +356,7 @@ def variable_type(text: str) -> VariableType:
             return kind
     raise ConfigError(
         tr("There is no variable type {text!r}.", text=text),
-        remedy=tr("These are known: {names}.", names=", ".join(VariableType)),
+        remedy=known_names(VariableType, text),
     )
 
 

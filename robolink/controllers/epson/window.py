@@ -72,9 +72,8 @@ class CommandWindow:
             tr("A movement started over this serial line could not be stopped over it."),
             reason=NotReadyReason.NO_ABORT,
             remedy=tr(
-                "Nothing was sent. Move over Remote Ethernet; or see with 'robolink "
-                "expert verify-controller' that the controller knows the letter A, "
-                "and write letters=guessed into the URL."
+                "Nothing was sent. Move over Remote Ethernet, or see docs/remote-rs232.md for "
+                "letters=guessed."
             ),
         )
 

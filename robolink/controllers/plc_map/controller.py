@@ -20,7 +20,7 @@ from robolink.controllers.plc_map.tools import RegisterResolver, RegisterToolTab
 from robolink.controllers.preserving import Preserver
 from robolink.controllers.registry import ConnectionTerms
 from robolink.errors import Concerning, ConfigError, RejectedError
-from robolink.messages import tr
+from robolink.messages import known_names, tr
 from robolink.model import (
     Act,
     Capabilities,
@@ -63,10 +63,7 @@ class MappedInputs(DriverPart):
         if bit not in self._inputs:
             raise ConfigError(
                 tr("The map has no input {number}.", number=bit),
-                remedy=tr(
-                    "These are known: {numbers}.",
-                    numbers=", ".join(map(str, self._inputs)) or tr("none"),
-                ),
+                remedy=known_names(self._inputs),
             )
         return self._registers.is_on(self._inputs[bit].signal)
 
@@ -400,5 +397,5 @@ def _require_simulator(url: LinkUrl, said: str) -> None:
     if said != "yes" or not url.stays_here:
         raise ConfigError(
             tr("The option simulated=yes is only for a simulator on this computer."),
-            remedy=tr("Remove it from the address of a machine. Nothing was sent."),
+            remedy=tr("Nothing was sent. Remove it from the address of a machine."),
         )

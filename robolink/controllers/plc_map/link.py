@@ -411,16 +411,12 @@ class MappedPlc(DriverLink):
     def _refuse(self, tool: int, components: tuple[str, ...]) -> NoReturn:
         raise NotComparedError(
             tr(
-                "Nobody has compared {values} of the map {name!r} with the screen of the machine "
-                "at {identity} yet.",
+                "Nobody has compared {values} of the map {name!r} with the screen at {identity}.",
                 values=", ".join(f"{tool}.{name}" for name in components),
                 name=self.register_map.name,
                 identity=self.identity,
             ),
             tool=tool,
             components=components,
-            remedy=tr(
-                "Nothing was written. Run 'robolink expert plc check-map' with the same -c at "
-                "the machine. A changed map has to be compared again."
-            ),
+            remedy=tr("Nothing was written. Compare them there: robolink expert plc check-map"),
         )

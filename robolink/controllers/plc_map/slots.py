@@ -105,16 +105,15 @@ class OffsetValues:
         if not any(words.values()) and self._map.all_zero is not AllZero.TOOL:
             raise LimitError(
                 tr(
-                    "All registers of tool {tool} would be zero. This map takes that for "
-                    "{meaning}, so it could not be read back; nothing was sent.",
+                    "Tool {tool} would be all zeros, which this map takes for {meaning}.",
                     tool=slot.tool,
                     meaning=tr("no tool")
                     if self._map.all_zero is AllZero.UNDEFINED
                     else tr("a lost link"),
                 ),
                 remedy=tr(
-                    "Where zeros are a tool of this machine, say so in the map: "
-                    'all_zero = "tool". To remove a tool: robolink tool clear.'
+                    'Nothing was sent. If zeros are a tool: all_zero = "tool" in the map. To '
+                    "remove one: robolink tool clear"
                 ),
             )
         try:
@@ -176,17 +175,15 @@ class OffsetValues:
         if not number.is_absurd(value) and name not in ANGLES and limit == self._map.largest_mm:
             raise RemoteProtocolError(
                 tr(
-                    "{axis} at {place} reads {value:g} mm, more than the {limit:g} mm that the map "
-                    "allows (largest_mm).",
+                    "{axis} at {place} reads {value:g} mm; the map allows {limit:g} mm "
+                    "(largest_mm).",
                     axis=name.upper(),
                     place=number.place,
                     value=value,
                     limit=limit,
                 ),
                 remedy=tr(
-                    "If the tool really is that long, state a larger largest_mm in the map; "
-                    "otherwise compare address, type, scale and word_order with the PLC's register "
-                    "list."
+                    "Compare address, type, scale and word_order with the PLC, or raise largest_mm."
                 ),
             )
         raise RemoteProtocolError(
@@ -228,12 +225,12 @@ class OffsetValues:
     def _all_zero(self, slot: MapSlot) -> RemoteProtocolError:
         return RemoteProtocolError(
             tr(
-                "All registers of tool {tool} are zero: a PLC whose link was lost shows just that.",
+                "All registers of tool {tool} are zero, as after a lost link.",
                 tool=slot.tool,
             ),
             remedy=tr(
-                "Look at the tool on the HMI. If zeros are normal there, say so in the map: "
-                'all_zero = "undefined" or all_zero = "tool".'
+                'Look at the HMI. If zeros are normal, write all_zero = "undefined" or "tool" '
+                "in the map."
             ),
         )
 

@@ -18,7 +18,7 @@ from robolink.controllers.resolving import MarkerResolver, examine_write
 from robolink.controllers.tool_table import ToolTableCore
 from robolink.controllers.tool_writing import ToolWrite
 from robolink.errors import RejectedError, ToolError
-from robolink.messages import tr
+from robolink.messages import known_names, tr
 from robolink.model import (
     PROOFS,
     Expected,
@@ -204,10 +204,10 @@ class RegisterToolTable(ToolTableCore):
         )
 
     def _choices(self) -> str:
-        return tr("Choose one of these: {tools}.", tools=", ".join(map(str, self.indices())))
+        return known_names(self.indices())
 
     def _known(self, lowest: int) -> str:  # noqa: ARG002 - alike for both
-        return tr("These are known: {tools}.", tools=", ".join(map(str, self.indices())))
+        return known_names(self.indices())
 
 
 class _RegisterWrite(ToolWrite):

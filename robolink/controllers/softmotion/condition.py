@@ -82,15 +82,12 @@ def require_beats(whole_look_s: float) -> None:
     if whole_look_s > MOST_LOOK_S:
         raise ConfigError(
             tr(
-                "This line is too slow for movements: one reading of the PLC takes "
-                "{look:.2f} s, and the PLC stops a movement after 0.5 s without a signal "
-                "from this computer.",
+                "This line is too slow to move: one reading takes {look:.2f} s, and the PLC "
+                "stops after 0.5 s.",
                 look=whole_look_s,
             ),
             remedy=tr(
-                "Nothing was sent. Set the PLC's serial line and baud in the URL to "
-                "9600 or more, or move by Modbus TCP. Tools can still be read, "
-                "written and selected."
+                "Nothing was sent. Set baud to 9600 or more at both ends, or use Modbus TCP."
             ),
         )
 
@@ -134,8 +131,7 @@ def require_tool_known(now: Response) -> None:
             ),
             reason=NotReadyReason.WRONG_TOOL,
             remedy=tr(
-                "Nothing was moved. Select tool {slot} again, or find out which program sets the "
-                "group's tool.",
+                "Nothing moved. Select tool {slot} again, or find what sets the group's tool.",
                 slot=now.tool_slot,
             ),
         )

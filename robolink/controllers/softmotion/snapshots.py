@@ -80,16 +80,12 @@ def _require_place(words: Sequence[int], controller: str) -> None:
         return
     raise RemoteProtocolError(
         tr(
-            "The probe of {controller} is {shift:+d} registers from its place, in this word "
-            "order: {order}.",
+            "The probe of {controller} is {shift:+d} registers off; word order: {order}.",
             controller=controller,
             shift=shift,
             order=found.order.meaning,
         ),
-        remedy=tr(
-            "Low word first at +0 is right: correct the response address in the URL, or the word "
-            "order in the PLC's union or in the gateway."
-        ),
+        remedy=tr("Correct the response address in the URL, or the word order: low word first."),
     )
 
 
@@ -100,10 +96,7 @@ def _foreign(meaning: str, controller: str) -> RemoteProtocolError:
             controller=controller,
             meaning=meaning,
         ),
-        remedy=tr(
-            "Compare the addresses in the URL and the program in the PLC with "
-            "'robolink expert plc export'."
-        ),
+        remedy=tr("Compare its addresses and program with: robolink expert plc export"),
     )
 
 

@@ -268,8 +268,8 @@ class SoftMotionToolTable(ToolTableCore):
     def _prove_selected(self, offset: ToolOffset, request: str) -> None:  # noqa: ARG002 - alike
         self._group_tool.require(offset)
 
-    def _known(self, lowest: int) -> str:  # noqa: ARG002 - alike for both
-        return tr("The mailbox has tools 0 to 15.")
+    def _known(self, lowest: int) -> str:
+        return tr("Choose a tool from {lowest} to 15.", lowest=lowest)
 
     def _require_changeable(self, tool: int, requested: ToolOffset | None, now: Response) -> None:
         """Refuse what the PLC would refuse for the selected slot."""

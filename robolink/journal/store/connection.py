@@ -284,9 +284,7 @@ def _require_file(place: JournalPlace) -> None:
     if place.path is not None and not place.path.exists():
         raise JournalError(
             tr("There is no journal {name}.", name=place.name),
-            remedy=tr(
-                "robolink creates one at the first change; or name another one in ROBOLINK_JOURNAL."
-            ),
+            remedy=tr("Name another in ROBOLINK_JOURNAL; the first change makes this one."),
         )
 
 

@@ -139,8 +139,7 @@ def newer_error(name: str, found: int) -> JournalError:
             own=len(MIGRATIONS),
         ),
         remedy=tr(
-            "Nothing was written to it. Install the newer robolink that made it; {export} reads "
-            "what this one understands.",
+            "Nothing was written. Install the newer robolink, or read it: {export}",
             export=remedy_word(RemedyWord.EXPORT_JOURNAL),
         ),
     )

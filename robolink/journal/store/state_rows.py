@@ -168,9 +168,8 @@ def _marker(row: _Stored) -> Marker:
         raise JournalError(
             tr("A safety record of {controller} cannot be read.", controller=row.controller),
             remedy=tr(
-                "It is about an unfinished job, {request!r} of {when}, and may come from a "
-                "newer robolink. Check the robot's selected tool and its tool offsets by "
-                "hand, then move the journal away.",
+                "It is about {request!r} of {when}. Check the tools by hand, then move the "
+                "journal away.",
                 request=row.request,
                 when=local_label(row.begun_at),
             ),

@@ -158,8 +158,7 @@ def require_known_length(stored: ToolOffset | None) -> ToolOffset:
         raise ConfigError(
             tr("The tool is not defined: the robot cannot know how far above the pin to stop."),
             remedy=tr(
-                "First write the place of the tip with 'tool set', to a millimetre or two, "
-                "then measure."
+                "Write the tip's place, to a millimetre or two, then measure: robolink tool set"
             ),
         )
     return stored

@@ -121,10 +121,7 @@ def find_last_touch(controller: Controller, tool: int, station: str) -> LastTouc
                 at=local_label(newest.at),
                 value=describe_offset(newest.value),
             ),
-            remedy=tr(
-                "The tool changed since its last calibration. Write that value back, or "
-                "run a full calibration."
-            ),
+            remedy=tr("Write that value back, or run a full calibration."),
         )
     return newest
 

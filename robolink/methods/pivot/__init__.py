@@ -212,10 +212,9 @@ def require_known_tip(stored: ToolOffset | None) -> ToolOffset:
     """
     if stored is None:
         raise ConfigError(
-            tr("The tool is not defined: where its tip would swing when it tilts is not known."),
+            tr("The tool is not defined: robolink cannot know where its tip would swing."),
             remedy=tr(
-                "First write the place of the tip with 'tool set', to a millimetre or two, "
-                "then measure."
+                "Write the tip's place, to a millimetre or two, then measure: robolink tool set"
             ),
         )
     return stored
@@ -262,16 +261,12 @@ def require_tilting(controller: Controller, method: str) -> None:
     raise CalibrationError(
         "rank_deficient",
         tr(
-            "{robot} has {axes} axes and turns its tool about Z only, so {method} cannot be "
-            "measured with it: nothing shows Z and the tilt of the tool.",
+            "{robot} has {axes} axes and turns its tool about Z only; {method} needs tilts.",
             robot=", ".join(controller.facts().robot_models) or controller.identity,
             axes=axes,
             method=method,
         ),
-        remedy=tr(
-            "Measure X and Y with 'calibrate n-angle' and Z with 'calibrate z-touch' or "
-            "'calibrate one-touch'."
-        ),
+        remedy=tr("Measure X and Y with 'calibrate n-angle', Z with 'calibrate z-touch'."),
     )
 
 

@@ -174,15 +174,11 @@ def require_observable(columns: Floats) -> None:
     raise CalibrationError(
         "rank_deficient" if fit.rank < SIX else "insufficient_rotation",
         tr(
-            "Touches of a plane at this angle do not tell where the tip is along "
-            "{axis} of the flange: the tilts that this robot can reach change nothing "
-            "there.",
+            "Touches of a plane at this angle cannot show where the tip is along {axis} of the "
+            "flange.",
             axis=weak,
         ),
-        remedy=tr(
-            "Nothing was written. Put the plane at an angle of 15 to 30 degrees, or measure with "
-            "'calibrate sphere-touch' or 'calibrate pivot'."
-        ),
+        remedy=tr("Nothing was written. Tilt the plane 15 to 30 degrees, or touch a sphere."),
     )
 
 

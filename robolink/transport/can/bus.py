@@ -69,10 +69,7 @@ def open_can_bus(
     except (NotImplementedError, ImportError, TypeError, ValueError) as error:
         raise ConfigError(
             tr("The CAN interface {name!r} cannot be used: {cause}.", name=interface, cause=error),
-            remedy=tr(
-                "Check interface, channel and bitrate in the URL; udp_multicast needs "
-                "'pip install robolink[udp-multicast]'."
-            ),
+            remedy=tr("Check the URL. For udp_multicast: pip install robolink[udp-multicast]"),
             controller=url.identity,
         ) from error
     except (can.CanError, OSError) as error:

@@ -168,10 +168,7 @@ class SdoTransfer:
                 identity=self._identity,
                 request=self._shown,
             ),
-            remedy=tr(
-                "Check that the PLC runs, its node number, the bit rate and the terminators, then "
-                "connect again."
-            ),
+            remedy=tr("Check the PLC, node number, bit rate and terminators, then connect again."),
             request=self._shown,
         )
 

@@ -74,15 +74,12 @@ def flooding(identity: str, request: ModbusRequest, count: int, raw: bytes) -> R
     """Return the error for a far end that keeps sending unrequested data."""
     return RemoteProtocolError(
         tr(
-            "{identity} sends without an end: {count} bytes, and no answer to: {request}.",
+            "{identity} sent {count} bytes without an end, and no answer to {request}.",
             identity=identity,
             count=count,
             request=describe(request),
         ),
-        remedy=tr(
-            "Check that this is the PLC's Modbus port; on a serial line look for a second client, "
-            "or a device that never stops."
-        ),
+        remedy=tr("Check that this is its Modbus port; on a serial line, find a second client."),
         request=describe(request),
         raw=raw[-_SHOWN_BYTES:],
     )
@@ -141,9 +138,9 @@ def unintelligible(
 def mismatched(identity: str, request: ModbusRequest) -> RemoteProtocolError:
     """Return the error for an answer to another request than the one it claims."""
     return RemoteProtocolError(
-        tr("{identity} answered something other than it was asked.", identity=identity),
+        tr("{identity} answered something other than asked.", identity=identity),
         remedy=tr(
-            "Check the unit in the URL ({unit}) and that no other device shares this address.",
+            "Check the unit in the URL ({unit}), and for a second device at this address.",
             unit=request.unit,
         ),
         request=describe(request),

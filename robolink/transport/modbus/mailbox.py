@@ -74,15 +74,13 @@ def open_modbus_link(
         client.close()
         raise ConfigError(
             tr(
-                "A mailbox of {read} registers is read at once, for its checksum; {identity} "
-                "allows {most} in one read.",
+                "robolink reads {read} registers at once; {identity} allows {most}.",
                 read=RESPONSE_WORDS,
                 most=client.most_registers,
                 identity=client.identity,
             ),
             remedy=tr(
-                "Set the PLC's Modbus device to allow {read} registers in one read and {written} "
-                "in one write, or use a register map.",
+                "Let the PLC allow {read} in a read and {written} in a write, or use a map.",
                 read=RESPONSE_WORDS,
                 written=COMMAND_WORDS,
             ),

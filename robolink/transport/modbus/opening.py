@@ -176,10 +176,7 @@ def _nobody_there(
             baud=settings.baud,
             parity=settings.parity,
         ),
-        remedy=tr(
-            "Check unit, baud, parity and stopbits in the URL against the PLC's settings, then "
-            "the cable (A and B may be swapped)."
-        ),
+        remedy=tr("Compare unit, baud, parity and stopbits with the PLC; check the cable (A, B)."),
         controller=url.identity,
         request=error.request,
         raw=error.raw,

@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields
 from typing import Final
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import known_names, tr
 from robolink_simulators.cell.camera import CameraOptics, FinderFaults
 from robolink_simulators.cell.habits import BiasFrame, PersonHabits, PinBump
 from robolink_simulators.cell.surfaces import Touched
@@ -205,7 +205,7 @@ def parameters_from_text(pairs: Mapping[str, str]) -> dict[str, object]:
         if name not in parameter_names():
             raise ConfigError(
                 tr("The simulated world has no parameter {name!r}.", name=name),
-                remedy=tr("These are known: {names}.", names=", ".join(parameter_names())),
+                remedy=known_names(parameter_names(), name),
             )
     values = values_from_text(WorldParameters, pairs)
     for name in ("camera_um_per_px_x", "camera_um_per_px_y"):

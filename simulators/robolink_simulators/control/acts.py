@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Final, get_args
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import known_names, tr
 from robolink_simulators.control.answers import FlangeTold
 from robolink_simulators.control.cell import ControlledCell
 from robolink_simulators.control.declared_acts import (
@@ -171,7 +171,7 @@ def act_named(cell: ControlledCell, name: object) -> ControlAct:
     if act is None:
         raise UnknownActError(
             tr("The simulator cannot do {act!r}.", act=name),
-            remedy=tr("These are known: {acts}.", acts=", ".join(acts)),
+            remedy=known_names(acts, name),
         )
     return act
 

@@ -20,7 +20,7 @@ from urllib.parse import urlsplit
 
 from robolink.errors import ConfigError, RobolinkError
 from robolink.interrupts import ClosedAtExit
-from robolink.messages import tr
+from robolink.messages import known_names, tr
 from robolink_simulators.cell.clock import ScaledClock
 from robolink_simulators.cell.habits import PersonManner
 from robolink_simulators.cell.person import PersonLook
@@ -407,9 +407,7 @@ def simulator_at(url: str) -> Assisted:
     if named is None:
         raise ConfigError(
             tr("{url!r} is not a sim URL.", url=url),
-            remedy=tr(
-                "These are known: {known}.", known=", ".join(f"{it}://NAME" for it in _IN_PROCESS)
-            ),
+            remedy=known_names(f"{it}://NAME" for it in _IN_PROCESS),
         )
     return named(parts.hostname or "")
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, Final, Literal
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import known_names, tr
 from robolink.model import Pose
 from robolink_simulators.control.answers import Described
 from robolink_simulators.control.cell import ControlledCell
@@ -127,7 +127,7 @@ class Taken:
 
     def _example(self) -> str:
         if self.choices:
-            return tr("These are known: {choices}.", choices=", ".join(self.choices))
+            return known_names(self.choices)
         examples = {"whole": "1", "number": "1.5", "flag": "true", "text": '"a"'}
         return tr("Give it as {example}.", example=f'"{self.name}": {examples[self.form]}')
 

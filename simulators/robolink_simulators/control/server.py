@@ -20,7 +20,7 @@ from urllib.parse import parse_qsl, urlsplit
 
 from robolink.errors import ConfigError, RobolinkError
 from robolink.interrupts import ClosedAtExit
-from robolink.messages import tr
+from robolink.messages import known_names, tr
 from robolink_simulators.control.acts import (
     ACTS,
     MACHINE_REFUSALS,
@@ -160,9 +160,7 @@ class ControlServer(ClosedAtExit):
             case _:
                 raise UnknownActError(
                     tr("There is no such address."),
-                    remedy=tr(
-                        "These are known: {known}.", known=", ".join(map(self._path_of, self.cells))
-                    ),
+                    remedy=known_names(map(self._path_of, self.cells)),
                 )
 
     def _about(self, name: str) -> dict[str, Any]:

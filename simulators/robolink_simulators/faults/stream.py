@@ -5,7 +5,7 @@ from enum import Enum, auto
 from typing import Final
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import known_names, tr
 
 
 class FaultAction(Enum):
@@ -112,9 +112,7 @@ class Fault:
         if named is None:
             raise ConfigError(
                 tr("There is no fault {action!r}.", action=self.action),
-                remedy=tr(
-                    "These are known: {known}.", known=", ".join(FaultAction.__members__).lower()
-                ),
+                remedy=known_names(map(str.lower, FaultAction.__members__), self.action),
             )
         object.__setattr__(self, "action", named)
         self.__post_init__()

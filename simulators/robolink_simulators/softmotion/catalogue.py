@@ -5,13 +5,12 @@ import math
 import random
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from difflib import get_close_matches
 from functools import partial
 from itertools import product
 from typing import Any, Final, TypeVar, cast
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import joined, known_names, tr
 from robolink.model import (
     AxisKind,
     ISMKinematicsWithOrientationImage,
@@ -93,7 +92,7 @@ def machine_named(name: str, parameters: Mapping[str, float] | None = None) -> M
                 kinematics=name,
                 names=", ".join(sorted(left)),
             ),
-            remedy=tr("These are known: {names}.", names=", ".join(parameter_names(name))),
+            remedy=known_names(parameter_names(name), min(left)),
         )
     _require_standing(name, kinematics, limits)
     model = MachineModel(kinematics, limits)
@@ -157,19 +156,16 @@ def _row(
 
 
 def _no_machine(name: str) -> ConfigError:
-    by_name = {known.casefold(): known for known in NAMES}
-    close = get_close_matches(name.casefold(), by_name, n=1)
-    if close:
-        remedy = tr("Is {name} meant?", name=by_name[close[0]])
-    else:
-        remedy = tr(
-            "These are known: {names}; the first {count} of them also with + and one of "
-            "{others}; or module:Class for a kinematics of your own.",
-            names=", ".join((*POSITION_ROWS, *STANDALONE_ROWS)),
-            count=len(POSITION_ROWS),
-            others=", ".join(ORIENTATION_ROWS),
-        )
-    return ConfigError(tr("The simulator has no kinematics {name!r}.", name=name), remedy=remedy)
+    return ConfigError(
+        tr("The simulator has no kinematics {name!r}.", name=name),
+        remedy=joined(
+            " ",
+            (
+                known_names(NAMES, name),
+                tr("Or give module:Class for your own. See docs/simulated-softmotion.md."),
+            ),
+        ),
+    )
 
 
 def _require_finite(parameters: Mapping[str, float]) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import known_names, tr
 from robolink.model import Secret, ToolOffset
 from robolink_simulators.cell.clock import EXCHANGE_S, ManualClock, SteeredClock
 from robolink_simulators.cell.workplace import MOUNTED_TOOL
@@ -75,7 +75,7 @@ class CellRequest:
             if name not in names:
                 raise ConfigError(
                     tr("A simulated cell has no parameter {name!r}.", name=name),
-                    remedy=tr("These are known: {names}.", names=", ".join(names)),
+                    remedy=known_names(names, name),
                 )
         for name, value in given.items():
             takes, example = _FORMS[name]
@@ -120,7 +120,7 @@ def require_heeded(names: Iterable[str], kinds: Iterable[str]) -> None:
                     kinds=", ".join(kinds),
                     name=name,
                 ),
-                remedy=tr("These are known: {names}.", names=", ".join(sorted(heeded))),
+                remedy=known_names(sorted(heeded)),
             )
 
 

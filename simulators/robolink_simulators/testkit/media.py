@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import known_names, tr
 from robolink_simulators.device.hosted import HostedDevice
 
 MEDIA: Final = {
@@ -55,7 +55,7 @@ def served(
     if medium not in known:
         raise ConfigError(
             tr("A simulator cannot be served over {medium!r}.", medium=medium),
-            remedy=tr("These are known: {known}.", known=", ".join(known)),
+            remedy=known_names(known),
         )
     given: dict[str, Any] = {} if map_file is None else {"map_file": map_file}
     if medium == "sim":

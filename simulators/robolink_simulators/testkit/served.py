@@ -254,8 +254,7 @@ class SimulatedCell:
             raise ConfigError(
                 tr("This cell lives in the process of the test; a command is another process."),
                 remedy=tr(
-                    "Ask for one on a port, for example by epson_tcp, epson_cell, "
-                    "softmotion_cell, or a factory with medium=."
+                    "Ask for one on a port, for example with epson_cell or a factory with medium=."
                 ),
             )
         done = subprocess.run(

@@ -98,7 +98,7 @@ def test_two_values_a_nanometre_apart_are_not_the_same(controller):
 
 
 def test_a_tool_that_somebody_changed_is_not_written(cell, plc, controller):
-    with pytest.raises(ToolChangedError, match="not the expected"):
+    with pytest.raises(ToolChangedError, match="as expected"):
         controller.tools.write(3, NEW, expected=None)
     assert plc.executed == []
     assert cell.open_requests() == []

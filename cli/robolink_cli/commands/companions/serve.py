@@ -107,7 +107,7 @@ def serve(
         max_change_mm = min(max_change_mm, allowed_mm or max_change_mm)
     limits = CallbackLimits(tolerance_mm, max_change_mm, sigma_mm)
     if (address is None) is (method is None):
-        raise click.UsageError(tr("Give one of --spel and --plc."))
+        raise click.UsageError(tr("expert serve takes one of --spel and --plc."))
     if address is not None:
         _serve_programs(context, address, limits, allow=allow, controllers=controllers)
         return

@@ -269,8 +269,7 @@ def _failed(failure: "TaskFailure", default_robot: str | None) -> ControllerFaul
     remedy = tr("Correct that line, or handle the error with OnErr.")
     if default_robot is not None:
         remedy = tr(
-            "No robot was named, so the program ran on {robot}. Name its robot with "
-            "--robot, or correct that line.",
+            "The program ran on {robot}. Name its robot with --robot, or correct that line.",
             robot=default_robot,
         )
     return ControllerFaultError(

@@ -61,7 +61,9 @@ def scan(
     )
 
     if addresses is None and not lines:
-        raise click.UsageError(tr("Give a range of addresses, or a serial line with --line."))
+        raise click.UsageError(
+            tr("A range of addresses, or a serial line with --line, is missing.")
+        )
     wanted = [] if addresses is None else parse_range(addresses)
     asked = ask_lines(lines, timeout_s)
     probes = probe_all(wanted, port, timeout_s) if wanted else []

@@ -320,10 +320,7 @@ def _ask(plc: "SoftMotionController", holder: str, *, yes: bool) -> None:
                 holder=holder,
                 controller=plc.identity,
             ),
-            remedy=tr(
-                "End that program; 10 s after its last signal the mailbox is free. To take "
-                "over anyway, run this on a terminal, or add --yes."
-            ),
+            remedy=tr("End that program, or take over: run this on a terminal, or add --yes."),
             controller=plc.identity,
         )
     if plc.status().running:

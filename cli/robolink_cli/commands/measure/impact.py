@@ -63,7 +63,7 @@ def impact(
     request = impact_request(points, path, names=("--points", "--pts"))
     if request is None:
         raise ConfigError(
-            tr("No points were named."), remedy=tr("Give --points 1-50 or --pts robot1.pts.")
+            tr("The points are missing."), remedy=tr("Give --points 1-50 or --pts robot1.pts.")
         )
     changes = _changes(given._asdict())
     wanted = report_request(report_path, force=force)

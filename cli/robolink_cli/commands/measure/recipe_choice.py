@@ -203,11 +203,7 @@ def _copied(
     copy_recipe(name, path)
     return ConfigError(
         tr("Written: {path}. Do not run it yet: its numbers are for a simulated cell.", path=path),
-        remedy=tr(
-            "Enter the numbers of your cell in the marked lines, delete the line "
-            "'numbers', then: robolink recipe check {path}",
-            path=path,
-        ),
+        remedy=tr("Enter yours, delete the line 'numbers', then: robolink recipe check FILE"),
     )
 
 

@@ -137,8 +137,7 @@ def change_named(entries: "Iterable[Recorded]", name: str) -> str:
     raise ConfigError(
         _what_is_wrong(name, list(ids)),
         remedy=tr(
-            "'robolink journal list' shows numbers and ids; {count} characters of an id "
-            "are enough if only one change starts with them.",
+            "Give a number, or {count} characters of an id. To see them: robolink journal list",
             count=SHORTEST_ID,
         ),
     )

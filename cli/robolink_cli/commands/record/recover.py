@@ -169,7 +169,7 @@ def recover(
     if choose is not None and (keep or yes or forget):
         raise ConfigError(
             tr("--choose cannot be combined with --keep, --yes or --forget."),
-            remedy=tr("Nothing was sent."),
+            remedy=tr("Nothing was sent. Give one of them."),
         )
 
     def settle() -> tuple[int, dict[str, object]]:

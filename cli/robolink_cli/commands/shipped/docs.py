@@ -47,7 +47,8 @@ def docs(
     name = page.removesuffix(".md").removeprefix("docs/")
     from robolink_cli.commands.shipped.shipped_files import require_one_of
 
-    require_one_of(name, list(pages), remedy=tr("'robolink docs' lists the pages."))
+    missing = tr("No page {name!r}.", name=name)
+    require_one_of(name, list(pages), missing, remedy=tr("To see all pages: robolink docs"))
     path = _in_language(pages[name])
     if json_is_on():
         text = path.read_text(encoding="utf-8")

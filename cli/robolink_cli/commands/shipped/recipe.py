@@ -60,7 +60,8 @@ def copy_recipe(name: str, path: Path, *, replace: bool = False) -> None:
         ConfigError: There is no such recipe, or the file is there or cannot be written.
     """
     found = models()
-    require_one_of(name, list(found), remedy=tr("'robolink recipe list' lists the recipes."))
+    missing = tr("No recipe {name!r}.", name=name)
+    require_one_of(name, list(found), missing, remedy=tr("To see all: robolink recipe list"))
     require_free(path, replace=replace)
     first, *lines = found[name].read_text(encoding="utf-8").splitlines()
     if not first.startswith("#:schema "):

@@ -27,8 +27,14 @@ def recipe_schema() -> Path:
     return pages_folder() / "recipe.schema.json"
 
 
-def require_one_of(name: str, names: Sequence[str], *, remedy: str) -> None:
+def require_one_of(name: str, names: Sequence[str], missing: str, *, remedy: str) -> None:
     """Refuse a name that is none of these, and suggest similar ones.
+
+    Args:
+        name: It.
+        names: All that there are.
+        missing: The sentence that says that it is none of them.
+        remedy: How to see them all.
 
     Raises:
         ConfigError: It is none.
@@ -38,7 +44,7 @@ def require_one_of(name: str, names: Sequence[str], *, remedy: str) -> None:
     near = get_close_matches(name, names, n=3) or [one for one in names if name in one][:3]
     hint = tr("Did you mean {names}?", names=", ".join(near)) if near else ""
     raise ConfigError(
-        tr("There is no {name!r}.", name=name),
+        missing,
         remedy=joined(" ", filter(None, (hint, remedy))),
     )
 

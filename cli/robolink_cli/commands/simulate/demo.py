@@ -120,7 +120,10 @@ class AcceptedChange(DemonstratedChange):
     def drift_mm(self) -> float:
         """The largest drift about the new tip."""
         if self.report.verification is None:
-            raise VerifyError(tr("The demonstration did not pass its test."))
+            raise VerifyError(
+                tr("The demonstration did not pass its test."),
+                remedy=tr("Run it again with another --seed."),
+            )
         return self.report.verification.max_drift_mm
 
     def end(self) -> dict[str, object]:

@@ -7,14 +7,13 @@ says where they come from.
 import csv
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from difflib import get_close_matches
 from enum import StrEnum
 from functools import cache
 from importlib.resources import files
 from typing import Final, NamedTuple, Self
 
 from robolink.errors import ConfigError
-from robolink.messages import tr
+from robolink.messages import known_names, tr
 from robolink_simulators.epson.condition import OutOfReach
 
 
@@ -223,12 +222,10 @@ def find_robot(name: str) -> RobotModel:
                 name=upright.name,
             ),
         )
-    close = get_close_matches(wanted, by_name, n=1)
-    if close:
-        remedy = tr("Is {name} meant?", name=by_name[close[0]].name)
-    else:
-        remedy = tr("Choose one of {names}.", names=", ".join(robot_names()))
-    raise ConfigError(tr("There is no simulated robot {name!r}.", name=name), remedy=remedy)
+    raise ConfigError(
+        tr("There is no simulated robot {name!r}.", name=name),
+        remedy=known_names(robot_names(), name),
+    )
 
 
 class Joints(tuple[float, ...]):

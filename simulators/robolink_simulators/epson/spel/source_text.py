@@ -67,7 +67,7 @@ class ProgramRefused(ConfigError):
         self.faults = tuple(faults)
         super().__init__(
             tr(
-                "The program cannot be built. Faults: {count}. The first is {fault}.",
+                "Faults: {count}. The first: {fault}.",
                 count=len(self.faults),
                 fault=self.faults[0],
             ),

@@ -236,7 +236,7 @@ def _parameters(method: AnyMethod, given: Mapping[str, Any], check: Check) -> Me
         raise ConfigError(
             "\n".join(f"{line}." for line in lines),
             remedy=tr(
-                "Nothing was sent. For the options: robolink calibrate {name} --help",
+                "Nothing was sent. Help: robolink calibrate {name} --help",
                 name=method.name,
             ),
         )

@@ -397,5 +397,5 @@ def unusable(path: str, why: str) -> ConfigError:
     """Return the error for a file with a wrong layout."""
     return ConfigError(
         tr("{path}: {why}.", path=path or tr("the file"), why=why),
-        remedy=tr("docs/solvers.md shows what each method takes."),
+        remedy=tr("Correct the file. See what each method takes: docs/solvers.md"),
     )

@@ -132,9 +132,10 @@ def _take_orphans(yes: bool) -> None:
 def _serve(requests: socket.socket) -> None:
     """Fork a command for each request, until nobody is left to ask."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the commands
+    gc.disable()  # nothing of what is imported is garbage
     _import_all()
-    gc.collect()
     gc.freeze()
+    gc.enable()
     while True:
         asked, ends, _, _ = socket.recv_fds(requests, _LONGEST, 3)
         if not asked:

@@ -14,6 +14,9 @@ from tests._canary import Watch, install
 from tests._documents import DOCUMENTS
 from tests._processes import pytest_addoption, pytest_runtestloop  # noqa: F401 - hooks
 
+# Nothing of what is imported and collected is garbage: a search for it begins with the tests.
+gc.disable()
+
 # Before anything imports numpy: threads for matrices of six rows cost far more than they bring,
 # the more so the more cores a machine has.
 for _library in ("OPENBLAS", "OMP", "MKL"):
@@ -185,5 +188,6 @@ def pytest_collection_finish():
     """Leave thousands of collected tests out of each later search for garbage; it is rarer, too."""
     gc.collect()
     gc.freeze()
+    gc.enable()
     # And search less often: a test makes and drops much, and little of it is garbage in circles.
     gc.set_threshold(10_000, 10, 10)

@@ -10,18 +10,17 @@ from robolink.transport.traffic import Traffic
 _WordsT = TypeVar("_WordsT", tuple[int, ...], MailboxHead)
 
 
-class WordTraffic:
-    """Implements :class:`~robolink.transport.MailboxLink` by another, and tells what passes.
+class MailboxLinkAround:
+    """The part of a :class:`~robolink.transport.MailboxLink` that is another one's as it is.
 
-    A word is told as two bytes, the high one first, as in the registers of a Modbus server.
+    Whoever sees what passes has it as base, and passes the exchanges on.
 
     Args:
-        inner: Moves the words; owned by this.
+        inner: Carries it all; owned by this.
     """
 
-    def __init__(self, inner: MailboxLink, traffic: Traffic | None = None) -> None:
+    def __init__(self, inner: MailboxLink) -> None:
         self._inner = inner
-        self._traffic = traffic or Traffic(inner.identity, inner.clock)
 
     @property
     def identity(self) -> str:
@@ -47,6 +46,24 @@ class WordTraffic:
     def whole_look_s(self) -> float:
         """The inner link's."""
         return self._inner.whole_look_s
+
+    def close(self) -> None:
+        """See :meth:`robolink.transport.MailboxLink.close`."""
+        self._inner.close()
+
+
+class WordTraffic(MailboxLinkAround):
+    """Implements :class:`~robolink.transport.MailboxLink` by another, and tells what passes.
+
+    A word is told as two bytes, the high one first, as in the registers of a Modbus server.
+
+    Args:
+        inner: Moves the words; owned by this.
+    """
+
+    def __init__(self, inner: MailboxLink, traffic: Traffic | None = None) -> None:
+        super().__init__(inner)
+        self._traffic = traffic or Traffic(inner.identity, inner.clock)
 
     def write_command(self, words: Sequence[int]) -> None:
         """See :meth:`robolink.transport.MailboxLink.write_command`."""
@@ -77,10 +94,6 @@ class WordTraffic:
     def reopened(self, *, timeout_s: float) -> MailboxLink:
         """See :meth:`robolink.transport.MailboxLink.reopened`."""
         return WordTraffic(self._inner.reopened(timeout_s=timeout_s), self._traffic)
-
-    def close(self) -> None:
-        """See :meth:`robolink.transport.MailboxLink.close`."""
-        self._inner.close()
 
     def _sent(self, request: str, words: Sequence[int]) -> None:
         if self._traffic.listened():

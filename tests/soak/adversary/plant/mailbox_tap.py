@@ -19,8 +19,8 @@ from robolink.protocols.mailbox import (
     decode_response,
     encode_command,
 )
-from robolink.timing import Clock
 from robolink.transport import MailboxHead, MailboxLink
+from robolink.transport.word_traffic import MailboxLinkAround
 from tests.soak.adversary.computer import VirtualProcess
 from tests.soak.adversary.plant.machine import SentKind, SentRequest, WireTap
 
@@ -128,7 +128,7 @@ class WatchedMailbox(Protocol):
         """See a request before it leaves, in words; with the block where it is one."""
 
 
-class TappedMailboxLink:
+class TappedMailboxLink(MailboxLinkAround):
     """Implements :class:`robolink.transport.MailboxLink` around another one.
 
     Args:
@@ -145,37 +145,12 @@ class TappedMailboxLink:
         tap: WireTap,
         plant: "WatchedMailbox",
     ) -> None:
-        self._inner = inner
+        super().__init__(inner)
         self._process = process
         self._tap = tap
         self._plant = plant
         self._seen = SeenSession()
         self._last = SentKind.OTHER
-
-    @property
-    def identity(self) -> str:
-        """The inner link's."""
-        return self._inner.identity
-
-    @property
-    def place(self) -> str:
-        """The inner link's."""
-        return self._inner.place
-
-    @property
-    def durable(self) -> bool:
-        """The inner link's."""
-        return self._inner.durable
-
-    @property
-    def clock(self) -> Clock:
-        """The inner link's."""
-        return self._inner.clock
-
-    @property
-    def whole_look_s(self) -> float:
-        """The inner link's."""
-        return self._inner.whole_look_s
 
     def write_command(self, words: Sequence[int]) -> None:
         """See :meth:`robolink.transport.MailboxLink.write_command`."""
@@ -226,10 +201,6 @@ class TappedMailboxLink:
         """See :meth:`robolink.transport.MailboxLink.reopened`."""
         inner = self._inner.reopened(timeout_s=timeout_s)
         return TappedMailboxLink(inner, self._process, self._tap, self._plant)
-
-    def close(self) -> None:
-        """See :meth:`robolink.transport.MailboxLink.close`."""
-        self._inner.close()
 
     def _asks(self, text: str) -> None:
         self._tap.leaving(self._process, SentRequest(SentKind.OTHER, text))

@@ -4,9 +4,15 @@ import contextlib
 import io
 import json
 from dataclasses import dataclass
+from functools import cache, partial
 from typing import Any
 
 from robolink_cli import main
+
+from robolink.locale.languages import translator
+
+chinese = cache(partial(translator, "zh"))
+"""Returns what translates; thousands of sentences are read once, not for each test."""
 
 
 @dataclass(frozen=True)

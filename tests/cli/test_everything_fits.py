@@ -27,12 +27,12 @@ from robolink.calibration import AccuracyFacts, assessed, carrying, impact_on, s
 from robolink.calibration_run import Proposal, Seating
 from robolink.controllers import SimpleController
 from robolink.drift import CellDrift, MeasuredChange, charts_of
-from robolink.locale.languages import translator
 from robolink.model import json_value
 from robolink.report.pictures.control_chart import chart_drawing
 from robolink.report.pictures.plans import draw, pose_drawings
 from robolink.report.pictures.residuals import fit_drawings, order_drawings
 from robolink.transaction import Wanted, change_tools
+from tests._commands import chinese
 from tests.cli.wizard.test_screens import SCREENS
 
 WIDTHS = (60, 68, 80, 100, 120)
@@ -42,7 +42,7 @@ ROOT = Path(__file__).parents[2]
 @pytest.fixture(params=["en", "zh"])
 def language(request):
     before = messages._translate
-    messages.install(translator("zh") if request.param == "zh" else None)
+    messages.install(chinese() if request.param == "zh" else None)
     yield request.param
     messages.install(before)
 

@@ -12,7 +12,7 @@ import robolink
 from robolink import messages
 from robolink.errors import DeclinedError, RobolinkError
 from robolink.interrupts import Interrupted
-from robolink.locale.languages import translator
+from tests._commands import chinese
 from tests.cli.wizard._every_method import ABORTS, changing, moments_of, stored
 from tests.contract.test_proof_after_a_break import CASES
 
@@ -32,7 +32,7 @@ def soaked(method, *more, kept=False):
 @pytest.fixture
 def language(request):
     before = messages._translate
-    messages.install(translator("zh") if request.param == "zh" else None)
+    messages.install(chinese() if request.param == "zh" else None)
     yield request.param
     messages.install(before)
 

@@ -49,12 +49,13 @@ from robolink.errors import (
     OutcomeUnknownError,
     VerifyError,
 )
-from robolink.locale.languages import CHINESE, ENGLISH, translator
+from robolink.locale.languages import CHINESE, ENGLISH
 from robolink.messages import spoken, tr
 from robolink.methods import find_method
 from robolink.model import Path as Way
 from robolink.model import Pose, ToolOffset, ToolReceipt, WorkBox
 from robolink.runner import AngleShown, JogRange, MoveSubject, Question
+from tests._commands import chinese
 from tests.cli.wizard._people import (
     ARRIVAL,
     CHECK,
@@ -472,7 +473,7 @@ SCREENS = {
 def language(request):
     speak = {
         "en": None,
-        "zh": translator("zh"),
+        "zh": chinese(),
         "pseudo": lambda text: f"[{text}{'~' * (2 * len(text) // 5)}]",
     }[request.param]
     assert speak is not None or request.param == "en"

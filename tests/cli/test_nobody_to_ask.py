@@ -157,6 +157,7 @@ def done_by(cell):
     ("cell", "name", "words"),
     [*rows(ASKS, "epson"), *rows(SIX_AXES, "C8-C901S")],
     indirect=["cell"],
+    scope="module",  # of the cell; else each test has one made
 )
 def test_what_asks_ends_with_9_and_says_that_nobody_is_there(cell, monkeypatch, name, words):
     monkeypatch.setattr(sys, "stdin", NobodyThere())
@@ -177,6 +178,7 @@ def test_what_asks_ends_with_9_and_says_that_nobody_is_there(cell, monkeypatch, 
     ("cell", "name", "words"),
     rows({name: [words] for name, words in CONSENT.items()}, "epson"),
     indirect=["cell"],
+    scope="module",  # of the cell; else each test has one made
 )
 def test_where_the_command_is_the_consent_it_is_done_at_once(cell, monkeypatch, name, words):
     monkeypatch.setattr(sys, "stdin", NobodyThere())

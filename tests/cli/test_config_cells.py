@@ -105,7 +105,7 @@ def test_another_robot_than_the_cell_file_says_is_refused(cell, simulator, capsy
     cell("robot = 'LS10-B'")
     assert main.run(["-c", "a", "tool", "set", "3", "--x", "1"]) == 2
     shown = capsys.readouterr().err
-    assert "has a robot LS10-B, but at epson+sim://config-cell there is: T6-602S." in shown
+    assert "needs robot LS10-B; at epson+sim://config-cell there is T6-602S." in shown
     assert "robolink.toml" in shown
     assert simulator.machine.tools.get(3) is None
 

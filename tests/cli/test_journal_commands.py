@@ -158,7 +158,7 @@ def test_a_name_that_means_nothing_or_too_much_is_refused(run, recorded, name):
     code, out, err = run("journal", "show", name)
     assert (code, out) == (2, "")
     assert WRONG_NAMES[name] in err
-    assert "'robolink journal list'" in err
+    assert "robolink journal list" in err
 
 
 def test_the_difference_of_two_changes(document, run, recorded):

@@ -213,7 +213,7 @@ def test_tab_completes_the_names_of_kinematics(start, offered):
 def test_a_name_that_is_nearly_right_is_told_the_right_one(capsys):
     code, told = refusal(capsys, "--kinematics", "Kin_Scara3Z")
     assert code == 2
-    assert "Is Kin_Scara3_Z meant?" in told
+    assert "Did you mean Kin_Scara3_Z" in told
 
 
 def test_what_cannot_move_by_itself_says_so_by_its_name(capsys):

@@ -445,7 +445,7 @@ def test_a_cell_file_is_checked_anew_for_a_look_when_it_changed(moving, stop, ca
     assert "no_such_key" in capsys.readouterr().err
     cell.write_text(CELL.format(url=moving.url, more="robot = 'LS10-B'"))
     assert main.run(["-c", "a", "status"]) == 0
-    assert "has a robot LS10-B" in capsys.readouterr().err
+    assert "needs robot LS10-B" in capsys.readouterr().err
 
 
 def test_a_look_that_does_not_check_the_cell_file_heeds_what_it_says(moving, stop, capsys):
@@ -457,7 +457,7 @@ def test_a_look_that_does_not_check_the_cell_file_heeds_what_it_says(moving, sto
         capsys.readouterr()
         assert main.run(["-c", "a", "status"]) == 0
         told = capsys.readouterr().err
-        assert "The cell a has a robot LS10-B" in told
+        assert "Cell a needs robot LS10-B" in told
         assert "the cell a uses tool 2" in told
         assert main.run(["-c", "a", "--operator", "Anna", "status"]) == 0
         assert main.run(["-c", "a", "--operator", "nobody", "status"]) == 2

@@ -102,8 +102,8 @@ def nothing_named() -> ConfigError:
         return ConfigError(
             tr("No controller is named."),
             remedy=tr(
-                "Give -c CELL from a cell file, or -c URL such as epson+tcp://192.168.0.1:5000. "
-                "To practise on a simulated robot: robolink docs tutorial"
+                "Give -c CELL from a cell file, or a URL, -c epson+tcp://192.168.0.1:5000. To "
+                "practise on a simulated robot: robolink docs tutorial"
             ),
         )
     if len(names) == 1:

@@ -102,7 +102,7 @@ class Schemas:
         return found
 
     def _says_what_else(self, schema: dict[str, Any]) -> bool:
-        """Tell whether a schema itself says which other keys there may be, or one of several."""
+        """Return whether a schema itself says which other keys there may be, or one of several."""
         if "$ref" in schema:
             return self._says_what_else(self._referred(schema))
         parts = [it for key in _PARTS for it in schema.get(key, ())]

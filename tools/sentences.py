@@ -43,7 +43,7 @@ def _of_call(node: ast.Call, keywords: Mapping[str, Any]) -> Iterator[_Found]:
 
 
 def _makes(decorator: ast.expr) -> bool:
-    """Tell whether a decorator makes a command out of a function."""
+    """Return whether a decorator makes a command out of a function."""
     if not isinstance(decorator, ast.Call):
         return False
     made_by = decorator.func

@@ -79,7 +79,7 @@ def shares(total: int, population: str) -> Iterator[tuple[Course, int]]:
 
 
 def _belongs(course: Course, population: str) -> bool:
-    """Tell whether a course has what a population needs: a turn test, or a row to be wrong in."""
+    """Return whether a course has what a population needs: a turn test, or a row to be wrong in."""
     if population in FACTORS:
         return course.proves
     return population == CLEAN or bool(course.rows)

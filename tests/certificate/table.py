@@ -343,7 +343,7 @@ def _in_prose(counts: dict[str, Count], seed: int) -> list[str]:
 
 
 def counts_in(goal: Goal, counts: dict[str, Count]) -> bool:
-    """Tell whether the population of a goal was run."""
+    """Return whether the population of a goal was run."""
     name = goal.name.partition(",")[0]
     return any(count.runs and key.startswith(name) for key, count in counts.items())
 

@@ -270,5 +270,5 @@ def test_killed_in_the_middle_recover_gives_the_tool_back(epson_factory, robolin
 
 
 def written(cell):
-    """Tell whether the first value of the checks stands there."""
+    """Return whether the first value of the checks stands there."""
     return cell.simulator.truth()["stored"]["2"]["x_mm"] == pytest.approx(1.5)

@@ -126,7 +126,7 @@ HELLO = encode_line(CallbackLine(1, CallbackWord.HELLO, ("S", "1", "0", "-", "1"
 
 
 def greeted(link):
-    """Tell whether the server answers a program."""
+    """Return whether the server answers a program."""
     link.sendall(HELLO)
     return b"WELCOME" in link.recv(200)
 

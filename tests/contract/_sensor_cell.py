@@ -57,7 +57,7 @@ class EitherOf:
     switches: tuple[TipSwitch, ...]
 
     def trips(self, tip_mm: XyzMm, shaft: tuple[float, float, float] = STANDING) -> bool:
-        """Tell whether any of them trips."""
+        """Return whether any of them trips."""
         return any(switch.trips(tip_mm, shaft) for switch in self.switches)
 
 
@@ -68,7 +68,7 @@ class Inverted:
     switch: TipSwitch
 
     def trips(self, tip_mm: XyzMm, shaft: tuple[float, float, float] = STANDING) -> bool:
-        """Tell whether it does not trip."""
+        """Return whether it does not trip."""
         return not self.switch.trips(tip_mm, shaft)
 
 

@@ -19,7 +19,7 @@ def cell(request, tmp_path, monkeypatch):
 
 
 def within(document, truth, *, axes="xy"):
-    """Tell whether the truth lies in the stated interval, four times as wide for safety."""
+    """Return whether the truth lies in the stated interval, four times as wide for safety."""
     half = document["fit"]["half_width95"]
     return all(
         abs(document["proposed"][f"{axis}_mm"] - getattr(truth, f"{axis}_mm"))

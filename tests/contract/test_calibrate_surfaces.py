@@ -51,7 +51,7 @@ def slot(simulator):
 
 
 def inside(simulator, tool):
-    """Tell whether each length that was written is within twice its interval of the truth.
+    """Return whether each length that was written is within twice its interval of the truth.
 
     One in 20 lies outside of a 95 % interval; how many do is counted in soak.
     """

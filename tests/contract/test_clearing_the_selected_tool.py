@@ -1,4 +1,4 @@
-"""The tool in force is never cleared behind anybody's back, on every kind of controller.
+"""The selected tool is never cleared behind anybody's back, on every kind of controller.
 
 What would stay green while the next program crashes a nozzle: a clear that is accepted, read back
 and on record, and leaves the machine with Tool 0.

@@ -166,7 +166,7 @@ EACH_TIME = ("one-touch", "camera", "z-touch")
 
 
 class Cuts(Listener):
-    """Ends all when the last value is written: nothing goes out, nothing is put on record."""
+    """Ends all when the last value is written: nothing goes out, nothing is recorded."""
 
     gone = False
 

@@ -100,7 +100,7 @@ def check_nothing_else_was_written(cell: EpsonRecipeCell) -> None:
 
 
 def check_the_next_command_says_what_is_selected(cell: EpsonRecipeCell) -> None:
-    """What is in force is named beside what it was, and how it is put back."""
+    """What is in force is named beside what it was, and how it is restored."""
     markers = cell.open_markers()
     shown = cell.run("status")
     assert shown.code == 0, shown.err

@@ -76,7 +76,7 @@ class NozzleCell:
 
     @property
     def selected_tool(self) -> int:
-        """The tool in force, past the wire."""
+        """The selected tool, past the wire."""
         return self.simulator.machine.tools.selected
 
     @property

@@ -117,7 +117,7 @@ def check_all_or_none(cell: RecipeCell) -> bool:
 
 
 def check_writes(cell: RecipeCell) -> None:
-    """Each tool was written once at most, and once more where its old value was put back."""
+    """Each tool was written once at most, and once more where its old value was restored."""
     for tool, count in Counter(cell.writes()).items():
         assert count <= (1 if tool in cell.changed() else 2), (tool, count)
 

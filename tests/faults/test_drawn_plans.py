@@ -49,7 +49,7 @@ CELLS = {"epson": epson_cell, "softmotion": softmotion_cell}
 
 
 def bent(simulator):
-    """Tell whether text was bent on its way."""
+    """Return whether text was bent on its way."""
     return any(fault.action in BENT for fault in simulator.faults.fired)
 
 

@@ -1,4 +1,4 @@
-"""Ctrl-C, SIGTERM or SIGHUP at each step of a nozzle change: all of before is put back.
+"""Ctrl-C, SIGTERM or SIGHUP at each step of a nozzle change: all of before is restored.
 
 Until the verification has passed, an interrupted change ends with the old value in tool 1: it
 was not written, or it is written back, and that is said. From then on the new value is kept.

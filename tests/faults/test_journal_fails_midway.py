@@ -1,4 +1,4 @@
-"""The journal fails in the middle of a calibration: what was in force is put back all the same.
+"""The journal fails in the middle of a calibration: what was in force is restored all the same.
 
 Its marker, which names the tool of before and the old value, is stored before anything changes;
 so putting them back needs no further record. What cannot be recorded stays open for ``recover``.

@@ -80,7 +80,7 @@ def test_f79_a_value_that_stood_already_makes_an_order_done_all_the_same():
 
 @pytest.mark.fault("F79")
 def test_f79_an_order_is_not_told_as_done_while_something_is_not_put_back():
-    """Production that is started on it would run with the tool in force of the measurement."""
+    """Production that is started on it would run with the selected tool of the measurement."""
     desk = Desk()
     with desk.connected() as controller:
         with carrying_out(controller, ORDER, JOB) as order:

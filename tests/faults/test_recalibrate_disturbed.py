@@ -1,8 +1,8 @@
 """`robolink change RECIPE.toml`, disturbed at each instant of its run (F21, F22, F24).
 
 Ctrl-C ends a run with the old values in all tools, or with the new ones once all are proved,
-and with the selected tool, power and speed of before. After an emergency stop, an opened guard,
-a failed drive or a withdrawn permit not everything can be put back: message and marker name what
+and with the selected tool, power and speed as before. After an emergency stop, an opened guard,
+a failed drive or a withdrawn permit not everything can be restored: message and marker name what
 is left, and after the reset one more command puts it right. Outputs stay as the recipe switched
 them, and the end of the run names them.
 

@@ -2,7 +2,7 @@
 
 A point is a kind of checkpoint (a lock, an exchange, a commit, a question, a step), what goes on
 there, and the step of the procedure. After the acknowledgement there is no movement, no output,
-no write and no success, except that tool, power and speed are put back and each tool of an open
+no write and no success, except that tool, power and speed are restored and each tool of an open
 change once (docs/reference/rules.md 5).
 
 By default a sample is taken. ``ROBOLINK_ALL_KILL_POINTS=1`` takes all; ``pytest -s`` counts them.
@@ -81,7 +81,7 @@ def check_nothing_went_on(cell: RecipeCell, ended: Ended, rest: AtRest) -> None:
 
 
 def check_said(cell: RecipeCell, ended: Ended) -> None:
-    """Whatever could not be put back is named, and one command after the reset puts it right."""
+    """Whatever could not be restored is named, and one command after the reset puts it right."""
     check_markers_are_named(cell.open_markers(), ended)
     if cell.selected != 1 or cell.open_markers():
         assert cell.run("reset").code == 0

@@ -256,7 +256,7 @@ def imported(tree: ast.Module) -> dict[str, tuple[str, str]]:
 
 
 def followed(thing: Any, names: list[str]) -> bool:
-    """Tell whether an attribute's attribute and so on is there, annotated ones included."""
+    """Return whether an attribute's attribute and so on is there, annotated ones included."""
     for number, name in enumerate(names):
         if not hasattr(thing, name):
             said = {key for one in getattr(thing, "__mro__", ()) for key in _said(one)}
@@ -272,7 +272,7 @@ def _said(one: type) -> set[str]:
 
 
 def absolute(names: list[str]) -> bool:
-    """Tell whether a whole dotted name leads somewhere."""
+    """Return whether a whole dotted name leads somewhere."""
     for count in range(len(names), 0, -1):
         try:
             module = import_module(".".join(names[:count]))
@@ -283,7 +283,7 @@ def absolute(names: list[str]) -> bool:
 
 
 def leads_somewhere(role: Role, trees: dict[str, ast.Module]) -> bool:
-    """Tell whether what a role names is there."""
+    """Return whether what a role names is there."""
     names = role.target.split(".")
     if names[0] in {package.rpartition("/")[2] for package in PACKAGES} or len(names) > 2:
         return absolute(names)

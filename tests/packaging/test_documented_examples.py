@@ -66,7 +66,7 @@ def parameters(called: Any) -> list[str]:
 
 
 def is_value(kind: type) -> bool:
-    """Tell whether a class is a value, described by its attributes."""
+    """Return whether a class is a value, described by its attributes."""
     plain = (enum.Enum, BaseException, tuple)
     return is_dataclass(kind) or issubclass(kind, plain) or hasattr(kind, "model_fields")
 
@@ -91,7 +91,7 @@ def callables(name: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 
 def same(one: Any, other: Any) -> bool:
-    """Tell whether two methods take the same."""
+    """Return whether two methods take the same."""
     return inspect.isfunction(other) and parameters(one) == parameters(other)
 
 

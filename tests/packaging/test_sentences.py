@@ -80,7 +80,7 @@ def str_part(part):
 
 
 def is_filled(sentence):
-    """Tell whether ``tr`` fills the sentence in: braces alone are text."""
+    """Return whether ``tr`` fills the sentence in: braces alone are text."""
     return re.search(r"(?<!{){[a-z_]\w*[^{}]*}", sentence) is not None
 
 

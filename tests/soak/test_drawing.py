@@ -32,7 +32,7 @@ def disturbances(kind, seeds=range(25)):
 
 
 def is_told_instant(one):
-    """Tell whether a disturbance is one of those that are placed where they tell most."""
+    """Return whether a disturbance is one of those that are placed where they tell most."""
     return any(
         (instant.kind, instant.what, instant.match) == (one.kind.value, one.what, one.match)
         and one.at in range(instant.first, instant.first + instant.count)

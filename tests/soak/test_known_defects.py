@@ -1,4 +1,4 @@
-"""Known defects that are put back are found; all of them: ``make soak`` prints the table."""
+"""Known defects that are restored are found; all of them: ``make soak`` prints the table."""
 
 from contextlib import ExitStack
 from functools import cache

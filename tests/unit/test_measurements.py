@@ -1,4 +1,4 @@
-"""What a measurement goes on with: the flange, the last touch, a cell on paper, names of before."""
+"""What a measurement goes on with: the flange, the last touch, a cell on paper, former names."""
 
 import math
 from dataclasses import replace

@@ -17,7 +17,7 @@ from tests.contract._sensor_cell import miss_mm
 
 
 class Pictures:
-    """Implements :class:`robolink.model.TipSensor` with pictures that are known beforehand."""
+    """Implements :class:`robolink.model.TipSensor` with pictures that are known in advance."""
 
     identity = "bench"
     unit = SpotUnit.PIXEL

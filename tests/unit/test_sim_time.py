@@ -230,7 +230,7 @@ def passing(simulator, clock, really, seconds):
 
 
 def ended(link):
-    """Tell whether the controller has ended the link, once a client has taken what was sent."""
+    """Return whether the controller has ended the link, once a client has taken what was sent."""
     link.outgoing()
     return link.closed
 

@@ -56,7 +56,7 @@ def complete_recipe(
 
 
 def is_recipe(path: Path) -> bool:
-    """Tell whether a file is a recipe, by the line that every recipe has."""
+    """Return whether a file is a recipe, by the line that every recipe has."""
     if path.suffix != ".toml" or not path.is_file():
         return False
     with path.open("rb") as file:

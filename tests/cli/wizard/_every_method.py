@@ -133,7 +133,7 @@ class FlowHand:
                 self.press("stop")
 
     def has_to_do(self) -> bool:
-        """Tell whether the list says by now that something has to be done first."""
+        """Return whether the list says by now that something has to be done first."""
         subject = self.state.subject
         if self.state.ending or not isinstance(subject, CheckSubject):
             return False

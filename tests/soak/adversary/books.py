@@ -20,7 +20,7 @@ class BookedMarker:
         operation: Its id.
         kind: What it stands for.
         request: What was begun.
-        details: What is needed to settle it.
+        details: What is needed to recover it.
     """
 
     operation: str

@@ -128,7 +128,7 @@ class VirtualComputer:
         return process
 
     def lives(self, pid: int) -> bool:
-        """Tell whether a process of that number runs."""
+        """Return whether a process of that number runs."""
         return any(one.number == pid and one.alive for one in self._processes)
 
     def cut_power(self, now_ns: int, disk: FaultyDisk, seed: int) -> None:

@@ -71,7 +71,7 @@ class SteppedThread:
         self.turn = threading.Semaphore(0)
 
     def can_go_on(self, now_ns: int) -> bool:
-        """Tell whether what it waits for is there, its time has come, or its process is dead."""
+        """Return whether what it waits for is there, its time has come, or its process is dead."""
         if self.over or self.suspended:
             return False
         if self.ready is None or self.ready() or (self.owner is not None and not self.owner.alive):

@@ -69,7 +69,7 @@ class CameraCell:
         return install_vision(self.simulator, self.path)
 
     def nine_poses(self):
-        """Poses of the tool in force about where it stands now: TL, TC, TR, CR, C, CL and so on."""
+        """Poses of the selected tool about where it stands now: TL, TC, TR, CR, C, CL and so on."""
         at = self.simulator.machine.tip()
         rows = [IN_THE_PICTURE_MM, IN_THE_PICTURE_MM[::-1], IN_THE_PICTURE_MM]
         places = zip((3.0, 0.0, -3.0), rows, strict=True)

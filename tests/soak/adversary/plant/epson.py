@@ -133,12 +133,12 @@ class EpsonPlant(PlantWithWorld):
         return MachineState(dict(tools.defined()), selected, settings, machine.robot_number)
 
     def flange(self) -> Frame:
-        """Return where the flange of the robot in force is commanded to be."""
+        """Return where the flange of the current robot is commanded to be."""
         self._simulator.advance(self.clock.now_ns())
         return frame_of(self._simulator.machine.arm.flange())
 
     def tip(self) -> Frame:
-        """Return where the tip of the tool in force is commanded to be."""
+        """Return where the tip of the selected tool is commanded to be."""
         self._simulator.advance(self.clock.now_ns())
         return frame_of(self._simulator.machine.robot.tip())
 

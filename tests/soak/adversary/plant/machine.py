@@ -63,9 +63,9 @@ class MachineState:
 
     Attributes:
         tools: Every tool that is defined.
-        selected: The tool in force, 0 for none.
+        selected: The selected tool, 0 for none.
         settings: Power and speeds that a procedure has to leave as they were, where it has any.
-        robot: The robot in force, where a controller has several.
+        robot: The current robot, where a controller has several.
     """
 
     tools: Mapping[int, ToolOffset]
@@ -105,7 +105,7 @@ class PlantMachine(ABC):
         numbered: Whether its commands have numbers, so that one that comes twice counts once.
         touched: Tools that somebody past this computer has written since the last look.
         by_hand: What they wrote last, by tool.
-        moved_itself: Whether the tool in force was changed past this computer since then.
+        moved_itself: Whether the selected tool was changed past this computer since then.
         acts: What is planned to happen past the wire, counted by requests.
         values: Values that its own program was given since the last look.
         settings_reset: Whether the machine has put power and speeds to its own since then.
@@ -217,7 +217,7 @@ class PlantMachine(ABC):
         return None
 
     def tip(self) -> Frame | None:
-        """Return where the tip of the tool in force is, ``None`` where robolink moves nothing."""
+        """Return where the tip of the selected tool is, ``None`` where robolink moves nothing."""
         return None
 
     @property

@@ -188,7 +188,7 @@ class SoftMotionPlant(PlantWithWorld):
         return MachineState(tools, plc.tools.selected)
 
     def mistook(self, asked: ToolOffset, held: ToolOffset) -> bool:
-        """Tell whether it read an offset in an order of words that a fault let it take on."""
+        """Return whether it read an offset in an order of words that a fault let it take on."""
         pairs = list(zip(asked.components(), held.components(), strict=True))
         return any(all(b in _readings(a, order) for a, b in pairs) for order in self._laid)
 

@@ -211,7 +211,7 @@ class ContractRules:
     # After every event.
 
     def leaving(self, process: VirtualProcess, sent: SentRequest) -> None:
-        """Check a request that is about to leave: a movement is for the tool in force."""
+        """Check a request that is about to leave: a movement is for the selected tool."""
         self.passed()
         self.stops.leaving(process, sent)
         if self._previews:

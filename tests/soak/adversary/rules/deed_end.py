@@ -33,7 +33,7 @@ _OUT_OF_REACH: Final = (
     LeaseLostError,
     ConfigError,
 )
-"""After these nothing can be put back: the link is gone, or the right to write, or the record."""
+"""After these nothing can be restored: the link is gone, or the right to write, or the record."""
 
 _TRIED: Final = {"rolled back", "not applied", "conflict", "unknown"}
 """What the journal says of a tool that was, or could not be, put back."""
@@ -81,7 +81,7 @@ class EndRules:
             )
 
     def _unsent(self, marker: BookedMarker) -> bool:
-        """Tell whether nothing has left under a marker.
+        """Return whether nothing has left under a marker.
 
         Where its sync failed it counted as not stored, and the disk may have it nevertheless.
         """
@@ -286,7 +286,7 @@ class RestRules:
             self._on.staged |= self._on.plant.staged()
 
     def _came_from_a_lost_write(self, tool: int, holds: ToolOffset | None) -> bool:
-        """Tell whether a request brought into force what nobody could know to wait for one.
+        """Return whether a request brought into force what nobody could know to wait for one.
 
         A write had ended between its registers and its request, and the disk lost the record of
         it. A person has to have been told, where the record could show it.
@@ -354,7 +354,7 @@ class RestRules:
         )
 
     def _proved(self, tool: int, holds: ToolOffset | None) -> bool:
-        """Tell whether a new value rests on a proof, or on a person's word."""
+        """Return whether a new value rests on a proof, or on a person's word."""
         typed = (*self._on.now.wish.asked, *self._on.now.typed_by_others)
         if any(n == tool and self._on.plant.same(offset, holds) for n, offset in typed):
             return True

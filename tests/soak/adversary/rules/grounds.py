@@ -124,7 +124,7 @@ class Grounds:
         self.doubted: set[int] = set()
 
     def from_a_lost_write(self, tool: int, holds: ToolOffset | None) -> bool:
-        """Tell whether a value is one that nobody could know to wait for a request."""
+        """Return whether a value is one that nobody could know to wait for a request."""
         staged = self.staged.get(tool)
         return staged is not None and self.plant.same(staged, holds)
 

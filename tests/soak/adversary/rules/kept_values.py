@@ -76,7 +76,7 @@ class AskedRules:
     def _mistaken(
         self, tool: int, asked: Sequence[ToolOffset | None], holds: ToolOffset | None
     ) -> bool:
-        """Tell whether the machine took an offset for another one, and the record is open."""
+        """Return whether the machine took an offset for another one, and the record is open."""
         books = self._on.books
         told = not books.trusted or any(
             m.details.get("tool") == tool or str(tool) in m.details.get("tools", {})

@@ -139,7 +139,7 @@ class WireRules:
         )
 
     def _puts_back(self, sent: SentRequest, markers: Sequence[BookedMarker]) -> bool:
-        """Tell whether the write that is marked brings back what was there before."""
+        """Return whether the write that is marked brings back what was there before."""
         if not self._on.books.trusted:
             return True
         tool = sent.tool or 0

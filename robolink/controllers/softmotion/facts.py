@@ -242,7 +242,9 @@ def _slots(mailbox: Mailbox) -> MailboxFinding:
             tr("tool slots"),
             tr("these cannot be used: {slots}", slots=", ".join(map(str, broken))),
             right=False,
-            remedy=tr("Compare the PLC's register map and its checksum (docs/reference/mailbox.md)."),
+            remedy=tr(
+                "Compare the PLC's register map and its checksum (docs/reference/mailbox.md)."
+            ),
         )
     return MailboxFinding(
         tr("tool slots"),

@@ -65,7 +65,7 @@ def test_what_was_typed_before_a_question_or_during_a_jog_answers_nothing(start,
     assert arm.flange().x_mm - before.x_mm == pytest.approx(0.5, abs=0.2)
     terminal.press(b"x0.1\n")
     terminal.wait_for(
-        "is not a step. A step is .*: axis, sign, number, with a point. Axes are x, y, z"
+        "is not a step. A step is .*: axis, sign, number, with a point. Nothing moved"
     )
     terminal.press(b"\n")
     terminal.wait_for("ENTER alone does nothing")

@@ -295,7 +295,7 @@ def test_any_proved_value_comes_back_by_its_number(run, simulator, changed):
     assert run("tool", "set", "1", "--x", "13", "--yes")[0] == 0
     code, out, _ = run("undo", "--to", str(number), "--yes")
     assert (code, tool_1(simulator)) == (0, NEW)
-    assert f"what entry {number} of" in out
+    assert f"confirmed by entry {number} of" in out
 
 
 def test_a_dry_run_shows_the_table_and_the_requests_and_sends_none(run, simulator, changed):

@@ -222,7 +222,7 @@ def test_what_was_left_unfinished_is_said_on_connecting(command, capsys, monkeyp
     }
     shown = capsys.readouterr()
     assert shown.out == ""
-    for text in ("Tool 0 is selected now", "puts tool 3 back", f'robolink -c "{URL}" recover'):
+    for text in ("Tool 0 is selected now", "restores tool 3", f'robolink -c "{URL}" recover'):
         assert text in shown.err
     assert "TLSet 3, XY(1,2,3,0)" in shown.err
     assert "robot stays blocked" in shown.err

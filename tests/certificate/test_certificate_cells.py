@@ -616,7 +616,7 @@ def test_every_method_turns_once_more_from_where_its_turn_test_has_ended(course)
     at = AtTerminal(course.name, lambda _cell: None, lambda _cell: None, {}, 0.0)
     surface = course.method in ("plane-touch", "sphere-touch", "z-touch")
     slip = slips(0.0, 0.0, 0.4) if surface else slips(0.4, -0.1)
-    answers = Answers("once more", "once more")
+    answers = Answers(" more ", " more ")  # one more touch, once more with the camera
     ended = at_a_terminal(at, answers, at_write=slip, drift_mm=1.0)
     assert ended.taken_back
     assert ended.proof is not None

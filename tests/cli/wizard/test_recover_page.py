@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import threading
+import time
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -82,6 +83,10 @@ def killed_in_its_proof(simulator, words):
         simulator.on_request = None
     assert held.is_set(), said
     assert process.returncode == -signal.SIGKILL
+    end_s = time.monotonic() + 60
+    while simulator.status_flags().running:  # the controller ends the movement by itself
+        assert time.monotonic() < end_s
+        time.sleep(0.01)
 
 
 def chosen_and_tested(hand):

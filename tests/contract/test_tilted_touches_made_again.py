@@ -30,8 +30,10 @@ pytestmark = pytest.mark.simulator_only
 
 ON_A_SURFACE = TouchPlan(lift_mm=15.0)
 TILTS = informative_tilts(4, 20.0)
+# Of nine touches of a plane the ninth alone tells so much that the fit follows it: a slip there
+# leaves no residual, and another one seems to fit worst (docs/reference/touches.md).
 SOURCES: dict[str, tuple[Any, WorldParameters, int]] = {
-    "plane-touch": (PlaneTouchSource(ON_A_SURFACE, PlaneSurvey(9), axes=5), LEANING, 9),
+    "plane-touch": (PlaneTouchSource(ON_A_SURFACE, PlaneSurvey(9), axes=5), LEANING, 8),
     "sphere-touch": (
         SphereTouchSource(ON_A_SURFACE, SphereSurvey(10.0, 11), axes=5),
         WorldParameters(person_touches="sphere"),

@@ -4,12 +4,13 @@ Source: docs/reference/rules.md 2.
 
 Read; equal to what is wanted: nothing is written, because a write wears the controller's
 memory; not what was expected, or farther than the cell allows: nothing is written either; else a
-durable intent, one write, and a read-back of all six components. What became of it goes on record
-together with the end of the intent.
+durable intent, one write, and a read-back of all six components, again where it differs. What
+became of it goes on record together with the end of the intent.
 """
 
 from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping
+from typing import Final
 
 from robolink.controllers.driver_link import DriverLink, MarkedCommand
 from robolink.errors import ReadBackError
@@ -29,6 +30,9 @@ from robolink.model import (
 )
 
 Same = Callable[[ToolOffset | None, ToolOffset | None], bool]
+
+_MORE_READINGS: Final = 2
+"""After a first one that is neither the written value nor, in doubt, the old one."""
 
 
 class ToolWrite(MarkedCommand[ToolOffset | None]):
@@ -142,8 +146,21 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
         return details
 
     def read(self) -> ToolOffset | None:
-        """Read what it changes."""
-        return self.read_back() if self.acknowledged else self.read_doubted()
+        """Read what it changes; a value that it cannot have left counts when it is read twice.
+
+        Two characters that change places on a serial line leave the sum over the answer as it is.
+        """
+        read = self.read_back if self.acknowledged else self.read_doubted
+        found = read()
+        for _ in range(_MORE_READINGS):
+            if self._same(found, self.requested):
+                break
+            if not self.acknowledged and self._same(found, self.before):
+                break
+            last, found = found, read()
+            if self._same(found, last):
+                break
+        return found
 
     def entries(self, marker: Marker, found: ToolOffset | None) -> Iterator[NewEntry]:
         """Return what is recorded together with the end of the marker."""

@@ -53,12 +53,16 @@ FROZEN_PROGRAM = drawn_history(919892947, 20).without_hours(
     [hour for hour in range(20) if hour not in (1, 2, 4)]
 )
 """A hand cannot select a tool while the PLC's program stands still."""
+SWAPPED = drawn_history(966517133, 20).without_hours(
+    [hour for hour in range(20) if hour not in (4, 5)]
+)
+"""Two characters of a read-back changed places, and the disk kept what they said."""
 
 
 @pytest.mark.soak
 @pytest.mark.parametrize(
     "history",
-    [*HISTORIES, HALF_A_FILE, LOST_RECORD, NO_HEAD, FROZEN_PROGRAM],
+    [*HISTORIES, HALF_A_FILE, LOST_RECORD, NO_HEAD, FROZEN_PROGRAM, SWAPPED],
     ids=lambda history: str(history.seed),
 )
 def test_every_rule_holds_in_what_broke_one(history):

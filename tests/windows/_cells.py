@@ -16,7 +16,7 @@ RECIPE: Final = ROOT / "examples" / "recipes" / "scara-pin.toml"
 CELL: Final = """
 [cells.line3]
 url = "{url}"
-remote_timeout_s = 60
+remote_timeout_s = 600
 remote_timeout_confirmed_by = "the test: it is a simulator"
 """
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
+from robolink_simulators.epson.options import EpsonOptions
 
 from tests.windows._cells import Opener, cell_for_windows
 from tests.windows._windows_python import WindowsPython, made, suite_beside
@@ -24,8 +25,12 @@ def suite(windows: WindowsPython) -> Path:
 
 @pytest.fixture
 def simulator() -> EpsonSimulator:
-    """A simulated controller of this machine."""
-    return EpsonSimulator(seed=7)
+    """A simulated controller of this machine.
+
+    Its patience is that of the cell file. wine keeps the socket of a killed process for longer
+    than the 60 s that controllers come with, and Windows closes it at once.
+    """
+    return EpsonSimulator(seed=7, options=EpsonOptions(remote_timeout_s=600))
 
 
 @pytest.fixture

@@ -120,8 +120,7 @@ def once_it_is_silent(windows, state, folder, *words):
     """Run a command; again while it says that another process is at work, or logged in.
 
     Nothing on Windows proves that a process has ended but its silence of 10 s, and the controller,
-    which takes one client, hears of the end of the killed one when wine closes its socket, or after
-    the 60 s of silence that end a session.
+    which takes one client, hears of the end of the killed one when wine closes its socket.
     """
     end_s = time.monotonic() + 180
     told = at_cell(windows, state, folder, *words)

@@ -85,10 +85,10 @@ class MappedInputs(DriverPart):
 
 _FAR_MM: Final = 100_000.0
 _FAR_DEG: Final = 36_000.0
+"""Largest plausible distance, in mm, and turn, in degrees, of a head."""
 
 _IN_PROCESS: Final = "sim"
-"""The medium of a simulator of this process, with which its tools end."""
-"""No head stands farther away or is turned more often."""
+"""Medium of a simulator in this process; its tools are lost when the process ends."""
 
 
 class FlangeReader(MotionGroupCore):

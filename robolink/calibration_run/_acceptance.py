@@ -321,7 +321,7 @@ def _how_measured(key: str, *, station: str, kind: StationKind | None, tool: int
     """Return how to measure a default row, one sentence."""
     if key not in ACCURACY_ROWS:
         return tr("State the scatter of one touch, or make six touches or more.")
-    from robolink.accuracy import measuring_step  # not needed for a look
+    from robolink.accuracy import measuring_step  # imported only when used
 
     return measuring_step(key, station=station, kind=kind, tool=tool)
 

@@ -19,11 +19,10 @@ Line = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f
 """One line for people. No control characters: they would reach a terminal."""
 
 Note = Annotated[str, Field(max_length=5000, pattern=r"^[^\x00-\x08\x0b-\x1f\x7f-\x9f]*$")]
-"""Lines for people."""
+"""Text for people, of several lines."""
 
 Length = Annotated[float, Field(ge=0.001)]
-"""No limit is finer than the last digit that a controller prints, mm
-(docs/reference/rules.md 3)."""
+"""Smallest limit: the last digit that a controller prints, in mm (docs/reference/rules.md 3)."""
 
 Angle = Annotated[float, Field(ge=-360, le=360)]
 ToolNumber = Annotated[int, Field(ge=1, le=15)]
@@ -252,7 +251,8 @@ class Output(Table):
 
 
 _DESCRIBED = ConfigDict(use_attribute_docstrings=False)
-"""Their keys bring their sentences: pydantic need not look through every module for a source."""
+"""Configuration of tables whose keys have their own descriptions: pydantic need not read the source
+of every module."""
 
 
 class MethodTable(Table):

@@ -97,8 +97,8 @@ class CanopenMailboxLink:
     """
 
     whole_look_s: Final = 0.0
-    """Zero, because a whole look is short: a bus carries the block in about 60 ms at 125 kbit/s, in 8 ms
-    at 1 Mbit/s."""
+    """Zero, because a whole look is short: a bus carries the block in about 60 ms at 125 kbit/s, in
+    8 ms at 1 Mbit/s."""
 
     def __init__(
         self,

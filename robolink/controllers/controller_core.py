@@ -32,7 +32,7 @@ from robolink.model import (
     VariableTable,
 )
 
-if TYPE_CHECKING:  # to pyright a cached_property is no property, and its owner no Controller
+if TYPE_CHECKING:  # pyright does not accept a cached_property as a property of Controller
     from builtins import property as cached_property
 else:
     from functools import cached_property

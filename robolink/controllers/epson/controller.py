@@ -55,7 +55,7 @@ from robolink.protocols.spel import Statement
 from robolink.stop_latch import CommandClass
 from robolink.transport import LinkUrl
 
-if TYPE_CHECKING:  # to pyright a cached_property is no property, and its owner no Controller
+if TYPE_CHECKING:  # pyright does not accept a cached_property as a property of Controller
     from builtins import property as cached_property
 else:
     from functools import cached_property

@@ -36,7 +36,7 @@ from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.timing import Clock
 from robolink.transport import LinkUrl, open_modbus
 
-if TYPE_CHECKING:  # to pyright a cached_property is no property, and its owner no Controller
+if TYPE_CHECKING:  # pyright does not accept a cached_property as a property of Controller
     from builtins import property as cached_property
 else:
     from functools import cached_property

@@ -22,19 +22,20 @@ class Checkpoint(StrEnum):
     """The kind of point that a thread passes."""
 
     LOCK = "lock"
-    """Before it takes the lock of an exchange; it may wait there for another thread."""
+    """Before taking the lock of an exchange; the thread may wait there for another one."""
 
     HELD = "held"
-    """It has that lock: whoever else wants it waits. What is decided here cannot be overtaken."""
+    """The thread has that lock, and others wait for it. A decision made here cannot be overtaken.
+    """
 
     EXCHANGE = "exchange"
-    """An exchange is over and its lock is free again."""
+    """An exchange has ended and its lock is free again."""
 
     PROCEDURE = "procedure"
     """Before an operation of several exchanges begins."""
 
     COMMIT = "commit"
-    """Before, and after, something is stored durably."""
+    """Before, and after, storing something durably."""
 
     QUESTION = "question"
     """A person's answer, or its absence, has just been fetched."""

@@ -152,7 +152,7 @@ class ControllerOutcome:
 
 
 UNTOUCHED = ControllerOutcome()
-"""Nothing was sent that changes or moves anything."""
+"""The outcome if nothing was sent that changes or moves anything."""
 
 
 def outcome_after(error: BaseException) -> ControllerOutcome:

@@ -15,7 +15,7 @@ from importlib import import_module
 from typing import Final, ParamSpec, TypeVar, cast
 
 GONE_IN: Final = "0.2.0"
-"""The version without the names that this one still knows; a test reminds whoever makes it."""
+"""Version in which the old names of this version are gone; a test reminds whoever releases it."""
 
 OLD_NAMES: Final[Mapping[str, Mapping[str, str]]] = {
     "robolink.ambient": {
@@ -153,10 +153,10 @@ OLD_NAMES: Final[Mapping[str, Mapping[str, str]]] = {
         "PlcFaultAction": "robolink_simulators.faults.PlcFaultAction",
     },
 }
-"""By package: the old name, and what it is now."""
+"""Old names and their present ones, by package."""
 
 _GATE: Final = "robolink.lazy_exports"
-"""Whose calls lie between this module and whoever asks."""
+"""Module whose frames lie between this module and the caller."""
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -179,7 +179,7 @@ def under_old_name(package: str, name: str) -> object:
     if new is None:
         raise AttributeError(f"module {package!r} has no attribute {name!r}")
     home, _, now = new.rpartition(".")
-    # "from package import name" has the import system look first, then asks again by itself.
+    # On "from package import name" the import system looks the name up first, then asks again.
     depth, asking = 1, sys._getframe(1)  # noqa: SLF001 - as ``warnings`` finds whose line it is
     while asking.f_back is not None and asking.f_globals.get("__name__") == _GATE:
         depth, asking = depth + 1, asking.f_back

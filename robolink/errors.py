@@ -95,7 +95,7 @@ __all__ = [
     "VerifyError",
 ]
 
-if TYPE_CHECKING:  # what no command needs before something stands on a controller
+if TYPE_CHECKING:  # not needed until something was sent to a controller
     from robolink.controller_outcome import ControllerOutcome
 
 

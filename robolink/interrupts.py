@@ -51,10 +51,10 @@ class EndedBy(StrEnum):
     CTRL_C = "SIGINT"
     TERMINATED = "SIGTERM"
     HUNG_UP = "SIGHUP"
-    """The window was closed, or the line to it is gone."""
+    """The window was closed, or the connection to it was lost."""
 
     OUTPUT_CLOSED = "SIGPIPE"
-    """Nobody reads what is shown any more; it arrives as a failed write, not as a signal."""
+    """Nobody reads the output any more; this arrives as a failed write, not as a signal."""
 
 
 class Interrupted(KeyboardInterrupt):
@@ -70,7 +70,7 @@ class Interrupted(KeyboardInterrupt):
 
 
 _PATIENCE_S: Final = 60.0
-"""Cleaning up is bounded by deadlines well below this; after it, one more Ctrl-C is heard."""
+"""Time after which another Ctrl-C takes effect; cleaning up has much shorter deadlines."""
 
 
 def _known(*names: str) -> dict[int, EndedBy]:
@@ -123,7 +123,7 @@ class _Handler:
             if current is _usual(number):
                 signal.signal(number, self._came)
             elif current != self._came:
-                continue  # the program has a handler of its own, or ignores it
+                continue  # the program handles the signal itself, or ignores it
             self._watchers[number] = self._watchers.get(number, 0) + 1
             taken.append(number)
         return taken
@@ -169,7 +169,7 @@ class _Handler:
         else:
             raise Interrupted(by)
 
-    def _came(self, number: int, frame: FrameType | None) -> None:  # noqa: ARG002 - signal's form
+    def _came(self, number: int, frame: FrameType | None) -> None:  # noqa: ARG002 - signature of a signal handler
         self.arrived(EndedBy.HUNG_UP if self.closed else _OF_A_COMMAND[number])
 
     def heard_here(self) -> bool:
@@ -204,7 +204,7 @@ def heard_by_this_thread() -> Iterator[None]:
         yield
     finally:
         _handler.worker = None
-        # It was meant for the work, and that has ended.
+        # The interrupt was meant for this work, which has ended.
         _handler.held = None
 
 
@@ -226,7 +226,7 @@ def heed_while_waiting() -> None:
     """
     heed()
     if _handler.heard_here() and _handler.held is not None:
-        raise KeyboardInterrupt  # the gate raises what was held back at its end
+        raise KeyboardInterrupt  # at its end, the gate raises the interrupt that was held back
 
 
 def end(by: EndedBy) -> None:

@@ -35,7 +35,7 @@ def lazy_exports(
                 return otherwise(name)
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
         value = getattr(import_module(f"{package}.{home[name]}"), name)
-        setattr(sys.modules[package], name, value)  # the next use finds it at once
+        setattr(sys.modules[package], name, value)  # the next use finds the name at once
         return value
 
     def listed() -> list[str]:

@@ -100,10 +100,10 @@ def in_english(text: str) -> str:
 
 
 _MOST: Final = 100
-"""Characters of a list of names that is shown whole."""
+"""Largest number of characters of a list of names that is shown whole."""
 
 _SHOWN: Final = 50
-"""Characters of a longer one that are shown: a list of 200 names is no answer."""
+"""Number of characters shown of a longer list: 200 names help nobody."""
 
 
 def known_names(names: Iterable[object], typed: object = "") -> str:
@@ -120,7 +120,7 @@ def known_names(names: Iterable[object], typed: object = "") -> str:
         >>> known_names([f"option_{n}" for n in range(200)], "opton_17")
         'Did you mean option_17, option_197?'
     """
-    from difflib import get_close_matches  # here, because a stop needs none
+    from difflib import get_close_matches  # imported here, because a stop does not need it
 
     texts = [str(name) for name in names]
     if not texts:
@@ -141,7 +141,7 @@ def known_names(names: Iterable[object], typed: object = "") -> str:
 def plain(value: object) -> object:
     """Return plain values, mappings and lists, with every sentence in them in English."""
     kind = type(value)
-    if kind in _AS_THEY_ARE:  # most of a record, and far quicker than what follows
+    if kind in _AS_THEY_ARE:  # most values of a record, and far faster than the rest
         return value
     match value:
         case str():
@@ -151,7 +151,7 @@ def plain(value: object) -> object:
                 key: one if type(one) in _AS_THEY_ARE else plain(one) for key, one in value.items()
             }
         case list() | tuple():
-            if kind not in (list, tuple):  # a class of one's own, such as a named tuple
+            if kind not in (list, tuple):  # a class of its own, such as a named tuple
                 return value
             return kind([one if type(one) in _AS_THEY_ARE else plain(one) for one in value])
         case _:
@@ -159,14 +159,14 @@ def plain(value: object) -> object:
 
 
 _AS_THEY_ARE: Final = frozenset({str, float, int, bool, type(None)})
-"""Types of values that no language changes; a sentence is a type of its own."""
+"""Types of values that do not depend on the language; a sentence has its own type."""
 
 
 def _translated(
     translate: Callable[[str], str], sentence: str, values: Mapping[str, object]
 ) -> str:
     if not sentence:
-        return ""  # the name under which gettext keeps the head of a catalogue
+        return ""  # the name under which gettext keeps the header of a catalogue
     text = translate(sentence)
     if not values:
         return text if text == sentence else Translated(text, sentence)
@@ -174,5 +174,5 @@ def _translated(
     try:
         filled = text.format(**values)
     except (LookupError, ValueError, AttributeError, TypeError):
-        return english  # a faulty translation keeps nobody from what has to be said
+        return english  # a faulty translation must not hide the message
     return filled if filled == english else Translated(filled, english)

@@ -22,14 +22,14 @@ if TYPE_CHECKING:
 ROOT: Final = "robolink"
 
 Way = Literal["sent", "received", ""]
-"""Which way something went; empty for a decision."""
+"""Direction of a message; empty for a decision."""
 
 _DEBUG: Final = 10
 _INFO: Final = 20
 _WARNING: Final = 30
 
 _told: set[str] = set()
-"""What was said on standard error already."""
+"""Sentences already written to standard error."""
 
 
 class PackageLog:
@@ -98,10 +98,10 @@ class PackageLog:
     def _found(self) -> "Logger | None":
         logging = sys.modules.get("logging")
         if logging is None or (make := getattr(logging, "getLogger", None)) is None:
-            return None  # nobody listens, or another thread is importing it just now
+            return None  # no listener, or another thread is importing logging just now
         root: Logger = make(ROOT)
         if not any(isinstance(one, logging.NullHandler) for one in root.handlers):
-            root.addHandler(logging.NullHandler())  # else warnings go to standard error
+            root.addHandler(logging.NullHandler())  # otherwise warnings go to standard error
         found: Logger = make(self._package)
         self._logger = found
         return found
@@ -116,5 +116,5 @@ def complain(sentence: str) -> None:
     if sentence in _told or sys.stderr is None:
         return
     _told.add(sentence)
-    with suppress(Exception):  # a console that is gone, or cannot write it
+    with suppress(Exception):  # the console may be gone, or unable to write the text
         sys.stderr.write(f"{sentence}\n")

@@ -30,19 +30,19 @@ def find_plug_in(group: str, name: str) -> object | None:
         PlugInError: It cannot be loaded, or several packages bring one: nobody may guess which
             of them drives a machine.
     """
-    from importlib import metadata  # costs more than all that need it
+    from importlib import metadata  # slow to import, so only when used
 
     found = tuple(metadata.entry_points(group=group, name=name))
     if not found:
         return None
-    # One that is installed twice (an editable copy beside a wheel) leads to the same place.
+    # A package installed twice (an editable copy beside a wheel) gives the same entry point.
     if len(found) > 1 and len({entry.value for entry in found}) > 1:
         raise PlugInError(tr("several packages provide it"))
     try:
         return found[0].load()  # type: ignore[no-any-return]
     except (ImportError, AttributeError) as error:
         raise PlugInError(str(error)) from error
-    except Exception as error:  # its module runs when it is loaded, and may do anything
+    except Exception as error:  # loading runs the plug-in's module, which may raise anything
         raise PlugInError(f"{type(error).__name__}: {error}") from error
 
 

@@ -171,7 +171,7 @@ _present = SystemRuntime()
 @contextmanager
 def replaced(ambience: SystemRuntime) -> Iterator[None]:
     """Replace the real surroundings by ``ambience``, in every thread, within the block."""
-    global _present  # noqa: PLW0603 - a process has one world around it
+    global _present  # noqa: PLW0603 - a process has one environment
     before, _present = _present, ambience
     try:
         yield

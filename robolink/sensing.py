@@ -128,10 +128,10 @@ def scatter_of(spots: Sequence[Spot]) -> float | None:
 
 
 def _seen(sensor: TipSensor, mark: int) -> Sequence[Spot]:
-    # Whatever a camera's driver raises: it must neither leave the tip down before the lens, nor be
-    # taken for a failure of the controller's link.
-    # But a stop, and what nobody knows to have happened, stay what they are: a camera that is asked
-    # through the controller can meet both.
+    # Covers anything that a camera's driver raises: an error must neither leave the tip down in
+    # front of the lens, nor be mistaken for a failure of the controller's link. A stop and an
+    # unknown outcome keep their own types, because a camera that is read through the controller can
+    # raise both.
     try:
         return sensor.see(mark)
     except (StoppedError, OutcomeUnknownError):
@@ -145,7 +145,7 @@ def _seen(sensor: TipSensor, mark: int) -> Sequence[Spot]:
 
 
 def _require_finite(spot: Spot, sensor: TipSensor) -> None:
-    # Before anything is calculated from it: the next movement would be.
+    # Checked before any calculation: the next movement would depend on it.
     finite = math.isfinite(spot.x) and math.isfinite(spot.y)
     radius_px = spot.radius_px
     if finite and (radius_px is None or (math.isfinite(radius_px) and radius_px > 0)):
@@ -216,7 +216,7 @@ PROGRAM: Final = 7
 """Number of the function main7; every version of RC+ can start it (docs/reference/epson.md 1.2)."""
 
 SETTLE_S: Final = 0.2
-"""How long the robot stands still before a look (assumed)."""
+"""Time that the robot is stopped before a look, in s (assumed)."""
 
 _HIGHEST_PROGRAM: Final = 63
 
@@ -372,7 +372,7 @@ def _opener(url: str) -> SensorOpener:
             remedy=tr("Reinstall the package that provides it."),
         ) from error.origin
     if found is None:
-        from importlib import metadata  # costs more than the rest of this package
+        from importlib import metadata  # slower to import than the rest of this package
 
         known = sorted({*metadata.entry_points(group=SENSORS_GROUP).names, VISION_GUIDE})
         raise CalibrationError(

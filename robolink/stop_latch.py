@@ -43,22 +43,22 @@ class CommandClass(Enum):
     """What a request does to the machine."""
 
     LOOK = auto()
-    """It reads, logs in or out, or shows that this side is alive."""
+    """The command reads, logs in or out, or shows that this side is alive."""
 
     CALM = auto()
-    """It stops, ends or switches off."""
+    """The command stops, ends or switches off something."""
 
     RESET = auto()
-    """It clears an error, or releases the hold of a stop."""
+    """The command clears an error, or ends the hold of a stop."""
 
     RESTORE = auto()
-    """It selects a tool, or sets power or speed."""
+    """The command selects a tool, or sets power or speed."""
 
     WRITE = auto()
-    """It writes or clears a tool."""
+    """The command writes or clears a tool."""
 
     ACT = auto()
-    """Anything else: it moves, starts a program, switches motors or an output on."""
+    """Any other command: it moves, starts a program, or switches motors or an output on."""
 
 
 class StopLatch:
@@ -265,10 +265,11 @@ class StopLatch:
 
 
 LONGEST_WAIT_S: Final = 86_400.0
-"""Longest wait for a turn: a day."""
+"""Longest wait for a turn, in s: a day."""
 
 LOOK_S: Final = 0.1
-"""From one look to the next, while waiting, whether a stop or Ctrl-C came, or the way is free."""
+"""Interval, while waiting, between checks for a stop, for Ctrl-C, and for the end of the wait, in
+s."""
 
 T = TypeVar("T")
 

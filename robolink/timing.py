@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 NS_PER_S = 1_000_000_000
 
 FASTEST_ANSWER_S = 0.3
-"""Shortest time in which a person reads and answers a question (docs/reference/evidence.md 1)."""
+"""Shortest time in which a person reads and answers a question, in s (docs/reference/evidence.md
+1)."""
 
 
 class Clock(Protocol):
@@ -122,7 +123,7 @@ def local_label(at: str) -> str:
         if local.tzinfo is None:
             return at
         local = local.astimezone()
-    except (ValueError, OverflowError, OSError):  # Windows knows no zone before 1970
+    except (ValueError, OverflowError, OSError):  # Windows knows no time zone before 1970
         return at
     minutes = (local.utcoffset() or timedelta()) // timedelta(minutes=1)
     hours, rest = divmod(abs(minutes), 60)

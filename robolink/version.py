@@ -3,4 +3,4 @@
 from typing import Final
 
 VERSION: Final = "0.1.0"
-"""The same as in ``pyproject.toml``; a test compares the two."""
+"""Same version as in ``pyproject.toml``; a test compares them."""

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 _NEWEST: Final = 500
-"""The newest entries of a kind that are read, at most this many."""
+"""Largest number of entries read of each kind, newest first."""
 
 
 class Recall(Protocol):
@@ -113,7 +113,7 @@ def facts_at(
     pooled = None if alike is None else pooled_look(record.calibrations, alike)
     sigma_mm = None
     if pooled is not None:
-        # One look of several inputs has the mean of them in each coordinate.
+        # The look is the mean of its inputs in each coordinate.
         sigma_mm = pooled[0] / math.sqrt(max(inputs_per_look / 2, 1.0))
     months = months_at(
         station,

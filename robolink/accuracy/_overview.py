@@ -119,7 +119,7 @@ def mm_per_px(station: Station) -> float | None:
         return None
     try:
         model = camera_station(station).model
-    except (TypeError, ValueError, IndexError):  # a record that is damaged says nothing
+    except (TypeError, ValueError, IndexError):  # a damaged record counts for nothing
         return None
     area = 0.0 if model is None else abs(model.determinant)
     return math.sqrt(area) if math.isfinite(area) and area > 0 else None

@@ -19,14 +19,14 @@ from robolink.stations import station_of as station_in
 from robolink.timing import local_label, wall_time
 
 PLACED_ANEW_MM: Final = 0.5
-"""A station found further than this from where it was has been put up anew, or run into."""
+"""A station that moved further than this, in mm, was remounted or hit by something."""
 
 _TURNED_ANEW_DEG: Final = 2.0
 _FOCUSED_ANEW_PERCENT: Final = 2.0
 
 _LAST_DIGIT_MM: Final = 0.001 / math.sqrt(12)
 _LAST_DIGIT: Final = 0.001
-"""No turn, degrees, and no scale, percent, is believed to scatter less."""
+"""Smallest standard deviation assumed for a turn, in degrees, or a scale, in percent."""
 
 _NEWEST: Final = 100
 
@@ -160,7 +160,7 @@ def _turns(seen: Sequence[CameraModel]) -> RowBound | None:
     turns: list[tuple[float]] = []
     for one in seen:
         turn = one.turn_deg
-        if turns:  # from the one before, so that 179.9 and -179.9 lie side by side
+        if turns:  # relative to the turn before, so that 179.9 and -179.9 count as neighbours
             turn = turns[-1][0] + math.remainder(turn - turns[-1][0], 360)
         turns.append((turn,))
     return scatter_of_repeats(turns, anew_from=_TURNED_ANEW_DEG, floor=_LAST_DIGIT)
@@ -217,7 +217,7 @@ def months_at(
 
 
 def _months_since(at: str) -> float | None:
-    # A label of a damaged record tells no age.
+    # A damaged time label gives no age.
     with suppress(ValueError):
         then = datetime.fromisoformat(at)
         age = wall_time() - (then if then.tzinfo else then.replace(tzinfo=UTC))

@@ -135,12 +135,12 @@ def _positive(value: object) -> float | None:
 
 
 LEAST_DOF: Final = 6
-"""Degrees of freedom from which the record shows the scatter of a look."""
+"""Smallest number of degrees of freedom from which the record gives the scatter of a look."""
 
 _NEWEST: Final = 200
 
 _LAST_DIGIT_MM: Final = 0.001 / math.sqrt(12)
-"""No look scatters less than the last digit that a controller prints."""
+"""Smallest standard deviation of a look, in mm: the rounding to the last digit printed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,7 +223,7 @@ def _by_contact(touches: object) -> bool:
 
 
 LEAST_RECORDS: Final = 5
-"""A row is learnt from at least this many records."""
+"""Smallest number of records from which a row is learnt."""
 
 _OUTSIDE: Final = 0.05
 """Probability that the bound is too low."""

@@ -81,7 +81,7 @@ def read_tools(controller: ToolHolder) -> ToolState:
     Raises:
         NotReadyError: The controller cannot be asked now, for example because a program runs.
     """
-    # A machine builder's own registers may hold fewer tools; the others are not there.
+    # A machine builder's registers may hold fewer tools; the others read as undefined.
     tools = {**dict.fromkeys(TOOLS), **controller.tools.read_all()}
     return ToolState(tools, controller.tools.selected())
 
@@ -144,7 +144,7 @@ class ComponentComparison:
     @property
     def equal(self) -> bool:
         """Whether the difference is allowed."""
-        # A bound that is not a binary fraction must still include itself.
+        # Without the factor, rounding would exclude a difference equal to a bound such as 0.1.
         return abs(self.delta) <= self.tolerance * (1 + 1e-9)
 
 

@@ -318,7 +318,7 @@ def keep_first_backup(
     if any(one.exists() for one in paths):
         return None
     backup = take_backup(controller)
-    # Before it is there: a backup that is not on record is a sign that the record was lost.
+    # Recorded before the file exists: a backup without an entry shows that the record was lost.
     verdict = tr("saved in {path}", path=path)
     controller.outcomes.append(NewEntry(EntryKind.BACKUP, verdict=verdict))
     try:

@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 
 LEAST_ANGLE_DEG = 20.0
-"""Beams that cross at less than this determine one direction badly."""
+"""Smallest angle between two beams; below it, one direction is poorly determined."""
 
 LEAST_LENGTH_MM = 5.0
 
@@ -206,7 +206,7 @@ def check_crossings(crossings: Sequence[Crossing], *, minimum: int) -> tuple[str
                 remedy=tr("Cross each beam {minimum} times or more.", minimum=minimum),
             )
     poses = [pose for crossing in crossings for pose in (crossing.entry, crossing.exit)]
-    # A proof lets a tip cross that the controller already knows.
+    # A turn test may let a known tip, already stored in the controller, cross the beams.
     doubts = check_poses(poses, allow_mixed_hand=False, of_one_tip=True)
     for crossing in crossings:
         angles = zip(crossing.exit.coordinates()[3:], crossing.entry.coordinates()[3:], strict=True)
@@ -305,9 +305,9 @@ def _tip_at(crossing: Crossing, tip_mm: tuple[float, float]) -> tuple[float, flo
 ResultT = TypeVar("ResultT", bound="CalibrationResult")
 
 UNKNOWN_LENGTH_MM: Final = 0.6
-"""By so much the next needle may be longer or shorter than the one before where nobody measured its
-Z: as much as its tip is found elsewhere sideways. A needle that leans by a degree has its end
-0.01 mm elsewhere then."""
+"""Largest difference in length assumed between two needles if nobody measured Z: equal to the usual
+sideways difference of two tips. The end of a needle that leans by a degree then shifts by 0.01 mm.
+"""
 
 _SIGNIFICANT: Final = 0.99
 
@@ -417,7 +417,8 @@ def with_unknown_length(result: ResultT, lean: Lean, sigma_mm: float | None) -> 
         result,
         covariance=tuple(map(tuple, rows)),
         half_width95=tuple(halves),
-        # One direction only, and at most: the ellipse need not point the same way.
+        # An upper bound: the error acts in one direction, which need not be the ellipse's long
+        # axis.
         region95_radius_mm=None if region_mm is None else math.hypot(region_mm, NORMAL_95 * both),
         budget=None if result.budget is None else result.budget.with_row(row),
     )

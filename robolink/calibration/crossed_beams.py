@@ -218,7 +218,7 @@ def solve_crossed_beams(
         moved_mm=tuple(fit.x[system.moved].tolist()),
         step_mm=step_mm,
     )
-    # The crossings of the shaft have unknowns of their own and check nobody.
+    # The crossings of the shaft add unknowns used only by them, so they check no other crossing.
     own = system.width - system.lean.start if shaft else 0
     result = judged(
         result,
@@ -303,7 +303,7 @@ def crossing_sigma_gain(
     """
     two_ways = _two_ways(crossings, beams)
     system = _System.of(crossings, beams, two_ways, moved=beams_may_have_moved, shaft=shaft)
-    # Height 0 will do: the gain depends on no right side.
+    # Any height gives the same gain, because the gain does not depend on the right-hand side.
     a, b, _ = system.equations(TipHeight(0.0))
     return _gain(linear_fit(a, b))
 

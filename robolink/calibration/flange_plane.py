@@ -26,7 +26,7 @@ from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 
 LARGEST_LEAN_DEG = 10.0
-"""Beyond this an error of the tip's height reaches X and Y by more than a sixth."""
+"""Largest lean; above it, more than a sixth of an error in the tip's height reaches X and Y."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -276,7 +276,7 @@ def with_height_error(
         halves[i] = (halves[i] ** 2 + (NORMAL_95 * error) ** 2) ** 0.5
     region_mm = result.region95_radius_mm
     if region_mm is not None:
-        # At most: the two ellipses need not point the same way.
+        # An upper bound: the two ellipses need not point the same way.
         region_mm = math.hypot(region_mm, _REGION * math.hypot(*errors))
     return replace(
         result,

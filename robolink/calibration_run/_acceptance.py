@@ -84,7 +84,7 @@ class AcceptanceCriteria:
         by_defaults = self.over_by_defaults(result) is not None
         for verdict in self._of_fit(result):
             if by_defaults and verdict.code == "large_interval":
-                continue  # a person may weigh it; whoever writes asks
+                continue  # a person may accept it; the writer asks
             if not verdict.passed:
                 raise CalibrationError(
                     verdict.code,
@@ -248,7 +248,7 @@ class AcceptanceCriteria:
         change, in_plane = proposal.change_mm, proposal.plane_change_mm
         if change is None or in_plane is None:
             return
-        # Z is often measured by another method, so only the plane has a history of its own.
+        # Z often comes from another method, so only the changes in the plane are compared.
         require_shrinking(in_plane, earlier_mm)
         if change > self.limit_mm:
             raise CalibrationError(
@@ -321,7 +321,7 @@ def _how_measured(key: str, *, station: str, kind: StationKind | None, tool: int
     """Return how to measure a default row, one sentence."""
     if key not in ACCURACY_ROWS:
         return tr("State the scatter of one touch, or make six touches or more.")
-    from robolink.accuracy import measuring_step  # what only looks does without
+    from robolink.accuracy import measuring_step  # imported only when used
 
     return measuring_step(key, station=station, kind=kind, tool=tool)
 

@@ -41,7 +41,7 @@ from robolink.runner import Ask, StepDone, TouchSubject
 from robolink.stations import AGREEING_MM, Station, StationKind, stations_on_record
 
 _UNKNOWN_SIGMA_MM: Final = 0.05
-"""Scatter of one touch by a person, where neither residuals nor anybody tells it."""
+"""Scatter of one touch by a person, in mm, if neither residuals nor a statement give it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +150,7 @@ def _chained(controller: Controller, plan: ToolPlan, proposal: Proposal) -> Prop
     origin = {**proposal.kept_record, "z_from": "measured" if stated else last.z_from}
     notes = proposal.notes
     if "z_mm" in proposal.result.changed:
-        # A difference is as right as what it was added to.
+        # A difference is only as accurate as the value to which it is added.
         kept = tr(
             "Only the change of Z is known: the old Z was kept or typed and never "
             "measured. The new length is only as accurate as the old value."
@@ -163,7 +163,7 @@ def _told(controller: Controller, plan: ToolPlan, proposal: Proposal) -> _Told:
     """Return what the heights show, or why they show nothing; empty if nobody needs them."""
     if proposal.before is None or proposal.z_from == "typed" or not tells_height(proposal.result):
         return _Told()
-    # A Z that was made from a stated height cannot be compared with it.
+    # A Z calculated from a stated height cannot be compared with that height.
     stated = None if proposal.z_from == "measured" else plan.stated_pin
     known = known_height(controller, plan.tool, plan.pin, stated)
     if known is not None and _moved(known, plan, proposal):
@@ -200,7 +200,7 @@ def change_against(
     Raises:
         CalibrationError: ``touch_heights_differ``, ``non_finite``.
     """
-    from robolink.calibration import length_change  # numpy, late
+    from robolink.calibration import length_change  # numpy, imported late
 
     return length_change(
         [known.place_mm[2]] * known.touches,
@@ -252,7 +252,7 @@ def _said(proposal: Proposal, why: str, *, attended: bool) -> Proposal:
         CalibrationError: ``length_not_observable``: its Z was measured on a pin that moved, and
             nobody is there to look at it.
     """
-    from robolink.calibration import length_not_observable  # numpy, late
+    from robolink.calibration import length_not_observable  # numpy, imported late
 
     result = proposal.result
     if proposal.z_from == "measured":
@@ -282,10 +282,11 @@ def _decided(
     told, known = found.change, found.known
     if told is None or known is None:
         return proposal
-    # A Z that the heights confirm, or that follows them, is as good as the one it goes back to.
+    # A Z that the heights confirm or change is as good as the Z of the earlier calibration.
     good = replace(proposal, kept_record={**proposal.kept_record, "z_from": known.z_from})
     if not told.changed:
-        # The height of then stays what is compared with: small changes would else add up unseen.
+        # Compare with the earlier height again next time: otherwise small changes would add up
+        # unseen.
         return replace(good, length=told, pin_z_mm=known.place_mm[2], pin_touches=known.touches)
     decision, by_recipe = plan.length, bool(context.controller.outcomes.signature.recipe)
     question = tr(

@@ -108,7 +108,7 @@ def with_sources(plan: ToolPlan, result: CalibrationResult) -> CalibrationResult
         sources.append(ErrorSource.of_lengths("touch_mm", count))
     if not needs.finds_pin:
         sources.append(ErrorSource.of_lengths("place_mm", count, turning="in_base"))
-    # Without an interval of its own nothing tells how it scatters, and nothing is made up.
+    # Without a confidence interval the scatter is unknown, and no sources are assumed.
     return replace(result, sources=tuple(sources)) if result.half_width95 else result
 
 
@@ -118,12 +118,11 @@ MOST_ANEW: Final = 5
 
 MOST_FURTHER: Final = 3
 """How often a person may return to the touches from one proposal: repeating them until they fit
-would prove nothing.
-"""
+would prove nothing."""
 
 
 _INSTRUMENT: Final = frozenset({"no_edge", "sensor_failed", "tip_not_seen", "fiducial_not_seen"})
-"""Codes of measurements that ended because a sensor or camera showed nothing."""
+"""Codes of measurements that ended because a sensor or camera detected nothing."""
 
 
 class Measuring:
@@ -155,7 +154,7 @@ class Measuring:
             try:
                 return self._attempt(plan, partial(plan.source.measure, self._context, plan.tool))
             except CalibrationError as error:
-                # A person who begins anew takes none of the attempts of the plan.
+                # A restart by a person does not count as one of the plan's attempts.
                 by_hand = error.code == AGAIN and anew > 0
                 self._listener.refused(plan.tool, error, again=by_hand or left > 0)
                 if not by_hand and not left:
@@ -175,7 +174,7 @@ class Measuring:
             CalibrationError: They are not trusted any more.
         """
         source = touching_further(plan.source)
-        assert source is not None  # noqa: S101 - it was offered
+        assert source is not None  # noqa: S101 - further touches were offered
         what = tr("one more touch") if again is None else tr("touch {k} again", k=again + 1)
         self._context.controller.outcomes.append(decision_entry(what, tool=plan.tool))
 
@@ -216,7 +215,7 @@ class Measuring:
             adjusted = self._listener.adjusted(fresh, context)
             claim = turn_claim(result, facts)
             if claim is not None and not claim.finds_place and _by_difference(adjusted):
-                # What the place is off by cancels in a difference, and shows in its turn test.
+                # An error in the place cancels in a difference, but appears in its turn test.
                 claim = None
             proposal = replace(adjusted, claim=claim)
         entry = calibration_entry(
@@ -265,7 +264,7 @@ class Measuring:
                 raise
 
     def _record_end(self, entry: NewEntry) -> None:
-        # The error that is under way matters more than that it cannot be recorded.
+        # The error being raised matters more than a failure to record it.
         with suppress(ConfigError, RobolinkError):
             self._context.controller.outcomes.append(entry)
 

@@ -65,7 +65,7 @@ Earlier = Callable[[int], Sequence[float]]
 first."""
 
 DescribeReport = Callable[[ChangeReport], Mapping[str, object]]
-"""Returns the result of an order, plain JSON, for a second delivery of it."""
+"""Returns the result of an order, plain JSON, for a repeated delivery of that order."""
 
 
 class NozzleChange:
@@ -419,7 +419,7 @@ class NozzleChange:
             attended = Attended(
                 person.choose,
                 person.confirm,
-                # What proves by plain values can begin once more from where it has ended.
+                # A proof that uses plain values can be repeated from where it ended.
                 turned if isinstance(source, KeepsProof) else None,
                 relearning_commands(self._controller, plan, proposal.result),
             )

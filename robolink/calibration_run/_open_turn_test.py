@@ -171,13 +171,13 @@ def _adapter(kind: type[KeptT]) -> "TypeAdapter[KeptT]":
 
 @cache
 def _made_adapter(kind: type) -> "TypeAdapter[Any]":
-    from pydantic import TypeAdapter  # only a change that is open, or begins, needs it
+    from pydantic import TypeAdapter  # needed only when a change begins or is still open
 
     return TypeAdapter(kind)
 
 
 _OUT_OF_REACH: Final = (OutcomeUnknownError, TransportError, RemoteProtocolError, LeaseLostError)
-"""After these nothing can be restored here: the link is gone, or the right to write."""
+"""After these errors nothing can be restored here: the link or the right to write is lost."""
 
 
 def finish_by_turn_test(
@@ -252,7 +252,7 @@ def finish_by_turn_test(
     with controller.procedure(request):
         outcomes.change = str(marker.details.get("change", ""))
         try:
-            # From here on this marker alone is that of a procedure of this process.
+            # From here on, the marker belongs to a procedure of this process only.
             with controller.uninterrupted():
                 controller.begin(
                     MarkerKind.CHANGE, request, marker.details, operation=marker.operation
@@ -362,7 +362,7 @@ def _put_back(controller: Controller, marker: Marker) -> str:
     """Restore the old values with one write a tool; return the outcome, in words."""
     still = [one.operation for one in controller.outcomes.open_markers()]
     if marker.operation not in still:
-        return ""  # kept, or put back, already
+        return ""  # already kept or restored
     try:
         settler = Settler(controller)
         finding = settler.examine(marker)

@@ -161,7 +161,7 @@ def journey(target: Pose | None, purpose: str, here: Pose) -> Procedure[None]:
 
 
 Proposals = Sequence[tuple[ToolPlan, Proposal]]
-"""What is proposed for each tool of a plan."""
+"""Each tool of a plan, with its proposal."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -65,7 +65,7 @@ class RecipeListener(Listener):
         """Ask the questions of this moment, then switch its outputs."""
         self._audience.moment(moment, context, tool)
         if moment is Moment.AFTER_MEASURE:
-            # The id belonged to that tool; the value that is kept says it again.
+            # The nozzle id belonged to that tool; it is recorded again with the value that is kept.
             self._sign(self._signature)
         for number, prompt in enumerate(self._recipe.prompts, start=1):
             if _meant(prompt, moment, tool):
@@ -170,7 +170,7 @@ class RecipeListener(Listener):
                 tr("{controller} has no outputs.", controller=self._controller.identity),
                 remedy=tr("Remove [[outputs]] from the recipe."),
             )
-        # Ctrl-C waits until it is noted too: how the run ended names what it switched.
+        # Ctrl-C waits until the output is noted, so that the end of the run lists it.
         with self._controller.uninterrupted():
             outputs.set_output(output.output, output.on)
             self.switched[output.output] = output.on

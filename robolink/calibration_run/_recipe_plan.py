@@ -197,7 +197,7 @@ def located(recipe: "Recipe", stations: Mapping[str, Station]) -> tuple["Recipe"
         fits = recorded is not None and recorded.kind is needs.station and needs.place is not None
         known = recorded if recorded and fits else Station(id=place.id, kind=needs.station)
         if recorded is not None and not fits:
-            # Where it is does not matter to the method; what stands there goes on record.
+            # The method does not use the place; the gauge at that place is recorded.
             known = replace(known, gauge=recorded.gauge, gauge_due=recorded.gauge_due)
     return recipe, _as_told(recipe, known)
 
@@ -338,7 +338,7 @@ def _reference(entry: Recorded, station: str) -> Reference | None:
 
 def contact_z_mm(proposal: Proposal) -> float:
     """Return the height of the flange when the tip touched, mean of all touches, mm."""
-    from robolink.calibration import ZTouchResult  # numpy, late
+    from robolink.calibration import ZTouchResult  # numpy, imported late
 
     result = proposal.result
     if isinstance(result, ZTouchResult):
@@ -367,7 +367,7 @@ def proposed(
     offset, notes = tip, list[str]()
     height = contact_z_mm(measured) if recipe.source.of_method.tells_height else None
     if recipe.basis == "difference" and reference is not None:
-        # A height that a touch tells is compared below.
+        # A height that a touch shows is compared below.
         shown = {name for name in measured.result.found if name != "z_mm" or height is None}
         offset = _moved(reference, tip, shown)
         notes.append(_as_moved(reference, offset, shown))
@@ -472,7 +472,7 @@ def _height(
 def _record(recipe: "Recipe", reference: Reference | None) -> dict[str, object]:
     record: dict[str, object] = {"basis": recipe.basis, "z": recipe.z}
     if recipe.basis == "difference":
-        # Whatever was wrong with Z stays wrong by as much: no pin's height is learnt from it.
+        # An error in Z stays in a difference, so no pin's height is learnt from it.
         record["z_from"] = "kept"
     if reference is not None:
         record["reference_entry"] = reference.number

@@ -166,7 +166,7 @@ class RecipeRun:
                 reference = find_reference(controller, tool, recipe.station.id)
                 if reference is not None:
                     self._references[tool] = reference
-            # One without a reference makes all of them wait: all are written, or none.
+            # If one tool has no reference, all of them wait: all are written, or none.
             self.takes_reference = len(self._references) < len(stored)
         if self.takes_reference and self._measure_only:
             raise ConfigError(

@@ -64,7 +64,7 @@ def calibration_entry(
         "proposed": plain_offset(result.offset),
         "tip": plain_offset(proposal.tip),
         "notes": list(proposal.notes),
-        # Entries are labelled in UTC; whoever stood there knows it by the clock on the wall.
+        # Entries are labelled in UTC; people at the cell know the local time.
         "local_time": wall_time().astimezone().isoformat(timespec="seconds"),
         **({} if facts is None else {"facts": asdict(facts)}),
         **({"simulated": True} if simulated else {}),
@@ -90,7 +90,7 @@ def _measured(proposal: Proposal) -> str:
     own: list[str] = []
     others: list[str] = []
     for field in fields(ToolOffset):
-        # Adding zero takes the sign off what rounds to zero.
+        # Adding zero removes the sign from a value that rounds to zero.
         value = round(getattr(proposal.offset, field.name), 3) + 0.0
         axis, measured = field.name[0].upper(), field.name in found
         if measured or axis not in "VW" or value:
@@ -315,7 +315,7 @@ def _kept_inputs(result: CalibrationResult) -> list[Pose]:
 
 def _turned(pose: Pose, offset: ToolOffset) -> tuple[float, float, float]:
     """Return an offset in base axes."""
-    from robolink.calibration import rotation_of  # numpy, late
+    from robolink.calibration import rotation_of  # numpy, imported late
 
     rows = rotation_of(pose).tolist()
     along = offset.components()[:3]
@@ -370,7 +370,7 @@ def found_pin(station: str, proposal: Proposal, known: Station | None = None) ->
         x_mm=x_mm,
         y_mm=y_mm,
         z_mm=z_mm,
-        # The place of the pin is as uncertain as the tip: the equations treat both alike.
+        # The pin's place is as uncertain as the tip: both have the same role in the equations.
         sigma_mm=offset_sigma_mm(result),
         how=tr("{method} with tool {tool}", method=result.method, tool=proposal.tool),
         tool=proposal.tool,
@@ -396,8 +396,8 @@ def _spread(result: CalibrationResult) -> dict[str, object]:
     lengths = [i for i, name in enumerate(result.measured) if name.endswith("_mm")]
     if not result.covariance or len(lengths) not in (2, 3):
         return {}
-    # The normal equations are the same for tip and pin up to a turn; of the worst axis all are.
-    # As wide as few degrees of freedom made the interval, for who reads it later knows of none.
+    # The normal equations of tip and pin differ only by a rotation; the worst axis stands for all.
+    # Widened like the interval for few degrees of freedom, which a later reader does not know.
     half = max(result.half_width95[i] for i in lengths)
     variance = (half / NORMAL_95) ** 2
     rows = [[variance if i == j else 0.0 for j in lengths] for i in lengths]
@@ -409,9 +409,9 @@ def touch_details(station: str, proposal: Proposal) -> dict[str, object]:
     result = proposal.result
     chain = chain_of(result) or NeedleChain(offset_sigma_mm(result) or 0.0)
     x_mm, y_mm, z_mm = pin_mm(proposal)
-    # The next nozzle touches upright once: what counts is how this one stood upright last.
+    # The next nozzle makes one upright touch: compare it with the last upright touch of this one.
     touch = min(reversed(result.inputs), key=lambda pose: abs(pose.v_deg) + abs(pose.w_deg))
-    # Where a difference was written, the value puts the pin elsewhere than the tip does.
+    # If a difference was written, the stored value puts the pin elsewhere than the tip does.
     tip, value = _turned(touch, proposal.tip), _turned(touch, proposal.offset)
     heights = touch_heights_mm(proposal)
     height_mm = z_mm + value[2] - tip[2] if proposal.pin_z_mm is None else proposal.pin_z_mm
@@ -423,7 +423,7 @@ def touch_details(station: str, proposal: Proposal) -> dict[str, object]:
         "u_deg": touch.u_deg,
         **json_fields(chain, "sigma_mm", "changes", "full_sigma_mm"),
         "touch_sigma_mm": _touch_sigma_mm(result),
-        # Tilted touches have Z from the fit, and their heights say nothing about it.
+        # For tilted touches, Z comes from the fit, and their heights say nothing about it.
         **({} if "z_mm" in result.found else _scatter(heights, touched_by(result.inputs))),
         "touches": proposal.pin_touches or len(result.inputs) - len(result.rejected),
     }

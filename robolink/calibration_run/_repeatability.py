@@ -16,19 +16,20 @@ from robolink.procedures import TouchPlan
 from robolink.runner import TouchedAt
 
 TouchWitness = Literal["person", "contact", "poses"]
-"""What witnesses touches: a person with a standoff, an input, or nothing."""
+"""What confirms touches: a person with a standoff, an input, or nothing but the poses."""
 
 USUAL_SEAT_MM: Final = (0.1, 0.1, 0.05)
-"""Standard deviation of X, Y and Z while fewer changes are on record; a choice, not a finding."""
+"""Standard deviation of X, Y and Z, in mm, while fewer changes are recorded; chosen, not measured.
+"""
 
 LEAST_CHANGES: Final = 8
-"""So many changes tell the scatter better than the usual value does."""
+"""Smallest number of changes that gives the scatter better than the usual value."""
 
 LEAST_TOUCHES: Final = 10
-"""So many touches, less one a run, tell how well a cell touches in height."""
+"""Smallest number of touches, minus one per run, that shows a cell's scatter in height."""
 
 MOST_CHANGES: Final = 50
-"""Older changes say less about the nozzles of today."""
+"""Largest number of changes that are used: older ones say less about the present nozzles."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +81,7 @@ def seating_of(controller: Controller) -> Seating:
     if len(heights) >= LEAST_CHANGES:
         above = math.sqrt(sum(dz * dz for dz in heights) / len(heights))
     pooled = min(len(changes), len(heights) or len(changes))
-    # A scatter of nothing would make every touch a moved pin.
+    # With a scatter of zero, every touch would look like a moved pin.
     least = USUAL_SEAT_MM[2] / 10
     sigma = (max(plane, least), max(plane, least), max(above, least))
     return Seating(sigma, pooled)

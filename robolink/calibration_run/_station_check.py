@@ -79,7 +79,7 @@ def _shifts(
             seat = () if _same_nozzle(controller, proposal) else seating.sigma_mm
             shift = _supposed_shift(proposal, seat)
             if shift is not None and seat and not several:
-                # One tool cannot tell a lower pin from a longer tip.
+                # With one tool, a lower pin and a longer tip look the same.
                 shift = replace(shift, vector_mm=shift.vector_mm[:2], seat_sigma_mm=seat[:2])
         if shift is not None:
             yield shift
@@ -93,14 +93,14 @@ def _measured_shift(station: Station | None, proposal: Proposal) -> TipShift | N
     if found.x_mm is None or found.y_mm is None or not found.sigma_mm or not station.sigma_mm:
         return None
     vector = (found.x_mm - station.x_mm, found.y_mm - station.y_mm)
-    # The two places are as uncertain as they say; a shift has the variance of two touches.
+    # Both places have their stated uncertainties; a shift has the variance of two touches.
     sigma_mm = math.hypot(found.sigma_mm, station.sigma_mm) / math.sqrt(2)
     return TipShift(proposal.tool, vector, sigma_mm)
 
 
 def _supposed_shift(proposal: Proposal, seat_mm: tuple[float, ...]) -> TipShift | None:
     """Return by how much the pin would have moved if the tip had not."""
-    from robolink.calibration import rotation_of  # numpy, late
+    from robolink.calibration import rotation_of  # numpy, imported late
 
     before, after, result = proposal.before, proposal.tip, proposal.result
     if before is None or not result.sigma_mm:
@@ -115,7 +115,7 @@ def _same_nozzle(controller: Controller, proposal: Proposal) -> bool:
     """Return whether the nozzle is known to be the one measured last."""
     outcomes = controller.outcomes
     kept = outcomes.recorded(tool=proposal.tool, kinds=KEPT)
-    # An answer to a question is a decision too, and stands for no value.
+    # An answer to a question is a decision too, but contains no value.
     last = next((entry for entry in kept if "value" in entry.details), None)
     if last is None:
         return False
@@ -138,7 +138,7 @@ def _judged(plan: ToolPlan, proposal: Proposal, shift: StationShift) -> Proposal
         detectable=shift.detectable_mm,
     )
     if plan.verify and plan.moving:
-        # The proof about the new tip decides it, so there is nothing to doubt yet.
+        # The turn test about the new tip decides, so there is nothing to doubt yet.
         return replace(
             proposal,
             result=replace(proposal.result, notes=(*proposal.result.notes, "station_undecided")),

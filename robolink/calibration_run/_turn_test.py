@@ -37,7 +37,8 @@ from robolink.procedures import TOUCH_CODES
 from robolink.runner import ChoiceRow, OfferedChoice
 
 Choosing = Callable[[str, OfferedChoice], int]
-"""Asks a person and returns the index of the row, as :meth:`robolink.runner.Runner.choose`."""
+"""Asks a person and returns the index of the chosen row, as :meth:`robolink.runner.Runner.choose`.
+"""
 
 _USES_PLACE: Final = frozenset({"place_mm", "plate_mm", "camera_turn_deg", "camera_scale_percent"})
 
@@ -94,7 +95,7 @@ def relearning_commands(
     try:
         kind = find_method(plan.method or result.method).needs.station
     except ConfigError:
-        return ()  # a source of somebody's own, which is no method
+        return ()  # a caller's own source, not a registered method
     if kind is None:
         return ()
     learnt = outcomes.recorded(kinds=(EntryKind.STATION,))
@@ -282,7 +283,7 @@ def conclude_turn_test(
         outcomes.append(verification_entry(tool, shown, tests=tests))
         tell(shown)
         judgement = shown.judgement
-        # Too large a drift for the process is that first, whatever else it says.
+        # A drift too large for the process is reported as such, whatever else it shows.
         for one in (*tests, replace(shown, judgement=None)):
             require_proved(one, identity)
         if judgement is None or not judgement.code:

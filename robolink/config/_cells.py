@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 _BARE_KEY = re.compile("[A-Za-z0-9_-]+")
 _KIND = 4
-"""Where in a path the kind of a station stands: cells, NAME, stations, ID, kind."""
+"""Index of a station's kind in a path: cells, NAME, stations, ID, kind."""
 
 _SECRET = re.compile("pass|pwd|secret|token|credential|^pin$", re.IGNORECASE)
 
@@ -54,7 +54,7 @@ def problems_of(
     problems = []
     for detail in details:
         path, names = list(detail["loc"]), known.get(len(detail["loc"]), ())
-        # Behind the name of a station pydantic puts its kind, which stands in no file.
+        # After the name of a station, pydantic inserts its kind, which is in no file.
         if len(path) > _KIND and path[2] == "stations":
             names = kinds.get(str(path.pop(_KIND)), ())
         counted = [part + 1 if isinstance(part, int) else part for part in path]
@@ -87,13 +87,13 @@ def _unknown(key: str, known: Sequence[str]) -> str:
 
 
 _Said = dict[str, tuple[Path, object]]
-"""What files say about a cell: each value with the file that said it."""
+"""Values that files give for a cell, each with the file that gives it."""
 
 _CELL_NAME = re.compile(r"[^\s+:/\\]+")
 
 
 USUAL_CHANGE_MM: Final = 2.0
-"""Default limit of a cell: more than a change of nozzles explains."""
+"""Default limit of a cell, in mm: more than a nozzle change explains."""
 
 
 class CellGlimpse(NamedTuple):
@@ -310,7 +310,7 @@ def _cell(name: str, said: Mapping[str, tuple[Path, object]]) -> Cell:
     try:
         settings = CellSettings.model_validate(values)
     except ValidationError as error:
-        # Each file was right alone, so what is wrong is how they go together.
+        # Each file was valid on its own, so the error is in their combination.
         cell = dotted(["cells", name])
         problems = [
             Problem(f"{cell}.{problem.where}", problem.what) for problem in problems_of(error, {})

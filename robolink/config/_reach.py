@@ -89,7 +89,7 @@ def reach_cell(name: str) -> Reach:
                 table["password_file"] = str(file.path.parent / Path(hinted).expanduser())
         said = table | said
         if isinstance(table.get("url"), str):
-            # Farther files speak of the robot at another address (``load_cells``).
+            # Files with lower priority may refer to the robot at another address (``load_cells``).
             return Reach(
                 url=str(said["url"]),
                 password_file=_text(said, "password_file"),
@@ -146,7 +146,7 @@ def remember_reach(name: str, origin: Path, reach: Reach) -> None:
     """
     kept = asdict(reach) | {"doubt": ""}
     path = _copy_of(name, origin)
-    # A copy is a convenience: what keeps it from being written is told when it is missed.
+    # The copy is a convenience: a failure to write it is reported when the copy is needed.
     with suppress(OSError):
         if _read(path) != kept:
             make_folder(path.parent)

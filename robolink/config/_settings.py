@@ -142,7 +142,7 @@ class CameraSettings(_Station):
     def _goes_with_the_pixels(
         cls, origin_mm: tuple[float, ...] | None, info: ValidationInfo
     ) -> tuple[float, ...] | None:
-        # A value that is wrong itself is missing in the data, and told already.
+        # An invalid value is missing from the data and already reported.
         pixels = info.data.get("mm_per_px", ...)
         if pixels is not ... and (pixels is None) != (origin_mm is None):
             raise ValueError(tr("needs mm_per_px: give both, or neither"))
@@ -152,7 +152,7 @@ class CameraSettings(_Station):
 StationSettings = Annotated[
     PinSettings | BeamsSettings | TouchSettings | CameraSettings, Field(discriminator="kind")
 ]
-"""More kinds join this union."""
+"""Settings of a station; further kinds of stations join this union."""
 
 
 def station_keys() -> dict[str, list[str]]:
@@ -271,7 +271,7 @@ class CellSettings(BaseModel):
     @field_validator("remote_timeout_confirmed_by")
     @classmethod
     def _confirms_something(cls, person: str | None, info: ValidationInfo) -> str | None:
-        # A value that is wrong itself is missing in the data, and told already.
+        # An invalid value is missing from the data and already reported.
         stated = info.data.get("remote_timeout_s", ...)
         if stated is None and person is not None:
             raise ValueError(tr("confirms nothing: remote_timeout_s is missing"))

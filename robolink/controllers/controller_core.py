@@ -32,14 +32,14 @@ from robolink.model import (
     VariableTable,
 )
 
-if TYPE_CHECKING:  # to pyright a cached_property is no property, and its owner no Controller
+if TYPE_CHECKING:  # pyright does not accept a cached_property as a property of Controller
     from builtins import property as cached_property
 else:
     from functools import cached_property
 
 
 _STOPS_S: Final = 5.0
-"""Longest wait, at the end, for stops that are under way in other threads."""
+"""Longest wait, when closing, for stops under way in other threads, in s."""
 
 
 class ControllerCore(DriverPart, ABC):
@@ -116,7 +116,7 @@ class ControllerCore(DriverPart, ABC):
             state = f"{seen[0].state.value} when read last"
         return f"<{type(self).__name__} {self.identity}: {state}>"
 
-    # What a kind says.
+    # What each kind must provide.
 
     @property
     @abstractmethod
@@ -134,7 +134,7 @@ class ControllerCore(DriverPart, ABC):
     def _take_leave(self) -> None:
         """Do what is proper before the link is closed; errors are ignored."""
 
-    # What a kind may have; a command that needs none of it does without making it.
+    # What a kind may have; created only when a command needs it.
 
     @property
     def io(self) -> DigitalIo | None:
@@ -186,7 +186,7 @@ class ControllerCore(DriverPart, ABC):
         """Switch the motors on or off."""
         raise self._driver.lacks(str(Act.MOTORS_ON if on else Act.MOTORS_OFF))
 
-    # What is the same for all.
+    # What is the same for all kinds.
 
     def status(self) -> ControllerStatus:
         """Read the state flags; others see by this that the process is alive."""
@@ -276,9 +276,9 @@ class ControllerCore(DriverPart, ABC):
         try:
             self._take_leave()
         except RobolinkError:
-            pass  # the link is going away in any case; markers keep what is in doubt
+            pass  # the link is closing in any case; markers keep what is in doubt
         except BaseException as error:
-            # Ctrl-C while taking leave: the work is done, and what it left is to be told.
+            # Ctrl-C while closing: the work is done, and its outcome must be reported.
             note_outcome(error, self.ledger.outcome())
             raise
         finally:

@@ -51,7 +51,8 @@ from robolink.transport.traffic import Traffic
 _LOG: Final = PackageLog(__package__)
 
 EVERY_S: Final = 1.0
-"""Between two signs: a tenth of the silence after which somebody counts as gone."""
+"""Interval between signs of life, in s: a tenth of the silence after which a user counts as gone.
+"""
 
 
 class SignsOfLife:
@@ -88,7 +89,7 @@ class SignsOfLife:
             end()
 
     def _one(self) -> None:
-        # A thread that has ended without leaving its block is at no work any more.
+        # A thread that ended without leaving its block no longer counts as working.
         if any(thread.is_alive() for thread in self._inside):
             with suppress(RobolinkError):
                 self._sign()
@@ -305,7 +306,7 @@ class DriverLink:
             finally:
                 markers.leave_open(marker)
         if unclear is not None:
-            # What such a link says is not relied on, so this ends as a failure in any case.
+            # An answer over such a link is not relied on, so this ends as a failure in any case.
             unclear.remedy = command.told_by(found) or unclear.remedy
             raise unclear
         return found

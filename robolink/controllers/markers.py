@@ -35,7 +35,7 @@ _LOG: Final = PackageLog(__package__)
 
 _PROCEDURES: Final = frozenset({MarkerKind.SELECTION, MarkerKind.CHANGE})
 _OF_A_TOOL: Final = frozenset({"tool", "select"})
-"""Details of what writes, clears or selects a tool."""
+"""Details of markers for writing, clearing or selecting a tool."""
 
 
 class ProcedureLock:
@@ -98,7 +98,7 @@ class ProcedureLock:
         """
         patience = self.patience
         with ExitStack() as block, patience.within(wait_s):
-            with Concerning(self._identity, request):  # what the block raises is about itself
+            with Concerning(self._identity, request):  # only for errors raised here
                 block.enter_context(self._locked(request))
                 leased = block.enter_context(self._leased(request))
             with patience.between():
@@ -179,7 +179,7 @@ class ProcedureLock:
                 self._outcomes.look()
                 try:
                     held.enter_context(self._outcomes.hold(request))
-                except LeaseLostError as lost:  # somebody was faster; nothing has been read yet
+                except LeaseLostError as lost:  # another process was faster; nothing is read yet
                     raise LeaseHeldError(lost.what, remedy=lost.remedy) from lost
 
             try:
@@ -334,14 +334,14 @@ class MarkerStore:
         try:
             yield
         except StoppedError:
-            self.clear(marker)  # it was never sent
+            self.clear(marker)  # the request was never sent
             raise
 
     @property
     def changing(self) -> bool:
         """Whether a tool change of several steps is in progress here."""
         marker = self._procedures.get(MarkerKind.CHANGE)
-        # One that could not be taken back stays open when its change is over.
+        # A marker that could not be undone stays open after its change has ended.
         return marker is not None and marker.details.get("change") == self.outcomes.change
 
     def note_selection(self, tool: int) -> None:
@@ -380,7 +380,7 @@ class MarkerStore:
     def _refuse_unsettled(self, request: str, *, besides: Collection[str]) -> None:
         unsettled = self._unsettled(besides)
         if unsettled:
-            # Whoever began it may still be at it, or have finished just now.
+            # Its owner may still be working on it, or may have just finished.
             self.outcomes.look()
             still = {marker.operation for marker in self._unsettled(besides)}
             unsettled = [marker for marker in unsettled if marker.operation in still]
@@ -444,7 +444,7 @@ class MarkerStore:
 
     def unproved(self, request: str, error: RobolinkError) -> OutcomeUnknownError:
         """Return the error for a request whose effect ``error`` leaves unknown."""
-        # The link is gone with the answer, and with it what was under way on it.
+        # The link is lost with the answer, and so is everything under way on it.
         self._under_way.clear()
         doubt = OutcomeUnknownError(
             tr(

@@ -8,7 +8,8 @@ from typing import Final
 _FAMILIES: Final[Mapping[str, int]] = MappingProxyType(
     {"GX": 4, "RS": 4, "T": 4, "LS": 4, "G": 4, "C": 6, "CX": 6, "VT": 6}
 )
-"""The letters before the first digit of EPSON's models (docs/reference/epson-robots.md)."""
+"""Number of axes by the letters before the first digit of an EPSON model
+(docs/reference/epson-robots.md)."""
 
 _KINEMATICS: Final[Mapping[str, int]] = MappingProxyType(
     {
@@ -23,7 +24,8 @@ _KINEMATICS: Final[Mapping[str, int]] = MappingProxyType(
         "Kin_4AxisPalletizer": 4,
     }
 )
-"""Kinematics that stand alone (docs/reference/softmotion.md 3.3)."""
+"""Number of axes of kinematics that need no orientation kinematics (docs/reference/softmotion.md
+3.3)."""
 
 
 def axes_of_model(kind: str, model: str | None) -> int | None:

@@ -186,7 +186,7 @@ def stopped_before_edge(controller: str, request: str) -> StoppedError:
 
 _POLL_S: Final = 0.02
 _REST_S: Final = 5.0
-"""Longest time from a stop to a confirmed stop state (docs/reference/rules.md 5)."""
+"""Longest time from a stop to a confirmed stop state, in s (docs/reference/rules.md 5)."""
 
 
 class PolledGroup(MotionGroupCore):
@@ -233,7 +233,7 @@ class PolledGroup(MotionGroupCore):
                             raise
                     self._current = PolledMotion(self, link, target, marker)
         except (KeyboardInterrupt, StoppedError):
-            # Nobody will be given this motion to wait on.
+            # The caller gets no motion object to wait on.
             self.abort_unfinished()
             raise
         return self._current

@@ -66,7 +66,8 @@ class Preserver:
         lock = self._link.lock
         with lock.held(reason), lock.patience.between(), markers.ledger.block():
             markers.look()
-            # Before a person measures for what would be refused, whether or not a tool is told.
+            # Checked before a person starts a measurement that would be refused later, even if no
+            # tool is reported.
             markers.require_settled(reason)
             details = self._in_force(reason)
             if details is None:
@@ -113,7 +114,7 @@ class Preserver:
     def _in_force(self, reason: str) -> Mapping[str, object] | None:
         """Read what to restore, as plain JSON; ``None`` if nothing is ever changed."""
         tool = self._tools.selected()
-        # Who does not tell which tool is in force lets none be selected either.
+        # A controller that does not report the selected tool cannot select one either.
         return None if tool is None else {"tool": tool, "now": tool}
 
     def _restore_more(self, marker: Marker) -> None:

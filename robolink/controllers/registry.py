@@ -322,7 +322,7 @@ def connect(
         _require_kind(type(url), kind, str(url.identity))
         return url
     link, wait_s = parse_url(url), require_wait(wait_s or 0.0)
-    if kind is not None and link.kind in _KINDS:  # before anything is connected
+    if kind is not None and link.kind in _KINDS:  # before any connection is made
         _require_kind(_class_of_kind(link.kind), kind, url)
     terms = ConnectionTerms(
         signature or signature_here(VERSION),
@@ -367,7 +367,7 @@ def _require_kind(found: type, kind: type[Controller] | None, called: str) -> No
 
 
 _AGAIN_S: Final = 0.25
-"""Pause between two login attempts while somebody else is logged in."""
+"""Pause between two login attempts while another client is logged in, in s."""
 
 
 def _waited_for(

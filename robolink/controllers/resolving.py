@@ -83,7 +83,7 @@ def _entry(marker: Marker, tool: int, verdict: Verdict, now: ToolOffset | None) 
     details = {**marker.details, "value": plain_offset(now), "found_later": True}
     kind = _KINDS[verdict]
     if kind is EntryKind.DONE and marker.details.get("part"):
-        # Whether the change that it is part of is done, is settled after it.
+        # The change that this write belongs to is finished or undone afterwards.
         kind = EntryKind.READ_BACK
     return NewEntry(kind, operation=marker.operation, tool=tool, verdict=verdict, details=details)
 
@@ -156,7 +156,7 @@ class MarkerResolver(DriverPart):
     def settle(self, finding: Finding) -> None:
         """Do what ``finding.action`` says and remove the marker."""
         if finding.verdict is Verdict.NOT_RESTORED:
-            self.fence()  # what is selected is read anew behind it
+            self.fence()  # the selected tool is read again behind this fence
             self._preserver.restore(finding.marker)
         else:
             self._driver.markers.clear(finding.marker, *finding.entries)

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
 _LOG: Final = PackageLog(__package__)
 
 _TRIES: Final = 3
-"""A stop may be repeated: an answer that was lost, or another client's words over ours in a
-mailbox, is no reason to leave the robot moving."""
+"""Number of attempts to stop. A stop may be repeated: after a lost answer, or if another client
+overwrote it in a mailbox, the robot must not go on moving."""
 
 
 def stop_now(
@@ -123,8 +123,8 @@ class _Means(NamedTuple):
     clock: "Clock | None"
     met: "Callable[[str], None] | None"
     owner: int
-    """The token of all tries in a mailbox. With one of its own, a try would be overtaken by the one
-    before it, whose answer was lost and whose command is acknowledged only now."""
+    """Token of all attempts in a mailbox. With a new token, an attempt would be superseded by the
+    one before, whose answer was lost and whose command is acknowledged only now."""
 
 
 def _stop_epson(link: LinkUrl, means: _Means) -> "ControllerStatus":
@@ -143,7 +143,7 @@ def _stop_epson(link: LinkUrl, means: _Means) -> "ControllerStatus":
             if means.met is not None:
                 _tell_who(talk, means.met)
             if may_log_out(status):
-                with suppress(RobolinkError):  # it stands: nothing that fails here matters
+                with suppress(RobolinkError):  # it has stopped: a failure here is harmless
                     talk.exchange("Logout")
             return status
     finally:
@@ -216,7 +216,7 @@ def _stop_other(link: LinkUrl, means: _Means) -> "ControllerStatus":
         password=Secret(means.password) if means.password else None,
         timeout_s=means.timeout_s,
         clock=means.clock,
-        # It opens no journal before something has to be recorded.
+        # The journal is opened only when there is something to record.
         outcomes=open_log(link.address, durable=True, signature=signature, glance=True),
     )
     with opened(link, terms) as controller:

@@ -55,7 +55,7 @@ class ToolTableCore(DriverPart, ABC):
 
     machine_selects: ClassVar[bool] = False
 
-    # What a kind says.
+    # What each kind must provide.
 
     @abstractmethod
     def indices(self) -> Sequence[int]:
@@ -89,7 +89,7 @@ class ToolTableCore(DriverPart, ABC):
     def _send_selection(self, tool: int) -> None:
         """Select a tool; raises unless the controller accepted it."""
 
-    # What a kind may say.
+    # What a kind may provide.
 
     def _as_sent(self, request: str) -> str:
         """Return a request as sent on the wire."""
@@ -144,7 +144,7 @@ class ToolTableCore(DriverPart, ABC):
             "There are tools {lowest} to {highest}.", lowest=lowest, highest=self.indices()[-1]
         )
 
-    # What is the same for all.
+    # What is the same for all kinds.
 
     def require_writable(self, tool: int) -> None:
         """Refuse a tool number that cannot be written; sends nothing.
@@ -254,7 +254,7 @@ class ToolTableCore(DriverPart, ABC):
             self._driver.markers.ledger.saw_selected(before)
             if before == tool and self._is_in_force(tool):
                 return
-            if before is None:  # what was in force could not be put back, nor the new one proved
+            if before is None:  # the old selection could not be restored, nor the new one confirmed
                 raise RejectedError(
                     tr(
                         "{controller} does not report which tool is selected.",
@@ -316,8 +316,8 @@ class ToolTableCore(DriverPart, ABC):
                 raise
 
     def _require_defined(self, tool: int) -> ToolOffset:
-        # Tool n on an undefined tool leaves an EPSON controller in error
-        # (docs/reference/epson.md 1.5).
+        # Selecting an undefined tool puts an EPSON controller into error (docs/reference/epson.md
+        # 1.5).
         offset = self.read(tool)
         if offset is None:
             raise UndefinedToolError(

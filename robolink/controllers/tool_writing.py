@@ -32,7 +32,8 @@ from robolink.model import (
 Same = Callable[[ToolOffset | None, ToolOffset | None], bool]
 
 _MORE_READINGS: Final = 2
-"""After a first one that is neither the written value nor, in doubt, the old one."""
+"""Number of further readings if the first is neither the written value nor, in doubt, the old one.
+"""
 
 
 class ToolWrite(MarkedCommand[ToolOffset | None]):
@@ -188,7 +189,7 @@ class ToolWrite(MarkedCommand[ToolOffset | None]):
         if not self._same(found, self.requested):
             yield EntryKind.CONFLICT
         elif self.acknowledged and not self._link.markers.changing:
-            # A change of several steps says itself, at its end, whether it is done.
+            # A change of several steps records itself, at its end, if it is done.
             yield EntryKind.DONE
 
     def _receipt(self, found: ToolOffset | None, *, skipped: bool = False) -> ToolReceipt:

@@ -18,10 +18,10 @@ from robolink.messages import tr
 Quantity: TypeAlias = Literal["tip", "pin", "turn test"]
 
 _DIGIT_MM: Final = 0.001
-"""The last digit of a position; values that scatter by less differ by chance in it."""
+"""Last digit of a position, in mm; values with less scatter differ only by rounding."""
 
 _LEAST: Final = 2
-"""One value has no scatter, and draws no chart."""
+"""Fewest values for a chart: a single value has no scatter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,7 +166,7 @@ def _values(change: MeasuredChange) -> Iterable[tuple[_Key, float]]:
 def _chart(key: _Key, points: Sequence[ChartPoint], baseline: int) -> Chart:
     numbers = [point.value_mm for point in points if not point.repeat]
     first = min(baseline, len(numbers))
-    # A cell that showed the same digits each time, and then does not, has scatter after all.
+    # If a cell showed the same digits each time and then different ones, it does have scatter.
     differs = any(number != numbers[0] for number in numbers)
     floor_mm = _DIGIT_MM if differs else 0.0
     found = control_chart(numbers[:first], numbers[first:], least_sigma_mm=floor_mm)

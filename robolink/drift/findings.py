@@ -69,7 +69,7 @@ def mounted_trend(changes: Sequence[MeasuredChange]) -> MountedTrend | None:
 
 
 LEAST_SHIFTED: Final = 3
-"""So many changes in a row are asked for before a shift is believed; one may be a bad touch."""
+"""Number of successive changes needed to confirm a shift; one alone may be a bad touch."""
 
 _ALIKE_SIGMA: Final = 3.0
 
@@ -323,7 +323,7 @@ def _has_shifted(chart: Chart) -> bool:
     before = [point.value_mm for point in chart.counted[: -len(since)]]
     if shift_is_sure(before, since):
         return True
-    # One bad touch at the end brings scatter into which a shift would disappear.
+    # One bad touch at the end adds scatter that would hide a shift.
     *others, last = since
     if len(others) < LEAST_SHIFTED or not value_is_unusual(others, last):
         return False

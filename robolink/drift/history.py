@@ -10,7 +10,7 @@ from robolink.calibration import student_t
 from robolink.model import EntryKind, Recorded, read_offset, with_method_name_now
 
 KINDS = (EntryKind.CALIBRATION, EntryKind.VERIFY, EntryKind.DONE, EntryKind.ROLLED_BACK)
-"""Entries that say how a change went."""
+"""Entries that record how a change ended."""
 
 _AXES = {"x_mm": "x", "y_mm": "y", "z_mm": "z"}
 
@@ -136,10 +136,10 @@ def _pin(said: Mapping[str, object]) -> dict[str, float] | None:
 
 
 LEVEL: Final = 0.001
-"""False alarms of one test of one coordinate of a steady cell."""
+"""False-alarm rate of one test of one coordinate of a steady cell."""
 
 _RESOLUTION_MM: Final = 0.001 / math.sqrt(12)
-"""Standard deviation that a controller's three decimals alone leave."""
+"""Standard deviation, in mm, due to a controller's three decimals alone."""
 
 
 def shift_is_sure(before: Sequence[float], since: Sequence[float]) -> bool:
@@ -176,7 +176,7 @@ def likeliest_split(values: Sequence[float], earliest: int) -> int:
     mean, before = fmean(steady), math.fsum(steady[:earliest])
     best, found = -1.0, earliest
     for first in range(earliest, len(steady)):
-        # The sum of squares between the parts: by as much as it is larger, the rest is smaller.
+        # Sum of squares between the two parts: the larger it is, the smaller the rest.
         between = (before - first * mean) ** 2 * (1 / first + 1 / (len(steady) - first))
         if between > best:
             best, found = between, first

@@ -26,7 +26,7 @@ def file_name(identity: str) -> str:
     from hashlib import sha256
 
     readable = re.sub(r"[^A-Za-z0-9.]+", "-", identity).strip("-.")[:60]
-    # A name may hold what no encoding knows; it is this name all the same.
+    # A name may contain characters that no encoding has; its digest must still be the same.
     digest = sha256(identity.encode(errors="surrogatepass")).hexdigest()
     return f"{readable or 'controller'}-{digest[:16]}.json"
 
@@ -93,7 +93,7 @@ def _put_beside(draft: Path, path: Path) -> None:
     except FileExistsError:
         raise
     except OSError:
-        # A memory stick knows no second name for a file; there a look has to do.
+        # A memory stick has no hard links; there, check whether the file exists.
         if path.exists():
             raise FileExistsError(f"{path} exists") from None
         os.replace(draft, path)

@@ -11,7 +11,7 @@ from typing import Any, Final
 from robolink.messages import tr
 
 _SHOWN: Final = 100
-"""Characters of a list of keys that are shown."""
+"""Largest number of characters shown of a list of keys."""
 
 
 def is_not_known(key: str, table: Iterable[str]) -> str:

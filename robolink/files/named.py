@@ -13,7 +13,7 @@ from robolink.messages import tr
 from robolink.remedy_words import RemedyWord, remedy_word
 
 MOST_BYTES: Final = 4_000_000
-"""No cell file, recipe, map, backup or list of poses is nearly as long."""
+"""Size limit in bytes: cell files, recipes, maps, backups and pose lists are far smaller."""
 
 _ANYONE: Final = 0o666
 
@@ -118,7 +118,8 @@ def save_named(path: Path, data: bytes | Iterable[bytes], *, replace: bool = Fal
 _AT_ONCE: Final = (
     getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0) | getattr(os, "O_BINARY", 0)
 )
-"""Opening a pipe that nobody writes to does not wait, and a terminal does not become ours."""
+"""Flags for opening a file: a pipe without a writer does not block, and a terminal does not become
+the controlling terminal of this process."""
 
 
 def _mode_of_regular(descriptor: int) -> int:

@@ -22,10 +22,12 @@ __all__ = [
 ]
 
 MOST_BYTES: Final = 250_000
-"""A recipe of a hundred tools takes 60 kB, as does a cell file of a hundred cells."""
+"""Size limit in bytes: a recipe of a hundred tools or a cell file of a hundred cells takes 60 kB.
+"""
 
 MOST_SHOWN: Final = 40
-"""Most problems of one file in an error; a file in another form has one in each line."""
+"""Largest number of problems of one file in an error; a file in another format has one in each
+line."""
 
 _MOST_PARTS: Final = 32
 _PART: Final = r"""(?:[A-Za-z0-9_-]++|"[^"\n]*+"|'[^'\n]*+')"""
@@ -33,8 +35,8 @@ _LONG_KEY: Final = (
     rf"(?m)^[ \t]*+\[*+[ \t]*+{_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_MOST_PARTS}}}"
     rf"|[{{,][ \t]*+{_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{_MOST_PARTS}}}"
 )
-"""A key of very many parts, for which the parser of Python takes time by the square of them: one
-of 60000 parts, 120 kB, took minutes. The keys that we know have four."""
+"""A key with very many parts, on which Python's parser takes quadratic time: a key of 60,000 parts,
+120 kB, took minutes. The keys of robolink have four parts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,10 +88,10 @@ class FileKind:
         Raises:
             ConfigError: It is no TOML.
         """
-        import tomllib  # a look at a cell whose file is as before reads no TOML
+        import tomllib  # not needed while a cell's file is unchanged
 
         try:
-            # Editors on Windows put a byte order mark in front, which TOML does not know.
+            # Editors on Windows add a byte order mark, which TOML does not allow.
             text = content.decode("utf-8-sig")
             if re.search(_LONG_KEY, text):
                 raise self._unreadable(
@@ -100,7 +102,7 @@ class FileKind:
             raise self._unreadable(path, tr("it is not UTF-8 text")) from error
         except RecursionError as error:
             raise self._unreadable(path, tr("it is nested too deeply")) from error
-        except ValueError as error:  # TOML, or a number with thousands of digits
+        except ValueError as error:  # a TOML error, or a number with thousands of digits
             raise self._unreadable(path, str(error)) from error
 
     def refusal(self, path: Path, problems: Sequence[Problem]) -> ConfigError:

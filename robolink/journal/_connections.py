@@ -21,7 +21,7 @@ T = TypeVar("T")
 _lock: Final = threading.Lock()
 _opened: Final[dict[tuple[str, bool], "Journal"]] = {}
 _closed: Final[WeakValueDictionary[tuple[str, bool], "Journal"]] = WeakValueDictionary()
-"""Those that :func:`close_files` closed and somebody still has: they open again by themselves,
+"""Journals that :func:`close_files` closed and that are still in use: they reopen by themselves,
 and a place must not be opened twice."""
 _in_memory: Final[dict[str, "Journal"]] = {}
 
@@ -101,7 +101,7 @@ def open_log(
 
     def record() -> OutcomeLog:
         journal = open_journal()
-        journal.require_usable()  # one that was opened before may have been broken since
+        journal.require_usable()  # a journal opened earlier may have been damaged since
         return journal.log(address, signature=signature)
 
     trouble = None

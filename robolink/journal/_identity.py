@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 
 _LOOPBACK_PORT: Final = re.compile(r"[/@](?:127\.[\d.]+|localhost|\[::1\]):(\d+)")
 _FIRST_LENT_PORT: Final = 32768
-"""Ports from here on are given out by the system (Linux; other systems begin later)."""
+"""First port that the system assigns by itself (Linux; other systems start higher)."""
 
 _ANSWERS: Final = 3
-"""Of so many two must be the same."""
+"""Number of answers, two of which must agree."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +134,7 @@ class Naming:
             before = rows.at(found.address)
             if found.certain:
                 return _meeting(rows, found, before)
-            # Too busy to tell: taken for whom it was last, until it can be asked.
+            # Too busy to answer: assume the last known identity until the controller can be asked.
             name = before or found.name
             return _Meeting(_listed(rows, name))
 
@@ -152,7 +152,7 @@ class Naming:
                     tables.names.note_robot(robot, name)
                 tables.entries.append(name, signature, "", _entries(found, meeting))
         except JournalError:
-            # Looking goes on without; the next intent will say what the journal has to say.
+            # Reading goes on without it; the next intent will report the journal's error.
             return False
         self.remarks = _remarks(found, meeting)
         return True

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from robolink.journal.store.store import Store
 
 PAGE: Final = 500
-"""How many entries are read at once; nothing is locked between two pages."""
+"""Number of entries read at once; nothing is locked between two pages."""
 
 FIRST_PAGE: Final = 20
-"""How many are read first: whoever looks for the newest of a kind mostly finds it there."""
+"""Number of entries read first: the newest of a kind is mostly among them."""
 
 
 class Journal:
@@ -163,7 +163,7 @@ class Journal:
         Raises:
             JournalError: It cannot be read, or a newer robolink made it.
         """
-        # Whatever is added from here on is behind both.
+        # Everything added from here on comes after both.
         with self._store.read() as tables:
             if tables.newer:
                 raise _too_new(self.location)
@@ -266,7 +266,7 @@ class Journal:
 def _entry(row: Mapping[str, Any]) -> Recorded:
     return Recorded(
         **{name: row[name] for name in _PLAIN},
-        # A kind that only a newer robolink knows stays the text that it is.
+        # A kind that only a newer robolink knows stays a text.
         kind=_KINDS.get(row["kind"], cast("EntryKind", row["kind"])),
         details=_details(row["details"]),
         signature=Signature(**{field.name: row[field.name] for field in fields(Signature)}),

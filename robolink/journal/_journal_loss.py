@@ -20,7 +20,7 @@ from robolink.timing import wall_label
 _SCHEMA: Final = "robolink/known-controller/1"
 
 LOST: Final = "history"
-"""The operation of the marker that stands for a record which is missing."""
+"""Operation of the marker that stands for a missing record."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 _LOG: Final = PackageLog(__package__)
 
 BEAT_S: Final = 1.0
-"""A holder gives a sign of life at most this often."""
+"""Shortest interval between two signs of life of a holder, in s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +65,7 @@ class Lease:
         self._epoch = 0
         self._beaten_ns = 0
         self._lost = False
-        self._taken = LeaseView()  # as it was when its loss was noticed
+        self._taken = LeaseView()  # as it was when the loss was noticed
         self._seen: tuple[LeaseView, str] | None = None  # and why its holder may be replaced
 
     @property

@@ -88,7 +88,7 @@ def this_process(operator: str = "") -> LeaseHolder:
     try:
         os_user = getpass.getuser()
     except (OSError, KeyError, ImportError):
-        os_user = ""  # a container may run under a number that has no name
+        os_user = ""  # a container may run under a user number without a name
     pid = os.getpid()
     process_start, boot = _start_and_boot(pid)
     return LeaseHolder(
@@ -123,7 +123,7 @@ def _pid_namespace() -> str:
 
 
 def _has_ended(pid: int, start: str) -> bool:
-    # The system is asked first: /proc may be mounted so that it hides others' processes.
+    # Ask the system first: /proc may be mounted so that it hides processes of other users.
     try:
         os.kill(pid, 0)
     except ProcessLookupError:
@@ -139,7 +139,7 @@ def _state_and_start(pid: int) -> tuple[str, str] | None:
         text = Path(f"/proc/{pid}/stat").read_text(encoding="utf-8", errors="replace")
     except OSError:
         return None
-    # The name stands in parentheses and may hold any character (proc(5)); field 3 follows.
+    # The name is in parentheses and may contain any character (proc(5)); field 3 follows it.
     fields = text.rpartition(")")[2].split()
     return fields[0], fields[19]
 
@@ -151,10 +151,10 @@ def signature_here(version: str) -> Signature:
 
 
 LEASE_S: Final = 10.0
-"""A holder without a sign of life for this long may be replaced."""
+"""Time in s without a sign of life after which a holder may be replaced."""
 
 FREE: Final = ""
-"""The token of a lease that nobody holds."""
+"""Token of a lease without a holder."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -298,7 +298,7 @@ def describe(holder: LeaseHolder) -> str:
 
 _SCHEMA: Final = "robolink/mailbox-client/1"
 _KEPT_S: Final = 86_400.0
-"""For so long a file of a run that has ended without removing it is kept at least."""
+"""Shortest time in s for which the file of a run that ended without removing it is kept."""
 
 
 def note_client(client: str, holder: LeaseHolder) -> None:
@@ -336,7 +336,7 @@ def run_of(client: str, here: LeaseHolder) -> ClientRun | None:
         return None
     if here.proves_gone(holder):
         return ClientRun(describe(holder), since, lives=False)
-    # Of this process too: whether its earlier session still goes on is not known here.
+    # This process too: an earlier session of it may have ended, which is not known here.
     lives = True if here.can_tell(holder) and holder != here else None
     return ClientRun(describe(holder), since, lives=lives)
 
@@ -349,6 +349,6 @@ def _outdated(folder: Path) -> Iterator[Path]:
 
 
 def _path(client: str) -> Path:
-    # Eight hexadecimal digits; anything else could name a file that is none of ours.
+    # Eight hexadecimal digits; other text could name a file that is not ours.
     name = client if client.isalnum() else "unreadable"
     return state_folder("clients") / f"{name}.json"

@@ -47,7 +47,7 @@ _BEGINNINGS: Final = {
 _REST_ON_ANSWERS: Final = frozenset(
     {EntryKind.INTENT, EntryKind.SELECTION, EntryKind.STATION, *PROOFS}
 )
-"""Entries with which answers go on record where no tool change has an id."""
+"""Entries with which answers are recorded if no tool change has an id."""
 
 
 class JournalOutcomeLog:
@@ -94,7 +94,7 @@ class JournalOutcomeLog:
         self._holds = 0
         self._sound = False
         self._whole = False
-        self._traced = not store.durable  # what dies with this process needs no trace
+        self._traced = not store.durable  # a record that ends with this process needs no trace
 
     def __repr__(self) -> str:
         """Say of which controller, as it was called, and in which journal; nothing is asked."""
@@ -154,7 +154,7 @@ class JournalOutcomeLog:
             names = self._named()
             name = names.identity
             self._require_sound()
-            if not self._begun:  # else it was asked then, and what is put back may not fail now
+            if not self._begun:  # otherwise checked at the start: a restore must not fail now
                 self._refuse_lost()
             self._lease.prepare()
             newest: tuple[int, str] | None = None
@@ -170,8 +170,8 @@ class JournalOutcomeLog:
             self._begun.add(marker.operation)
             self._lease.settle(grip)
             if not self._traced:
-                # Only beside what is on record: a trace without a record means a lost one.
-                with suppress(OSError):  # a state folder that is full is no matter
+                # Only beside a record: a trace without a record means that the record was lost.
+                with suppress(OSError):  # a full state folder does not matter here
                     leave_trace(name, self._journal.location, newest)
                 self._traced = self._whole = True
 
@@ -198,7 +198,7 @@ class JournalOutcomeLog:
                     try:
                         self._lease.prove(tables.leases, last=last)
                     except LeaseLostError:
-                        self._begun.discard(operation)  # it is for whoever took over now
+                        self._begun.discard(operation)  # the process that took over finishes it
                         raise
                 elif last:
                     self._lease.release(tables.leases)
@@ -323,8 +323,8 @@ class JournalOutcomeLog:
         with self._lock:
             self._named()
             self._require_sound()
-            # While something that it began is open, a lease that was lost stays lost: clearing
-            # up after it is not for this process any more.
+            # While something that this process began is open, a lost lease stays lost: finishing it
+            # is no longer this process's task.
             self._lease.look(afresh=not self._begun)
 
     def at_work(self) -> str:
@@ -373,7 +373,7 @@ class JournalOutcomeLog:
         :meth:`begin` says.
         """
         with self._lock:
-            if self._lease.held:  # whoever only looks, thousands of times, holds none
+            if self._lease.held:  # a process that only reads, thousands of times, holds no lease
                 with suppress(JournalError):
                     self._lease.beat()
 
@@ -433,7 +433,7 @@ class JournalOutcomeLog:
     def _named(self) -> Names:
         with self._lock:
             if self._begun or self._holds:
-                return self._names  # whoever works on it is not asked in between
+                return self._names  # not read again while work is in progress
             names = self._naming.known(self.signature)
             if names.identity != self._lease.controller:
                 self._lease = Lease(self._store, names.identity, self._holder, self._clock)

@@ -26,10 +26,10 @@ _SHARES: Final = r"""
     | fuse\.(ceph(-fuse)? | cifs | davfs2? | glusterfs | gvfsd-fuse | nfs | rclone | s3fs
     | smbnetfs | sshfs | vmhgfs-fuse)
     """
-"""File systems that more than one running system may write to, by their names in Linux."""
+"""Linux names of file systems to which several running systems may write."""
 
 _REMOTE: Final = 4
-"""What GetDriveType of Windows answers for a drive of the network: DRIVE_REMOTE."""
+"""Result of GetDriveType on Windows for a network drive: DRIVE_REMOTE."""
 
 _ESCAPED: Final = re.compile(r"\\([0-7]{3})")
 
@@ -142,7 +142,7 @@ def share_in(table: str, path: str) -> str | None:
         if len(fields) < 5 or not kind:
             continue
         point = _ESCAPED.sub(lambda code: chr(int(code[1], 8)), fields[4])
-        # One that was mounted later covers an earlier one of the same place.
+        # A later mount covers an earlier one at the same place.
         if len(point) >= len(longest) and (path + "/").startswith(point.rstrip("/") + "/"):
             longest, found = point, kind
     return found if longest != "/" and re.fullmatch(_SHARES, found, re.VERBOSE) else None
@@ -175,7 +175,7 @@ def _require_regular(path: Path) -> None:
     try:
         special = path.exists() and not path.is_file()
     except OSError:
-        return  # opening it says why
+        return  # opening the file reports why
     if special:
         raise JournalError(
             tr("The journal {path} is not a regular file.", path=path),
@@ -204,6 +204,6 @@ def _file_location(path: Path) -> str:
 
 
 def _without_password(rest: str) -> str:
-    # Up to the last @: better a host that is hidden too than half a password shown.
+    # Up to the last @: rather hide the host too than show half of a password.
     shown = re.sub(r"^([^/@:?]*):.*@", r"\1:***@", rest)
     return re.sub(r"(?i)(password=)[^&]*", r"\1***", shown)

@@ -19,17 +19,17 @@ ENGLISH: Final = "en"
 CHINESE: Final = "zh"
 
 LANGUAGES: Final = (CHINESE, ENGLISH)
-"""The names by which a person asks for a language."""
+"""Names by which a person selects a language."""
 
 FOLDER: Final = os.path.dirname(os.path.abspath(__file__))
-"""Where the catalogues lie, ``LANGUAGE/LC_MESSAGES/NAME.po``."""
+"""Folder of the catalogues, ``LANGUAGE/LC_MESSAGES/NAME.po``."""
 
 TERRITORY: Final = {CHINESE: "zh_CN"}
-"""The folder of each language that has a catalogue."""
+"""Folder name of each language that has a catalogue."""
 
 OURS: Final = "robolink"
 CLICK: Final = "click"
-"""The two catalogues: our own sentences, and those that click shows by itself."""
+"""Names of the two catalogues: our own sentences, and those of click."""
 
 _TRADITIONAL: Final = ("hant", "tw", "hk", "mo", "taiwan", "hong kong", "macao", "traditional")
 
@@ -46,7 +46,7 @@ def language_named(text: str) -> str | None:
     if language in ("en", "eng", "english", "c", "posix"):
         return ENGLISH
     if language in ("zh", "zho", "chi") or language.startswith("chinese"):
-        # Somebody who reads the other script is better served in English than by a guess.
+        # For readers of the other script, English is better than a guess.
         other_script = any(word in part for part in (language, *details) for word in _TRADITIONAL)
         return None if other_script else CHINESE
     return None
@@ -98,7 +98,7 @@ def catalogue(language: str, name: str) -> "GNUTranslations | None":
         if _is_newer(source, compiled):
             return gettext.GNUTranslations(io.BytesIO(_compile(source, compiled)))
     except ImportError:
-        pass  # no Babel: what was compiled last holds, without the sentences since
+        pass  # no Babel: the last compiled catalogue is used, without newer sentences
     try:
         with open(compiled, "rb") as file:
             return gettext.GNUTranslations(file)

@@ -352,7 +352,7 @@ class BoardSource(RoundSource):
             sensor=self.sensor,
             station=self.station,
             plan=self.plan,
-            # The tool's own U turned with the board, so the joint stands where it stood.
+            # The tool's U turned together with the board, so the joint angle is unchanged.
             angles_deg=proof_angles(basis.result, basis.tool),
             camera_error_mm=camera_error_of(basis.result),
             board=self.board,

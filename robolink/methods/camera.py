@@ -118,7 +118,7 @@ class LookTest(PlacedProof):
     method: ClassVar[str] = "camera"
     by_touch: ClassVar[bool] = False
 
-    # A str or a TipSensor; a value that is read back is a str.
+    # A str or a TipSensor; a value read back is a str.
     sensor: object
     station: CameraStation
     plan: LookPlan
@@ -132,12 +132,12 @@ class LookTest(PlacedProof):
         if not isinstance(self.sensor, str):
             return "camera_open"
         if sensor_name(self.sensor) != self.sensor:
-            return "camera_token"  # kept nowhere
+            return "camera_token"  # not stored anywhere
         return ""
 
     def prove(self, context: MeasurementContext) -> VerifyResult:
         """Make it; see :meth:`~robolink.procedures.KeptProof.prove`."""
-        # As the source gave it; a type with a protocol in it could not be read back from a record.
+        # As the source gave it; a record could not restore a type that contains a protocol.
         camera = cast("str | TipSensor", self.sensor)
         here = context.controller.groups[0].pose()
         with calibrated_camera(camera, self.station) as eye:

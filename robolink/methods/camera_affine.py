@@ -61,7 +61,7 @@ if TYPE_CHECKING:
 
 
 LEAST_SPAN_MM: Final = 0.2
-"""A smaller pattern does not show the scale of a pixel."""
+"""Smallest size of a pattern that shows the scale of a pixel, in mm."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -293,7 +293,7 @@ class CameraAffineSource(LookSource):
 
     def found_station(self, result: CalibrationResult, tool: int) -> Found | None:
         """Return what a kept measurement shows about the camera, ``None`` without a name."""
-        from robolink.calibration import CameraCalibration  # numpy, which a look does without
+        from robolink.calibration import CameraCalibration  # numpy, imported only when used
 
         if not self.name or not isinstance(result, CameraCalibration):
             return None
@@ -333,7 +333,7 @@ class CameraAffineSource(LookSource):
             TypeError: The result is not that of a camera that was found.
         """
         from robolink.calibration import CameraCalibration
-        from robolink.methods.camera import LookTest  # numpy
+        from robolink.methods.camera import LookTest  # numpy, imported only when used
 
         if not isinstance(basis.result, CameraCalibration):
             raise TypeError(f"no camera was found by {basis.result.method}")

@@ -227,7 +227,7 @@ class PointsSource:
         poses = self._poses()
         if self._taught_tool:
             _require_taught_with(self._taught_tool, poses)
-        # A pose that names its tool knows better than the usual one of all of them, the flange.
+        # A pose that names its tool overrides the usual tool of all poses, the flange.
         named = {self._tool_of(pose) for pose in poses}
         tools = {number: _require_defined(controller, number) for number in sorted(named)}
         if not self._method.upright:
@@ -257,7 +257,7 @@ class PointsSource:
         """
         if named != {self._taught_tool}:
             return PosesFound(result, (), None)
-        # The listing may lack V and W; what is compared and written comes from single reads.
+        # The listing may lack V and W; values to compare and write come from single reads.
         listed = {number: o for number, o in controller.tools.read_all().items() if o is not None}
         fits = tool_fits(result, taught=self._taught_tool, stored=listed, calibrated=tool)
         if not self._said and any(pose.tool is None for pose in poses):

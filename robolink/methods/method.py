@@ -129,7 +129,7 @@ DEGREES: Final = Unit("degrees")
 MM_S: Final = Unit("mm/s")
 
 Length = Annotated[float, Ge(0.001), MM]
-"""A limit; none is finer than the last digit that a controller prints."""
+"""A limit, in mm; no smaller than the last digit that a controller prints."""
 
 Angle = Annotated[float, Ge(-360), Le(360), DEGREES]
 InputNumber = Annotated[int, Ge(0), Le(0xFFFF)]
@@ -138,7 +138,7 @@ Rows = tuple[Pair, Pair]
 
 
 LengthRule = Literal["ask", "difference", "keep"]
-"""What to do if a tip is longer or shorter: ask, write Z by difference, keep Z."""
+"""Rule if a tip is longer or shorter: ask, write Z by difference, or keep Z."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

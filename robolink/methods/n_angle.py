@@ -157,11 +157,11 @@ def _of_angles(angles_deg: tuple[float, ...]) -> Iterator[Problem]:
 
 
 _SHARES: Final = (1.0, -1.0, 0.5, -0.5)
-"""By which the planned turns are scaled where the arm cannot take them up: to the other side, and
-half as far."""
+"""Factors for the planned turns, tried in this order if the arm cannot make the turns: in the other
+direction, then half as far."""
 
 FALSE_ALARM: Final = 0.001
-"""How often a bias along the approach is told where there is none."""
+"""Probability that a bias along the approach is reported although there is none."""
 
 
 @dataclass(slots=True)
@@ -270,9 +270,10 @@ class NAngleSource(ManualPinSource):
         count = 1 + len(self.turns_deg)
         touches = PinTouches(self.touch, comes_down=stored is not None, total=count, retakes=True)
         first = yield from touches.first()
-        # Refused before anything turns, not when all touches are made.
+        # Refused before anything turns, not after all touches.
         solvable_planes([first], height_of(stored))
-        # Within half a turn of zero: adding up from touch to touch leaves the joint's range.
+        # Within half a turn of zero: angles added up from touch to touch could leave the joint's
+        # range.
         choice = [
             [
                 angle_difference_deg(first.u_deg + turn_deg * share, 0.0)
@@ -376,7 +377,7 @@ class ManyTouches:
 
     def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
         """Solve three poses and more; see :class:`~robolink.procedures.PoseMethod`."""
-        from robolink.calibration import solve_n_angle  # numpy, which a look does without
+        from robolink.calibration import solve_n_angle  # numpy, imported only when used
 
         return solve_n_angle(flange, stored=stored, sigma_mm=self.sigma_mm)
 

@@ -73,7 +73,7 @@ def _needs(method: AnyMethod) -> str:
 def _row(field: ParameterField) -> str:
     option = f"`{field.option.flag or field.flag}`"
     if field.option.metavar:
-        # A bar would end the cell.
+        # A bar would end the table cell.
         option = f"`{field.flag} {field.option.metavar}`".replace("|", "\\|")
     key = f"`{field.name}`" if field.in_recipe else f"`{field.option.from_recipe}` at the top"
     cells = (option, key, field.unit, _default(field), _limits(field), field.help)
@@ -137,4 +137,4 @@ def _range(metadata: tuple[object, ...]) -> str:
 
 
 if __name__ == "__main__":
-    print(method_page(), end="")  # noqa: T201 - it is what the page is made with
+    print(method_page(), end="")  # noqa: T201 - the page is made from this output

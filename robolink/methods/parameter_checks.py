@@ -74,7 +74,7 @@ class ParameterField:
         return not self.option.from_recipe
 
 
-# No functools.cache: to mypy a dataclass with a hash of its own is no Hashable as a type.
+# No functools.cache: mypy does not accept the type of a dataclass with its own hash as Hashable.
 _read: dict[type[Any], tuple[ParameterField, ...]] = {}
 
 
@@ -99,7 +99,7 @@ def _field(one: dataclasses.Field[Any], hint: object) -> ParameterField:
         return next((item for item in metadata if isinstance(item, wanted)), None)
 
     explained, unit = said(Help), said(Unit)
-    assert explained is not None, one.name  # noqa: S101 - a declaration without help is a mistake
+    assert explained is not None, one.name  # noqa: S101 - every parameter must have help
     return ParameterField(
         one.name,
         kind,
@@ -282,12 +282,12 @@ def _of_interval(
     method: AnyMethod, parameters: MethodParameters, limits: StatedLimits, check: Check
 ) -> Iterator[Problem]:
     """Check that the interval can be known, and can be as narrow as required."""
-    from robolink.calibration import NORMAL_95  # what --help does without
+    from robolink.calibration import NORMAL_95  # not needed for --help
 
     if limits.interval_mm is None:
         return
     if limits.sigma_mm is None:
-        # One touch may take it from the calibration before.
+        # For one touch, it may come from the calibration before.
         if parameters.no_residual() and method.by_reference:
             yield Problem(
                 "sigma_mm",

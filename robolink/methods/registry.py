@@ -35,7 +35,7 @@ _OWN: Final = {
     "sphere-touch": "robolink.methods.surface_touch.sphere",
     "points": "robolink.methods.points",
 }
-"""Name and module, in the order of the help page."""
+"""Module of each method, by name, in the order of the help page."""
 
 _registered: dict[str, AnyMethod] = {}
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 
 LARGEST_GAP_DEG = 60.0
-"""The solver says it too."""
+"""Largest gap between neighbouring angles, degrees; the solver has the same limit."""
 
 _LEAST_LOOKS = 8
 
@@ -45,7 +45,7 @@ class AllRoundPlan(LookPlan):
 
     def angles_deg(self, u_deg: float) -> tuple[float, ...]:
         """Return U of every look for a tool that stands at ``u_deg``, in order."""
-        # Between -180, which it leaves out, and 180.
+        # In the range from -180, exclusive, to 180.
         within = [180.0 - (180.0 - u_deg - turn_deg) % 360.0 for turn_deg in self.turns_deg]
         return tuple(sorted(within, reverse=u_deg > 0))
 
@@ -115,7 +115,7 @@ class RunoutTableSource(CameraSource):
         from robolink.calibration import RunoutTableResult  # numpy
         from robolink.methods.runout_table_procedure import WobbleTest
 
-        # "slots" makes the class anew, so the short form of super() would not find it.
+        # "slots" creates the class anew, so the short form of super() would not find it.
         looks = CameraSource.proof_of(self, basis)
         if not isinstance(basis.result, RunoutTableResult):
             return looks

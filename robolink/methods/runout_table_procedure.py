@@ -22,11 +22,11 @@ class WobbleTest(LookTest):
 
     def prove(self, context: MeasurementContext) -> VerifyResult:
         """Make it; see :meth:`~robolink.procedures.KeptProof.prove`."""
-        # "slots" makes the class anew, so the short form of super() would not find it.
+        # "slots" creates the class anew, so the short form of super() would not find it.
         seen = LookTest.prove(self, context)
         drifts = []
         for drift in seen.drifts:
-            # The table counts U of the flange, the proof that of the new tool.
+            # The table uses U of the flange, the turn test U of the new tool.
             dx_mm, dy_mm = self.table.at(drift.u_deg - self.written.u_deg)
             drifts.append(replace(drift, dx_mm=drift.dx_mm - dx_mm, dy_mm=drift.dy_mm - dy_mm))
         return replace(seen, drifts=tuple(drifts))

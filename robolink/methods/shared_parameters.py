@@ -39,7 +39,7 @@ Retake = Annotated[
     Option(flag="--retake/--no-retake", default=True),
     Help(declared("Offer to repeat the touch that fits worst.")),
 ]
-"""Whether the worst touch is offered again when all are made."""
+"""Whether the worst touch is offered again after all touches."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -195,7 +195,7 @@ PLACE = (
     declared("where the camera looks"),
     declared("the height in focus"),
 )
-"""What X and Y of the station are, and what Z is."""
+"""Descriptions of the station's X and Y, and of its Z."""
 
 UNMEASURED_Z = declared('cannot be "measured" by a camera; write "typed" or "kept"')
 
@@ -314,7 +314,7 @@ def camera_at(parameters: LookParameters, site: "Site") -> "tuple[str | TipSenso
     Raises:
         ConfigError: Nobody knows one of them.
     """
-    from robolink.stations import camera_station, sensor_of  # what --help does without
+    from robolink.stations import camera_station, sensor_of  # not needed for --help
 
     sensor = site.sensor or parameters.sensor or sensor_of(site.station)
     if not sensor:

@@ -17,7 +17,8 @@ from robolink.runner import Procedure
 from robolink.stations import Found, Station, StationKind, beam_station, touch_station
 
 _MOST_APART_MM: Final = 0.3
-"""Each touch is half of that from their middle: the largest residual of a touch."""
+"""Largest distance between two touches, in mm: each has a residual of half of it, at most the
+largest residual of a touch."""
 
 
 _USUAL: Final = TouchPlan()
@@ -94,7 +95,7 @@ def _pin(
     station: Station, tool: int, tip: ToolOffset, sigma_mm: float | None, plan: TouchPlan
 ) -> Procedure[Found]:
     """Touch the pin twice in one orientation; nothing would confirm one touch alone."""
-    from robolink.calibration import pin_touched  # numpy, which a look does without
+    from robolink.calibration import pin_touched  # numpy, imported only when used
 
     touches = PinTouches(plan)
     first = yield from touches.first("first")
@@ -139,7 +140,7 @@ def _require_same_place(one: Pose, other: Pose) -> None:
 def _beams(
     station: Station, here: Pose, tool: int, tip: ToolOffset, tip_sigma_mm: float
 ) -> Procedure[Found]:
-    from robolink.methods.beams.procedure import trace_beams  # numpy, which a look does without
+    from robolink.methods.beams.procedure import trace_beams  # numpy, imported only when used
 
     guess = beam_station(station)
     beams = yield from trace_beams(
@@ -179,9 +180,9 @@ def _surface(
         kind=StationKind.TOUCH,
         x_mm=guess.x_mm,
         y_mm=guess.y_mm,
-        # A tip that seems too long touched a surface that is too high.
+        # If the tip seems too long, the surface is higher than assumed.
         z_mm=guess.z_mm + tip.z_mm - found.offset.z_mm,
-        # A tip that is longer than its offset says touches a surface that seems too high.
+        # If the tip is longer than its offset says, the surface seems higher.
         sigma_mm=_with_tip(offset_sigma_mm(found), tip_sigma_mm),
         how=tr("touched with tool {tool}", tool=tool),
         gauge=station.gauge,

@@ -106,10 +106,10 @@ class TwoPoseSource(ManualPinSource):
         """Return the steps of the measurement; see :func:`measure_two_pose`."""
         touches = PinTouches(self.touch, comes_down=stored is not None, total=2, retakes=True)
         first = yield from touches.first()
-        # Refused before anything turns, not when both touches are made.
+        # Refused before anything turns, not after both touches.
         solvable_planes([first], height_of(stored))
-        # Toward zero, by the angle as it is counted and not modulo 360: U starts inside the
-        # joint's range, and so it stays there.
+        # Toward zero, with the angle as reported and not modulo 360: U starts inside the joint's
+        # range, and stays there.
         turn_deg = -self.touch.turn_deg if first.u_deg > 0 else self.touch.turn_deg
         nominal, guess = replace(self.touch, nominal=True), stored or ToolOffset()
         u_deg = yield from first_clear(

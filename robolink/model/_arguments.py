@@ -24,9 +24,9 @@ def plain_number(value: Any) -> float | None:  # noqa: ANN401 - whatever a calle
     Args:
         value: What was given.
     """
-    if isinstance(value, float):  # first, and without the look at an ABC: numpy's float64 is one
+    if isinstance(value, float):  # first, without an ABC check: numpy's float64 is a float
         return float(value)
-    if getattr(value, "shape", None) == ():  # numpy's, which this module does not import
+    if getattr(value, "shape", None) == ():  # a numpy scalar; this module does not import numpy
         value = value.item()
     if isinstance(value, bool) or not isinstance(value, Real):
         return None
@@ -85,7 +85,7 @@ def misgiven(
     """
     try:
         given = inspect.signature(function).bind(*args, **named).arguments
-    except TypeError:  # no such arguments at all: Python's own sentence says so
+    except TypeError:  # the arguments do not fit: Python's own error says so
         return
     for name, value in given.items():
         yield from _wrong_at(name, value, _hint(inspect.unwrap(function), name))
@@ -138,7 +138,7 @@ def _wrong_at(name: str, value: object, kind: Any) -> Iterator[ConfigError]:  # 
             if isinstance(value, str) or not isinstance(value, Iterable):
                 yield not_of_class(f"{name}[0]", value, kinds[0])
                 continue
-            if isinstance(value, Iterator):  # it can be gone through once
+            if isinstance(value, Iterator):  # an iterator can be read only once
                 continue
             for number, item in enumerate(value):
                 yield from _wrong_at(f"{name}[{number}]", item, inner[0])

@@ -81,7 +81,8 @@ def refuse_operator(outcomes: OutcomeLog, act: str) -> None:
 
 
 _ROUNDING: Final = 0.002
-"""In mm and degrees: what is accepted is compared as it is sent, in three decimals a component."""
+"""Allowance for rounding, in mm and degrees: accepted values are compared as sent, with three
+decimals per component."""
 
 
 @dataclass(frozen=True, slots=True)

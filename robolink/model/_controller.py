@@ -399,10 +399,10 @@ class Controller(Protocol):
 
 
 _SERIAL: Final = re.compile(r"(?:C-)?SIM[0-9A-F]{8}")
-"""Serial numbers of simulated EPSON controllers and robots; no other maker's are known."""
+"""Serial numbers of simulated EPSON controllers and robots; those of other makers are unknown."""
 
 _MEDIUM: Final = "+sim://"
-"""In the URL of a simulator that runs in the process that uses it."""
+"""Part of the URL of a simulator that runs in the process that uses it."""
 
 
 def is_simulated_name(name: str) -> bool:

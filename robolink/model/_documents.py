@@ -38,10 +38,10 @@ from robolink.model._json_values import from_fields
 T = TypeVar("T")
 
 NOT_FINITE: Final[Mapping[str, float]] = {"Infinity": inf, "-Infinity": -inf, "NaN": nan}
-"""How a document spells the numbers that JSON has not."""
+"""Spelling in documents of the numbers that JSON lacks."""
 
 MOST: Final = 2**1023
-"""Beyond this no whole number is a float."""
+"""Largest whole number accepted as a float."""
 
 _LISTS: Final[Mapping[Any, Any]] = {Sequence: tuple} | {it: it for it in (tuple, list, frozenset)}
 _MAPPINGS: Final = (Mapping, dict)
@@ -153,7 +153,7 @@ def members_of(kind: Any) -> tuple[Any, ...]:  # noqa: ANN401 - any annotation
     return (kind,)
 
 
-# Out.
+# Writing.
 
 
 def _tagged(value: object, at: str) -> dict[str, Any]:
@@ -175,7 +175,7 @@ def _written(kind: Any, value: Any, at: str) -> Any:  # noqa: ANN401 - any value
         return _written_as(others[0], value, at)
     if is_value(type(value)) and any(isinstance(value, one) for one in others if is_value(one)):
         return _tagged(value, at)
-    for one in sorted(others, key=lambda one: one is not type(value)):  # the exact one first
+    for one in sorted(others, key=lambda one: one is not type(value)):  # the exact type first
         try:
             found = _written_as(one, value, at)
         except DocumentError:
@@ -316,7 +316,7 @@ def _give_its_type() -> str:
     return tr("Give the field a value of its type.")
 
 
-# Back.
+# Reading.
 
 
 def _untagged(kind: type, document: Mapping[str, Any], at: str) -> Any:  # noqa: ANN401 - any value
@@ -369,7 +369,7 @@ def _derived(kind: type, stem: str) -> Iterator[type]:
             found = getattr(module, name)
             if isinstance(found, type) and issubclass(found, kind):
                 yield found
-    # The newest first: a class with slots is made of one without them, which lingers.
+    # The newest first: a class with slots is created from one without, which stays in the list.
     subclasses: list[type] = kind.__subclasses__()
     for one in reversed(subclasses):
         yield from _derived(one, stem)
@@ -407,7 +407,7 @@ def _read(kind: Any, value: Any, at: str) -> Any:  # noqa: ANN401 - any JSON, an
         others = named or others
     if len(others) == 1:
         return _read_as(others[0], value, at)
-    for one in sorted(others, key=lambda one: one is not type(value)):  # the exact one first
+    for one in sorted(others, key=lambda one: one is not type(value)):  # the exact type first
         try:
             return _read_as(one, value, at)
         except DocumentError:

@@ -25,7 +25,7 @@ def require_numbers(value: object, *names: str) -> None:
         ConfigError: One holds no number.
     """
     for name in names:
-        if type(getattr(value, name)) not in _NUMBERS:  # hardly ever, and nothing is loaded before
+        if type(getattr(value, name)) not in _NUMBERS:  # rare; loads nothing before
             from robolink.model._arguments import required_number
 
             required_number(value, name)
@@ -118,7 +118,7 @@ class Pose:
 
 def described(coordinates: Sequence[float]) -> str:
     """Return x, y, z in mm and u, v, w in degrees as a person reads them; V and W where not 0."""
-    # Adding 0.0 takes the sign off a negative zero.
+    # Adding 0.0 turns a negative zero into zero.
     named = zip("XYZUVW", coordinates, strict=True)
     shown = [(name, round(value, 3) + 0.0) for name, value in named]
     return " ".join(f"{name} {value:.3f}" for name, value in shown if name not in "VW" or value)

@@ -70,7 +70,7 @@ def is_own_name(name: str) -> bool:
 
 
 Who: TypeAlias = Callable[[], Identity]
-"""Asks a controller for its identity, each time anew; raises what an exchange may raise."""
+"""Asks a controller for its identity each time; raises what an exchange may raise."""
 
 
 @dataclass(frozen=True, slots=True)

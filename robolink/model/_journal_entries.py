@@ -55,7 +55,7 @@ NO_HISTORY: Final = (
     EntryKind.LEASE,
     EntryKind.CHECK,
 )
-"""Kinds of entries about a controller that record no change of it."""
+"""Kinds of entries about a controller that do not record a change."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,25 +149,25 @@ class AnsweredBy(StrEnum):
     """How a question was answered."""
 
     PERSON = "person"
-    """Somebody was asked, and typed it or pressed a key."""
+    """A person typed it or pressed a key when asked."""
 
     STAND_IN = "stand-in"
-    """The simulated person of a simulator: nobody was asked."""
+    """The simulated person of a simulator answered; nobody was asked."""
 
     YES = "--yes"
-    """With the command, for every question that a yes answers."""
+    """Given with the command, for every question that a yes answers."""
 
     OPTION = "option"
-    """With the command, by an option for this question."""
+    """Given with the command, by an option for this question."""
 
     RECIPE = "recipe"
-    """By a key of the recipe."""
+    """Given by a key of the recipe."""
 
     COMMAND = "command"
-    """The command itself is the consent: nobody was there to be asked."""
+    """The command itself is the consent: there was nobody to ask."""
 
     PROGRAM = "program"
-    """By the program that uses robolink."""
+    """Given by the program that uses robolink."""
 
 
 def answer_entry(
@@ -228,7 +228,7 @@ _FORMER: Final = {
     "camera_affine": "camera-affine",
     "board_fit": "board",
 }
-"""What was written, and the name of the method now."""
+"""Former names of methods in records, and the present names."""
 
 
 def method_name_now(written: str) -> str:

@@ -26,7 +26,7 @@ def json_value(value: Any) -> Any:  # noqa: ANN401 - any value, any JSON
         TypeError: JSON has nothing for such a value.
     """
     kind = type(value)
-    if kind is float:  # these first: most of a document, and far quicker than what follows
+    if kind is float:  # first: most values of a document, and far faster than the rest
         return value if isfinite(value) else None
     if kind is tuple or kind is list:
         return [*map(json_value, value)]

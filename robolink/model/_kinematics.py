@@ -33,13 +33,14 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 
 Direction3 = tuple[float, float, float]
-"""Three numbers along X, Y and Z (``SMC_Vector3D``); lengths are mm."""
+"""Three numbers along X, Y and Z (``SMC_Vector3D``); lengths are in mm."""
 
 RotationMatrix = tuple[Direction3, Direction3, Direction3]
-"""A rotation by its rows (``SMC_Matrix3``)."""
+"""A rotation matrix by its rows (``SMC_Matrix3``)."""
 
 ALONG_MM: Final = 1e-6
-"""How far a shift may stand off the known direction (the vendor's figure is unverified)."""
+"""Largest deviation of a shift from the known direction, in mm (the vendor's figure is unverified).
+"""
 
 _UNIT: Final = 1e-6
 _OPPOSITE: Final = 1e-9
@@ -165,7 +166,7 @@ def projected(wanted: RotationMatrix, v_u: Direction3, v_rot: Direction3) -> Rot
     if cosine < _OPPOSITE - 1:
         raise NotReachable("Its direction points the opposite way: no orientation is nearest")
     x, y, z = _cross(now, v_rot)
-    # Rodrigues' formula without its angle: 1 + [n] + [n]^2 / (1 + cos), n = now x v_rot.
+    # Rodrigues' formula without the angle: 1 + [n] + [n]^2 / (1 + cos), n = now x v_rot.
     k = 1 / (1 + cosine)
     turn = (
         (1 - k * (y * y + z * z), k * x * y - z, k * x * z + y),
@@ -177,7 +178,7 @@ def projected(wanted: RotationMatrix, v_u: Direction3, v_rot: Direction3) -> Rot
 
 def turned_vector(rotation: RotationMatrix, vector: Direction3) -> Direction3:
     """Return a vector after a rotation."""
-    # Written out, here and below: every cycle of a simulated movement does it several times.
+    # Written out, here and below: each cycle of a simulated movement calls it several times.
     (a, b, c), (d, e, f), (g, h, i) = rotation
     x, y, z = vector
     return (a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z)
@@ -220,10 +221,10 @@ class CsTool(Enum):
     """``MCS_OR_FLANGE``: what the orientations of an orientation kinematics are seen from."""
 
     MCS = "mcs"
-    """The machine: they are what becomes of the flange in the end."""
+    """The machine coordinate system: the orientations are those of the final flange."""
 
     FLANGE = "flange"
-    """The flange of the position kinematics that carries it."""
+    """The flange of the position kinematics that carries the orientation kinematics."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -274,7 +275,7 @@ def combined_space(
     return space
 
 
-# A simulated movement asks for the same few in every cycle.
+# A simulated movement asks for the same few products in every cycle.
 @lru_cache(maxsize=64)
 def _one_behind_the_other(base: OrientationSpace, turns: OrientationSpace) -> OrientationSpace:
     """Return the products ``B T`` of all B of one space and all T of another."""
@@ -289,7 +290,8 @@ def _one_behind_the_other(base: OrientationSpace, turns: OrientationSpace) -> Or
     if turns.dof is OrientationDof.ZERO:
         v_u = turned_vector(inverse_rotation(turns.m_ori_zero), base.v_u)
         return OrientationSpace(OrientationDof.ONE, member, v_u, base.v_rot)
-    # Two turns about one axis are one turn; about two axes they leave no direction known.
+    # Two turns about one axis are one turn; two turns about different axes leave no known
+    # direction.
     if abs(abs(sum(a * b for a, b in zip(turns.v_rot, base.v_u, strict=True))) - 1) > _PARALLEL:
         return OrientationSpace.unknown()
     v_rot = turned_vector(member, turns.v_u)
@@ -297,10 +299,10 @@ def _one_behind_the_other(base: OrientationSpace, turns: OrientationSpace) -> Or
 
 
 AxisPositions = tuple[float, ...]
-"""``AXISPOS_REF``: one value an axis, a0 first; degrees of a rotary axis, mm of a linear one."""
+"""``AXISPOS_REF``: one value per axis, a0 first; degrees for a rotary axis, mm for a linear one."""
 
 FlangeFrame = tuple[Direction3, RotationMatrix]
-"""The place of a flange in mm, and its orientation."""
+"""Position of a flange in mm, and its orientation."""
 
 
 class AxisKind(StrEnum):

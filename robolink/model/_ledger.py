@@ -82,7 +82,7 @@ class Ledger:
         self._accounts = [self._whole]
         self._unkept: list[Account] = []
 
-    # What is begun, and how it ends; told by whoever keeps the markers.
+    # What begins and how it ends, as reported by the keeper of the markers.
 
     def begin(self, marker: Marker) -> None:
         """Note a command or a procedure that is about to start; its marker is durable."""
@@ -139,7 +139,7 @@ class Ledger:
                 if operation not in self._doubts and _Deed(marker).tool == tool
             )
 
-    # What is read besides.
+    # What else is read.
 
     def saw_tool(self, tool: int, holds: ToolOffset | None) -> None:
         """Note the value read from a tool."""
@@ -172,7 +172,7 @@ class Ledger:
         """
         return self._seen
 
-    # What stands.
+    # The present state.
 
     @contextmanager
     def block(self) -> Iterator[Account]:

@@ -110,7 +110,7 @@ class MotionProfile:
     speed_mm_s: float = 20.0
 
     def __post_init__(self) -> None:
-        if type(self.path) is not Path:  # a mere word would pass for the other path
+        if type(self.path) is not Path:  # a plain string would count as the other path
             try:
                 object.__setattr__(self, "path", Path(self.path))
             except ValueError:

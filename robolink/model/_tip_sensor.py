@@ -8,17 +8,17 @@ from typing import Final, Protocol, runtime_checkable
 from robolink.model._controller import Controller
 
 TIP: Final = 0
-"""The mark that stands for the tip; fiducials of a held board count from 1."""
+"""Mark that stands for the tip; fiducials of a held board count from 1."""
 
 
 class SpotUnit(StrEnum):
     """The unit in which a sensor reports where it sees something."""
 
     PIXEL = "px"
-    """Pixels of its image, X to the right and Y down, or however it counts them."""
+    """Pixels of the image: X to the right and Y down, or as the sensor counts them."""
 
     BASE_MM = "mm"
-    """Millimetres in the robot's base: the sensor was calibrated by its own maker's means."""
+    """Millimetres in the robot's base: the sensor was calibrated with its maker's own tools."""
 
 
 @dataclass(frozen=True, slots=True)

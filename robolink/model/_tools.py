@@ -12,16 +12,17 @@ from robolink.model._geometry import angle_difference_deg, described
 
 _LEAST: Final = 1e-100
 _MOST: Final = 1e9
-"""Beyond what any tool has in any unit, rounding included. A round number whose words are in
-another order is far below; of any other one in six lies in between."""
+"""Larger than any tool value in any unit, rounding included. A round number whose words are in the
+wrong order is far below :data:`_LEAST`; of other numbers, one in six falls between the two."""
 
 _LOOKS: Final = 3
-"""A line that bends three answers in a row is no line to change a tool over."""
+"""Largest number of readings: a line that garbles three answers in a row is not fit for changing a
+tool."""
 
 _NUMBERS: Final = frozenset({float, int})
 
 COMPONENTS: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
-"""The components of an offset, and of a pose, as files and documents name them."""
+"""Components of an offset and of a pose, as named in files and documents."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +46,7 @@ class ToolOffset:
     def __post_init__(self) -> None:
         values = self.components()
         if _NUMBERS.issuperset(map(type, values)) and all(map(math.isfinite, values)):
-            return  # nearly always; what is another kind of number is looked at one by one
+            return  # the usual case; other types of numbers are checked one by one
         from robolink.model._arguments import not_a_number, required_number
 
         for name, value in zip(COMPONENTS, values, strict=True):
@@ -157,7 +158,7 @@ ANY: Final = Expect.ANY
 """Pass as ``expected`` to write over any stored value. Recorded as unconditional."""
 
 Expected = ToolOffset | None | Literal[Expect.ANY]
-"""The value that the caller expects: an offset, ``None`` for undefined, or :data:`ANY`."""
+"""Value that the caller expects: an offset, ``None`` for undefined, or :data:`ANY`."""
 
 
 def tool_changed(
@@ -393,8 +394,8 @@ class Jump:
         """Return how far ``after`` is from ``before``."""
         length_mm = math.dist(before.components()[:3], after.components()[:3])
         ours, theirs = _quaternion(before), _quaternion(after)
-        # By the chord, because the cosine of a small angle says little about it; q and -q are one
-        # orientation, so the nearer of them counts.
+        # By the chord, because the cosine of a small angle is too insensitive; q and -q are the
+        # same orientation, so the nearer one counts.
         opposite = (-a for a in ours)
         chord = min(math.dist(ours, theirs), math.dist(tuple(opposite), theirs))
         return cls(length_mm, math.degrees(4.0 * math.asin(min(1.0, chord / 2.0))))

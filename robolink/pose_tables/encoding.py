@@ -16,7 +16,7 @@ from robolink.pose_tables.values import UnusableText
 
 _MARKS: Final = (
     (codecs.BOM_UTF8, "utf-8-sig"),
-    (codecs.BOM_UTF32_LE, "utf-32"),  # before UTF-16, whose mark it begins with
+    (codecs.BOM_UTF32_LE, "utf-32"),  # before UTF-16, whose mark is the beginning of this one
     (codecs.BOM_UTF32_BE, "utf-32"),
     (codecs.BOM_UTF16_LE, "utf-16"),
     (codecs.BOM_UTF16_BE, "utf-16"),
@@ -65,4 +65,4 @@ def _unmarked(data: bytes) -> str:
         except UnicodeDecodeError:
             continue
         return name
-    return "latin-1"  # every byte is a character of it
+    return "latin-1"  # it has a character for every byte

@@ -70,7 +70,7 @@ def why_no_number(name: str, text: str) -> str:
 
 
 _FAR_M: Final = 50.0
-"""No robot stands this far from its base, so numbers beyond it are not metres."""
+"""Largest distance of a robot from its base, in m; larger numbers are not metres."""
 
 
 def settled_length(raw: RawTable, said: str | None) -> tuple[LengthUnit, str]:

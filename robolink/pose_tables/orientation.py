@@ -18,10 +18,10 @@ Matrix = tuple[float, ...]
 """Nine numbers, row by row."""
 
 UNIT_WITHIN: Final = 0.01
-"""A quaternion's length may differ from 1 by this; files keep three digits and more."""
+"""Largest deviation of a quaternion's length from 1; files have three digits or more."""
 
 ROTATION_WITHIN: Final = 3e-3
-"""How far R R' may be from the identity: three decimals leave up to 2e-3."""
+"""Largest deviation of R R' from the identity: three decimals cause up to 2e-3."""
 
 _SINGULAR: Final = 1e-9
 _EXACT: Final = 1e-12
@@ -97,7 +97,7 @@ def checked(matrix: Sequence[float], line: int) -> Matrix:
     if _determinant(matrix) < 0:
         raise UnusableText(tr("the matrix is left-handed: it mirrors"), line)
     found = tuple(matrix)
-    while _deviation(found) > _EXACT:  # nears the closest rotation, squaring what is off
+    while _deviation(found) > _EXACT:  # converges quadratically to the closest rotation
         cubed = product(product(found, _transposed(found)), found)
         better = tuple(1.5 * a - 0.5 * b for a, b in zip(found, cubed, strict=True))
         if _deviation(better) >= _deviation(found):
@@ -190,7 +190,7 @@ RULES: Final = {
         _rule(ROTATION_VECTOR, "", "rx ry rz"),
     )
 }
-"""Every rule with a name of its own."""
+"""Every rule that has a name, by name."""
 
 _ALIASES: Final = {
     "rpy": "xyzrpw",
@@ -211,10 +211,10 @@ _ALIASES: Final = {
 _PRODUCT: Final = re.compile(r"r?([xyz])r?([xyz])r?([xyz])")
 _ROLL_PITCH_YAW: Final = ("roll", "pitch", "yaw")
 _WORDS: Final = {"fanuc": ("roll", "pitch", "yaw"), "xyzrpw": ("yaw", "pitch", "roll")}
-"""In the order of the rule's axes: FANUC calls the turn about X yaw, everybody else roll."""
+"""Words in the order of the rule's axes: FANUC calls the turn about X yaw, others call it roll."""
 
 _FIRST_TO_LAST: Final = ("epson", "kuka", "codesys")
-"""Rules whose letters, in the order of the alphabet, are the matrices from left to right."""
+"""Rules whose letters, in alphabetical order, are the matrices from left to right."""
 
 
 def rule_named(name: str) -> RotationRule:
@@ -250,7 +250,7 @@ def order_for(rule: RotationRule, letters: Sequence[str]) -> tuple[int, ...] | N
     if set(found) == {"rx", "ry", "rz"} and len(set(rule.axes)) == 3:
         return tuple(found.index(f"r{axis}") for axis in rule.axes)
     if rule.letters[0] == "1":
-        return (0, 1, 2)  # a product that somebody wrote out counts the columns
+        return (0, 1, 2)  # a product that is written out numbers the columns
     in_order = sorted(found)
     if rule.name in _FIRST_TO_LAST and in_order in (["a", "b", "c"], ["u", "v", "w"]):
         return tuple(map(found.index, in_order))

@@ -20,10 +20,10 @@ _UNIT_WITHIN: Final = 0.01
 _KEPT: Final = frozenset({"name", "number", "hand", "local", "tool"})
 _NO_TURNS: Final = frozenset({*_KEPT, "x", "y", "z"})
 MOST_RAD: Final = 4 * math.pi
-"""Two turns; degrees under the name of radians are beyond it at once."""
+"""Largest angle in radians: two turns; degrees mistaken for radians exceed it at once."""
 
 FAR_MM: Final = 100_000.0
-"""No robot stands further from its base, whatever it runs on."""
+"""Largest distance of a robot from its base, in mm, even on a travelling axis."""
 
 _METRES_BELOW: Final = 2.0
 _FULL_TURN_RAD: Final = 2 * math.pi * (1 + 1e-6)

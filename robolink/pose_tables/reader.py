@@ -53,14 +53,15 @@ _PROGRAMS: Final[tuple[Callable[[str], RawTable | None], ...]] = (
     read_mitsubishi,
     read_urscript,
 )
-"""Each is told by what none of the others writes, in the order in which they are asked."""
+"""Readers of programs, in the order in which they are tried; each recognises something that no
+other format contains."""
 
 MOST_BYTES: Final = 32_000_000
-"""Half a million poses; a file of more is something else."""
+"""Size limit in bytes: half a million poses; a larger file is not a list of poses."""
 
 _TURNED_DEG: Final = 36_000.0
 _AS_FAR: Final = 0.2
-"""Touches of one pin lie as far from the base within this share."""
+"""Largest relative difference between the distances of one pin's touches from the base."""
 
 
 _NEEDED_AS: Final = {"z_mm": "Z", "v_deg": "V", "w_deg": "W"}

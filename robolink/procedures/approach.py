@@ -86,10 +86,10 @@ def seek_or_retract(step: Seek, *, here: Pose, safe_z_mm: float) -> Procedure[Po
 
 
 SHORT_TURN_DEG: Final = 15.0
-"""Within this the chord is off the arc by 0.9 % of its radius."""
+"""Largest short turn, degrees: up to it the chord differs from the arc by 0.9 % of the radius."""
 
 _LOOK_DEG: Final = 1.0
-"""Between two places that are checked: 0.5 mm at a radius of 30 mm."""
+"""Angle between two places that are checked, degrees: 0.5 mm at a radius of 30 mm."""
 
 LONGEST_TURN_DEG: Final = 360.0
 
@@ -155,10 +155,10 @@ def require_turn_inside(
         ...     swings={"tip of tool 1": ToolOffset(12, -3.5, -20)},
         ... )
     """
-    from robolink.calibration import rotation_of  # numpy, which the help of a command does without
+    from robolink.calibration import rotation_of  # numpy, not needed for a command's help
 
     _require_turn(turn_deg, lift_mm)
-    # Of the frame in force, the flange sits where the tool's own offset leads back to.
+    # In the selected frame, the tool's own offset leads back to the flange.
     frame = tool or ToolOffset()
     back = rotation_of(Pose(0.0, 0.0, 0.0, frame.u_deg, frame.v_deg, frame.w_deg)).T
     arms = {tr("flange"): ToolOffset(), **swings}

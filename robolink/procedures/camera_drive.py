@@ -14,15 +14,16 @@ from robolink.runner import Look, Move, Notify, Procedure, SeenAt, first_clear
 from robolink.stations import CameraStation
 
 HALF_ROUND_DEG: Final = (0.0, 60.0, 120.0, 180.0)
-"""Four angles over half a turn, which joints allow wherever they allow to turn about a tip at
-all; a whole turn would bring 0.50 sigma in place of 0.55. In steps of less than half a turn, so
-that no controller has two ways to choose from, and all in one direction."""
+"""Four angles over half a turn, degrees: joints that allow any turn about a tip allow these. A
+whole turn would give 0.50 sigma instead of 0.55. Each step is less than half a turn, so that the
+controller has only one way to turn, and all are in one direction."""
 
 TWO_ANGLES_DEG: Final = (0.0, 120.0)
 """Two angles that separate the camera's own error from the tool."""
 
 LEAST_BESIDE_MM: Final = 0.2
-"""An approach that begins nearer to its place does not show whether the spot moves with the tip."""
+"""Smallest distance from its place at which an approach begins, in mm; from nearer, it is not clear
+if the spot moves with the tip."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,15 +56,16 @@ class LookPlan:
 
 
 _SHARES: Final = (1.0, -1.0, 0.5, -0.5)
-"""By which the planned turns are scaled where the arm cannot take them up."""
+"""Factors for the planned turns, tried in this order if the arm cannot make the turns."""
 
 _NEARER: Final = (1.0, 0.5, 0.25)
-"""At which shares of the way beside a place a spot is sought that was not seen all of it away."""
+"""Shares of the distance beside a place, tried in turn if the spot is not seen at the full
+distance."""
 
 _UNSEEN: Final = frozenset(
     {"tip_not_seen", "fiducial_not_seen", "several_tips_seen", "several_fiducials_seen"}
 )
-"""What a picture beside a place may be refused for although one nearer to it may do."""
+"""Refusals of a picture beside a place after which a picture nearer to the place is tried."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,8 +213,8 @@ class CameraDrive:
                 continue
             yield from self._approach(at)
             pair = before, (yield from self._look(place))
-            # Over a shorter way more is allowed for: what was wrong over the whole one must not
-            # come to be right by that.
+            # A shorter distance has a wider tolerance: what was wrong over the full distance must
+            # not become right because of that.
             if watch.follows(place.mark, *pair) and not any(
                 watch.alike(pair, other) for other in wrong
             ):
@@ -346,7 +348,7 @@ class CameraDrive:
         return (
             yield from first_clear(
                 [tuple(u_deg + (angle - u_deg) * share for angle in planned) for share in _SHARES],
-                # Followed on paper by a drive of its own: nothing is seen there.
+                # Simulated by a separate drive: no camera is used.
                 lambda angles: replace(self).looks(places(angles), here),
                 here,
             )
@@ -368,8 +370,8 @@ class CameraDrive:
     def _turn_to(self, place: Place, here: Pose) -> Procedure[None]:
         """Lift, go over and turn, come down beside the place."""
         beside = self._beside(place)
-        # Where no pixel is known, the first movement is what all others are compared with: play of
-        # the joints is kept out of it.
+        # If the pixel size is unknown, all movements are compared with the first one, which must
+        # therefore be free of play in the joints.
         low = _shifted(beside, -self.plan.beside_mm) if self._measures_pixels else beside
         above = self._above(low)
         high_mm = max(here.z_mm, above.z_mm)

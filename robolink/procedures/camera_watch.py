@@ -28,13 +28,14 @@ from robolink.runner import SeenAt
 from robolink.stations import CameraStation
 
 _OF_A_MEDIAN: Final = 0.75
-"""Scatter of the median of two or more pictures, as a share of that of one."""
+"""Scatter of the median of two or more pictures, as a share of that of one picture."""
 
 _BEYOND_NOISE: Final = 5.0
-"""A spot that moves by fewer standard deviations than these may stand still."""
+"""Number of standard deviations that a spot must move to count as moving."""
 
 _SHORTEST_MM: Final = 0.1
-"""Over a shorter way an error of the camera does no harm, and would not be told from chance."""
+"""Shortest movement that is judged, in mm: over less, a camera error does no harm and cannot be
+distinguished from chance."""
 
 
 @dataclass(slots=True)
@@ -131,7 +132,7 @@ class SpotWatch:
         """Remember how far off a movement was because its places were approached from two sides."""
         movement = self.movement(before, after)
         off_mm = math.dist(movement.seen, movement.known_mm)
-        # More than that was a false find, which is no reason to believe the next.
+        # A larger difference was a false find, which is no reason to accept the next one.
         if self.in_mm(after) and off_mm <= FOLLOWS_WITHIN * movement.known_length_mm:
             self._play_mm = max(self._play_mm, off_mm)
 
@@ -174,9 +175,9 @@ class SpotWatch:
         last = movements[-1]
         if not self.in_mm(after):
             return tip_did_not_move(last, in_mm=False)
-        # A camera that changed shows movements in one wrong way, whatever their length; and by
-        # more than a tenth it did not change since it saw one rightly in this run. A fleck that is
-        # found in place of the tip in one of two pictures fits neither.
+        # A camera that changed shows all movements wrong in the same manner, whatever their length;
+        # and it cannot have changed by more than a tenth since it saw one rightly in this run. A
+        # speck found in place of the tip in one of two pictures fits neither.
         off_mm = math.dist(last.seen, last.known_mm)
         near = off_mm <= FOLLOWS_WITHIN * last.known_length_mm + 3 * last.noise
         steady = (

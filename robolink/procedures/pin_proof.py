@@ -26,7 +26,8 @@ from robolink.procedures.witnessed_touches import TouchPlan, heights_agree, plai
 from robolink.runner import AngleShown, Notify, Procedure, TouchedAt, first_clear
 
 MOST_MORE: Final = 2
-"""Most further touches for a drift that is neither certainly inside nor certainly outside."""
+"""Largest number of further touches for a drift that is neither certainly inside nor outside the
+limit."""
 
 
 @checks_arguments
@@ -95,7 +96,7 @@ def verify_by_turning(
         yield Notify(proof.told(doubted))
         shown = yield from turning.shown(doubted.u_deg, proof.so_far())
         proof.add(*shown, in_space=in_space)
-    from robolink.calibration import height_shows_from_mm  # numpy, which a look does without
+    from robolink.calibration import height_shows_from_mm  # numpy, imported only when used
 
     heights_mm = [contact.z_mm, *(touch.z_mm for touch in proof.touches)]
     sigma_z_mm = plan.sigma_in_height_mm
@@ -289,7 +290,7 @@ def place_on_pin(contact: Pose, angle_deg: float, written: ToolOffset, tip: Tool
 
 
 _MOVES_PER_ANGLE = 3
-"""Over the pin, down beside it, off it again."""
+"""Movements per angle: over the pin, down beside it, and off it again."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -358,6 +359,6 @@ class TurnTest(KeptProof):
             limit_mm = min(self.tolerance_mm, self.touch.clearance_mm)
             drift = Drift(first.u_deg, *apart, self.u_mm)
             return VerifyResult((drift,), limit_mm, inputs=(first,))
-        # The arm stands as the person left it; it is not to change its hand over the pin.
+        # The arm stays as the person left it; its hand must not change over the pin.
         contact = replace(self.contact, hand=first.hand, posture=first.posture)
         return (yield from replace(self, contact=contact).steps())

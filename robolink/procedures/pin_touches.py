@@ -28,7 +28,8 @@ if TYPE_CHECKING:
 
 
 LEAST_TURN_DEG: Final = 10.0
-"""Least turn between two touches of a plan whose angles are more than twice as far apart."""
+"""Smallest turn between two touches if their planned angles are more than twice as far apart,
+degrees."""
 
 
 class PinTouches(WitnessedTouches):
@@ -170,7 +171,7 @@ class PinTouches(WitnessedTouches):
     def _not_yet(self, touch: TouchedAt, arrival: Pose) -> NotYet | None:
         made = replace(touch, arrival=arrival)
         if not (touch.typed or self._made(made)):
-            return None  # told by whoever asks for it once more
+            return None  # reported by the caller that asks for it again
         return super()._not_yet(touch, arrival) or self._in_the_air(touch) or self._unturned(made)
 
     def _in_the_air(self, touch: Pose) -> NotYet | None:

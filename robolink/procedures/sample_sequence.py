@@ -20,10 +20,10 @@ from robolink.procedures.samples import (
 from robolink.runner import MORE, Confirm, FitRow, FitSubject, Notify, Procedure
 
 MOST_REPEATED: Final = 3
-"""How often one is offered to be taken again; after that the measurement stands as it is."""
+"""How often repeating a sample is offered; after that the measurement stands."""
 
 _DIGITS: Final = 6
-"""Residuals that are equal in so many decimals of a millimetre differ by rounding alone."""
+"""Number of decimals of a residual in mm; residuals equal in these differ only by rounding."""
 
 
 def finalize_samples(
@@ -149,7 +149,7 @@ def worst_of(result: CalibrationResult, times: Mapping[int, int]) -> int:
         times: How often each was taken again.
     """
     distances = result.residual_distances_mm
-    # Two that are checked by each other alone fit equally badly; then it is the other's turn.
+    # Two samples that only check each other fit equally badly; then the other one is next.
     return min(
         range(len(distances)), key=lambda i: (-round(distances[i], _DIGITS), times.get(i, 0))
     )
@@ -227,9 +227,9 @@ def fit_subject(
 
 
 LEAST_DOF_TO_STOP: Final = 4
-"""Degrees of freedom before an estimated scatter may end a measurement, those of four touches of a
-pin at different U: from fewer it is a guess, and whoever stops as soon as a guess is good stops too
-often on a lucky one."""
+"""Smallest number of degrees of freedom from which an estimated scatter may end a measurement: that
+of four touches of a pin at different U. With fewer the estimate is a guess, and stopping at the
+first good guess too often means stopping at a lucky one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -304,7 +304,7 @@ def sample_sequentially(
         try:
             fit = samples.solved()
         except CalibrationError:
-            # What is too little now may be enough in the end.
+            # Too few samples now may be enough at the end.
             continue
         if not fit.dof:
             continue

@@ -225,7 +225,7 @@ class MeasurementContext:
         group = self.controller.groups[0]
         if isinstance(camera, ControllerSensor):
             camera = camera.beside(self.controller)
-        # Where nothing moves there is nothing to limit, and perhaps no pose to be read.
+        # If nothing moves, there is nothing to limit, and perhaps no pose to read.
         start = Pose(0.0, 0.0, 0.0, 0.0) if self.start is None else self.start
         return Runner(
             self.controller,
@@ -235,7 +235,7 @@ class MeasurementContext:
             on_step=self._stepped,
             camera=camera,
             offers=self._offers,
-            # About a new tip nothing is repeated: its value is written and not yet proved.
+            # With a new tip nothing is repeated: its value is written but not yet confirmed.
             repeats=tip is None,
             types=self._types and tip is None,
             ending=self._ending,

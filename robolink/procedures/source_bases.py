@@ -139,7 +139,7 @@ class LazySource:
     ) -> CalibrationResult:
         """Go on; see :class:`~robolink.procedures.TouchesFurther`."""
         source = touching_further(self._source)
-        assert source is not None  # noqa: S101 - can_add_touch said so
+        assert source is not None  # noqa: S101 - can_add_touch is true
         return source.further(context, stored, result, again)
 
     @property
@@ -240,7 +240,7 @@ class TouchSource(ProvesAgain):
 
     def with_touch(self, plan: TouchPlan) -> Self:
         """Return the same source with another plan of its touches."""
-        # Each source is a dataclass of its own, which this base of them cannot be.
+        # Each source is a dataclass; this common base cannot be one.
         return cast(Self, replace(cast(Any, self), touch=plan))
 
     @property
@@ -393,7 +393,7 @@ def proof_angles(result: CalibrationResult, tool: int) -> tuple[float, ...]:
 
 def camera_error_of(result: CalibrationResult) -> tuple[float, float]:
     """Return the camera error that a measurement found, base X and Y in mm."""
-    from robolink.calibration import CameraRound  # numpy, which a look does without
+    from robolink.calibration import CameraRound  # numpy, imported only when used
 
     error_mm = result.camera_error_mm if isinstance(result, CameraRound) else None
     return error_mm or (0.0, 0.0)

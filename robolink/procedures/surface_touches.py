@@ -23,7 +23,7 @@ from robolink.procedures.witnessed_touches import (
 from robolink.runner import Move, Procedure, TouchedAt, TouchSubject
 
 if TYPE_CHECKING:
-    from robolink.calibration import Floats, SurfaceStandoffs  # numpy, which a look does without
+    from robolink.calibration import Floats, SurfaceStandoffs  # numpy, imported only when used
 
 
 class SurfaceTouches(WitnessedTouches):

@@ -33,7 +33,8 @@ from robolink.procedures.witnessed_touches import TouchPlan, plain_pose
 from robolink.runner import Ask, Move, NotYet, Procedure, TouchedAt, TouchSubject
 
 MOST_LEAN_DEG: Final = 5.0
-"""So far from upright, against the measurement, a person may leave the tool; its turn is free."""
+"""Largest lean of the tool, as a person leaves it, from the upright of the measurement, degrees;
+its turn is free."""
 
 Vector = tuple[float, float, float]
 

@@ -89,7 +89,7 @@ TOUCH_CODES: Final = (
     "camera_changed",
     "spot_changed",
 )
-"""Reasons why touches, or looks of a camera, do not count, in a measurement and in a turn test."""
+"""Reasons why touches or looks do not count, in a measurement and in a turn test."""
 
 
 def was_jogged(touch: TouchedAt) -> bool:
@@ -115,7 +115,7 @@ def require_touches(touches: Sequence[TouchedAt], *, sigma_z_mm: float) -> None:
         CalibrationError: ``not_touched``, ``touch_heights_differ``, ``touch_not_proven``,
             ``large_residual``.
     """
-    from robolink.calibration import judge_touches  # numpy, which a look does without
+    from robolink.calibration import judge_touches  # numpy, imported only when used
 
     evidence = judge_touches([witnessed_by(touch) for touch in touches], sigma_z_mm=sigma_z_mm)
     if code := evidence.most_telling:
@@ -124,7 +124,7 @@ def require_touches(touches: Sequence[TouchedAt], *, sigma_z_mm: float) -> None:
 
 def heights_agree(heights_mm: Sequence[float], sigma_z_mm: float) -> bool:
     """Return whether heights of a tip on one pin differ by no more than touches scatter."""
-    from robolink.calibration import height_limit_mm  # numpy, which a look does without
+    from robolink.calibration import height_limit_mm  # numpy, imported only when used
 
     limit_mm = height_limit_mm(len(heights_mm), sigma_z_mm)
     return max(heights_mm) - min(heights_mm) <= limit_mm
@@ -142,7 +142,7 @@ def require_one_height(heights_mm: Sequence[float], *, sigma_z_mm: float) -> Non
 
 
 _PRINTED_MM: Final = 0.001
-"""No controller prints positions coarser; a finer one changes nothing."""
+"""Coarsest step of printed positions, in mm; a finer one changes nothing."""
 
 
 def witnessed_by(touch: TouchedAt) -> "WitnessedTouch":
@@ -379,7 +379,7 @@ class WitnessedTouches(ABC):
             raise
         touch = replace(TouchedAt.of(answer), seed=self._seed)
         if touch.typed:
-            return touch  # nothing shows that its standoff was jogged away
+            return touch  # nothing shows that the standoff was jogged away
         return replace(touch, arrival=arrival, standoff_mm=standoff_mm)
 
     def _made(self, touch: TouchedAt) -> bool:

@@ -117,14 +117,15 @@ def _field(value: float) -> str:
 VERSION: Final = "RL1"
 
 LONGEST_LINE: Final = 255
-"""Most characters of a SPEL+ string (docs/reference/spel.md 17)."""
+"""Largest number of characters of a SPEL+ string (docs/reference/spel.md 17)."""
 
 _BASE: Final = 251
 _PRIME: Final = 8_388_593
-"""The largest prime below 2^23: 251 times a smaller number still fits a Long of SPEL+."""
+"""Largest prime below 2^23: 251 times a smaller number still fits in a SPEL+ Long."""
 
 _FIELD: Final = re.compile(r"[!-)+\-.-~]+")
-"""Printable ASCII but blank, asterisk and comma. None is empty: ParseStr passes over those."""
+"""Printable ASCII except blank, asterisk and comma. No field is empty, because ParseStr skips empty
+ones."""
 
 _LAST_NUMBER: Final = 999_999
 

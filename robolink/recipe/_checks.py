@@ -247,7 +247,7 @@ def _tools(draft: Draft) -> list[tuple[str, Tool]]:
 
 
 _LIMITS: Final = tuple(field.name for field in fields(StatedLimits))
-"""Keys of ``[tolerances]``; the other places are keys of ``[source]``."""
+"""Keys of ``[tolerances]``; the other limits are keys of ``[source]``."""
 
 
 def parameters(draft: Draft) -> Iterator[Problem]:
@@ -286,7 +286,7 @@ def place(draft: Draft) -> Iterator[Problem]:
     if station is None or source is None or source.of_method.needs.place is None:
         return
     if station.x_mm is None and station.y_mm is None and station.z_mm is None:
-        return  # all of it comes from the station's record
+        return  # all of the place comes from the station's record
     where, height = source.of_method.needs.place
     if station.x_mm is None and station.y_mm is None:
         yield Problem("station.x_mm", _missing(source.kind, where))

@@ -13,10 +13,10 @@ if TYPE_CHECKING:
     from robolink.recipe._loading import LoadedRecipe
 
 _LOOKED_AT: Final = 1000
-"""So many of the newest entries are looked at for changes with a recipe."""
+"""Number of newest entries that are searched for changes with a recipe."""
 
 _LAST: Final = 5
-"""So many of the last changes tell how long one takes."""
+"""Number of recent changes that give the usual duration."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +122,7 @@ def changes_left_of(loaded: "LoadedRecipe", journal: "Journal", address: str) ->
     recipe = loaded.recipe
     tells = recipe.source.of_method.changes_left
     if tells is None or journal.robots_of(address):
-        return {}  # of several robots it is not known here which one is meant
+        return {}  # with several robots, it is unknown here which one is meant
     left = {}
     for tool in recipe.tools:
         holds = journal.last_value(address, tool.number)

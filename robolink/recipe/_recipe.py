@@ -37,46 +37,46 @@ class Recipe(Table):
     model_config = ConfigDict(validate_default=True)
 
     format: Annotated[Literal["robolink/recipe/1"], Field(alias="schema")]
-    """What this file is, and which version of it."""
+    """Format of the file and its version."""
     name: Line
-    """Its name for people. It goes on record with everything that the recipe does."""
+    """Name of the recipe for people. Everything that the recipe does is recorded with it."""
     notes: Note = ""
-    """For people."""
+    """Notes for people."""
     cells: Annotated[tuple[Line, ...], Field(strict=False)] = ()
-    """Names of the cells that it is for; without it, any cell. At another cell robolink neither
-    offers nor runs it, because its poses would lead elsewhere."""
+    """Names of the cells for which the recipe is meant; without names, any cell. At another cell
+    robolink neither offers nor runs the recipe, because its poses would lead elsewhere."""
     numbers: Literal["simulated"] | None = None
-    """In a copy of a recipe that comes with robolink this is "simulated": it runs on simulated
-    controllers alone. Put in the stations, poses, box and limits of your cell, then delete the
+    """In a copy of a recipe that comes with robolink this is "simulated": the recipe runs only on
+    simulated controllers. Enter the stations, poses, box and limits of your cell, then delete the
     line."""
     basis: Basis
-    """What robolink writes. "difference": the stored offset, moved by how much the tip moved
-    against the reference of the same tool at the same station. "absolute": the measured
-    offset."""
+    """Value that robolink writes. "difference": the stored offset, shifted by the difference
+    between the new tip and the reference of the same tool at the same station. "absolute": the
+    measured offset."""
     z: HeightRule
-    """Where Z of the offset comes from: "measured" by the touch, "typed" by the person each time,
-    or "kept"."""
+    """Source of the offset's Z: "measured" by the touch, "typed" by the person each time, or
+    "kept"."""
     verify: bool | None = None
-    """Whether the robot makes the turn test after the write. If the robot moves at all, it does
-    so unless this is false."""
+    """Whether the robot makes the turn test after the write. A robot that moves at all makes the
+    test unless this is false."""
     source: Annotated[MethodTable, AnyKind()]
-    """Which method measures, and its parameters."""
+    """Method of measurement, and its parameters."""
     station: StationTable
-    """Where the tools are measured."""
+    """Place where the tools are measured."""
     poses: Poses = Field(default_factory=Poses)
     """Poses of the whole change."""
     tools: Annotated[tuple[Tool, ...], Field(strict=False, min_length=1)]
-    """The tools, in the order in which they are measured. robolink writes all of them or none."""
+    """Tools, in the order in which they are measured. robolink writes all of them or none."""
     speeds: Speeds = Field(default_factory=Speeds)
-    """How fast the robot goes, in Power Low."""
+    """Speeds of the robot, in Power Low."""
     box: Box = Field(default_factory=Box)
-    """How far the flange may go from where it is when the recipe starts."""
+    """Largest distance of the flange from its position at the start of the recipe."""
     tolerances: Tolerances = Field(default_factory=Tolerances)
     """Acceptance limits."""
     accuracy: AccuracyTable = Field(default_factory=AccuracyTable)
-    """Errors that no measurement shows by itself, as far as they are known."""
+    """Known sizes of errors that no measurement shows by itself."""
     refusal: RefusalTable = Field(default_factory=RefusalTable)
-    """What follows when a measurement is refused."""
+    """Action after a refused measurement."""
     prompts: Annotated[tuple[Prompt, ...], Field(strict=False)] = ()
     """Questions to a person, in this order."""
     outputs: Annotated[tuple[Output, ...], Field(strict=False)] = ()

@@ -19,11 +19,10 @@ Line = Annotated[str, Field(min_length=1, max_length=200, pattern=r"^[^\x00-\x1f
 """One line for people. No control characters: they would reach a terminal."""
 
 Note = Annotated[str, Field(max_length=5000, pattern=r"^[^\x00-\x08\x0b-\x1f\x7f-\x9f]*$")]
-"""Lines for people."""
+"""Text for people, of several lines."""
 
 Length = Annotated[float, Field(ge=0.001)]
-"""No limit is finer than the last digit that a controller prints, mm
-(docs/reference/rules.md 3)."""
+"""Smallest limit: the last digit that a controller prints, in mm (docs/reference/rules.md 3)."""
 
 Angle = Annotated[float, Field(ge=-360, le=360)]
 ToolNumber = Annotated[int, Field(ge=1, le=15)]
@@ -71,8 +70,8 @@ class StationTable(Table):
     """Where the tools are measured."""
 
     id: Line
-    """Name of the pin or gauge; it goes on record with every measurement. What this table leaves
-    out of its place comes from the station of that name in the cell file and the journal."""
+    """Name of the pin or gauge, recorded with every measurement. Coordinates that this table leaves
+    out come from the station of that name in the cell file and the journal."""
     x_mm: float | None = None
     """X of the pin's end (for the record only), of the place where the surface is touched, or of
     the place where a camera looks; base, mm. Give y_mm too."""
@@ -86,7 +85,7 @@ class StationTable(Table):
     """Standard deviation of each of them, mm, if it is known. Source "one-touch" with basis
     "absolute" needs it to state what it is repeatable to."""
     note: Note = ""
-    """For people."""
+    """Notes for people."""
 
     @property
     def place_mm(self) -> tuple[float, float, float]:
@@ -102,7 +101,7 @@ class Poses(Table):
     """Poses of the whole change."""
 
     safe: FlangePose | None = None
-    """Flange pose to which the robot goes first and last: up, across, down."""
+    """Flange pose to which the robot moves first and last: up, across, down."""
 
 
 class PoseFile(Table):
@@ -111,11 +110,11 @@ class PoseFile(Table):
     file: Line
     """Path of the file. A relative path begins in the folder of the recipe."""
     columns: Line | None = None
-    """A name for each of its columns, such as "x,y,z,u"; "-" skips one."""
+    """A name for each column of the file, such as "x,y,z,u"; "-" skips one."""
     length: Literal["mm", "cm", "m", "in"] | None = None
-    """Unit of its lengths."""
+    """Unit of the lengths."""
     euler: Line | None = None
-    """Rule by which its angles turn, such as "kuka"."""
+    """Rule of the rotation angles, such as "kuka"."""
 
 
 class Tool(Table):
@@ -124,12 +123,12 @@ class Tool(Table):
     number: ToolNumber
     """Number of the tool in the controller."""
     name: Line | None = None
-    """Its name for people."""
+    """Name of the tool for people."""
     approach: FlangePose | None = None
     """Flange pose from which the tool is measured, with the tip some mm beside the pin and above
-    it. Without it, the tool is measured from where the robot is."""
+    it. Without this pose, the tool is measured from the robot's present position."""
     retreat: FlangePose | None = None
-    """Flange pose to which the robot goes after the measurement."""
+    """Flange pose to which the robot moves after the measurement."""
     points: Annotated[tuple[PointNumber, ...], Field(strict=False, min_length=2)] | None = None
     """Numbers, 0 to 999, of the taught points that touch the pin with this tool: 2 for "two-pose",
     3 and more for "n-angle". For source "points" only, which needs them or a file of poses."""
@@ -150,11 +149,11 @@ class Box(Table):
     """How far the flange may go from where the recipe starts."""
 
     sideways_mm: Annotated[float, Field(ge=1)] = 150.0
-    """How far in X and in Y, mm."""
+    """Largest distance in X and in Y, mm."""
     down_mm: Annotated[float, Field(ge=1)] = 30.0
-    """How far down, mm."""
+    """Largest distance down, mm."""
     up_mm: Annotated[float, Field(ge=1)] = 50.0
-    """How far up, mm."""
+    """Largest distance up, mm."""
 
     @property
     def reach(self) -> WorkBox:
@@ -192,22 +191,24 @@ class AccuracyTable(Table):
     """
 
     touch_mm: HalfWidth | None = None
-    """How far off a person sees contact, always on the same side of the tool, mm."""
+    """Largest error of the point at which a person sees contact, always on the same side of the
+    tool, mm."""
     place_mm: HalfWidth | None = None
-    """How far the station may have moved since it was learnt, mm; only if the method uses its
-    place."""
+    """Largest movement of the station since it was learnt, mm; only if the method uses the place of
+    the station."""
     camera_turn_deg: HalfWidth | None = None
-    """How far the camera may have turned since it was calibrated, degrees."""
+    """Largest turn of the camera since its calibration, degrees."""
     camera_scale_percent: HalfWidth | None = None
-    """How much the scale of the camera may have changed since it was calibrated, percent."""
+    """Largest change of the camera's scale since its calibration, percent."""
     plate_mm: HalfWidth | None = None
-    """How far the height of the surface may be off, mm."""
+    """Largest error in the height of the surface, mm."""
     tip_image_px: HalfWidth | None = None
-    """How far beside its middle the camera may see a tip, pixels."""
+    """Largest distance between the middle of a tip and the point where the camera sees the tip,
+    pixels."""
     bend_deg: HalfWidth | None = None
-    """Bend of the needle that may be left after its correction, degrees."""
+    """Largest bend of the needle that may be left after its correction, degrees."""
     print_mm: HalfWidth | None = None
-    """How far the fiducials may be printed from their drawing, mm."""
+    """Largest deviation of the printed fiducials from their drawing, mm."""
 
     @property
     def stated(self) -> dict[str, float]:
@@ -221,19 +222,19 @@ class RefusalTable(Table):
     action: Literal["stop", "measure_again"] = "stop"
     """End the change with the old values, or measure that tool again."""
     attempts: Annotated[int, Field(ge=2, le=5)] | None = None
-    """How often a tool is measured at most; 2 if it is left out."""
+    """Largest number of measurements of a tool; 2 if left out."""
 
 
 class Prompt(Table):
     """A question to a person."""
 
     at: Literal["start", "before_measure", "before_write", "end"]
-    """When: once at start, before_write and end; before_measure for each tool."""
+    """Time of the question: once at start, before_write and end; before_measure for each tool."""
     text: Line
-    """The question, as the person reads it."""
+    """Question as the person reads it."""
     answer: Literal["yes", "nozzle", "lot", "text"] = "yes"
-    """What is asked for: a yes, without which the change ends; the nozzle's id, its lot, or a text
-    to record."""
+    """Kind of answer: a yes, without which the change ends; the nozzle's id, its lot, or a text to
+    record."""
     tool: ToolNumber | None = None
     """Ask before this tool only."""
 
@@ -242,17 +243,19 @@ class Output(Table):
     """An output that is switched: vacuum, purge, light."""
 
     at: Literal["start", "before_measure", "after_measure", "before_write", "end"]
-    """When: once at start, before_write and end; before and after the measuring of each tool."""
+    """Time of switching: once at start, before_write and end; before and after the measurement of
+    each tool."""
     output: OutputNumber
     """Number of the output bit."""
     on: bool
-    """Whether it is switched on or off."""
+    """Whether the output is switched on or off."""
     tool: ToolNumber | None = None
     """Switch it for this tool only."""
 
 
 _DESCRIBED = ConfigDict(use_attribute_docstrings=False)
-"""Their keys bring their sentences: pydantic need not look through every module for a source."""
+"""Configuration of tables whose keys have their own descriptions: pydantic need not read the source
+of every module."""
 
 
 class MethodTable(Table):
@@ -263,7 +266,7 @@ class MethodTable(Table):
     of_method: ClassVar[AnyMethod]
 
     kind: str
-    """The method."""
+    """Name of the method."""
 
     @property
     def parameters(self) -> MethodParameters:

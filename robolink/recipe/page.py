@@ -44,7 +44,7 @@ _TABLES: Final = {
     "Prompt": "`[[prompts]]`",
     "Output": "`[[outputs]]`",
 }
-"""The tables in the order of the page, with their headings."""
+"""Headings of the tables, in the order of the page."""
 
 _UNITS: Final = {"_mm": "mm", "_px": "px", "_deg": "degrees", "mm_s": "mm/s", "percent": "%"}
 
@@ -123,4 +123,4 @@ def _one_line(text: str) -> str:
 
 
 if __name__ == "__main__":
-    print(recipe_page(), end="")  # noqa: T201 - it is what the page is made with
+    print(recipe_page(), end="")  # noqa: T201 - the page is made from this output

@@ -16,15 +16,16 @@ from robolink.messages import tr
 from robolink.register_maps._map import COMPONENTS, MapSlot, Number, RegisterMap
 
 _FINEST: Final = 2
-"""Digits after the point that a comparison needs: hundredths of a millimetre or of a degree."""
+"""Number of decimals that a comparison needs: hundredths of a millimetre or degree."""
 
 _SLACK: Final = 1e-6
-"""What a REAL may lack of a decimal number, in units of the last digit that is shown."""
+"""Largest difference between a REAL and its decimal number, in units of the last digit shown."""
 
 _PLAIN: Final = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)", re.ASCII)
 
 _TEST_VALUES: Final = (7.3, 4.6, 8.9, 5.2, 9.7, 6.1, 3.4, 2.8, 1.5)
-"""Small enough for any tool and any register, and none the round number of a test by others."""
+"""Values small enough for any tool and register, and unlike the round numbers that others use in
+tests."""
 
 
 class MapDiffersError(ConfigError):
@@ -93,7 +94,7 @@ class OpenValue:
 
 
 Found = Mapping[MapValue, float]
-"""What the map finds, in mm and degrees; what cannot be read is missing."""
+"""Values found by the map, in mm and degrees; unreadable values are missing."""
 
 
 def values_of(register_map: RegisterMap) -> dict[MapValue, Number]:

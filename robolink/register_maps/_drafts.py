@@ -42,14 +42,15 @@ _BESIDE: Final = frozenset(
     {"offset", "offsets", "offs", "off", "pos", "position", "value", "val", "corr", "correction"}
     | {"shift", "tcp", "data"}
 )
-"""Words beside an axis that change nothing."""
+"""Words beside an axis that do not change its meaning."""
 
 _UNIT_WORDS: Final = {"mm": "mm", "um": "um", "inch": "inch", "deg": "deg", "rad": "rad"}
 _IDENTIFIER: Final = re.compile(r"[A-Za-z0-9]+")
 _PREFIX: Final = re.compile(
     r"^(?:a|ar|arr|ast|st|s|g|gv|p|r|lr|i|si|di|li|ui|udi|usi|w|dw|b|by|x|n|f|lf|fl|fb)(?=[A-Z])"
 )
-"""Hungarian notation. Other small letters (old, new, cmd) make it another variable."""
+"""Prefixes of Hungarian notation. Other words in lower case (old, new, cmd) make it another
+variable."""
 
 _WORD: Final = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
 _HIGHEST: Final = 15
@@ -64,7 +65,8 @@ _CHINESE: Final = {
     "微米": "um",
     **dict.fromkeys(("角度", "轴", "向", "号"), ""),
 }
-"""Words of Chinese register lists. A name with others is something else: an old value, say."""
+"""Words of Chinese register lists. A name with other words has another meaning, such as an old
+value."""
 
 _CHINESE_WORD: Final = re.compile("|".join(_CHINESE))
 
@@ -93,7 +95,7 @@ def component_of(name: str) -> Component | None:
     for position, identifier in enumerate(identifiers):
         words = [word.lower() for word in _WORD.findall(identifier)]
         if not words or words[0] not in _TOOL:
-            continue  # a path, or an Old, New, Cmd before it that makes it another variable
+            continue  # part of a path, or a prefix (Old, New, Cmd) that makes it another variable
         rest = words[1:] + [
             word.lower() for it in identifiers[position + 1 :] for word in _WORD.findall(it)
         ]
@@ -109,7 +111,7 @@ def _read(words: list[str]) -> Component | None:
     rest = [w for w in words if not w.isdigit() and w not in (*axes, *units, *_BESIDE)]
     if rest or len(numbers) != 1 or len(axes) != 1 or len(units) > 1:
         return None
-    # Python reads no number of thousands of digits.
+    # Python does not read numbers of thousands of digits.
     if len(numbers[0]) > _MOST_DIGITS or not 1 <= int(numbers[0]) <= _HIGHEST:
         return None
     return Component(int(numbers[0]), axes[0], _UNIT_WORDS[units[0]] if units else "")
@@ -244,7 +246,7 @@ def _rows(path: Path) -> Iterator[tuple[int, dict[str, str]]]:
                 row["address"] = f"16#{row['address'].removeprefix('16#').removeprefix('0x')}"
             if row.get("name"):
                 yield reader.line_num, row
-    except csv.Error as error:  # a cell of more than 131072 characters: a quote that is left open
+    except csv.Error as error:  # a cell of more than 131072 characters: an unclosed quote
         raise _unusable(path, str(error)) from error
 
 

@@ -78,7 +78,7 @@ def _checked(path: Path) -> tuple[RegisterMap | None, list[Problem]]:
 
 
 _COMMIT_DEPTH: Final = 2
-"""How deep pydantic's location goes before the kind of commit stands in it."""
+"""Length of a pydantic location beyond which it contains the kind of commit."""
 
 
 def problems_of(error: "ValidationError") -> list[Problem]:
@@ -92,7 +92,7 @@ def problems_of(error: "ValidationError") -> list[Problem]:
 def _path(location: Sequence[int | str]) -> str:
     steps = list(location)
     if len(steps) > _COMMIT_DEPTH and steps[0] == "commit":
-        del steps[1]  # the kind of commit, which pydantic puts in and no file has
+        del steps[1]  # the kind of commit, which pydantic inserts and no file contains
     path = ""
     for step in steps:
         joint = "." if path else ""
@@ -133,7 +133,7 @@ def _missing(location: Sequence[int | str]) -> str:
 
 
 _MOST_READ: Final = 125
-"""Registers that one request reads (docs/reference/softmotion.md 4.3)."""
+"""Largest number of registers in one read request (docs/reference/softmotion.md 4.3)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -135,10 +135,11 @@ class RegisterWords:
 
 
 LREAL_TOLERANCE: Final = 1e-9
-"""Two LREALs this near are equal (docs/reference/rules.md 3)."""
+"""Largest difference between equal LREALs (docs/reference/rules.md 3)."""
 
 _TINY: Final = 1e-20
-"""What is smaller and not 0 is no length and no angle, but words in the wrong order."""
+"""Smallest plausible value; a smaller one that is not 0 means that the words are in the wrong
+order."""
 
 
 class NumberType(StrEnum):
@@ -221,7 +222,7 @@ class Number:
         raw: float
         data = struct.pack(f">{len(words)}H", *self._as_stored(list(words)))
         (raw,) = struct.unpack(_FORMATS[self.type], data)
-        return raw * self.factor + 0.0  # which takes the sign off a negative zero
+        return raw * self.factor + 0.0  # turns a negative zero into zero
 
     def is_absurd(self, value: float) -> bool:
         """Return whether ``value`` is not a number, or smaller than any length that is not 0."""
@@ -247,7 +248,7 @@ COMPONENTS: Final = ("x", "y", "z", "u", "v", "w")
 """Components of a tool offset and of a pose, in the order of :class:`robolink.model.Pose`."""
 
 ANGLES: Final = frozenset("uvw")
-"""Those that are degrees; the others are mm."""
+"""Components that are in degrees; the others are in mm."""
 
 
 class AllZero(StrEnum):

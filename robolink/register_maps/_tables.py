@@ -208,7 +208,7 @@ KEYS: Final = {
     )
     for name, field in table.model_fields.items()
 }
-"""Every key of every table, for a guess at what was meant."""
+"""All keys of all tables, used to suggest a correction."""
 
 
 _LENGTHS: Final = {"mm": 1.0, "um": 0.001, "m": 1000.0, "inch": 25.4}

@@ -8,10 +8,11 @@ from xml.etree.ElementTree import Element, tostring
 Content: TypeAlias = Element | str | None
 
 _INVISIBLE: Final = ("Cc", "Cf", "Cs")
-"""Control characters, marks that change the direction of writing, halves of pairs."""
+"""Unicode categories of control characters, characters that change the writing direction, and
+surrogates."""
 
 _PLUS_MINUS: Final = re.compile(r"(?<![0-9A-Za-z.])\+-(?: |(?=\d)|\Z)")
-"""How every sentence writes plus or minus: each console has it, also one that is ASCII alone."""
+"""Plus or minus as every sentence writes it: ASCII consoles can show it too."""
 
 
 def element(tag: str, *content: Content, **attributes: object) -> Element:
@@ -53,7 +54,7 @@ def plain(text: str) -> str:
 
 def rounded(value: float, digits: int = 3) -> str:
     """Return a number as a person reads it."""
-    # Adding zero takes the sign off what rounds to zero.
+    # Adding zero removes the sign from a value that rounds to zero.
     return f"{round(value, digits) + 0.0:.{digits}f}"
 
 

@@ -42,7 +42,7 @@ def render(report: Report, *others: Report) -> str:
         .render(
             title=tr("Tool {tool} of {controller}", tool=numbers, controller=report.controller),
             policy=POLICY,
-            # The style is the one text that is not escaped: a page takes it as it stands.
+            # The style is the only text that is not escaped: it is inserted unchanged.
             style=Markup(style),
             heading=summary.heading(reports),
             facts=summary.facts(reports),
@@ -115,7 +115,7 @@ def _squares(report: Report) -> Iterator[Drawing]:
     yield from pose_drawings(report.fit)
 
 
-def _shown(value: Any) -> Any:  # noqa: ANN401 - whatever a template shows
+def _shown(value: Any) -> Any:  # noqa: ANN401 - any value that a template shows
     """Return what a template shows of a value: no invisible characters, nothing for nothing."""
     if value is None:
         return ""

@@ -266,7 +266,7 @@ _NOT_ABOUT_A_CHANGE = (
     EntryKind.RAW,
     EntryKind.DECISION,
 )
-"""Their tool, where they name one, is not one that was changed."""
+"""Kinds of entries whose tool, if any, was not changed."""
 
 
 def reports_of(
@@ -392,7 +392,7 @@ def _answer(entry: Recorded) -> str:
     if entry.kind is not EntryKind.DECISION or "question" not in details:
         return ""
     by = details.get("answered_by")
-    if by is None:  # older entries do not say it
+    if by is None:  # older entries do not contain it
         return tr("{question} {answer}", question=details["question"], answer=entry.verdict)
     return tr(
         "{question} {answer} ({by})",

@@ -88,7 +88,7 @@ def foreseen_steps(
     try:
         while True:
             if isinstance(step, (Notify, Confirm)):
-                # What it would say depends on poses that nobody took.
+                # The content depends on poses that nobody took.
                 step = procedure.send(None)
                 continue
             if isinstance(step, Consider):
@@ -105,7 +105,7 @@ def foreseen_steps(
                 answer = here = step.target
             step = procedure.send(answer)
     except (StopIteration, CalibrationError):
-        # The poses are foreseen, so what they would give means nothing.
+        # The poses are predicted, so a result from them means nothing.
         return here, known
 
 
@@ -188,7 +188,7 @@ class ArmAhead:
 
     def considered(self, step: Consider, *, known: bool) -> tuple[str, ...]:
         """Answer a procedure's question; nothing if its places are unknown."""
-        # Where a person will have brought the tip is not known, so neither what is in the way.
+        # It is unknown where a person will have jogged the tip, and so is what is in the way.
         if not known:
             return nothing_in_the_way(step, known=known)
         return tuple(starmap(self.obstacle, considered(step)))

@@ -37,7 +37,8 @@ _STEP: Final = re.compile(
     r"(?=[\s;xyzu]|,(?![0-9])|$)\s*[,;]?",
     re.ASCII,
 )
-"""Axis, sign, number; a comma before a digit is a decimal comma, any other parts two steps."""
+"""Axis, sign, number; a comma before a digit is a decimal comma, any other comma separates two
+steps."""
 
 _COMMA: Final = re.compile(r"([xyzu]\s*[+-]\s*[0-9]+),([0-9])", re.ASCII)
 
@@ -46,14 +47,15 @@ _PLAIN: Final = str.maketrans(
     | {chr(0xFEE0 + code): chr(code) for code in range(0x21, 0x7F)}
     | {"\u3000": " "}
 )
-"""Minus signs of other keyboards, and the wide letters and digits of Chinese input methods."""
+"""Translation of minus signs of other keyboards, and of the wide letters and digits of Chinese
+input methods."""
 
 _TURNED_DEG: Final = 0.005
-"""Less than this is what a position reads besides, not a turn."""
+"""Largest change of angle that is only read-out noise, degrees."""
 
 TYPED_AWAY_MM: Final = 1.0
-"""Further from where the controller says the tool is no typed pose lies: half of the clearance with
-which the next touch is approached from it."""
+"""Largest distance between a typed pose and the reported one, in mm: half of the clearance from
+which the next touch is approached."""
 
 TYPED_AWAY_DEG: Final = 1.0
 

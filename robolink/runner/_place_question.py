@@ -27,13 +27,14 @@ from robolink.runner._steps import (
 from robolink.timing import FASTEST_ANSWER_S, NS_PER_S
 
 MOST_EARLY: Final = 3
-"""So many answers to one question that came too early: a key is held down, or a file is fed in."""
+"""Number of answers to one question that may come too early: beyond it a key is held down, or a
+file is the input."""
 
 MOST_NOT_YET: Final = 3
-"""So often a place is asked for that is not to be taken yet, before it ends the measurement."""
+"""How often a place is requested again that does not count yet, before the measurement ends."""
 
 AGAIN: Final = "taken_again"
-"""The code of a person's request to repeat an earlier touch."""
+"""Code of a person's request to repeat an earlier touch."""
 
 MOST_REFUSED: Final = 10
 """This many useless answers in a row end a question: a person, or a substitute, would continue in
@@ -48,7 +49,7 @@ _QUESTIONS: Final = {
 }
 
 Line = Callable[[Callable[[], object] | None], str]
-"""Returns the next line typed, calling the function between two looks at the input."""
+"""Returns the next line typed, calling the function between two checks of the input."""
 
 
 class PlaceQuestion:
@@ -247,7 +248,7 @@ class PlaceQuestion:
     def _refuse(self, error: ConfigError, refused: int) -> int:
         """Report why an answer is refused; return how many in a row have now been refused."""
         if isinstance(error, JournalError):
-            raise error  # no mistake of the person's: the record cannot be kept any more
+            raise error  # not a person's mistake: the record can no longer be kept
         # A typing mistake ends nothing; the limits held and nothing was sent.
         if refused + 1 == MOST_REFUSED:
             raise self._gets_nowhere(error) from error

@@ -13,7 +13,7 @@ from typing import Final, Protocol, runtime_checkable
 from robolink.model import InputEdge, Path, Pose, WorkBox
 
 POLL_S: Final = 1.0
-"""Longest time between two status reads while a person is asked."""
+"""Longest time between two status reads while a person is asked, in s."""
 
 
 class Question(Enum):
@@ -23,13 +23,13 @@ class Question(Enum):
     """Jog steps until the tip is on the reference point, then an empty line."""
 
     ROOM = "room"
-    """Jog steps until the tip is free to go along the axes of the tool, then an empty line."""
+    """Jog steps until the tip has room to move along the axes of the tool, then an empty line."""
 
     ALONG_X = "along x"
-    """Jog steps along the tool's own +X, then an empty line."""
+    """Jog steps along the tool's +X, then an empty line."""
 
     ALONG_Z = "along z"
-    """The same along its +Z."""
+    """Jog steps along the tool's +Z, then an empty line."""
 
     YES_NO = "yes/no"
 
@@ -37,7 +37,7 @@ class Question(Enum):
     """A line of text that is not empty; ``q`` alone ends."""
 
     CHOICE = "choice"
-    """The number of a row; an empty line, or ``q``, is the first, which is safe."""
+    """The number of a row; an empty line, or ``q``, selects the first, which is safe."""
 
 
 class Operator(Protocol):

@@ -120,10 +120,11 @@ def as_measurement() -> Iterator[None]:
 
 
 CONTACT_POLL_S: Final = 0.2
-"""The same while an input is watched that shows contact."""
+"""The same while watching an input that shows contact, in s."""
 
 _MOST_REPEATS: Final = 2
-"""Steps of one procedure that may be repeated: a computer busier than that has to be looked at."""
+"""Largest number of repeated steps in one procedure: a computer busier than that needs attention.
+"""
 
 T = TypeVar("T")
 
@@ -205,7 +206,7 @@ class Runner:
                 try:
                     done = self._take(step)
                 except CalibrationError as error:
-                    # The procedure may draw the tip back before it gives up.
+                    # The procedure may draw the tip back before it ends.
                     step = procedure.throw(error)
                     continue
                 if self._on_step is not None:
@@ -377,7 +378,7 @@ class Runner:
                     "the robot. Nothing was written. Repeat this step from here?"
                 )
             )
-        except DeclinedError:  # nobody is there
+        except DeclinedError:  # there is nobody to ask
             return False
 
     @property

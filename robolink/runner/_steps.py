@@ -20,15 +20,14 @@ from robolink.runner._prompt_context import FitSubject, JogRange, TouchSubject
 from robolink.timing import NS_PER_S, Clock
 
 FINEST_STEP: Final = 0.1
-"""Longest last step before a touch, in mm or degrees: with steps of a millimetre a person stops up
-to half of one away (docs/decisions/0041).
-"""
+"""Largest last step before a touch, in mm or degrees: with steps of a millimetre, a person stops up
+to half a millimetre away (docs/decisions/0041)."""
 
 SETTLING_S: Final = 0.3
-"""For this long after a step keys are ignored: they were pressed for what came before."""
+"""Time in s after a step during which keys are ignored: they were pressed for what came before."""
 
 OLDEST_READING_S: Final = 1.0
-"""What took longer to read is not where the tip is now."""
+"""Longest time for reading a position, in s: after a longer one, the tip may have moved on."""
 
 _ROUNDING: Final = 1e-9
 
@@ -48,7 +47,7 @@ class NotYet:
 
 
 Judge = Callable[[object], NotYet | None]
-"""Says of a :class:`~robolink.runner.TouchedAt` why it does not count yet."""
+"""Says why a :class:`~robolink.runner.TouchedAt` does not count yet."""
 
 
 class StepsTaken:
@@ -132,13 +131,13 @@ class TeachPrompt(Enum):
     """The tip is on the reference point."""
 
     ROOM = "room"
-    """The tip is free in the air, with room to go along the axes of the tool."""
+    """The tip is in free space, with room to move along the axes of the tool."""
 
     ALONG_X = "along_x"
-    """The tip has gone along the tool's own +X since."""
+    """The tip has since moved along the tool's +X."""
 
     ALONG_Z = "along_z"
-    """The same along its +Z."""
+    """The tip has since moved along the tool's +Z."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -345,7 +344,7 @@ class Confirm:
 
 
 TakenStep = Move | Ask | Seek | Look | Notify | Confirm
-"""A step in the cell, or for a person; it is reported and previewed."""
+"""A step in the cell or for a person; it is reported and previewed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -371,6 +370,5 @@ Step = TakenStep | Consider
 T = TypeVar("T")
 
 Procedure = Generator[Step, Any, T]
-"""Yields steps, receives the answer of each step, returns a result. The type of an answer follows
-from the step, which a generator's type cannot express.
-"""
+"""Yields steps, receives the answer of each step, returns a result. The type of an answer depends
+on the step, which the type of a generator cannot express."""

@@ -16,18 +16,18 @@ if TYPE_CHECKING:
 
 
 LEAST_CROSSINGS: Final = 8
-"""Each beam both ways, twice: once would leave no residual that could contradict."""
+"""Smallest number of crossings: each beam in both directions, twice; once would leave no residual
+that could contradict the result."""
 
 LEAST_OF_A_ROUND: Final = 4
-"""Each beam both ways."""
+"""Number of crossings in one round: each beam in both directions."""
 
 LEAST_TURN_DEG: Final = 60.0
-"""From 60 degrees on, a turn test shows beams that were moved by e as a drift of e or more: 2 e
-sin(turn / 2).
-"""
+"""Smallest turn, degrees: from 60 degrees on, a turn test shows beams that were moved by e as a
+drift of e or more: 2 e sin(turn / 2)."""
 
 LEAST_SHAFT_MM: Final = 1.0
-"""How much deeper the shaft is crossed, at least, so that its lean shows."""
+"""Smallest extra depth at which the shaft is crossed, in mm, so that its lean shows."""
 
 _ONE_DEPTH_MM: Final = 0.2
 _ONE_ANGLE_DEG: Final = 1.0
@@ -156,7 +156,7 @@ class ProgramCrossings:
 
     def from_place(
         self,
-        result: "CalibrationResult",  # noqa: ARG002 - as others need it
+        result: "CalibrationResult",  # noqa: ARG002 - other measures need it
         written: ToolOffset,  # noqa: ARG002
         proof: "VerifyResult",
     ) -> "VerifyResult":

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 MOST_POSES: Final = 64
 
 _SAME_MM: Final = 0.002
-"""Nearer to each other two poses are taken for one that was sent twice."""
+"""Smallest distance between two poses, in mm; closer ones count as one pose sent twice."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,13 +23,15 @@ if TYPE_CHECKING:
 
 
 LEAST_WAY_MM: Final = 0.2
-"""A look nearer to its place than this does not show whether the spot moves with the tip."""
+"""Smallest distance of the first look from its place, in mm: from nearer, it is not clear if the
+spot moves with the tip."""
 
 _SAME_DEG: Final = 0.05
-"""Orientations that differ by less are one."""
+"""Largest difference between equal orientations, degrees."""
 
 _PLAY_MM: Final = 0.02
-"""What play in the joints may make of a way: a program cannot be asked for a closer look."""
+"""Largest effect of joint play on a movement, in mm: a program cannot be asked for a closer look.
+"""
 
 _FOLLOWS_WITHIN: Final = 0.1
 
@@ -107,8 +109,8 @@ def require_moving(pairs: Sequence[LookPair]) -> None:
         for movement in movements
         if movement.judged(CameraChangeRows(), play_mm=_PLAY_MM) is not MovementVerdict.AS_KNOWN
     ]
-    # A camera that changed shows every way in one wrong manner; that play makes one of them seem
-    # wrong is no reason to refuse the others.
+    # A camera that changed shows all movements wrong in the same manner. One that is wrong because
+    # of play is no reason to refuse the others.
     for movement in wrong:
         steady = all(movement.like(one, within=_FOLLOWS_WITHIN) for one in movements)
         if not steady and math.dist(movement.seen, movement.known_mm) > (
@@ -128,11 +130,12 @@ def _same_orientation(one: "Sighting", other: "Sighting") -> bool:
 
 LEAST_LOOKS: Final = 4
 LEAST_PROOFS: Final = 3
-"""At so many angles; at each the tool stands beside its place first, and at it then."""
+"""Smallest number of angles; at each, the tool first stops beside its place and then at its place.
+"""
 
 _SEEN_APART: Final = 10.0
-"""In a proof the tip stays before one place of the camera, within so many tolerances: a scale
-that is wrong by 5 % then counts for half a tolerance, and a measurement with it shows."""
+"""Largest displacement of the tip before the camera in a turn test, in tolerances: a scale that is
+wrong by 5 % then makes half a tolerance, and the measurement shows it."""
 
 
 class ProgramLooks:
@@ -235,7 +238,7 @@ class ProgramLooks:
 
     def from_place(
         self,
-        result: "CalibrationResult",  # noqa: ARG002 - as others need it
+        result: "CalibrationResult",  # noqa: ARG002 - other measures need it
         written: ToolOffset,  # noqa: ARG002
         proof: "VerifyResult",
     ) -> "VerifyResult":

@@ -69,10 +69,11 @@ _LENGTHS: Final = {
     CallbackWord.RESTORED: 8,
     CallbackWord.BYE: 0,
 }
-"""Questions, and how many fields each has; of a pose the method decides how many."""
+"""Number of fields of each question; the fields of a pose depend on the method."""
 
 _POSE_FIELDS: Final = 7
-"""The selected tool, and six lengths and angles; what was seen there follows."""
+"""Number of fields before what was seen at a pose: the selected tool, and six lengths and angles.
+"""
 
 
 @dataclass(slots=True)
@@ -182,7 +183,7 @@ class CallbackConversation:
         if self._log is not None:
             self._log.close()
 
-    # What the program says of itself.
+    # What the program reports about itself.
 
     def _hello(self, fields: Sequence[str]) -> Answer:
         serial, robot, flag, operation, tool, *value = fields
@@ -191,7 +192,7 @@ class CallbackConversation:
         place = f"spel@{self._peer}"
         name = record_name(serial, _number(robot), self._controllers) or place
         log = self._journal.log(name, signature=self._signature)
-        # Robots of one controller call from one address.
+        # The robots of one controller call from the same address.
         address = f"spel://{self._peer}" if robot == "1" else f"spel://{self._peer}?robot={robot}"
         log.ask(lambda: Identity(name, address, place))
         self._log, self._flag = log, int(flag)
@@ -260,7 +261,7 @@ class CallbackConversation:
                 "unsettled", tr("Something that was begun on this controller is not settled.")
             )
 
-    # What it measured.
+    # What the program measured.
 
     def _pose(self, fields: Sequence[str]) -> Answer:
         run = self._require_run()
@@ -311,7 +312,7 @@ class CallbackConversation:
         )
         return CallbackWord.VALUE, (run.change.operation, *offset_fields(rounded))
 
-    # What it wrote.
+    # What the program wrote.
 
     def _wrote(self, fields: Sequence[str]) -> Answer:
         run, change = self._of_change(fields[0])
@@ -350,7 +351,7 @@ class CallbackConversation:
         self.over = True
         return CallbackWord.BYE, ()
 
-    # What stands.
+    # The present state.
 
     def _refused(self, error: RobolinkError) -> Answer:
         """Record a refusal; a program that has written restores the old value."""
@@ -369,7 +370,7 @@ class CallbackConversation:
             log.append(entry)
         except ConfigError as unrecorded:
             code = self._unrecorded("journal", unrecorded, besides=error)
-        except OutcomeUnknownError as missing:  # nothing goes on it until a person has looked
+        except OutcomeUnknownError as missing:  # nothing is recorded until a person has looked
             code = self._unrecorded("unsettled", missing, besides=error)
         if self._in_work():
             return CallbackWord.BACK, (code,)
@@ -383,7 +384,7 @@ class CallbackConversation:
         return code
 
     def _say(self, code: str, error: RobolinkError) -> None:
-        with suppress(Exception):  # a console that is gone ends nobody's conversation
+        with suppress(Exception):  # a console that is gone must not end a conversation
             self._tell(code, error)
 
     def _in_work(self) -> bool:

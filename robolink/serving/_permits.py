@@ -29,7 +29,7 @@ _AGAIN_S: Final = 1.0
 PERMIT_METHODS: Final = ("n-angle", "pivot")
 
 _SEEN: Final = ("1", "1")
-"""The permit was off at a look before, and is on now."""
+"""The permit was off at the look before, and is on now."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -274,4 +274,4 @@ class PermitCall:
         try:
             self._controller.outcomes.append(entry)
         except ConfigError:
-            return  # what is under way matters more than that it cannot be recorded
+            return  # the work in progress matters more than a failure to record it

@@ -21,7 +21,8 @@ if TYPE_CHECKING:
 
 
 LEAST_TOUCHES: Final = 4
-"""With three touches of a circle little contradicts a wrong one, and nobody looks on."""
+"""Smallest number of touches: with three on a circle, little contradicts a wrong touch, and nobody
+is watching."""
 
 LEAST_PROOFS: Final = 2
 
@@ -94,7 +95,7 @@ class ProgramTouches:
         proof = verify_drift(touches.poses, written, tolerance_mm=limit_mm)
         tip = tip_pose(touches.poses[0], written, tool=0)
         place = (tip.x_mm, tip.y_mm, tip.z_mm)
-        # The measured point has two coordinates where the height says nothing.
+        # The measured point has two coordinates if the height is not determined.
         away_mm = math.dist(place[: len(result.reference_point_mm)], result.reference_point_mm)
         if away_mm > limit_mm:
             raise CalibrationError(

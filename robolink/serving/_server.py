@@ -19,7 +19,8 @@ if TYPE_CHECKING:
 MOST_PROGRAMS: Final = 8
 BEAT_S: Final = 1.0
 IDLE_S: Final = 900.0
-"""A program that says nothing for so long is taken for gone; its moves take minutes at most."""
+"""Time in s without a message after which a program counts as gone; its moves take minutes at most.
+"""
 
 _CHUNK: Final = 4096
 
@@ -77,7 +78,8 @@ class CallbackServer:
             family = socket.AF_INET6 if ":" in host else socket.AF_INET
             self._listener = socket.create_server((host, port), family=family)
         except OSError as error:
-            # Python tells the address once more; before that stands what the system said.
+            # Python repeats the address in its own error; the system's error before it has only the
+            # cause.
             said = error.__context__ if isinstance(error.__context__, OSError) else error
             raise ConfigError(
                 tr(
@@ -117,7 +119,8 @@ class CallbackServer:
             except TimeoutError:
                 continue
             except OSError as error:
-                # Too many open files, or a program that gave up meanwhile: the next one may call.
+                # Too many open files, or a program that gave up meanwhile: the next one may still
+                # connect.
                 before, trouble = trouble, str(error.strerror or error)
                 if trouble != before:
                     self._say(
@@ -143,7 +146,7 @@ class CallbackServer:
         thread = threading.Thread(target=self._talk, args=(link, peer), daemon=True)
         try:
             thread.start()
-        except RuntimeError as error:  # the system gives no further thread just now
+        except RuntimeError as error:  # the system cannot start another thread now
             self._say(tr("robolink disconnected {peer}: {cause}", peer=peer, cause=error))
             self._end(link)
             return
@@ -167,7 +170,7 @@ class CallbackServer:
         )
 
     def _say(self, sentence: str) -> None:
-        with suppress(Exception):  # a console that is gone ends nobody's conversation
+        with suppress(Exception):  # a console that is gone must not end a conversation
             self._tell(sentence)
 
     def _talk(self, link: socket.socket, peer: str) -> None:
@@ -179,9 +182,9 @@ class CallbackServer:
         except RobolinkError as error:
             self._say(tr("robolink disconnected {peer}: {cause}", peer=peer, cause=error))
         except OSError:
-            pass  # the program puts its own value back; what is open stays so in the journal
+            pass  # the program restores the value itself; what is open stays open in the journal
         finally:
-            # Whatever it was: a place that is not given back is one program less for good.
+            # In any case: a place that is not released would be lost for good.
             self._end(link)
 
     def _end(self, link: socket.socket) -> None:

@@ -136,7 +136,7 @@ def _together(declared: Station, learnt: Station) -> Station:
 
 
 _SAME: Final = 0.0015
-"""Bases that differ by less, in mm or degrees, are one: controllers show three decimals."""
+"""Largest difference between equal bases, in mm or degrees: controllers show three decimals."""
 
 _TURN_DEG: Final = 360.0
 
@@ -155,7 +155,7 @@ def base_now(controller: Controller) -> tuple[float, ...] | None:
         return None
     try:
         return controller.groups[0].base()
-    except RobolinkError:  # what lasts is met again by whoever does more than look
+    except RobolinkError:  # commands that do more report a lasting failure
         return None
 
 

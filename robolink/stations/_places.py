@@ -115,7 +115,7 @@ def pin_of(station: Station) -> "Pin":
     Raises:
         ConfigError: Nobody knows.
     """
-    from robolink.calibration import Pin  # numpy, which a look does without
+    from robolink.calibration import Pin  # numpy, imported only when used
 
     x_mm, y_mm, z_mm = _place(station)
     sigma_mm = station.sigma_mm or 0.0
@@ -175,7 +175,7 @@ def beam_station(station: Station) -> BeamStation:
 
 def _beam(line: Mapping[str, float], sigma_mm: float) -> "Beam":
     """Return a beam as recorded; an old record has no uncertainty."""
-    from robolink.calibration import Beam  # numpy, which a look does without
+    from robolink.calibration import Beam  # numpy, imported only when used
 
     return from_fields(Beam, {"sigma_mm": sigma_mm, **line}, partial=True)
 
@@ -195,7 +195,7 @@ def camera_station(station: Station) -> CameraStation:
         model = CameraModel(
             ((a, b), (c, d)),
             (x_mm, y_mm),
-            # Its middle, where no record tells the point that it knows best.
+            # The middle, unless the record gives the point that is known best.
             centre_mm=(centre[0], centre[1])
             if isinstance(centre, Sequence)
             else _place(station)[:2],

@@ -12,7 +12,8 @@ from robolink.model import EntryKind, NewEntry, Recorded, finding_named_now, jso
 from robolink.timing import local_label, wall_time
 
 AGREEING_MM: Final = 2.0
-"""How far the cell file may be from the learnt place: a search still finds the station."""
+"""Largest distance of the cell file's place from the learnt one, in mm, at which a search finds the
+station."""
 
 
 class StationKind(StrEnum):

@@ -22,10 +22,10 @@ KIND: Final = "holders"
 MOST_BYTES: Final = 65_536
 
 _TAKEN_S: Final = 1.0
-"""A process that does not even take the request in this time is no help."""
+"""Longest wait for a process to accept the request, in s; a slower one is of no use."""
 
 _RESTS_S: Final = 8.0
-"""Longest wait for the end of a stop that was taken: five seconds to rest, and the exchanges."""
+"""Longest wait for the end of an accepted stop, in s: five seconds to stop, plus the exchanges."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,7 +83,7 @@ class ControllerHolder:
         return self._understood(said)
 
     def _understood(self, said: dict[str, object]) -> LastSeen | None:
-        from robolink.model import ControllerStatus  # here, because a stop needs none of it
+        from robolink.model import ControllerStatus  # here, because a stop does not need it
 
         try:
             status = said["status"]
@@ -232,7 +232,7 @@ def _reached(place: str | tuple[str, int]) -> socket.socket:
 
 def _is_gone(pid: int) -> bool:
     if os.name != "posix":
-        return False  # a signal of 0 would end it there
+        return False  # there, signal 0 would end the process
     with suppress(PermissionError):
         try:
             os.kill(pid, 0)

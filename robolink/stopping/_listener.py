@@ -36,17 +36,17 @@ from robolink.transport import far_end_of
 KIND: Final = "holders"
 
 MOST_BYTES: Final = 4096
-"""Most bytes of a request."""
+"""Largest number of bytes of a request."""
 
 _HEARD_S: Final = 1.0
 _LAST_ANSWER_S: Final = 10.0
-"""Longest wait for an answer under way before the socket is closed."""
+"""Longest wait for an answer in progress before the socket is closed, in s."""
 
 _LONGEST_PATH: Final = 100
-"""Bytes of a socket's path; Linux takes 107, others 103."""
+"""Largest number of bytes of a socket's path; Linux allows 107, other systems 103."""
 
 Answer = Callable[[socket.socket, dict[str, object]], None]
-"""Answers a caller with the token."""
+"""Answers a caller that has the token."""
 
 
 class Stoppable(Protocol):
@@ -170,8 +170,8 @@ class StopListener(ClosedAtExit):
         except Exception as error:
             what = unexpected(error)
             _tell(caller, {"error": "OutcomeUnknownError", "what": what, "remedy": ""})
-        # Last: a console that is held up must not hold up a stop. And one that fails ends nothing:
-        # how the stop ended has been told, and the next one has to be heard.
+        # Last, because a blocked console must not delay a stop. If it fails, nothing ends: the
+        # result of the stop has been sent, and the next request must be heard.
         with suppress(Exception):
             if self._heard:
                 self._heard(str(asked.get("who", "")))
@@ -213,21 +213,21 @@ class _LocalServer(ClosedAtExit):
             one.close()
 
     def _listen(self) -> None:
-        # No plain select: it takes no descriptor above 1023, and whoever holds us may have more.
+        # No plain select: it accepts no descriptor above 1023, and the host process may have more.
         with selectors.DefaultSelector() as selector:
             for one in (self._socket, self._awake):
                 selector.register(one, selectors.EVENT_READ)
             while self._awake not in [key.fileobj for key, _ in selector.select()]:
-                with suppress(OSError):  # whoever knocked has left
+                with suppress(OSError):  # the caller has left
                     caller, _ = self._socket.accept()
                     with caller:
                         self._hear(caller)
 
     def _hear(self, caller: socket.socket) -> None:
         asked = _read_line(caller)
-        from hmac import compare_digest  # here, because nobody knocks on most commands
+        from hmac import compare_digest  # imported here, because most commands never get a request
 
-        # As bytes: it refuses to compare text that is not ASCII, with an error that would end us.
+        # As bytes: for text that is not ASCII it raises an error that would end the listener.
         shown = str(asked.get("token", "")).encode("utf-8", "surrogatepass")
         if compare_digest(shown, self._token.encode()):
             self._answer(caller, asked)
@@ -251,7 +251,7 @@ def _listening(path: Path) -> tuple[socket.socket, str]:
         listening = socket.socket(family, socket.SOCK_STREAM)
         try:
             listening.bind(str(path))
-            path.chmod(0o600)  # the folder was its owner's alone before
+            path.chmod(0o600)  # the folder was already accessible only to its owner
             listening.listen()
         except OSError:
             listening.close()
@@ -262,7 +262,7 @@ def _listening(path: Path) -> tuple[socket.socket, str]:
 
 def _read_line(caller: socket.socket) -> dict[str, object]:
     data = b""
-    # One deadline for the whole line: whoever drips bytes must not keep the next one waiting.
+    # One deadline for the whole line: a caller that sends byte by byte must not delay the next one.
     until = time.monotonic() + _HEARD_S
     while not data.endswith(b"\n") and len(data) < MOST_BYTES:
         caller.settimeout(max(until - time.monotonic(), 0.001))

@@ -139,7 +139,7 @@ def clear_note(keys: Set[str], name: str = "") -> None:
         if data is None or not (found := _note(data)).is_about(name):
             continue
         for other in (*_paths(found.keys), path):
-            # Under another key there may be the note of a later stop, of another controller.
+            # Another key may hold the note of a later stop, of another controller.
             if other == path or _content(other) == data:
                 other.unlink(missing_ok=True)
 

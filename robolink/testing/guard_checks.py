@@ -22,7 +22,8 @@ from robolink.model import ANY, ChangeLimits, Controller, Jump, Marker, MarkerKi
 from robolink.testing.subject import Check, Subject, another_offset, refused, require
 
 _OF_NO_TOOL_MM: Final = 2e9
-"""No tool is so long, and words of a PLC read in another order easily say so."""
+"""Length in mm that no tool has; words of a PLC that are read in the wrong order often yield such
+values."""
 
 
 def what_is_unsettled_blocks(subject: Subject) -> None:
@@ -47,7 +48,7 @@ def a_stop_holds_writes_back(subject: Subject) -> None:
     with subject.kept() as controller:
         tools, before = controller.tools, defined(controller, subject.tool)
         with subject.releasing_stop(controller):
-            with suppress(RobolinkError):  # a machine that cannot be stopped from here says so
+            with suppress(RobolinkError):  # a machine that cannot be stopped from here reports it
                 controller.stop()
             require(controller.latch.closed, "stop() closes the latch, whatever becomes of it")
             _refuses_acts(controller, subject.tool, StoppedError, "after a stop")
@@ -84,12 +85,12 @@ def a_stop_lets_the_tool_be_put_back(subject: Subject) -> None:
         defined(controller, subject.tool)
         with subject.releasing_stop(controller):
             with suppress(RobolinkError), controller.preserved("a check"):
-                with suppress(RejectedError):  # where the machine alone selects
+                with suppress(RejectedError):  # if only the machine selects tools
                     tools.select(0 if before else subject.tool)
                 controller.stop()
             left = controller.outcomes.open_markers()
             named = any(marker.details.get("tool") == before for marker in left)
-            # A PLC that holds the stop takes no selection until it is reset.
+            # A PLC that holds the stop accepts no selection until it is reset.
             kept = tools.selected() == before or (named and controller.status().paused)
             require(kept, "after a stop the tool of before is selected")
         for marker in left:
@@ -192,10 +193,10 @@ def forbidden_acts(controller: Controller, tool: int) -> dict[str, Callable[[], 
     acts: dict[str, Callable[[], object]] = {
         "a write": lambda: tools.write(tool, another_offset(there), expected=there),
     }
-    with suppress(ToolError, RejectedError):  # where a kind cannot forget a tool
+    with suppress(ToolError, RejectedError):  # if this kind cannot clear a tool
         if tools.preview_clear(tool, then_select=0):
             acts["a clear"] = lambda: tools.clear(tool, expected=there, then_select=0)
-    with suppress(ToolError, RejectedError):  # where the machine alone selects
+    with suppress(ToolError, RejectedError):  # if only the machine selects tools
         if tools.preview_select(other):
             acts["a selection"] = lambda: tools.select(other)
     return acts
@@ -224,10 +225,10 @@ def left_unsettled(subject: Subject) -> Iterator[Controller | None]:
         with subject.connect() as first:
             marker = first.begin(MarkerKind.CHANGE, "a check", {"tools": {}, "change": "a check"})
         with subject.connect() as second:
-            # Where it is not open the record is kept with the connection only.
+            # If it is not open here, the record exists only with the connection.
             yield second if _is_open(second, marker) else None
     finally:
-        # Ctrl-C in between must not leave it to block whatever comes next.
+        # Ctrl-C in between must not leave an open marker that blocks what follows.
         with subject.connect() as third:
             if marker is not None and _is_open(third, marker):
                 third.finish(marker)
@@ -289,4 +290,4 @@ GUARD_CHECKS: Final[tuple[Check, ...]] = (
     text_is_no_value,
     what_is_asked_for_is_compared_as_it_is_sent,
 )
-"""They try to write one tool although that is forbidden, and put it back."""
+"""Checks that try to write one tool although that is forbidden, and restore it."""

@@ -191,7 +191,7 @@ MOVING_CHECKS: Final[tuple[Check, ...]] = (
     nothing_moves_that_cannot_be_recorded,
     a_stop_in_the_last_instant_holds_a_movement_back,
 )
-"""They move the robot, a step up and down again."""
+"""Checks that move the robot, one step up and down again."""
 
 WRITING_WHILE_MOVING_CHECKS: Final[tuple[Check, ...]] = (nothing_is_written_while_it_moves,)
-"""They do both, so a tool that may be written has to be named."""
+"""Checks that move and write, so a tool that may be written must be given."""

@@ -38,17 +38,18 @@ from robolink.testing.subject import another_offset
 from robolink.timing import Deadline, SystemClock
 
 _REST_S: Final = 10.0
-"""A step of 5 mm at 10 mm/s ends well before."""
+"""Longest time for a step, in s: 5 mm at 10 mm/s end well before."""
 
 _LOOK_S: Final = 0.05
 
 _AGAIN_S: Final = 0.5
 
 _STOP_S: Final = 4.0
-"""A stop logs in, stops and logs out within a second or two."""
+"""Longest time for a stop, in s: it logs in, stops and logs out within a second or two."""
 
 _SILENT_S: Final = 12.0
-"""After 10 s without a sign a PLC lets its owner go (docs/reference/mailbox.md, "Owners")."""
+"""Silence in s: after 10 s without a sign, a PLC releases its owner (docs/reference/mailbox.md,
+"Owners")."""
 
 
 class Connect(Protocol):
@@ -128,7 +129,7 @@ def kept_on_site(
                 if tool is not None:
                     _require_spare(controller, tool)
                 agree(controller)
-                held.enter_context(gate)  # once it is begun, it is put back
+                held.enter_context(gate)  # once begun, it will be restored
                 kept = _put_on_record(controller, reason, tool)
             yield
         finally:
@@ -173,7 +174,7 @@ def _require_spare(controller: Controller, tool: int) -> None:
 
 
 def _put_on_record(controller: Controller, reason: str, tool: int | None) -> _Kept:
-    # What kind it is decides what is put back besides the tool in force: it says so itself.
+    # The kind of controller decides what is restored besides the selected tool, and reports it.
     with controller.preserved(reason):
         found = [it for it in controller.outcomes.open_markers() if it.kind is MarkerKind.SELECTION]
         before = None if tool is None else controller.tools.read(tool)
@@ -278,13 +279,13 @@ def _await_rest(controller: Controller) -> None:
 def _restore_tool(controller: Controller, kept: _Kept, tool: int) -> None:
     """Restore the tool's value; a check may have left any value of its own there."""
     marker = kept.change
-    assert marker is not None  # noqa: S101 - asked for by the caller
+    assert marker is not None  # noqa: S101 - the caller checked it
     tools = controller.tools
     mine = controller.begin(marker.kind, marker.request, marker.details, operation=marker.operation)
     now = tools.read(tool)
     written = not tools.same(now, kept.before)
     before = kept.before
-    # A roll-back of this change goes on beside what else is to be put back.
+    # A roll-back of this change is part of the restoring.
     with controller.latch.putting_back(tool):
         if written and before is None:
             selected = kept.selected or 0

@@ -28,18 +28,18 @@ from robolink.runner import (
 )
 
 XyzMm = tuple[float, float, float]
-"""A place in the base: X, Y and Z."""
+"""A position in the base: X, Y and Z."""
 
 T = TypeVar("T")
 
 _ANSWERED_AFTER_S: Final = 4.0
-"""What a person takes for an answer: longer than one that was typed ahead."""
+"""Time in s that a person takes to answer: longer than for an answer that was typed ahead."""
 
 _WAY_MM: Final = 60.0
-"""How far a person goes along an axis of the tool."""
+"""Distance that a person jogs along an axis of the tool, in mm."""
 
 _STEP_MM: Final = 0.1
-"""The least that a switch is on for on a way, to be found."""
+"""Shortest distance over which a switch must be on to be found, in mm."""
 
 _HALVINGS: Final = 40
 

@@ -108,4 +108,4 @@ READING_CHECKS: Final[tuple[Check, ...]] = (
     a_marker_of_somebody_else_is_refused,
     closing_is_final,
 )
-"""They read only."""
+"""Checks that only read."""

@@ -101,14 +101,14 @@ class Subject:
             yield
         finally:
             controller.release_stop()
-            # A held stop, or motors that went off, must not meet the next check; there may be
-            # nothing to reset.
+            # A held stop, or motors that were switched off, must not affect the next check; there
+            # may be nothing to reset.
             with suppress(RobolinkError), controller.uninterrupted():
                 controller.reset_fault()
 
 
 Check = Callable[[Subject], None]
-"""One promise; raises :class:`ContractBrokenError` where it is broken."""
+"""A check of one promise; raises :class:`ContractBrokenError` if it is broken."""
 
 
 def require(kept: object, promise: str) -> None:

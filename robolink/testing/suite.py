@@ -74,8 +74,8 @@ def outcomes(subject: Subject, checks: Iterable[Check] = READING_CHECKS) -> Iter
             if found := _found_before(error):
                 broken = f"{found}; {broken}"
         except (Exception, SystemExit) as error:
-            # Who uses a controller catches one family of errors; a driver lets no other out,
-            # and ends no process.
+            # Users of a controller catch one family of errors; a driver must raise no others, and
+            # must not end the process.
             broken = f"{type(error).__name__} at {_place_of(error)} is no RobolinkError"
             broken += f": {_said_by(error)}"
         promise = " ".join((check.__doc__ or "").split())

@@ -22,15 +22,15 @@ from robolink.testing.subject import Check, Subject, another_offset, refused, re
 
 _COMPONENTS: Final = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
 _WHOLE: Final = dict(zip(_COMPONENTS, (10.125, -20.375, 30.625, 15.5, -2.25, 1.75), strict=True))
-"""A value that is another one if any of its components is lost, rounded to tenths or negated."""
+"""A value that changes if any component is lost, rounded to tenths or negated."""
 
 _TOLD_APART: Final = 0.1
-"""Values that differ by this, in mm or degrees, are two: a tip would be seen to be elsewhere."""
+"""Difference between distinct values, in mm or degrees; a tip would be visibly displaced."""
 
 _TIP_SLACK_MM: Final = 0.1
 
 _AT_ONCE_S: Final = 5.0
-"""Longer than any refusal takes, on a slow line too."""
+"""Time in s that is longer than any refusal takes, even on a slow line."""
 
 
 def a_write_is_read_back(subject: Subject) -> None:
@@ -66,7 +66,7 @@ def a_write_lasts(subject: Subject) -> None:
         with subject.connect() as controller:
             controller.tools.write(subject.tool, wanted, expected=before)
     finally:
-        # Whatever came in between, Ctrl-C included: nothing but this puts the old value back.
+        # Whatever happened in between, including Ctrl-C: only this restores the old value.
         with subject.connect() as controller:
             found = controller.tools.read(subject.tool)
             same = controller.tools.same(found, wanted)
@@ -83,7 +83,7 @@ def the_other_tools_are_left_alone(subject: Subject) -> None:
         tools.write(subject.tool, value, expected=ANY)
         _same_but_one(controller, before, subject.tool, "a write")
         require(tools.selected() == selected, "a write selects no tool")
-        with suppress(ToolError, RejectedError):  # where a kind cannot forget a tool
+        with suppress(ToolError, RejectedError):  # if this kind cannot clear a tool
             tools.clear(subject.tool, expected=value)
         _same_but_one(controller, before, subject.tool, "a clear")
 
@@ -102,7 +102,7 @@ def the_tip_is_that_of_the_selected_tool(subject: Subject) -> None:
                 tools.select(tool)
                 places.append(controller.groups[0].pose())
         except RejectedError:
-            return  # the machine alone selects, and said so
+            return  # only the machine selects tools, and has reported it
         flange, tip = (ToolOffset(*pose.coordinates()) for pose in places)
         off_mm = Jump.between(flange, tip).length_mm
         length_mm = Jump.between(ToolOffset(), value).length_mm
@@ -181,7 +181,7 @@ def a_selection_is_read_back(subject: Subject) -> None:
                 tools.clear(subject.tool, expected=value)
             tools.select(0)
         except RejectedError:
-            return  # the machine alone selects, and said so
+            return  # only the machine selects tools, and has reported it
         with suppress(ToolError):
             tools.clear(subject.tool, expected=value)
         if tools.read(subject.tool) is None:
@@ -197,7 +197,7 @@ def what_was_selected_is_put_back(subject: Subject) -> None:
             return
         tools.write(subject.tool, another_offset(tools.read(subject.tool)), expected=ANY)
         with suppress(_OursError), controller.preserved("a check"):
-            with suppress(RejectedError):  # where the machine alone selects
+            with suppress(RejectedError):  # if only the machine selects tools
                 tools.select(0 if before else subject.tool)
             raise _OursError
         require(tools.selected() == before, "the tool of before is selected again")
@@ -210,13 +210,13 @@ def one_procedure_at_a_time(subject: Subject) -> None:
         ends: list[BaseException | None] = []
         before = controller.tools.read(subject.tool)
         arguments = (controller, subject.tool, before, ends)
-        # One that waits for the first to end would wait for ever, and with it the process.
+        # A thread that waits for the first to end would wait for ever, and block the process.
         other = threading.Thread(target=_write, args=arguments, daemon=True)
         with controller.preserved("a check"):
             other.start()
             other.join(_AT_ONCE_S)
             told = list(ends)
-        other.join(_AT_ONCE_S)  # what waited for the end has it now
+        other.join(_AT_ONCE_S)  # if it waited for the end, it has the result now
         require(told, "a second procedure is told at once, and does not wait")
         require(isinstance(told[0], BusyError), "a second procedure is refused with BusyError")
 
@@ -233,7 +233,7 @@ def _written_whole(controller: Controller, tool: int) -> tuple[ToolOffset, tuple
         try:
             tools.write(tool, wanted, expected=before)
         except RobolinkError:
-            # A kind without these angles says so, and has written nothing.
+            # A kind without these angles reports it, and has written nothing.
             if held == _COMPONENTS[:3] or not tools.same(tools.read(tool), before):
                 raise
         else:
@@ -259,7 +259,7 @@ def _write(
     try:
         controller.tools.write(tool, another_offset(before), expected=before)
     except Exception as error:
-        ends.append(error)  # of whatever kind: it is looked at where the check is made
+        ends.append(error)  # of any type: it is checked where the result is used
     else:
         ends.append(None)
 
@@ -284,4 +284,4 @@ WRITING_CHECKS: Final[tuple[Check, ...]] = (
     one_procedure_at_a_time,
     *GUARD_CHECKS,
 )
-"""They write one tool, and restore it."""
+"""Checks that write one tool, and restore it."""

@@ -78,7 +78,7 @@ class Wanted:
 
 
 _OUT_OF_REACH = (OutcomeUnknownError, TransportError, RemoteProtocolError, LeaseLostError)
-"""After these nothing can be taken back here: the link is gone, or the right to write."""
+"""After these errors nothing can be undone here: the link or the right to write is lost."""
 
 
 class ToolChange:
@@ -126,8 +126,8 @@ class ToolChange:
         for number, one in enumerate(self._wanted):
             if not isinstance(one, Wanted):
                 raise not_of_class(f"wanted[{number}]", one, Wanted)
-        # An order counts as carried out in the transaction that keeps the value: that takes a
-        # change which is open until then.
+        # An order counts as carried out in the transaction that keeps the value, which requires a
+        # change that is open until then.
         self._several_steps = verify or len(self._wanted) > 1 or order is not None
         self._ordered = None if order is None else OrderedChange(order, describe)
         self._verify = verify
@@ -148,7 +148,7 @@ class ToolChange:
     def __enter__(self) -> Self:
         controller = self._controller
         with ExitStack() as entered:
-            # Id, marker and roll-back are those of one change at a time.
+            # Id, marker and roll-back belong to one change at a time.
             entered.enter_context(controller.procedure(self.request, wait_s=self._wait_s))
             self._account = controller.ledger.open()
             if not controller.outcomes.change:
@@ -191,14 +191,14 @@ class ToolChange:
         """
         with self._controller.patience.within(self._wait_s):
             self._controller.latch.require_open(self.request)
-            # What is there already needs no write that would be refused, and is told as done.
+            # A value already stored needs no write that could be refused, and is reported as done.
             self._controller.require_settled(self.request)
             steps = self._believed() or self._compare()
             for doubt in self._controller.tools.doubts([step.tool for step in steps]):
                 self._tell(doubt)
             self._selected = self._selected_before(steps)
             if self._several_steps and any(self._differs(step) for step in steps):
-                for step in steps:  # what a write would be refused for, before the first of them
+                for step in steps:  # all reasons to refuse a write, before the first one
                     self._controller.change_guard.require(step.tool, step.before, step.requested)
                 tools = {
                     str(step.tool): {
@@ -235,7 +235,7 @@ class ToolChange:
         """
         self._controller.latch.require_open(self.request)
         if self._marker is None:
-            # Each write said itself that it is done; this says what the values rest on.
+            # Each write recorded its own end; this entry records what the values are based on.
             told = any(wanted.details for wanted in self._wanted)
             ends = self._ends(EntryKind.DECISION, "", verdict) if told else []
             if self._ordered:
@@ -303,7 +303,7 @@ class ToolChange:
             expected = wanted.expected
             if expected is ANY or tools.same(before, expected) or not self._differs(step):
                 if wanted.offset is None:
-                    # Raises what a clear would, before the first of several tools is written.
+                    # Raises the errors of a clear before the first of several tools is written.
                     tools.preview_clear(wanted.tool, then_select=wanted.then_select)
                 continue
             identity = self._controller.identity
@@ -321,7 +321,7 @@ class ToolChange:
 
     def _write(self, wanted: Wanted, step: Step) -> ToolReceipt:
         tools = self._controller.tools
-        # Before the write: whatever interrupts it, what was begun is looked at again.
+        # Before the write: whatever interrupts it, the step is checked again.
         self._begun.append(step)
         expected: Expected = ANY if wanted.expected is ANY else step.before
         try:
@@ -332,7 +332,7 @@ class ToolChange:
             self._spoiled = wanted.tool
             raise
         except (NotReadyError, BusyError, NotAllowedError, ToolError):
-            self._begun.pop()  # these four say that nothing was sent
+            self._begun.pop()  # these four errors mean that nothing was sent
             raise
 
     def _take_back(self, error: BaseException | None) -> None:
@@ -353,7 +353,7 @@ class ToolChange:
             sentences = (result.sentence for result in done)
             error.remedy = joined(" ", filter(None, (error.remedy, *sentences)))
         elif refusal is not None and (error is None or isinstance(error, Exception)):
-            # Whoever leaves the block takes the old values for back.
+            # To the caller that leaves the block, the old values are back.
             others = (result.sentence for result in done if result.error is None)
             refusal.remedy = joined(" ", filter(None, (refusal.remedy, *others)))
             raise refusal from error
@@ -389,7 +389,7 @@ class ToolChange:
         assert account is not None  # noqa: S101 - __enter__ opened it
         try:
             if error is not None:
-                # A link that is gone has told what it knew.
+                # A link that is gone has already reported what it knew.
                 with suppress(RobolinkError):
                     self._controller.tools.selected()
         finally:
@@ -409,8 +409,8 @@ class ToolChange:
 
     def _record(self, done: Sequence[PutBack]) -> None:
         entries = [result.entry for result in done]
-        # The error under way matters more than that it cannot be recorded; what is not
-        # recorded stays open.
+        # The error being raised matters more than a failure to record; what is not recorded stays
+        # open.
         with suppress(ConfigError):
             for result in done:
                 self._close_writes(result)

@@ -31,10 +31,10 @@ from robolink.model import (
 from robolink.transaction._put_back import Step
 
 LONGEST_ORDER: Final = 64
-"""Characters of an order's id."""
+"""Largest number of characters of an order's id."""
 
 Describe = Callable[[Sequence[ToolReceipt]], Mapping[str, object]]
-"""Returns the result of a change, plain JSON, for a second delivery."""
+"""Returns the result of a change, plain JSON, for a repeated delivery of the order."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,8 +176,8 @@ def carrying_out(
         outcomes.hold(purpose),
         controller.signs_of_life(),
     ):
-        # Whoever is told that it is done starts production: with the tool in force, at the speed
-        # and in the power that a killed run has perhaps not put back.
+        # A caller told that the order is done starts production: with the selected tool, at the
+        # speed and in the power mode that a killed run may not have restored.
         controller.require_settled(purpose)
         entry = _found(outcomes, order)
         if entry is not None:

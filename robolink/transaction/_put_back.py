@@ -112,7 +112,7 @@ def _clear(tools: ToolTable, tool: int, now: ToolOffset | None, selected: int) -
     try:
         tools.clear(tool, expected=now, then_select=selected)
     except SelectedToolError:
-        # It was selected before, without a definition: the flange is what that meant.
+        # The tool was selected without a definition, which meant the flange.
         tools.clear(tool, expected=now, then_select=0)
 
 

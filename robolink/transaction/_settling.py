@@ -307,8 +307,8 @@ _ORDER = (
     MarkerKind.MOVE,
     MarkerKind.HISTORY,
 )
-"""What was in flight is judged before the change around it. Whether a movement was as it should
-be takes a person, who looks at the cell when its own tool is selected again."""
+"""Order of judging: what was in flight comes before the change around it. Only a person can judge a
+movement, by looking at the cell when its own tool is selected again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -483,5 +483,5 @@ def _examined(settler: Settler, marker: Marker) -> Finding:
     except JournalError:
         raise
     except ConfigError as error:
-        # Written by something else: a person looks, and it is forgotten on his word.
+        # Written by something else: a person checks and confirms that it can be dropped.
         return Finding(marker, Verdict.LOOK, error.what)

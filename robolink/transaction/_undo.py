@@ -140,7 +140,7 @@ def earlier_corrections(controller: Controller, tool: int) -> tuple[float, ...]:
         if before is None or value is None:
             break
         length_mm = math.hypot(value.x_mm - before.x_mm, value.y_mm - before.y_mm)
-        if length_mm or value.z_mm == before.z_mm:  # a write of Z alone corrected no X and Y
+        if length_mm or value.z_mm == before.z_mm:  # a write of Z alone did not correct X and Y
             lengths.append(length_mm)
     return tuple(reversed(lengths))
 
@@ -169,7 +169,7 @@ def of_change(outcomes: OutcomeLog, change: str, tool: int | None) -> list[Recor
     """
     chosen = change or _newest_done(outcomes, tool)
     ends = list(outcomes.recorded(change=chosen, kinds=_ENDS)) if chosen else []
-    if chosen and not ends:  # a single write, known by its operation
+    if chosen and not ends:  # a single write, identified by its operation
         ends = [entry for entry in outcomes.recorded(kinds=_ENDS) if id_of_change(entry) == chosen]
     taken_back = any(entry.kind is EntryKind.ROLLED_BACK for entry in ends)
     done = [entry for entry in ends if tool in (None, entry.tool)]
@@ -295,7 +295,7 @@ def plan_undo(
     if to is not None:
         return _plan_to(controller, to, tool)
     entries = of_change(controller.outcomes, change, tool)
-    # Newest first, so that of several writes of one tool the oldest says what was there before.
+    # Newest first, so that the oldest of several writes of one tool gives the old value.
     wanted = {tool_of(entry): offset_of(entry, "before") for entry in entries}
     undone = id_of_change(entries[0])
     numbers = ", ".join(str(number) for number in sorted(wanted))
@@ -343,7 +343,7 @@ def undo(
     if not plan.steps:
         return Undone("", ())
     with controller.procedure(plan.sentence):
-        # Before the decision goes on record.
+        # Checked before the decision is recorded.
         controller.require_settled(plan.sentence)
         outcomes = controller.outcomes
         change = outcomes.change = new_operation()
@@ -358,7 +358,8 @@ def undo(
             ]
             with ExitStack() as accepted:
                 for step in plan.steps:
-                    # What was proved before is no slip of the fingers; the figure goes on record.
+                    # A value confirmed earlier is no typing mistake; the size of the jump is
+                    # recorded.
                     jump = controller.change_guard.beyond(step.before, step.requested)
                     if jump is not None:
                         accepted.enter_context(controller.change_guard.accepting(step.tool, jump))

@@ -14,7 +14,7 @@ SLOT_WORDS: Final = 36
 SLOTS: Final = 15
 DEVICE_WORDS: Final = 4
 HEARTBEAT_WORD: Final = 62
-"""The place of the client's heartbeat in the command block."""
+"""Word of the client's heartbeat in the command block."""
 
 
 class MailboxHead(NamedTuple):
@@ -31,7 +31,7 @@ class MailboxHead(NamedTuple):
 
 
 HEAD_PLACES: Final = MailboxHead(ack=1, state=2, error_class=3, group_state=7, heartbeat=9)
-"""Where each part of the head stands in the response block."""
+"""Word of each part of the head in the response block."""
 
 
 class MailboxLink(Protocol):

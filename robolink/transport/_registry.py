@@ -37,8 +37,8 @@ _REGISTER_MEDIA = {
 }
 
 _loaded: Final[dict[str, Callable[..., Any]]] = {}
-"""What entry points gave, by scheme: finding one reads what every installed package says of
-itself, and what was imported once stays what it is until the process ends."""
+"""Loaded entry points, by scheme: finding one reads the metadata of every installed package, and an
+imported one stays the same until the process ends."""
 
 
 class TransportOpener(Protocol):
@@ -103,7 +103,7 @@ def open_mailbox_link(
     link = parse_url(url) if isinstance(url, str) else url
     opened: MailboxLink = _find(link, _MAILBOX_MEDIA)(link, timeout_s=timeout_s, clock=clock)
     if link.medium in _MAILBOX_MEDIA:
-        return opened  # its bytes tell
+        return opened  # its bytes are traced
     from robolink.transport.word_traffic import WordTraffic
 
     return WordTraffic(opened)
@@ -164,7 +164,7 @@ def _load(link: LinkUrl, media: Mapping[str, tuple[str, str]]) -> Callable[..., 
             remedy=tr("Reinstall robolink, or the package that provides this scheme."),
         ) from error.origin
     if found is None:
-        from importlib import metadata  # costs more than all of this package
+        from importlib import metadata  # slower to import than the rest of this package
 
         known = {f"{link.kind}+{medium}" for medium in media}
         known |= metadata.entry_points(group=TRANSPORTS_GROUP).names

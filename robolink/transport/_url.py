@@ -22,7 +22,7 @@ from robolink.messages import known_names, tr
 from robolink.remedy_words import RemedyWord, remedy_word
 
 _PSEUDO_TERMINAL: Final = re.compile(r"/dev/pts/\d+|/dev/ttys\d+")
-"""Names that Linux and macOS give to pseudo terminals, and to no port with a cable."""
+"""Names that Linux and macOS give to pseudo terminals, and never to a port with a cable."""
 
 _MODBUS_PORT: Final = 502
 _USUAL_UNITS: Final = {"modbus-tcp": "255", "modbus-rtu": "1"}
@@ -110,7 +110,7 @@ def parse_url(text: str) -> LinkUrl:
         parts = urlsplit(text)
         port = parts.port
     except ValueError as error:
-        # The text is not repeated: it may hold a password.
+        # The text is not repeated, because it may contain a password.
         raise ConfigError(tr("The controller URL cannot be read."), remedy=example) from error
     if parts.username is not None or parts.password is not None:
         raise ConfigError(
@@ -234,7 +234,7 @@ class UrlOptions:
 
 
 _APART: Final = ("unit", "command", "node", "interface")
-"""Options that tell several controllers behind one address apart."""
+"""Options that distinguish several controllers behind one address."""
 
 _LOOPBACK: Final = frozenset({"127.0.0.1", "::1"})
 

@@ -140,7 +140,7 @@ class TracingTransport:
 
     def send(self, data: bytes, *, deadline: Deadline, secret: bool = False) -> None:
         """See :meth:`robolink.transport.Transport.send`; a secret never reaches the sink."""
-        # Looked at here, and once an exchange: what it costs where nobody listens, all pay.
+        # Checked here, once per exchange: without a listener, the cost would be paid by everyone.
         self._told = self._listened()
         if secret or self._told:
             self.traffic.sent(data, secret=secret)

@@ -152,9 +152,9 @@ def _opened(
 
     more: dict[str, object] = {}
     if not device.startswith("rfc2217:"):
-        more["write_timeout"] = timeout_s  # pyserial has none there
+        more["write_timeout"] = timeout_s  # pyserial sets none there
     if "://" not in device:
-        more["exclusive"] = True  # a device server keeps its port to one client itself
+        more["exclusive"] = True  # a device server limits its port to one client itself
     try:
         port = serial.serial_for_url(
             device,
@@ -187,7 +187,7 @@ class SerialTransport:
     """Implements :class:`~robolink.transport.Transport` on an open port, and owns it."""
 
     durable: bool = True
-    """What hangs on a cable outlives this process."""
+    """True: a device on a cable outlives this process."""
 
     def __init__(self, port: Any, url: LinkUrl, clock: Clock) -> None:  # noqa: ANN401 - pyserial has no types
         self._port = port
@@ -256,7 +256,7 @@ class SerialTransport:
         )
 
     def _ended(self, error: Exception) -> TransportError:
-        # pyserial reads from a port that another thread has closed as from no number at all.
+        # On a port closed by another thread, pyserial raises TypeError.
         if self._closed or isinstance(error, TypeError):
             return link_closed(self.identity)
         return TransportBrokenError(

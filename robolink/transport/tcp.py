@@ -43,7 +43,7 @@ from robolink.timing import Clock, Deadline, SystemClock
 from robolink.transport._url import LinkUrl
 from robolink.transport.byte_stream import link_closed
 
-# Unacknowledged data end the connection after 2.5 s. Each constant is missing on some platform.
+# Unacknowledged data end the connection after 2.5 s. Each constant is missing on some platforms.
 _OPTIONS: Final = (
     ("SOL_SOCKET", "SO_KEEPALIVE", 1),
     ("IPPROTO_TCP", "TCP_NODELAY", 1),
@@ -56,7 +56,7 @@ _OPTIONS: Final = (
 _PROBES: Final = 2
 _SILENT_MS: Final = 2500
 _INFO: Final = struct.Struct("@8B13I")
-"""The beginning of ``struct tcp_info`` of linux/tcp.h, up to ``tcpi_last_ack_recv``."""
+"""First part of ``struct tcp_info`` of linux/tcp.h, up to ``tcpi_last_ack_recv``."""
 _PROBES_OUT, _LAST_DATA, _LAST_ACK = 3, 19, 20
 
 
@@ -78,7 +78,7 @@ def unheard(connection: socket.socket) -> OSError | None:
     try:
         info = _INFO.unpack(connection.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _INFO.size))
     except (OSError, struct.error):
-        return None  # closed meanwhile; the next call says so
+        return None  # closed meanwhile; the next call reports it
     if info[_PROBES_OUT] < _PROBES or min(info[_LAST_DATA], info[_LAST_ACK]) < _SILENT_MS:
         return None
     return TimeoutError(errno.ETIMEDOUT, os.strerror(errno.ETIMEDOUT))
@@ -210,7 +210,7 @@ class TcpTransport:
     """Implements :class:`~robolink.transport.Transport` on a connected socket, and owns it."""
 
     durable: bool = True
-    """What listens on a network outlives this process."""
+    """True: a device on a network outlives this process."""
 
     def __init__(self, connection: socket.socket, url: LinkUrl, clock: Clock) -> None:
         self._socket = connection
@@ -220,7 +220,7 @@ class TcpTransport:
         self._closed = False
         self._unheard: OSError | None = None
         self._look = looker(connection)
-        # Without MSG_DONTWAIT (Windows) nothing may wait in the kernel: poll first, always.
+        # Without MSG_DONTWAIT (Windows) no call may block in the kernel: always poll first.
         self._no_wait: int = getattr(socket, "MSG_DONTWAIT", 0)
         connection.setblocking(bool(self._no_wait))
         if self._no_wait:
@@ -288,7 +288,7 @@ class TcpTransport:
                 return True
             self._unheard = unheard(self._socket)
             if self._unheard is not None:
-                return True  # the next look at it says so
+                return True  # the next look reports it
             if remaining_s == 0:
                 return False
         return True
@@ -296,7 +296,7 @@ class TcpTransport:
     def close(self) -> None:
         """See :meth:`robolink.transport.Transport.close`."""
         self._closed = True
-        with contextlib.suppress(OSError):  # not connected any more: nobody to wake
+        with contextlib.suppress(OSError):  # no longer connected: nobody to wake
             self._socket.shutdown(socket.SHUT_RDWR)
         self._socket.close()
 
@@ -340,7 +340,7 @@ def _peer(connection: socket.socket) -> str:
         return ""
     address = ip_address(host.partition("%")[0])
     if address.version == 6 and (address.ipv4_mapped or address.is_loopback):
-        # One machine: a name may lead to either, and the port is the same.
+        # The same machine: a name may resolve to either, and the port is the same.
         address = address.ipv4_mapped or ip_address("127.0.0.1")
     return f"[{address}]:{port}" if address.version == 6 else f"{address}:{port}"
 
@@ -367,7 +367,7 @@ def wait_ready(connection: socket.socket, timeout_s: float, *, to_write: bool = 
     try:
         if hasattr(select, "poll"):
             return _poll(connection, timeout_s, to_write=to_write)
-        # Windows has no poll; its select has no limit on descriptor numbers, unlike POSIX's.
+        # Windows has no poll; its select does not limit descriptor numbers, unlike POSIX's.
         reads, writes = ([], [connection]) if to_write else ([connection], [])
         return any(select.select(reads, writes, [], timeout_s))
     except (OSError, ValueError):

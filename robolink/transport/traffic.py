@@ -26,12 +26,12 @@ TraceSink = Callable[[int, Direction, bytes], None]
 """Receives the time in ns of the link's clock, the direction and the bytes."""
 
 SECRET_PLACEHOLDER: Final = b"<secret>"
-"""Stands in a trace for every secret, whatever its content and length."""
+"""Replaces every secret in a trace, whatever its content and length."""
 
 PACKAGE_LOG: Final = PackageLog(__package__)
 
 _RUN: Final = 6
-"""Characters of a secret in a row that are not told."""
+"""Number of successive characters of a secret that are never shown."""
 
 _SHORTEST: Final = 4
 

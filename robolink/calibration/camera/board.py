@@ -108,7 +108,7 @@ def solve_board(
         sigma_stated=scatter is not None,
         interval_from=scatter.source if scatter else "",
         rank=3,
-        # The spacing is known as well, but only used as a check.
+        # The spacing is known too, but serves only as a check.
         dof=0,
         sources=(
             *camera_sources((first, second), gains, camera=camera, finds_place=False),

@@ -166,7 +166,7 @@ def _placed(seen: Complexes, drawing: Complexes) -> tuple[complex, complex]:
 def _require_as_drawn(seen: Complexes, drawing: Complexes) -> None:
     centred_f, centred_d = seen - seen.mean(), drawing - drawing.mean()
     size = float((np.abs(centred_d) ** 2).sum())
-    # Twice the rms distance from the middle is the spacing when there are two.
+    # With two fiducials, twice the rms distance from their middle equals their spacing.
     spread_mm = 2 * math.sqrt(float((np.abs(centred_f) ** 2).sum()) / len(seen))
     check_spacing(min(spread_mm, 2 * math.sqrt(size / len(seen))), None)
     scale = float(abs(np.vdot(centred_d, centred_f))) / size
@@ -182,7 +182,7 @@ def _unit_covariance(turn: complex, drawing: Complexes) -> Floats:
     """Return the covariance of x, y in mm^2 and u in deg^2 for sigma = 1 mm."""
     centred = drawing - drawing.mean()
     angle = 1 / float((np.abs(centred) ** 2).sum())
-    # The origin turns about the middle of the fiducials, to which alone the mean is tied.
+    # The mean fixes only the middle of the fiducials; an angle error swings the origin about it.
     lever = -1j * turn * complex(drawing.mean())
     column = np.array([lever.real, lever.imag, math.degrees(1.0)])
     unit: Floats = np.outer(column, column) * angle + np.diag([1, 1, 0]) / len(drawing)
@@ -300,15 +300,15 @@ def solve_board_round(
 
     fit, design, turn_rad = found(sightings)
     x_mm, y_mm, _, error_x, error_y = fit.x.tolist()
-    # A row of residuals times the transposed A leads from the flange's axes to the base's.
+    # A row of residuals times A transposed is converted from flange axes to base axes.
     vectors = (fit.residuals.reshape(2, -1).T[:, None, :] @ columns)[:, 0, :]
     in_degrees = np.diag((1.0, 1.0, math.degrees(1.0)))
     unit = in_degrees @ fit.unit_covariance[:3, :3] @ in_degrees
     u_deg = math.degrees(math.remainder(turn_rad, math.tau))
-    # Rows are X of all sightings, then Y.
+    # The rows are X of all sightings, then Y of all sightings.
     by_row = (in_degrees @ fit.gains(design)[:3]).reshape(3, 2, -1).transpose(0, 2, 1)
     gains = gains_in_base(by_row, sightings)
-    # What the plain fit said about itself is said anew.
+    # These values replace those of the plain fit.
     fresh = replace(
         plain,
         offset=keep_unmeasured(stored, x_mm=x_mm, y_mm=y_mm, u_deg=u_deg),

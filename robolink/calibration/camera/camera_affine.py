@@ -47,8 +47,8 @@ UNKNOWNS = 8
 MAX_CONDITION = 100.0
 
 LEAST_SPREAD_PX = 5.0
-"""What is seen has to spread over the image by this much in every direction, rms: the finder's
-scatter alone, of a spot that stands still, spreads too, and has a scale and a shear of its own."""
+"""Smallest rms spread of the sightings over the image, in every direction, in pixels: even for a
+stationary spot the finder's scatter alone spreads, and yields a false scale and shear."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +150,7 @@ def solve_camera_affine(
         residuals_mm=tuple(map(tuple, residuals.tolist())),
         condition_number=fit.condition_number,
         rank=fit.rank,
-        # Place, turn and scale of the camera are found with it.
+        # The fit also finds the camera's place, turn and scale, so none of them adds an error.
         sources=(ErrorSource.of_lengths("tip_image_px", 2, gain=camera.largest_mm_per_px),),
         camera=camera,
     )
@@ -178,7 +178,7 @@ def _with_spread(
     if offset_mm is None:
         return camera
     variances = fit.unit_covariance.diagonal()
-    # What one look scatters, as wide as the few degrees of freedom made the interval.
+    # Scatter of one look, widened by the same factor for few degrees of freedom as the interval.
     sigma_mm = offset_mm / math.sqrt(float(variances[6:].max()))
     px, py = mean_pixel
     return replace(
@@ -198,7 +198,7 @@ def _system(
     """
     planes = solvable_planes(poses, height)
     a = np.zeros((len(poses), 2, UNKNOWNS))
-    # About the mean pixel, M and b hardly disturb each other.
+    # Centring on the mean pixel nearly decouples M and b.
     centred = pixels - pixels.mean(axis=0)
     a[:, 0, 0:2] = a[:, 1, 2:4] = centred
     a[:, 0, 4] = a[:, 1, 5] = 1.0

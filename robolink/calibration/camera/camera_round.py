@@ -39,7 +39,7 @@ from robolink.calibration.quality.fit_quality import judged
 from robolink.model import Pose, ToolOffset
 
 CAMERA_MOVED_MM = 0.1
-"""A camera that is off by more than this since its own calibration is doubted."""
+"""Error of a camera since its calibration, in mm, above which the camera is doubted."""
 
 _UNKNOWNS = 4
 
@@ -140,7 +140,7 @@ def _upright_gains(flanges: Sequence[Pose]) -> list[list[float]]:
     z = np.exp(1j * np.radians([flange.u_deg for flange in flanges]))
     turned = z - z.mean()
     by = turned.conj() / float(np.vdot(turned, turned).real)
-    # As complex numbers multiply.
+    # The real and imaginary parts of a complex product.
     x = np.column_stack((by.real, -by.imag)).ravel()
     y = np.column_stack((by.imag, by.real)).ravel()
     return [x.tolist(), y.tolist()]

@@ -23,22 +23,22 @@ from robolink.calibration.quality.station import StationPart
 from robolink.messages import tr
 
 USUAL_MM_PER_PX: Final = 0.02
-"""What a pixel is where the camera answers in millimetres and nothing says it: an image of 1,280
-pixels shows 26 mm then."""
+"""Size of a pixel assumed if the camera answers in millimetres and no calibration gives the size:
+an image of 1,280 pixels then shows 26 mm."""
 
 USUAL_AWAY_MM: Final = 1.0
-"""How far from the middle of the image a mark is taken to be seen where nobody knows the middle:
-a new nozzle sits a few tenths of a millimetre beside the old one."""
+"""Distance of a mark from the middle of the image, assumed if the middle is unknown: a new nozzle
+sits a few tenths of a millimetre beside the old one."""
 
 _Shifts = list[tuple[float, float]]
-"""By how much each sighting is moved, base X and Y."""
+"""Displacement of each sighting along base X and Y."""
 
 _AXES: Final = ((1.0, 0.0), (0.0, 1.0))
 
 _STEP_MM = 1e-3
 
 _STEP = 1e-5
-"""Of scale and direction; 40 mm from the centre it shifts what is seen by 0.4 um."""
+"""Step of scale and of direction (rad); 40 mm from the centre it shifts the sighting by 0.4 um."""
 
 
 def camera_part(
@@ -129,7 +129,7 @@ def camera_sources(
     for away in _from_middle(sightings, camera, finds_place=finds_place):
         ways["camera_turn_deg"].append([(-y, x) for x, y in away])
         ways["camera_scale_percent"].append(away)
-    # A camera that tells the height as well sees it as it sees the rest.
+    # A camera that also measures the height has the same error in height.
     lengths = 2 if sightings[0].z_mm is None else 3
     pixel_mm = camera.largest_mm_per_px if camera else USUAL_MM_PER_PX
     found = [ErrorSource.of_lengths("tip_image_px", lengths, gain=pixel_mm)]
@@ -187,7 +187,7 @@ def print_source(
     columns = []
     for mark in dict.fromkeys(marks):
         for along in _AXES:
-            # It turns with the tool.
+            # The error turns with the tool.
             columns.append(
                 [
                     FlangePlane.of(s.flange).in_base(*along) if one == mark else (0.0, 0.0)

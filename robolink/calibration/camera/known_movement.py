@@ -16,40 +16,42 @@ from robolink.errors import CalibrationError
 from robolink.messages import tr
 
 FOLLOWS_WITHIN: Final = 0.1
-"""Of its length by which a seen movement may differ from the known one, where pixels are known."""
+"""Largest difference between seen and known movement, as a share of the length, if the pixel size
+is known."""
 
 FOLLOWS_UNCALIBRATED: Final = 0.2
-"""The same where nobody knows yet what a pixel is: play of the joints is in both movements then."""
+"""The same share if the pixel size is still unknown: both movements then include play of the
+joints."""
 
 LEAST_SHARE: Final = 1 / 3
-"""A spot that moves less than this share of what is expected stands still."""
+"""Smallest share of the expected movement; a spot that moves less counts as stationary."""
 
 PIXEL_SIGMA: Final = 0.1
-"""Standard deviation of a found place, pixels, where the pictures do not tell a larger one."""
+"""Standard deviation of a found position, in pixels, unless the pictures show a larger one."""
 
 CAMERA_SIGMA_MM: Final = 0.005
-"""The same of a camera that answers in mm."""
+"""Standard deviation of a found position if the camera answers in mm."""
 
 ROBOT_SIGMA_MM: Final = 0.005
-"""Standard deviation of how far the robot really moves between two places, each axis."""
+"""Standard deviation of the distance that the robot really moves between two places, per axis."""
 
 RADIUS_WITHIN: Final = 0.03
-"""Share by which the radius of a spot may differ from the other looks of a run."""
+"""Largest relative difference between the radius of a spot and that in the other looks of a run."""
 
 LEAST_RADIUS_PX: Final = 0.3
-"""No closer limit than this is held against a radius: a finder scatters by 0.1 px."""
+"""Smallest limit, in pixels, on a difference in radius: a finder scatters by 0.1 px."""
 
 _FACTOR: Final = 3.0
 """Number of standard uncertainties that count as chance."""
 
 _PLAY_AGAIN: Final = 1.5
-"""How much a measured backlash may differ at another place."""
+"""Factor by which backlash may exceed the measured value at another place."""
 
 _SAME_DIRECTION_DEG: Final = 5.0
-"""Movements whose directions differ by less are of one direction."""
+"""Movements whose directions differ by less than this count as parallel."""
 
 _DULLEST: Final = 0.1
-"""A movement whose length the scatter makes less sure than this share tells nothing."""
+"""Largest scatter of a movement, as a share of its length; a movement with more shows nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,10 +89,10 @@ class MovementVerdict(Enum):
     """The spot moved as the robot did."""
 
     ANOTHER = auto()
-    """It moved, by another vector."""
+    """The spot moved, but not as the robot did."""
 
     NONE = auto()
-    """It hardly moved."""
+    """The spot hardly moved."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -48,14 +48,16 @@ from robolink.messages import tr
 from robolink.model import ToolOffset
 
 WOBBLE_QUANTILE = 0.995
-"""Of F, for each of two amplitudes: a round circle is said to wobble in 1 % of the cases."""
+"""Quantile of F, for each of two amplitudes: a true circle is reported as a wobble in 1 % of cases.
+"""
 
 _HARMONICS = 4
 
 _RANK_BELOW = 1e-6
 
 _BADLY_TOLD_APART = 100.0
-"""Condition above which angles are too near each other, so that errors come out as wobble."""
+"""Largest condition number of a design; above it the angles are too close together, and errors look
+like wobble."""
 
 _SAME_ANGLE_DEG = 0.01
 
@@ -141,12 +143,12 @@ def runout_report(sightings: Sequence[Sighting], *, sigma_mm: float | None = Non
     design = _terms([np.ones_like(z), z])
     plain = _harmonics(seen, design)
     full = None
-    # With four sightings everything fits, and nothing is left to tell a wobble from noise.
+    # Four sightings fit exactly and leave no residual that separates a wobble from noise.
     if told_apart and len(seen) > _HARMONICS:
         design = _terms([np.ones_like(z), z, z.conj(), z**2])
         full = _harmonics(seen, design)
     upside_down = FlangePlane.of(sightings[0].flange).r33 < 0
-    # Columns are X of all sightings, then Y.
+    # The columns are X of all sightings, then Y of all sightings.
     gains = (full or plain).gains(design)[2:4].reshape(2, 2, -1).transpose(0, 2, 1).reshape(2, -1)
     gains[1] *= -1.0 if upside_down else 1.0
     return _report(
@@ -176,7 +178,8 @@ def _report(
     amplitudes = [math.hypot(*best.x[k : k + 2].tolist()) for k in range(4, len(best.x), 2)]
     limit = None
     if full is not None:
-        # The scatter of these sightings, stated or not: only so is the share of false alarms kept.
+        # The scatter of these sightings, even if one is stated: only this keeps the false-alarm
+        # rate.
         gain = math.sqrt(
             2 * f_quantile(WOBBLE_QUANTILE, 2, dof) * float(full.unit_covariance[4, 4])
         )
@@ -245,7 +248,8 @@ def _harmonics(seen: Complexes, design: Floats) -> LinearFit:
 
 
 LARGEST_GAP_DEG = 60.0
-"""Between neighbouring angles, round the circle; beyond it half of a wobble stays unseen."""
+"""Largest gap between neighbouring angles around the circle; with a larger gap, half of a wobble
+could stay unseen."""
 
 LEAST_LOOKS = 8
 
@@ -429,7 +433,7 @@ def _result(
     variance = (scatter.sigma_mm * report.sigma_gain) ** 2 if scatter else 0.0
     x_mm, y_mm = report.tip_mm
     moved = max(map(abs, report.centre_mm)) > CAMERA_MOVED_MM
-    # A wobble is what is measured here, so it is no doubt.
+    # The wobble is the measurement here, so it raises no doubt.
     warnings = tuple(code for code in report.warnings if code != "wobble")
     distances = [math.hypot(*residual) for residual in report.residuals_mm]
     return CalibrationResult(

@@ -104,7 +104,7 @@ def _seen_in_space(
     sighting: Sighting, z_mm: float, stored: ToolOffset | None, sigma_mm: float | None
 ) -> tuple[CalibrationResult, list[list[float]]]:
     """Return the result, and by how much it changes with X and Y of what was seen."""
-    from robolink.calibration.core.rotations import rotation_of  # numpy, which X and Y do without
+    from robolink.calibration.core.rotations import rotation_of  # numpy, not needed for X and Y
 
     flange = sighting.flange
     away = (sighting.x_mm - flange.x_mm, sighting.y_mm - flange.y_mm, z_mm - flange.z_mm)
@@ -121,7 +121,7 @@ def _one_look(
     sigma_mm: float | None,
 ) -> CalibrationResult:
     scatter, axes = Dispersion.of(0.0, 0, sigma_mm), len(found)
-    # A rotation leaves errors that are alike in all directions as they are.
+    # A rotation leaves errors unchanged that are equal in all directions.
     variance = scatter.sigma_mm**2 if scatter else 0.0
     place = (sighting.x_mm, sighting.y_mm, sighting.z_mm)
     return CalibrationResult(

@@ -184,10 +184,10 @@ Basis = Literal["stated", "record", "default"]
 """The source of a row's size: the cell file, the record, or the default."""
 
 Turning = Literal["with_tool", "in_base", "as_offset"]
-"""What becomes of an error when the tool turns about the tip that was found.
+"""How an error behaves when the tool turns about the tip that was found.
 
-``with_tool``: it turns along, so a turn test never shows it. ``in_base``: it stays where the
-station is, so the tip and the station part. ``as_offset``: the offset alone is wrong.
+``with_tool``: it turns with the tool, so a turn test never shows it. ``in_base``: it stays with the
+station, so tip and station move apart. ``as_offset``: only the offset is wrong.
 """
 
 

@@ -22,8 +22,8 @@ Source = Literal["residuals", "stated", "resolution"]
 _REGION: Final = 0.95
 
 PRINT_STEP_MM: Final = 0.001
-"""The smallest step in which a controller tells a position, where nobody knows it better: EPSON
-prints three decimals, and no field bus of a robot carries less."""
+"""Step of printed positions, in mm, assumed if the controller's own is unknown: EPSON prints three
+decimals, and no robot field bus carries fewer."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,7 +37,7 @@ def tilted_flange_pose(tip: Pose, offset: ToolOffset) -> Pose:
     The tool's orientation is the flange's followed by the offset's own: ``R_tip = R R_tool``,
     ``tip = flange + R t`` (docs/reference/epson.md 3.1).
     """
-    from robolink.calibration.core.rotations import (  # numpy, which four axes do without
+    from robolink.calibration.core.rotations import (  # numpy, not needed for four axes
         rotation_of,
         uvw_deg,
     )
@@ -60,7 +60,7 @@ def tilted_flange_pose(tip: Pose, offset: ToolOffset) -> Pose:
 
 def tilted_from(written: ToolOffset, tip: ToolOffset) -> ToolOffset:
     """Return where a tip is, seen from the frame of a written offset of a six-axis robot."""
-    from robolink.calibration.core.rotations import rotation_of  # numpy, which four axes do without
+    from robolink.calibration.core.rotations import rotation_of  # numpy, not needed for four axes
 
     own = rotation_of(Pose(0.0, 0.0, 0.0, written.u_deg, written.v_deg, written.w_deg))
     aside = [b - a for a, b in zip(written.components(), tip.components(), strict=True)][:3]
@@ -117,7 +117,7 @@ def in_base(pose: Pose, local: ToolOffset) -> Pose:
             u_deg=local.u_deg + pose.u_deg,
             local=0,
         )
-    from robolink.calibration.core.rotations import (  # numpy, which four axes do without
+    from robolink.calibration.core.rotations import (  # numpy, not needed for four axes
         rotation_of,
         uvw_deg,
     )
@@ -158,7 +158,7 @@ def tip_pose(flange: Pose, offset: ToolOffset, *, tool: int | None) -> Pose:
         dx, dy = rotate_xy(offset.x_mm, offset.y_mm, flange.u_deg)
         dz, u_deg, v_deg, w_deg = offset.z_mm, flange.u_deg + offset.u_deg, 0.0, 0.0
     else:
-        from robolink.calibration.core.rotations import (  # numpy, which four axes do without
+        from robolink.calibration.core.rotations import (  # numpy, not needed for four axes
             rotation_of,
             uvw_deg,
         )

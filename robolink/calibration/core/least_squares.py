@@ -30,19 +30,19 @@ REJECT_BEYOND: Final = 4.0
 """Residual distance, in standard deviations of a coordinate, beyond which a pose is rejected."""
 
 MOST_SAMPLES: Final = 20_000
-"""Up to this many smallest samples are all tried."""
+"""Up to this number, all of the smallest samples are tried."""
 
 REFINED: Final = 30
-"""Number of best samples that are refined."""
+"""Number of best samples to refine."""
 
 MOST_REFITS: Final = 20
 
 _WIDER: Final = (1.5, 1.25, 1.0)
 
 _AT_ONCE: Final = 400_000
-"""Distances that are computed in one piece, so that the memory stays small."""
+"""Number of distances computed at once, to limit memory."""
 
-# Median length of a normal vector with 2 or 3 coordinates, in standard deviations of one.
+# Median length of a normal vector of 2 or 3 coordinates, in standard deviations of one coordinate.
 _MEDIAN_DISTANCE: Final = {2: 1.1774100225, 3: 1.5381722545}
 
 
@@ -177,10 +177,10 @@ def _best_set(
     if threshold_mm is None:
         threshold_mm = _estimated(agreement, robust, starts[0], refit)
     inside = starts <= threshold_mm * _WIDER[0]
-    # Where it begins is all that decides where it ends; good samples begin with the same set.
+    # The starting set alone decides the result, and good samples share one: settle each set once.
     different = {mask.tobytes(): mask for mask in inside}.values()
     ends = (_settled(mask, threshold_mm, refit) for mask in different)
-    # Python keeps the first among equals: the sample with the least cost.
+    # Of equal results, ``min`` keeps the first: the sample with the least cost.
     return min(
         ((-int(kept.sum()), squares, kept) for kept, squares in filter(None, ends)),
         key=lambda end: end[:2],
@@ -222,7 +222,7 @@ def _estimated(
 ) -> float:
     """Return a threshold from the median distances of the best sample, then of its refit."""
     for _ in range(2):
-        # The correction for few poses is the usual one of least median of squares.
+        # The usual least-median-of-squares correction for few poses.
         spare = max(distances.size - agreement.unknowns / agreement.dimensions, 1.0)
         middle = float(np.median(distances)) / _MEDIAN_DISTANCE[agreement.dimensions]
         threshold_mm = REJECT_BEYOND * max((1 + 5 / spare) * middle, robust.resolution_mm)

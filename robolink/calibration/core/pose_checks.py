@@ -11,10 +11,11 @@ from robolink.messages import tr
 from robolink.model import COMPONENTS, Hand, Pose, ToolOffset
 
 MAX_OFFSET_MM = 1000.0
-"""A longer tool counts as a mistake (docs/reference/calibration.md 3)."""
+"""Longest plausible tool, in mm (docs/reference/calibration.md 3)."""
 
 METRES_BELOW = 2.0
-"""No flange stays so near to its own base axis, in mm; in metres most do."""
+"""If X and Y of all poses are smaller than this, the poses are in metres: no flange works so close,
+in mm, to the axis of its base."""
 
 MIN_ROTATION_DEG = 30.0
 
@@ -25,7 +26,7 @@ _SAME_ANGLE_DEG = 1e-9
 _LIKE_A_NEEDLE_MM = 150.0
 
 UPRIGHT_WITHIN_DEG = 0.01
-"""A flange that leans less is upright: at 120 mm of tool it moves the tip by 0.02 mm."""
+"""Largest lean of an upright flange: with a tool of 120 mm it moves the tip by 0.02 mm."""
 
 
 _P = ParamSpec("_P")
@@ -183,7 +184,7 @@ def require_finite_poses(poses: Sequence[Pose]) -> None:
     """
     for number, pose in enumerate(poses, start=1):
         if all(type(value) is float and math.isfinite(value) for value in pose.coordinates()):
-            continue  # nearly always; what is no float may be one all the same
+            continue  # the usual case; another type of number may be finite too
         for name, value in zip(COMPONENTS, pose.coordinates(), strict=True):
             if not isinstance(value, (int, float)) or not math.isfinite(value):
                 raise CalibrationError(
@@ -381,7 +382,7 @@ def refuse_radians(poses: Sequence[Pose], spread_deg: float) -> None:
     if spread_deg < _SAME_ANGLE_DEG or any(abs(angle) > 2 * math.pi for angle in angles):
         return
     positions = [pose.coordinates()[:3] for pose in poses]
-    # Twice the way from one pose is never less than the way between any two.
+    # The distance between any two poses is at most twice the largest distance from the first.
     travel_mm = max(math.dist(positions[0], position) for position in positions)
     if travel_mm / (2 * math.sin(math.radians(spread_deg / 2))) > _LIKE_A_NEEDLE_MM:
         raise CalibrationError(

@@ -26,7 +26,7 @@ U_STEP_DEG = 15.0
 _EXCHANGES: Final = 20
 
 
-# Makes two poses comparable before any combination of them tells everything.
+# Regularisation: makes two poses comparable before any combination determines every unknown.
 _FAINT: Final = 1e-6
 
 

@@ -18,7 +18,7 @@ from robolink.model import (
 )
 
 NOTICEABLE_MM: Final = 0.002
-"""A smaller step or drift is left to rounding, whatever its F."""
+"""Smallest step or drift reported, in mm; less is put down to rounding, however large F is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,9 +154,8 @@ class ResidualVectors(Sequence[tuple[float, ...]]):
 
 
 LEAST_HALF_WIDTH: Final = 0.0005
-"""Least stated half width: half of the last digit that a controller prints, in mm and in degrees
-(docs/reference/evidence.md 6).
-"""
+"""Smallest half width stated: half of the last digit that a controller prints, in mm and in degrees
+(docs/reference/evidence.md 6)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -322,10 +321,10 @@ class CalibrationResult:
 
 
 GUARD_FACTOR: Final = 1.65
-"""A one-sided error of 5 % on either side."""
+"""One-sided 95 % factor: each of the two verdicts is wrong in at most 5 % of cases."""
 
 PERSON_U_DRIFT_MM: Final = 0.03
-"""Drift in U of a person who touches a pin, whether the eye or an input shows the contact."""
+"""Standard uncertainty of a drift that a person measures at a pin, mm, by eye or with an input."""
 
 
 class DriftVerdict(Enum):

@@ -55,8 +55,8 @@ def pose_table(poses: Sequence[Pose]) -> Floats:
         struct.error: A coordinate is no number.
     """
     row = _ROW.pack
-    # Packing walks the objects once and takes numbers only; a text of digits is none. Attributes
-    # that are written out are read twice as fast as by a getter or a method.
+    # Packing visits each pose once and accepts only numbers, no text of digits. Reading the
+    # attributes one by one is twice as fast as calling a getter or a method.
     rows = [row(p.x_mm, p.y_mm, p.z_mm, p.u_deg, p.v_deg, p.w_deg) for p in poses]
     return np.frombuffer(b"".join(rows)).reshape(-1, 6)
 
@@ -77,7 +77,7 @@ def checked_table(
     except (struct_error, OverflowError):
         table, alike = np.full((1, 6), np.nan), False
     if not np.isfinite(table).all():
-        require_finite_poses(poses)  # which tells the pose and the name
+        require_finite_poses(poses)  # names the pose and the component
     near = np.abs(table[:, :2]) < METRES_BELOW if abs(table[0, 0]) < METRES_BELOW else _FAR
     refuse_metres(bool(near.all()))
     some = poses[:1] if alike else poses
@@ -129,7 +129,7 @@ def zyz_deg(rotation: Floats) -> tuple[float, float, float]:
     sine = math.hypot(r[0, 2], r[1, 2])
     b = math.degrees(math.atan2(sine, r[2, 2]))
     if sine < _SINGULAR:
-        # At B = 180 the first column is (-cos, -sin): Ry turns x over.
+        # At B = 180 the first column is (-cos, -sin), because Ry inverts x.
         sign = math.copysign(1.0, r[2, 2])
         return math.degrees(math.atan2(sign * r[1, 0], sign * r[0, 0])), b, 0.0
     a = math.degrees(math.atan2(r[1, 2], r[0, 2]))

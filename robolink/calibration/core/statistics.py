@@ -17,7 +17,7 @@ NORMAL_95 = 1.959963984540054
 """97.5 % quantile of the normal distribution."""
 
 _NORMAL_ABOVE = 1e7
-"""Degrees of freedom that no quantile tells from infinitely many, to 1e-7."""
+"""Number of degrees of freedom above which quantiles equal those of infinitely many, to 1e-7."""
 
 _TINY = 1e-300
 
@@ -26,13 +26,15 @@ _NEGLIGIBLE = 1e-15
 _MOST_TERMS = 100_000
 
 _NO_SCATTER = 1e-6
-"""Share of a shift below which what scatters beside it does not matter."""
+"""Scatter below this share of a shift does not matter."""
 
 _FAR_OFF = 5.0
-"""Standard deviations from which on only one side of an interval is ever missed."""
+"""Number of standard deviations of a shift from which only one side of the interval is ever
+exceeded."""
 
 _STEPS = 64
-"""Of a sum over the cosine of half a turn: what is summed up ends smoothly at both sides."""
+"""Number of steps of the sum over the cosine of half a turn; the integrand ends smoothly at both
+sides."""
 
 
 def student_t95(dof: float) -> float:
@@ -96,7 +98,7 @@ def chi_square_quantile(p: float, nu: float) -> float:
     if math.isinf(nu):
         raise ValueError("chi-square needs a finite number of degrees of freedom")
     half = nu / 2
-    # Wilson and Hilferty's cube is a start that few steps improve to all digits.
+    # Wilson and Hilferty's cube: from this start a few steps reach all digits.
     cube = 1 - 2 / (9 * nu) + normal_quantile(p) * math.sqrt(2 / (9 * nu))
     return 2 * _root(
         lambda x: _gamma_below(half, x) - p,
@@ -123,7 +125,7 @@ def f_quantile(p: float, d1: float, d2: float) -> float:
     log_beta = math.lgamma(a) + math.lgamma(b) - math.lgamma(a + b)
 
     def density(f: float) -> float:
-        # d1 f / (d1 f + d2) is distributed as beta.
+        # d1 f / (d1 f + d2) follows a beta distribution.
         x, y = d1 * f / (d1 * f + d2), d2 / (d1 * f + d2)
         return math.exp(a * math.log(x) + b * math.log(y) - log_beta) / f
 

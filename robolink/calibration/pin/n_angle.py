@@ -61,7 +61,8 @@ Complexes = NDArray[np.complex128]
 UNKNOWNS = 4
 
 _NEARLY_PARALLEL = 0.2
-"""Samples of two poses that differ by less than about 11 degrees are not believed."""
+"""Smallest |z1 - z2| of a sample of two poses: about 11 degrees. Samples with a smaller turn are
+not used."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +99,7 @@ class PlanarFit:
 def fit_planar(p: Complexes, z: Complexes, kept: Mask | None = None) -> PlanarFit:
     """Return the least squares of the kept poses; residuals are those of all poses."""
     chosen_p, chosen_z = (p, z) if kept is None else (p[kept], z[kept])
-    # A sum by itself: ``mean`` costs three times that at a few poses.
+    # Plain sums: ``mean`` takes three times as long for a few poses.
     mean_p, mean_z = (
         complex(chosen_p.sum()) / chosen_p.size,
         complex(chosen_z.sum()) / chosen_z.size,
@@ -151,7 +152,8 @@ def as_rotations(z: Complexes) -> Floats:
 RECOMMENDED_POSES = 4
 
 ROBUST_POSES = 6
-"""Among fewer an outlier search cannot be trusted (docs/reference/evidence.md 10)."""
+"""Smallest number of poses for which an outlier search is reliable (docs/reference/evidence.md 10).
+"""
 
 _ONE = np.eye(2)
 
@@ -314,8 +316,8 @@ def _turned_enough(poses: Sequence[Pose], z: Complexes, min_rotation_deg: float)
         CalibrationError: As ``pose_checks.check_rotation``.
     """
     wanted_deg = max(min_rotation_deg, WARN_ROTATION_DEG)
-    # Directions within an arc have a mean of at least the cosine of half of it; one that is
-    # shorter tells that they spread further, and the arc itself need not be found.
+    # Directions within an arc have a mean of length cos(arc / 2) or more. A shorter mean shows that
+    # they spread further, so the arc itself need not be found.
     if wanted_deg <= 180.0 and abs(complex(z.mean())) < math.cos(math.radians(wanted_deg / 2)):
         return ()
     return check_rotation(poses, _spread_deg(z), min_rotation_deg)

@@ -70,7 +70,7 @@ class NeedleChain:
         if start is None and self.changes == 0:
             start = self.sigma_mm
         longer = math.hypot(self.sigma_mm, difference_sigma_mm)
-        # Of an older record nobody knows how it began: what it had become is what it starts from.
+        # An older record does not say how its chain began: it starts from the present uncertainty.
         known = self.sigma_mm if start is None else start
         sigma_mm = math.hypot(known, difference_sigma_mm) if shared_touch else longer
         return NeedleChain(sigma_mm, self.changes + 1, known if shared_touch else None)
@@ -101,7 +101,7 @@ class NeedleChain:
             6
         """
         chain, left = self, 0
-        # How sure a full calibration itself was is no matter of the differences after it.
+        # The differences after a full calibration do not depend on how accurate it was.
         while not (chain.changes and chain.is_due(limits)):
             chain = chain.after(difference_sigma_mm, shared_touch=shared_touch)
             left += 1

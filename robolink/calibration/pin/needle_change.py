@@ -32,8 +32,8 @@ Point = tuple[float, ...]
 USUAL_LIMITS = NeedleLimits()
 
 _LEAN_WITHOUT_HEIGHT_DEG = 0.5
-"""Beyond this a change of length of 1 mm, which two coordinates do not show, shifts the tip in
-X and Y by more than 0.009 mm."""
+"""Largest lean if heights are unknown: beyond it, a change of length of 1 mm, which two coordinates
+cannot show, shifts the tip in X and Y by more than 0.009 mm."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -63,10 +63,10 @@ QR_ABOVE_CONDITION = 50.0
 _ONE = np.eye(3)
 
 _RANK_BELOW = 1e-9
-"""1 - s below this is a direction that the rotations leave alone."""
+"""If 1 - s is below this, the rotations do not determine that direction."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)  # arrays are no values
+@dataclass(frozen=True, slots=True, eq=False)  # arrays have no equality or hash
 class PivotDesign:
     """What the orientations of the poses allow, before any position is used.
 
@@ -87,7 +87,7 @@ class PivotDesign:
     mean: Floats
 
 
-@dataclass(frozen=True, slots=True, eq=False)  # arrays are no values
+@dataclass(frozen=True, slots=True, eq=False)  # arrays have no equality or hash
 class PivotFit:
     """Tip and pivot point, mm, with the residual vector of every pose in base axes."""
 
@@ -99,8 +99,8 @@ class PivotFit:
 def pivot_design(rotations: Floats) -> PivotDesign:
     """Return what N x 3 x 3 rotations can determine about a tip."""
     count = len(rotations)
-    # Plain sums and floats: at a few poses, the calls cost more than the arithmetic.
-    mean = np.einsum("ijk->jk", rotations) / count  # three times as quick as a sum along an axis
+    # Plain sums and floats: for a few poses the calls cost more than the arithmetic.
+    mean = np.einsum("ijk->jk", rotations) / count  # three times as fast as a sum along an axis
     _, s, axes = np.linalg.svd(mean)
     largest, *_ = singular = s.tolist()
     gaps = [max(1 - value, 0.0) for value in singular]
@@ -149,7 +149,7 @@ def fit_pivot(
     p, r = (positions, rotations) if kept is None else (positions[kept], rotations[kept])
     solve = _by_qr if condition_number > QR_ABOVE_CONDITION else _by_normal_equations
     tip, point = solve(p, r, r.sum(axis=0) / len(r) if mean is None else mean)
-    # As one tall matrix: a product for each of many small ones takes six times as long.
+    # One tall matrix: multiplying many small ones takes six times as long.
     turned = (rotations.reshape(-1, 3) @ tip).reshape(-1, 3)
     return PivotFit(tip, point, positions + turned - point)
 
@@ -218,7 +218,7 @@ def fit_pivot_robust(
 
 def _by_normal_equations(p: Floats, r: Floats, rm: Floats) -> tuple[Floats, Floats]:
     pm = np.einsum("ij->j", p) / len(p)
-    # Far from the origin p would swamp the differences that matter.
+    # Centred: far from the origin, p would swamp the differences that matter.
     right = (r.reshape(-1, 3).T @ (p - pm).reshape(-1)) / len(p)
     tip = np.linalg.solve(_ONE - rm.T @ rm, -right)
     return tip, rm @ tip + pm
@@ -258,12 +258,13 @@ WARN_CONDITION = 20.0
 MAX_CONDITION = 100.0
 
 LEAST_SINGULAR_VALUE = 0.1
-"""Of the 3N x 6 system for 30 poses; it grows with the root of their number."""
+"""Smallest singular value of the 3N x 6 system for 30 poses; it grows with the square root of N."""
 
 RECOMMENDED_POSES = 4
 
 ROBUST_POSES = 7
-"""Among fewer an outlier search cannot be trusted (docs/reference/evidence.md 10)."""
+"""Smallest number of poses for which an outlier search is reliable (docs/reference/evidence.md 10).
+"""
 
 _CLEARLY_ALONG = 0.98
 

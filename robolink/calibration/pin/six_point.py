@@ -25,10 +25,11 @@ from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 
 LEAST_WAY_MM: Final = 5.0
-"""A shorter way shows no direction."""
+"""Shortest move, in mm, that shows a direction."""
 
 GOOD_WAY_MM: Final = 50.0
-"""Length of a good move: with 0.01 mm of scatter at both ends it shows an axis to 0.02 degrees."""
+"""Length of a good move, in mm: with 0.01 mm of scatter at both ends it shows an axis to 0.02
+degrees."""
 
 _TURNED_DEG: Final = 0.01
 
@@ -73,7 +74,7 @@ def require_unturned(start: Pose, end: Pose) -> None:
     Raises:
         CalibrationError: ``turned_on_the_way``.
     """
-    # Half of |R1 - R2| is sqrt2 sin(angle / 2).
+    # Half of the Frobenius norm of R1 - R2 is sqrt(2) sin(angle / 2).
     off = float(np.linalg.norm(rotation_of(start) - rotation_of(end)))
     if off > math.sqrt(2) * math.radians(_TURNED_DEG):
         raise CalibrationError(
@@ -90,19 +91,20 @@ def between_deg(one: Floats, other: Floats) -> float:
 
 
 MOST_OFF_SQUARE_DEG = 2.0
-"""Raw axes that are further from a right angle are refused (docs/reference/calibration.md 2.4)."""
+"""Largest deviation of the raw axes from a right angle (docs/reference/calibration.md 2.4)."""
 
 FAR_DEG = 45.0
-"""A move further than this from its stored axis is nearer to another axis."""
+"""Largest angle between a move and its stored axis; beyond it the move is closer to another axis.
+"""
 
 _MOST_ASKEW = 2.0
-"""How many halves of its 95 % interval the angle between the ways may be off a right angle."""
+"""Largest deviation of the moves from a right angle, in half widths of its 95 % interval."""
 
 _LEAST_ASKEW_DEG = 0.001
-"""Below what a controller prints nothing is doubted."""
+"""Smallest deviation that raises a doubt: the last digit that a controller prints."""
 
 _START = -3
-"""Where among all poses the ways start: before their two ends."""
+"""Index of the pose where both moves start; the last two poses are their ends."""
 
 _MEASURED = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
 
@@ -327,7 +329,7 @@ def _unit_covariance(
     def angles(p: Floats) -> Floats:
         start, along_x, second = p
         ways = (start_turn @ (along_x - start), start_turn @ (second - start))
-        # Away from the jump at 180 degrees.
+        # Centred on zero, away from the jump at 180 degrees.
         turns: Floats = (np.array(uvw_deg(_frame(*ways, square=square))) - around + 180.0) % 360.0
         return turns - 180.0
 

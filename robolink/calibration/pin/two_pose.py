@@ -85,7 +85,7 @@ def solve_two_pose(
     scale = 2 * math.sin(half)
     t_x, t_y = -m_y / scale, m_x / scale
     at_x, at_y = rotate_xy(t_x, t_y, start_deg)
-    if on_its_head(first):  # and the second one alike, as was checked
+    if on_its_head(first):  # the second one is the same way up, as checked above
         t_y = -t_y
     result = CalibrationResult(
         method="two-pose",

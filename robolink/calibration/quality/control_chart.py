@@ -18,7 +18,8 @@ from robolink.errors import CalibrationError, ConfigError
 from robolink.messages import tr
 
 LEAST_BASELINE: Final = 20
-"""Limits from fewer calibrations are unreliable: from ten, 2.4 % of all good points lie outside."""
+"""Smallest number of calibrations for reliable limits: with ten, 2.4 % of all good points lie
+outside."""
 
 USUAL_LAMBDA: Final = 0.2
 

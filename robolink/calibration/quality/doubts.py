@@ -16,7 +16,8 @@ from robolink.messages import tr
 from robolink.remedy_words import RemedyWord, remedy_word
 
 BEYOND_TOLERANCE: Final = ("large_residual", "large_rms", "large_pixel_residual")
-"""Codes of a result that contradicts itself, the plainest first; it must not be written."""
+"""Codes of a result that contradicts itself, the plainest first; such a result must not be written.
+"""
 
 
 def beyond_tolerance(codes: Sequence[str], *, judged: Sequence[str] = ()) -> tuple[str, ...]:
@@ -57,32 +58,34 @@ class Tolerance:
 
 
 PLANAR_TOLERANCE = Tolerance(rms_mm=0.05, max_residual_mm=0.15)
-"""For a camera or a well visible pin on four axes."""
+"""Tolerance for a camera or a clearly visible pin on four axes."""
 
 TOUCH_TOLERANCE = Tolerance(rms_mm=0.3, max_residual_mm=1.0)
-"""For a pin touched with six axes."""
+"""Tolerance for a pin touched with six axes."""
 
 
 NEAREST_MM: Final = 0.8
 FARTHEST_MM: Final = 1.2
-"""How far beside the pin the tip stops: well above a person's aiming error."""
+"""Range of distances beside the pin at which the tip stops, mm: well above a person's aiming error.
+"""
 
 LEVELS_MM: Final = (0.0, 0.6, 1.2, 1.8)
-"""How much above the clearance it stops: one and the same way down would not end at one height."""
+"""Heights above the clearance at which the tip stops, mm: they differ, so that jogging down by the
+same amount each time would not end at one height."""
 
 HIGHEST_MM: Final = max(LEVELS_MM)
 
 LEAST_JOG_MM: Final = 0.02
 PRINT_STEPS: Final = 3
-"""A robot at rest prints positions that differ by as much."""
+"""Largest difference between positions that a robot at rest prints, in last digits."""
 
 LEAST_HEIGHT_LIMIT_MM: Final = 0.10
 PERSON_SIGMA_Z_MM: Final = 0.05
 PROBE_SIGMA_Z_MM: Final = 0.01
-"""Standard deviation of a touch in height, of a person and of a contact input."""
+"""Standard deviation of a touch in height, in mm, by a person and by a contact input."""
 
 MOST_LEFT: Final = 0.5
-"""Share of the standoffs that may be left, with the uncertainty of the share on top."""
+"""Largest share of the standoffs that may be left, including the uncertainty of the share."""
 
 MOST_RESIDUAL_MM: Final = 0.15
 
@@ -123,7 +126,7 @@ def order_in_words(order: RunOrder) -> str:
     return ""
 
 
-# Called late, because the language is chosen when a command runs.
+# Functions, because the language is chosen only when a command runs.
 _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
     "small_rotation": lambda: tr("The poses differ little in U; half a turn would be best."),
     "few_poses": lambda: tr("Too few poses to find the wrong one; four or more would show it."),
@@ -238,4 +241,4 @@ _SENTENCES: Final[Mapping[str, Callable[[], str]]] = {
         "These touches cannot show whether the length of the tool has changed."
     ),
 }
-"""Doubts that a caller says in other words are left out."""
+"""Sentence for each doubt, by code; doubts that callers describe themselves are not included."""

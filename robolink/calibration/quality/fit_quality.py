@@ -15,10 +15,10 @@ from robolink.calibration.quality.doubts import Tolerance
 ResultT = TypeVar("ResultT", bound=CalibrationResult)
 
 CONTRADICTED_ABOVE = 0.99
-"""Chi-square of the residuals beyond this quantile contradicts a stated sigma."""
+"""Quantile of chi-square above which the residuals contradict a stated sigma."""
 
 TOO_SMALL_BELOW = 0.001
-"""Below this quantile the residuals are better than the stated sigma allows."""
+"""Quantile of chi-square below which the residuals are better than the stated sigma allows."""
 
 
 def judged(
@@ -136,7 +136,7 @@ def _agreement(
     )
     if found > limit:
         return evidence, ("sigma_contradicted",)
-    # On a coarse grid residuals may be nothing at all, whoever made the touches.
+    # On a coarse grid, genuine touches can leave residuals of zero.
     natural = grid_mm is not None and grid_mm >= sigma_mm
     too_small = not natural and found < chi_square_quantile(TOO_SMALL_BELOW, dof)
     return evidence, ("residuals_too_small",) if too_small else ()

@@ -28,7 +28,7 @@ UNFIT_PERCENT = 30.0
 LEAST_CATEGORIES = 5
 
 _PROCESS_WIDTH = 6.0
-"""Standard deviations that a tolerance band is compared with."""
+"""Width to which a tolerance band is compared, in standard deviations."""
 
 _CATEGORIES = 1.41
 
@@ -155,7 +155,7 @@ def _variances(table: Floats) -> _Variances:
     if o > 1:
         ms_person = n * r * float(((persons - mean) ** 2).sum()) / (o - 1)
         between = max(0.0, (ms_person - against) / (n * r))
-        # Nothing is taken off for what chance alone makes the means differ by.
+        # The chance differences between the means are not subtracted.
         freedom = (o - 1) / chi_square_quantile(0.05, o - 1)
         upper = freedom * max(ms_person, against) / (n * r) + interaction
     part = max(0.0, (ms_part - against) / (o * r))
@@ -178,7 +178,7 @@ def _table(values_mm: Sequence[Sequence[Sequence[float]]]) -> Floats:
             remedy=tr("Measure what is missing, or leave that nozzle or person out."),
         )
     n, o, r = len(values_mm), *(persons or {0}), *(repeats or {0})
-    # What is left for the repeatability: repeats, else persons by nozzle.
+    # Degrees of freedom left for the repeatability: from repeats, otherwise from persons by nozzle.
     if n < 2 or o < 1 or r < 1 or n * o * r - n - o + 1 < 1:
         raise CalibrationError(
             "too_few_values",

@@ -144,16 +144,17 @@ def _suspect(what: str) -> CalibrationError:
 
 
 UNSUSPICIOUS_MM = 1.0
-"""A change up to this is an ordinary nozzle change and raises no doubt about the tool."""
+"""Largest change of an ordinary nozzle change, in mm; it raises no doubt about the tool."""
 
 _NEW_NOZZLE_MM = 2.0
-"""A larger change than this is none of a new nozzle, whatever is accepted this time."""
+"""Largest change that a new nozzle explains, in mm, whatever limit is accepted this time."""
 
 ALIKE_MM = 0.01
-"""Offsets nearer than this are one: whichever tool it was, the same is written."""
+"""Largest difference between equal offsets, in mm: whichever tool it was, the same value is
+written."""
 
 MUCH_NEARER = 4.0
-"""Another tool has to explain the poses this many times better before it is named."""
+"""Number of times smaller the change must be with another tool before that tool is named."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,17 +41,17 @@ from robolink.messages import tr
 from robolink.model import Pose, ToolOffset, angle_difference_deg, rotate_xy
 
 NEEDLE_LIMIT_MM = 2.0
-"""Largest plausible change by a new needle; 0.5 mm is usual for a nozzle
+"""Largest plausible change by a new needle, in mm; 0.5 mm is usual for a nozzle
 (docs/reference/calibration.md 2.9)."""
 
 NOISE_MM = 0.05
 
 
 TAKEN_AGAIN = ("step_in_run_order", "drift_in_run_order")
-"""Doubts after which the touches have to be taken again (docs/reference/evidence.md 8)."""
+"""Doubts that require the touches to be repeated (docs/reference/evidence.md 8)."""
 
 BIRGE_LIMIT = 3.0
-"""Residuals this many times larger than the stated sigma need somebody to look."""
+"""Largest ratio of the residuals to the stated sigma; above it, a person has to check."""
 
 
 def writes_refused_unattended(result: CalibrationResult) -> str:
@@ -114,7 +114,7 @@ def update_guard(
     """
     changes = (new.x_mm - stored.x_mm, new.y_mm - stored.y_mm, new.z_mm - stored.z_mm)
     length = math.hypot(*changes)
-    # Divergence first: at the end of it the change is implausible as well.
+    # Divergence is checked first: a diverging series ends in an implausible change too.
     require_shrinking(length, earlier_mm, noise_mm=noise_mm)
     if length > max_change_mm:
         raise CalibrationError(
@@ -191,7 +191,7 @@ class PointImpact:
 
 
 _SAME_MM: Final = 1e-6
-"""Displacements that differ by less are equal but for rounding."""
+"""Largest difference between displacements that is only rounding, in mm."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -276,7 +276,7 @@ def _at(number: int, pose: Pose, old: ToolOffset, new: ToolOffset) -> PointImpac
 
 
 def _at_leaning(number: int, pose: Pose, old: ToolOffset, new: ToolOffset) -> PointImpact:
-    from robolink.calibration.core.rotations import rotation_of  # numpy, late
+    from robolink.calibration.core.rotations import rotation_of  # numpy, imported late
 
     before, after = (
         rotation_of(Pose(0.0, 0.0, 0.0, *tool.components()[3:])) for tool in (old, new)

@@ -42,17 +42,18 @@ FALSE_ALARM: Final = 0.01
 LEAST_TOUCHES: Final = 6
 
 _ROUNDING_MM: Final = 1e-6
-"""A smaller shift is what floating point leaves of touches without scatter; it has no F."""
+"""Smallest shift that has an F, in mm; less is only floating-point rounding of touches without
+scatter."""
 
 _SEEN: Final = 1e-6
-"""A split is judged when the design leaves so much of its column."""
+"""Smallest share of its column that the design must leave for a split to be judged."""
 
 _ALL_SPLITS_OF: Final = 100
 
 _FEW_SPLITS: Final = 32
 
 _ONES: Final = (np.eye(0), np.eye(1), np.eye(2), np.eye(3))
-"""By their size."""
+"""Identity matrices, indexed by size."""
 
 
 def run_order(
@@ -117,7 +118,7 @@ class _Columns:
 @lru_cache(maxsize=64)
 def _columns(count: int) -> _Columns:
     splits = np.arange(1, count)
-    if count > _ALL_SPLITS_OF:  # not everywhere among hundreds
+    if count > _ALL_SPLITS_OF:  # among hundreds of poses, only at some splits
         splits = np.linspace(1, count - 1, _FEW_SPLITS).round().astype(np.intp)
     after = (count - splits).astype(float)
     ramp = np.arange(count) / (count - 1.0)
@@ -141,12 +142,12 @@ def _gained(
     """
     dimensions = len(inverse)
     across = across.reshape(-1, dimensions, dimensions)
-    # d' d: the column's own squares, less what the point and the offset take over.
+    # d' d: the squares of the column itself, minus what the point and the offset explain.
     taken = across @ inverse @ across.transpose(0, 2, 1)
     one = _ONES[dimensions]
     left = columns.own[:, None, None] * one - taken
     limit = _SEEN * columns.squares
-    # What is taken has no negative eigenvalue, so that none of what is left lies below this.
+    # The explained part has no negative eigenvalue, so no eigenvalue of the rest lies below this.
     hidden = columns.own - np.einsum("ijj->i", taken) < limit
     if hidden.any():
         hidden = np.linalg.eigvalsh(left)[:, 0] < limit
@@ -167,7 +168,7 @@ def _as_f(gained: Floats, shifts: Floats, whole: float, spare: int) -> Floats:
 
 
 HIGH_LEVERAGE: Final = 0.9
-"""A pose above it leaves next to nothing of its own error in its residual."""
+"""Leverage above which almost nothing of a pose's own error appears in its residual."""
 
 ResultT = TypeVar("ResultT", bound=CalibrationResult)
 
@@ -178,7 +179,7 @@ def copies(table: Floats) -> tuple[int, ...]:
     Args:
         table: N x 6, positions in mm and angles in degrees, as they were printed.
     """
-    # One number a row, made of all: where these differ nothing needs a closer look.
+    # One number per row, a mix of all columns: if all numbers differ, no row is a duplicate.
     mixed = table[:, 0].copy()
     for column, factor in zip(table.T[1:], (1.37, 2.61, 3.83, 5.23, 7.91), strict=True):
         mixed += factor * column
@@ -257,7 +258,7 @@ def with_evidence(
         "high_leverage" if alone.size else "",
         order.finding if order is not None else "",
     )
-    # Where the grid decides, the residuals say nothing about the order either.
+    # If the resolution dominates, the residuals say nothing about the order either.
     testable = len(kept) >= LEAST_TOUCHES or "resolution_floor" in result.notes
     return replace(
         result,
@@ -268,7 +269,7 @@ def with_evidence(
 
 
 UNSTABLE_BEYOND: Final = 0.1
-"""Robust results further apart than this part of the half interval are not believed."""
+"""Largest spread of robust results, as a share of the half interval; above it they are refused."""
 
 
 def with_consensus(result: ResultT, kept: Mask, spread_mm: float) -> ResultT:
@@ -318,7 +319,7 @@ def require_robust_poses(count: int, minimum: int) -> None:
 Complexes = NDArray[np.complex128]
 
 CLAIMED_BEYOND: Final = 3.0
-"""Standard uncertainties that a bias exceeds before it is told."""
+"""Number of standard uncertainties above which a bias is reported."""
 
 _BIAS_SEEN: Final = 1e-3
 

@@ -89,7 +89,7 @@ def with_station(result: ResultT, *parts: StationPart) -> ResultT:
         result: The result of the touches alone; lengths are its first components.
         parts: What its stations add; one that adds nothing leaves no trace.
     """
-    import numpy as np  # which the help of a command does without
+    import numpy as np  # numpy, not needed for a command's help
 
     added = [part for part in parts if np.any(np.asarray(part.covariance))]
     if not result.half_width95 or not added:
@@ -216,17 +216,17 @@ def shared_station(u_station_mm: float, sigma_mm: float) -> SharedStation:
 
 
 MOVED_PROBABILITY = 0.999
-"""A shift is believed when fewer than one in a thousand unmoved stations would show it."""
+"""A shift counts as real if fewer than one in a thousand unmoved stations would show it."""
 
 LEAST_SHIFT_MM = 0.05
-"""Less is no harm, however sure it is: it is what a touch repeats to."""
+"""Smallest shift that counts, in mm, however certain it is: the repeatability of a touch."""
 
 SEEN_PROBABILITY = 0.9
-"""A shift counts as detectable when so many of its size are found."""
+"""Probability with which a shift of detectable size is found."""
 
 _STEPS = 2000
 _KNOWN = 1e4
-"""So many changes say as much as a scatter that is known."""
+"""Number of changes from which an estimated scatter counts as known."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,8 @@ from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 
 PLACING_TOLERANCE_MM = 0.1
-"""Drift allowed for placing; dispensing is content with 0.2 (docs/reference/calibration.md 3)."""
+"""Largest drift for placing, in mm; 0.2 mm is enough for dispensing (docs/reference/calibration.md
+3)."""
 
 RECOMMENDED_ANGLES = 4
 
@@ -89,7 +90,7 @@ def _angles(poses: Sequence[Pose]) -> tuple[list[float], list[float], list[float
 def _drifts(poses: Sequence[Pose], offset: ToolOffset) -> tuple[Drift, ...]:
     positions, turned = pose_arrays(poses)
     tips = positions + turned @ offset.components()[:3]
-    # On four axes the height says nothing about the offset.
+    # On four axes, the height gives no information about the offset.
     upright = not any(pose.v_deg or pose.w_deg for pose in poses)
     drifts = []
     for pose, (dx, dy, dz) in zip(poses, (tips - tips[0]).tolist(), strict=True):

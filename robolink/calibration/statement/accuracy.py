@@ -45,7 +45,7 @@ _BEAMS_MM: Final = 0.003
 _CAMERA_PX: Final = 0.1
 
 _PLANE: Final = 2
-"""Lengths that are measured in the plane."""
+"""Number of lengths measured in the plane."""
 
 
 def usual_look_sigma_mm(
@@ -114,7 +114,7 @@ def assessed(result: ResultT, facts: AccuracyFacts) -> ResultT:
             return replace(result, accuracy=None)
         height_mm = _PROBE_MM if usual == sigma_mm and _aimed(result, facts) else None
         scattered = _scattering(result, sigma_mm, len(lengths), height_mm=height_mm)
-        # Nothing usual is known of angles.
+        # There is no usual scatter for angles.
         sources = tuple(one.of_first(len(lengths)) for one in sources)
         basis = "default" if facts.look_sigma_mm is None else "record"
     elif _too_sure_of_its_aim(result, facts, len(lengths)):
@@ -228,7 +228,7 @@ class _Held:
 
         The factors of few degrees of freedom stay those of all rows together.
         """
-        import numpy as np  # which the help of a command does without
+        import numpy as np  # numpy, not needed for a command's help
 
         halves, held = whole.half_width95, cls._by_covariance(whole)
         shift = np.array([row.half_width * line[0] for line in row.source.gain])
@@ -251,7 +251,7 @@ class _Held:
         if len(lengths) == 1:
             return cls(alone[lengths[0]], alone)
         if len(lengths) > _PLANE:
-            return cls(held.within_mm, alone)  # in space the factor holds the end as it is
+            return cls(held.within_mm, alone)  # in space, the factor also covers the shifted end
         among = np.ix_(lengths, lengths)
         known_mm = math.sqrt(
             chi_square_quantile(0.95, _PLANE) * float(np.linalg.eigvalsh(total[among])[-1])
@@ -284,7 +284,7 @@ def row_covariance(source: ErrorSource, half_width: float) -> "Floats":
         source: How it enters.
         half_width: Half its width, in the unit of the row.
     """
-    import numpy as np  # which the help of a command does without
+    import numpy as np  # numpy, not needed for a command's help
 
     gain = np.array(source.gain)
     covariance: Floats = gain @ gain.T * (half_width * half_width / 3)

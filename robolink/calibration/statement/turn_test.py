@@ -49,10 +49,10 @@ from robolink.calibration.statement.accuracy import row_covariance, usual_look_s
 from robolink.model import angle_difference_deg
 
 SHOWN_IN: Final = 0.95
-"""In so many tests a shift is contradicted from which on a turn test is said to show it."""
+"""Share of tests that must contradict a shift before a turn test counts as showing that shift."""
 
 _NODES: Final = tuple(step / 2 for step in range(-12, 13))
-"""Of what the drifts have in common, standard deviations."""
+"""Nodes for integration over the error that all drifts have in common, in standard deviations."""
 
 _HALVINGS: Final = 16
 
@@ -103,7 +103,7 @@ def shows_from_mm(views: Sequence[View], coordinates: int, nu: float | None) -> 
                 least = middle
             else:
                 found = middle
-    # A scatter that was estimated may be larger.
+    # The true scatter may be larger than the estimated one.
     wider = 1.0 if beyond is None else beyond / known
     return max(found, nearest + wider * (found - nearest))
 
@@ -122,23 +122,23 @@ def _missed(shift_mm: float, limits: Sequence[tuple[View, float]]) -> float:
 
 
 FALSE_ALARMS: Final = 0.001
-"""So often may a right result be contradicted, all drifts of one test together."""
+"""Share of tests in which a right result may be contradicted, all drifts of one test together."""
 
 _ENOUGH_NU: Final = 6
-"""From so many degrees of freedom on an estimated scatter is used in place of a usual one; from
-fewer only where that would let too much pass."""
+"""Smallest number of degrees of freedom from which an estimated scatter replaces a usual one; fewer
+are accepted only where the usual scatter would let too much pass."""
 
 LEAST_TURN_DEG: Final = 90.0
-"""Less turn from where the tool was measured does not count as tested."""
+"""Smallest turn from the orientation of the measurement that counts as a test."""
 
 _SHOWN: Final = 0.5
-"""A drift that shows less than this share of an error tells no wider statement."""
+"""Smallest share of an error that a drift must show to widen the statement."""
 
 _ROUGHER: Final = 0.99
-"""Quantile of chi-square above which looks are rougher than is usual."""
+"""Quantile of chi-square above which looks are rougher than usual."""
 
 _WITH_DIRECTION: Final = 3
-"""X, Y and the direction of a tool."""
+"""Number of coordinates with direction: X, Y and the direction of a tool."""
 
 _PLANE: Final = 2
 
@@ -147,7 +147,7 @@ _LEAST_TILTED: Final = 4
 _TELLS_NOTHING: Final = 1e-9
 
 _REGION95: Final = 2.45
-"""Of two coordinates with a known scatter, together."""
+"""95 % factor for two coordinates together, with a known scatter."""
 
 
 def turn_claim(result: CalibrationResult, facts: AccuracyFacts) -> TurnClaim | None:
@@ -174,13 +174,13 @@ def turn_claim(result: CalibrationResult, facts: AccuracyFacts) -> TurnClaim | N
     place = [one for one in sources if one.turning == "in_base"]
     aside = [one for one in sources if one.turning == "as_offset"]
     marks = _Marks.of(result)
-    # A look of several inputs has the mean of them in each coordinate.
+    # One look of several inputs is their mean in each coordinate.
     single_mm = sigma_mm * math.sqrt(max(result.inputs_per_look / 2, 1.0))
     return TurnClaim(
         look_sigma_mm=sigma_mm,
         look_nu=nu,
         offset_sigma_mm=single_mm * (marks.middle_gain or result.sigma_gain),
-        # Touches of a surface tell a height, at whatever angle.
+        # Touches of a surface measure a height, at any angle.
         headings_deg=tuple(
             tip_pose(pose, result.offset, tool=0).u_deg if pose.tool in (None, 0) else pose.u_deg
             for pose in result.inputs
@@ -224,7 +224,7 @@ class _Marks:
         """Return the marks of a method's turn test."""
         looks = max(len(result.inputs), 1)
         if not result.marks_mm:
-            # At a row it is held to one look, in the place of all.
+            # With a runout table, the test compares one look, not all of them, with its row.
             row = 0.0 if result.held_to_table_mm is None else max(1 - 2 / looks, 0.0)
             return cls(((0.0, 0.0),), row, None)
         places, count = result.marks_mm, len(result.marks_mm)
@@ -264,11 +264,11 @@ def _tilted_leverage(result: CalibrationResult) -> float | None:
     """
     if result.by_surface or len(result.reference_point_mm) < 3 or "z_mm" not in result.measured:
         return None
-    # Those that tell directions only leave no residual.
+    # Poses that only show directions leave no residual.
     poses = result.inputs[: len(result.residuals_mm)]
     if len(poses) < _LEAST_TILTED:
         return None
-    import numpy as np  # which the help of a command does without
+    import numpy as np  # numpy, not needed for a command's help
 
     from robolink.calibration.core.rotations import rotations
 
@@ -292,15 +292,15 @@ def _look_scatter(
     of_look = math.sqrt(max(result.inputs_per_look / 2, 1.0))
     step_mm = (result.evidence.grid_mm if result.evidence is not None else None) or 0.0
     if usual_mm is not None:
-        # Looks on a grid can be off by its step without scattering at all.
+        # On a grid, looks can be off by up to one step without any scatter.
         usual_mm = max(usual_mm, step_mm / math.sqrt(12) / of_look)
     own_mm = None if result.sigma_mm is None else result.sigma_mm / of_look
     from_residuals, dof = result.interval_from == "residuals", result.dof or 0
     if own_mm is not None and from_residuals and dof >= _ENOUGH_NU:
         return own_mm, float(dof)
     if own_mm is not None and result.sigma_stated:
-        # Few residuals make the interval wider, by the factor of Student's t, even where they are
-        # small: what was stated stands as long as they do not contradict it.
+        # Few residuals widen the interval by the factor of Student's t, even if they are small: the
+        # stated value stands unless they contradict it.
         ratio = result.evidence.birge_ratio if from_residuals and result.evidence else None
         stated_mm = own_mm / (ratio or 1.0)
         if from_residuals and "sigma_contradicted" in result.warnings:
@@ -308,7 +308,7 @@ def _look_scatter(
         return stated_mm, None
     recorded = facts.look_sigma_mm is not None and facts.look_nu >= _ENOUGH_NU
     least_mm = facts.look_sigma_mm if recorded else usual_mm
-    # Looks that are rougher than is usual, beyond doubt, say so themselves, however few they are.
+    # Even a few looks show it if they are clearly rougher than usual.
     if own_mm is not None and least_mm and from_residuals and dof:
         squares = dof * (own_mm / least_mm) ** 2
         if squares > chi_square_quantile(_ROUGHER, dof):
@@ -432,16 +432,16 @@ def _limits(
     look = claim.look_sigma_mm**2
     scatter, place = look / drift.looks + claim.offset_sigma_mm**2, 0.0
     if proof.heights_only:
-        # The surface is where it was, whatever its height.
+        # The place of the surface does not change with its height.
         return _both(scatter, 0.0, count, coordinates, claim.look_nu, 180.0)
     if claim.by_surface:
-        # Twice: the surface is known no better than the touches of the test show it.
+        # Doubled: the test's own touches limit how well the surface is known.
         scatter = 2 * max(look / drift.looks, drift.u_mm**2)
     elif claim.finds_place:
         scatter = look / drift.looks + look * _leverage(claim, drift.u_deg)
     else:
         place = (abs(_turned(claim.headings_deg, drift.u_deg)) * claim.place_u_mm) ** 2
-    # Where a mark lies on the tool is no movement, so it contradicts neither statement.
+    # The place of a mark on the tool is no movement, so it contradicts neither statement.
     scatter += look * claim.mark_leverage + claim.mark_u_mm**2
     rows = place + claim.offset_u_mm**2
     turn_deg = max(abs(angle_difference_deg(drift.u_deg, one)) for one in claim.headings_deg)
@@ -491,7 +491,7 @@ def _wider_mm(claim: TurnClaim, pairs: Sequence[tuple[Drift, DriftLimits]]) -> f
     """Return U = (d + 2.45 s) / min(1, 2 sin(a / 2)), the largest, never below what was said."""
     told = []
     for drift, _ in pairs:
-        # What moved in between shows against the last look.
+        # A movement between the looks shows in the difference from the last look.
         last = claim.headings_deg[-1:] if claim.finds_place else claim.headings_deg
         shown = min(1.0, abs(_turned(last, drift.u_deg)))
         spread_mm = _REGION95 * claim.look_sigma_mm / math.sqrt(drift.looks)

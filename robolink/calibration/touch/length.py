@@ -26,10 +26,10 @@ from robolink.errors import CalibrationError
 from robolink.messages import tr
 
 LengthDecision = Literal["difference", "keep", "measure"]
-"""What to do about a changed length: write Z by difference, keep it, measure it."""
+"""Decision about a changed length: write Z by difference, keep it, or measure it."""
 
 LEAST_LENGTH_CHANGE_MM: Final = 0.10
-"""Less is what touches of a person differ by, and no other length."""
+"""Smallest change of length, in mm; touches by a person differ by less than this anyway."""
 
 _NO_CHANGE_QUANTILE: Final = 3.29
 

@@ -31,19 +31,20 @@ from robolink.messages import tr
 from robolink.model import Pose, ToolOffset, json_fields
 
 LEAST_TOUCHES = 7
-"""Six unknowns; six touches may fit in more than one way."""
+"""Smallest number of touches: there are six unknowns, and six touches may fit in more than one way.
+"""
 
 LEAST_ON_A_KNOWN_PLANE = 4
 
 _UNKNOWNS = 6
 
 _STARTS = 5
-"""How many of the thirteen directions are followed: those that fit best as they are."""
+"""Number of starting directions, of thirteen, that are refined: those that fit best."""
 
 _SAME_TIP_MM = 0.01
 
 _AS_GOOD = 4.0
-"""A second solution whose squares are less than this times those of the best is one too."""
+"""A second solution counts too if its sum of squares is less than this times the best one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,7 +205,7 @@ def _found(p: Floats, r: Floats) -> tuple[_State, LinearFit]:
         middle = (p + r @ state.tip).mean(axis=0)
         turned = state.normal + _tangents(state.normal) @ by[3:5]
         normal = turned / np.linalg.norm(turned)
-        # The distance was counted at the middle of the places, about which the normal turns.
+        # The distance refers to the middle of the places, about which the normal turns.
         distance = state.distance + by[5] + float((normal - state.normal) @ middle)
         return _State(state.tip + by[:3], normal, distance)
 

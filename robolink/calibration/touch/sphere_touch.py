@@ -32,7 +32,7 @@ from robolink.model import Pose, ToolOffset
 _UNKNOWNS = 7
 
 _INSIDE_OUT = 0.2
-"""A radius that is found this share below or above the one that was stated contradicts it."""
+"""Largest difference between found and stated radius, as a share of the stated radius."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

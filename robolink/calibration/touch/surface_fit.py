@@ -34,11 +34,11 @@ from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 
 MAX_CONDITION = 150.0
-"""Beyond it the touches do not tell tip and surface apart."""
+"""Largest condition number of touches that separate tip and surface."""
 
 MAX_GAIN = 50.0
-"""Nor where the error of one touch counts more than so many times in a length of the tip: a column
-that is nearly zero does not show in the condition, for which all are brought to one length."""
+"""Largest gain of one touch's error in a length of the tip. The condition number does not show a
+column that is nearly zero, because all columns are scaled to one length."""
 
 SURFACE_TOLERANCE = Tolerance(rms_mm=0.3, max_residual_mm=1.0)
 
@@ -197,8 +197,8 @@ def tip_result(
 
 
 LEAST_UNEXPLAINED_MM2: Final = 0.28
-"""For each touch beyond those that tip and surface take: the part of the squared distances that no
-tip and no surface could explain as well."""
+"""Smallest part of the squared distances that no tip and no surface could explain, in mm^2, for
+each touch beyond the unknowns of tip and surface."""
 
 _FAINT_MM: Final = 1e-6
 

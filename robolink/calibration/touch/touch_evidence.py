@@ -35,11 +35,12 @@ from robolink.model import Pose
 from robolink.timing import FASTEST_ANSWER_S
 
 LEAST_UNEXPLAINED_MM2: Final = 0.28
-"""For each touch beyond the second: the part of the squared standoffs that no pin and no needle
-could explain as well, so that the test of them finds what it is for."""
+"""Smallest part of the squared standoffs that no pin and no needle could explain, in mm^2, for each
+touch beyond the second; with less, the test of the standoffs would find nothing."""
 
 _MOST_DRAWS: Final = 1000
-"""A draw is kept in about one of three; where the angles leave no room the best one is taken."""
+"""Largest number of draws: about one in three is kept; if the angles allow none, the best one is
+used."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +58,7 @@ class Standoff:
 
 
 NO_STANDOFF: Final = Standoff()
-"""That of a touch to which the person brought the tip from wherever it was."""
+"""Standoff of a touch for which the person jogged from wherever the tip was."""
 
 
 class StandoffSeries:
@@ -102,7 +103,8 @@ class StandoffSeries:
         before = [standoff for _, standoff in taken]
         needed_mm2 = LEAST_UNEXPLAINED_MM2 * (len(poses) - 2)
         best, most_mm2 = self._drawn(level_mm), -1.0
-        # Three touches of a leaning tool leave no direction that pin and needle do not explain.
+        # With three touches, pin and needle can explain the standoffs of a leaning tool in any
+        # direction.
         if not self._sideways or len(poses) < (3 if self._planar else 4):
             return best
         explained = _basis(pin_columns(poses, planar=self._planar))
@@ -182,10 +184,10 @@ def _unexplained_mm2(explained: Floats, standoffs: Sequence[Standoff], *, planar
 
 
 _LEAST_TOUCHES: Final = 4
-"""Fewer leave nothing by which standoffs could be told from scatter."""
+"""Smallest number of touches that separates standoffs from scatter."""
 
 _UPRIGHT: Final = 1e-4
-"""Sine of the lean up to which heights are compared as they are: 0.02 mm at 120 mm."""
+"""Sine of the largest lean at which heights are compared directly: 0.02 mm at 120 mm."""
 
 REFUSING: Final = (
     "not_touched",
@@ -194,7 +196,7 @@ REFUSING: Final = (
     "touch_not_proven",
     "large_residual",
 )
-"""The grounds on which touches are refused, the most telling first."""
+"""Reasons for refusing touches, the most telling first."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -41,11 +41,11 @@ from robolink.messages import tr
 from robolink.model import Pose, ToolOffset
 
 LATENCY_S = (-0.002, 0.2)
-"""What a trigger can have: a scan takes 1 to 20 ms, a filter 1 to 50, a polled network up to
-200; a little below nothing is rounding of the clock."""
+"""Plausible latency of a trigger, in s: a scan takes 1 to 20 ms, a filter 1 to 50 ms, a polled
+network up to 200 ms; slightly negative values come from rounding of the clock."""
 
 OVERSHOOT_S2_PER_MM = (0.0, 0.005)
-"""What braking can have: 0.005 is a deceleration of 100 mm/s^2."""
+"""Plausible overshoot from braking: 0.005 corresponds to a deceleration of 100 mm/s^2."""
 
 _BEYOND_SIGMAS = 3.0
 _AS_RARE = 0.9973
@@ -153,7 +153,7 @@ def require_plausible(
     dof = residuals.size - found.fit.rank
     slack = max(_BEYOND_SIGMAS * (sigma_mm or 0.0), step_mm or 0.0)
     if dof > 0:
-        # Of a scatter that a few touches tell, as many as are as rare: Student's t.
+        # With a scatter estimated from a few touches, Student's t gives the same probability.
         scatter = math.sqrt(float(residuals @ residuals) / dof)
         slack = max(slack, math.sqrt(f_quantile(_AS_RARE, 1, dof)) * scatter)
     low, high = LATENCY_S
@@ -204,10 +204,10 @@ PROBE_TOLERANCE = Tolerance(rms_mm=0.05, max_residual_mm=0.15)
 RECOMMENDED_TOUCHES = 3
 
 USUAL_DECELERATION_MM_S2 = 300.0
-"""Assumed least deceleration of a robot; see docs/reference/evidence.md 13."""
+"""Assumed least deceleration of a robot (docs/reference/evidence.md 13)."""
 
 _SPEEDS_APART = 1.5
-"""Speeds that differ by less than this factor do not tell the latency."""
+"""Smallest ratio of the speeds that separates the latency."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -387,8 +387,8 @@ def _with_braking(result: ZTouchResult, shift_mm: float, origin: str) -> ZTouchR
     result = replace(result, budget=(result.budget or UncertaintyBudget.of(())).with_row(row))
     if not result.half_width95:
         return result
-    # Not by degrees of freedom of both together: few touches that agree by luck would make the
-    # factor of their own scatter small as well, and 92 % of the intervals held the truth.
+    # The degrees of freedom of both are not combined: a few touches that agree by luck would reduce
+    # the factor of their own scatter too, and only 92 % of the intervals held the true value.
     half_mm = shifted_half95(shift_mm, result.half_width95[0] / NORMAL_95)
     return replace(
         result,

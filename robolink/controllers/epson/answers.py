@@ -10,8 +10,8 @@ from robolink.model import ControllerStatus
 from robolink.protocols.epson_text import ErrorCode, Refusal, StatusFlags
 
 NOT_EXECUTED = frozenset({10, 11, 12, 13, 14, 15, 16, 20, 21})
-"""Refusals that say that nothing was carried out (docs/reference/epson.md 1.6); 19 and 99 do not
-say so."""
+"""Refusals that show that nothing was carried out (docs/reference/epson.md 1.6); 19 and 99 do not
+show it."""
 
 
 def rejected(refusal: Refusal, *, controller: str, request: str = "") -> RejectedError:

@@ -88,7 +88,7 @@ _TOLD: Final = (
     Preference.RESET_OUTPUTS_OFF,
     Preference.OUTPUTS_OFF_AT_ESTOP,
 )
-"""The preferences that matter for tool work."""
+"""Preferences that matter for tool work."""
 
 
 class ConditionReader:
@@ -125,13 +125,13 @@ class ConditionReader:
         with suppress(RejectedError):  # older firmware has no alarms
             found["alarms"] = list(self._alarms.list())
         if status.state is ControllerState.READY:
-            # A controller that serves monitoring only may not show it in its flags.
+            # A controller set to monitoring only may not show it in its flags.
             with suppress(RejectedError):
                 found["selected_tool"] = self._tools.selected()
                 found["motors_on"] = self._group.motors_on()
                 found["power"] = "high" if self._group.settings.power_high() else "low"
         if found["selected_tool"] is None:
-            # A table that is being changed just now must not hide the state.
+            # If the table is just being changed, the state must still be shown.
             with suppress(RejectedError, ToolError):
                 table = published()
                 found["published_selected_tool"] = table.selected if table else None

@@ -55,7 +55,7 @@ from robolink.protocols.spel import Statement
 from robolink.stop_latch import CommandClass
 from robolink.transport import LinkUrl
 
-if TYPE_CHECKING:  # to pyright a cached_property is no property, and its owner no Controller
+if TYPE_CHECKING:  # pyright does not accept a cached_property as a property of Controller
     from builtins import property as cached_property
 else:
     from functools import cached_property
@@ -275,7 +275,7 @@ class EpsonController(ControllerCore):
         """
         request, link, markers = _typed_statement(statement), self._link, self._link.markers
         with link.lock.held(request):
-            # Before an engineer's word for it goes on record.
+            # Checked before an engineer's consent is recorded.
             markers.require_settled(request)
             link.window.require_ready(request)
             if command_class_of(execution(request)) is CommandClass.ACT:
@@ -307,8 +307,8 @@ class EpsonController(ControllerCore):
         return reader.read(published=self.published_tools)
 
     def _require_resettable(self, status: ControllerStatus) -> None:
-        # The flag of an emergency stop stays on after its release until the reset
-        # (docs/reference/epson.md 1.7), so it cannot hold the reset back.
+        # The emergency-stop flag stays on after the release until the reset
+        # (docs/reference/epson.md 1.7), so it must not prevent the reset.
         if status.serious_fault or status.running or not status.remote:
             require_ready(status, controller=self._link.identity, request="Reset")
         if status.guard_open:
@@ -361,8 +361,8 @@ def open_epson_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
             remote_timeout_s=terms.remote_timeout_s,
         )
     except LoginUnansweredError:
-        # One client at a time is served (docs/reference/epson.md 1.1). The lease may say who that
-        # is, if the journal can be read.
+        # The controller serves one client at a time (docs/reference/epson.md 1.1). The lease may
+        # name that client, if the journal can be read.
         with suppress(JournalError):
             outcomes.look()
         raise

@@ -33,7 +33,7 @@ from robolink.protocols import spel
 from robolink.remedy_words import RemedyWord, remedy_word
 
 _PRINTED_MM: Final = 0.001
-"""A position is printed with three decimals (docs/reference/spel.md 5.6)."""
+"""Last digit of a printed position, in mm: three decimals (docs/reference/spel.md 5.6)."""
 
 
 class EpsonGroup(MotionGroupCore):
@@ -89,7 +89,7 @@ class EpsonGroup(MotionGroupCore):
 
         def look_at_input() -> None:
             link.preferences.require_real_inputs(statement)
-            # Through Execute, as the statement that follows will see it.
+            # Read through Execute, so that it shows what the next statement will see.
             on = spel.parse_integer(window.printed(spel.print_input(edge.number))) != 0
             edge.require_ahead(on, controller=link.identity, request=statement)
 
@@ -126,7 +126,7 @@ class EpsonGroup(MotionGroupCore):
         faster = spel.parse_number(window.printed(spel.print_speeding_up()))
         return speed_mm_s**2 / (2 * min(faster, self.deceleration_mm_s2()))
 
-    def edge_step_mm(self, speed_mm_s: float) -> float:  # noqa: ARG002 - it is the digits printed
+    def edge_step_mm(self, speed_mm_s: float) -> float:  # noqa: ARG002 - only the printed digits matter
         """Return the last digit of a position as it is printed."""
         return _PRINTED_MM
 
@@ -206,7 +206,7 @@ class EpsonGroup(MotionGroupCore):
         link, window = self._link, self._link.window
         try:
             with link.lock.held(statement):
-                # Before power and speed are set for it.
+                # Checked before power and speed are set for the movement.
                 link.markers.require_settled(statement)
                 self._require_supervision()
                 window.require_ready(statement)
@@ -223,7 +223,7 @@ class EpsonGroup(MotionGroupCore):
                     self._current = self._started(target, statement, found)
                 return self._current
         except (KeyboardInterrupt, StoppedError):
-            # Nobody will be given this motion to wait on.
+            # The caller gets no motion object to wait on.
             self.abort_unfinished()
             raise
 
@@ -231,7 +231,7 @@ class EpsonGroup(MotionGroupCore):
         session, markers = self._link.session, self._link.markers
         marker = self._marked(target, statement, selected=selected)
         if session.interrupted:
-            # Ctrl-C came while the marker was stored: nothing begins to move after it.
+            # Ctrl-C came while the marker was stored: no movement may start after it.
             markers.clear(marker)
             raise KeyboardInterrupt
         with markers.doubt(statement), markers.unless_stopped(marker):
@@ -272,8 +272,9 @@ class EpsonGroup(MotionGroupCore):
         )
 
     def _require_supervision(self) -> None:
-        # With a remote time-out of 0 the robot may keep moving when this PC is gone
-        # (docs/reference/epson.md 1.1). The value cannot be read over the wire; a person states it.
+        # With a remote time-out of 0 the robot may keep moving after this PC is gone
+        # (docs/reference/epson.md 1.1). The value cannot be read over the network; a person states
+        # it.
         if self._remote_timeout_s <= 0:
             raise NotReadyError(
                 tr("The remote time-out of this controller is stated as 0 (never)."),

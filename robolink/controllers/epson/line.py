@@ -51,7 +51,7 @@ if TYPE_CHECKING:
 
 
 SERIAL: Final = "serial"
-"""The medium of Remote RS232."""
+"""Medium of Remote RS232."""
 
 
 _LOGIN_ANSWERS: Final = frozenset(
@@ -59,7 +59,7 @@ _LOGIN_ANSWERS: Final = frozenset(
     for text in ("#Login,0", *(f"!Login,{int(code)}" for code in ErrorCode))
     for end in (b"\r\n", b"\r", b"\n")
 )
-"""Answers to a login in which no password can stand (docs/reference/epson.md 1.6)."""
+"""Answers to a login that cannot contain a password (docs/reference/epson.md 1.6)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,10 +160,10 @@ def _turned_on(transport: Transport, dialect: "Dialect") -> EpsonLine:
 
 
 _PASSWORD_REFUSALS: Final = (13, 98)
-"""The password is wrong, or one is demanded (docs/reference/epson.md 1.6)."""
+"""The password is wrong, or one is required (docs/reference/epson.md 1.6)."""
 
 _STRAYS: Final = 16
-"""A controller never sends this many unrequested answers."""
+"""Largest number of unrequested answers; a controller never sends so many."""
 
 
 class EpsonConversation:
@@ -291,7 +291,7 @@ class EpsonConversation:
             while (event := self._codec.next_event()) is not NEED_DATA:
                 if isinstance(event, (Reply, Refusal)) and self._answers(event, wanted):
                     return event
-                # A login that was bent on its way comes back in its refusal, password and all.
+                # A login garbled on the line comes back in its refusal, including the password.
                 self._take_aside(event, hidden=wanted == "login")
 
     def _require_none_held(self, request: Request, error: TransportTimeoutError) -> None:

@@ -114,8 +114,8 @@ class Preferences:
         try:
             fields = self._session.exchange("GetContSettings").fields
         except RejectedError:
-            return None  # not known to this firmware, or not to be had now
-        # In a form that is not known it tells nothing; verify-controller shows what it was.
+            return None  # unknown to this firmware, or not available now
+        # An unknown form shows nothing here; verify-controller shows what was received.
         with suppress(RemoteProtocolError):
             return parse_preferences(",".join(fields))
         return None
@@ -171,13 +171,12 @@ class Preferences:
 
 
 _UNSET: Final = frozenset({"", "0"})
-"""What a text reads as when nobody set it (docs/reference/epson.md 1.8)."""
+"""Values of a text that nobody has set (docs/reference/epson.md 1.8)."""
 
 _QUERY: Final = spel.print_robot_serial()
 
 _NOT_NOW: Final = frozenset({20, 21})
-"""Refusals that say nothing about the query itself: the controller is busy
-(docs/reference/epson.md 1.6)."""
+"""Refusals that mean only that the controller is busy (docs/reference/epson.md 1.6)."""
 
 
 def name_from(number: Sequence[str], robots: Sequence[str]) -> str:
@@ -264,11 +263,11 @@ class IdentityReader:
         number = int(fields[0]) if fields[0].isdecimal() else 0
         if 1 <= number <= len(robots):
             return robots[number - 1]
-        raise _BusyNow  # none is chosen yet: nothing may be put on record of one
+        raise _BusyNow  # no robot is selected yet, so nothing may be recorded for one
 
     def _printed(self, address: str, place: str) -> Identity:
         try:
-            # Nothing is printed while production runs: looking disturbs nobody.
+            # Nothing is printed while production runs: reading must disturb nobody.
             self._window.require_ready(_QUERY)
             text = self._window.printed(_QUERY).strip()
         except ControllerError as error:
@@ -306,7 +305,7 @@ class FactReader:
             controller_name=self._text("GetContName"),
             controller_type=self._text("GetContType"),
             controller_serial=self._text("GetContNo"),
-            # Blanks stand inside the version and mean nothing (docs/reference/epson.md 1.8).
+            # Blanks inside the version have no meaning (docs/reference/epson.md 1.8).
             firmware=None if firmware is None else "".join(firmware.split()),
             project=self._text("GetPrjName"),
             robot_number=None if number is None else spel.parse_integer(number),
@@ -347,7 +346,7 @@ class FactReader:
         try:
             text = self._window.printed(query).strip()
         except RejectedError:
-            # A controller that serves monitoring only shows nothing of it in its flags.
+            # A controller set to monitoring only does not show it in its flags.
             return ()
         return (text,) if text else ()
 

@@ -32,7 +32,7 @@ from robolink.protocols.epson_text import ErrorCode, Refusal
 from robolink.timing import Deadline
 
 POLL_S = 0.1
-"""Interval between status reads while the robot moves."""
+"""Interval between status reads while the robot moves, in s."""
 
 
 class EpsonMotion:
@@ -93,7 +93,8 @@ class EpsonMotion:
         with session.uninterrupted():
             with self._link.markers.doubt(self.statement):
                 if self._pending.answer is None:
-                    # A refusal may mean that it has just ended by itself; its end is awaited.
+                    # A refusal may mean that the movement has just ended by itself; wait for its
+                    # end.
                     with suppress(RejectedError):
                         session.exchange("Abort")
                     self._end_within(session.timeout_s)
@@ -115,7 +116,7 @@ class EpsonMotion:
             except (TransportError, RemoteProtocolError):
                 if self._pending.answer is None:
                     raise
-                break  # the session was over after the end of the movement was announced
+                break  # the session broke after the movement had reported its end
         return True
 
     def _end_within(self, timeout_s: float) -> None:
@@ -146,9 +147,9 @@ class EpsonMotion:
         assert answer is not None  # noqa: S101 - _watch returned True
         with self._link.session.uninterrupted():
             self._link.session.finish(pending)
-            # A controller that only gave up waiting (docs/reference/epson.md 1.6) may be moving
-            # still; so may one that refuses while it runs, because the answer was to something
-            # else, and one whose flags cannot be asked any more. The marker stays then.
+            # A controller that only gave up waiting (docs/reference/epson.md 1.6) may still be
+            # moving. So may one that refuses while it runs, because the answer was to something
+            # else, and one whose flags can no longer be read. The marker then stays.
             gave_up = isinstance(answer, Refusal) and answer.code == ErrorCode.TIMED_OUT
             failed: RobolinkError | None = None
             with self._link.markers.doubt(self.statement):
@@ -163,7 +164,7 @@ class EpsonMotion:
                         raise self._link.markers.unproved(self.statement, error) from error
                     failed = error
             self._link.markers.clear(self._marker)
-        # How an aborted statement is answered is not documented (docs/reference/epson.md 1.6).
+        # The answer to an aborted statement is not documented (docs/reference/epson.md 1.6).
         aborted = pending.abort_requested
         if failed is not None and not (aborted and not isinstance(failed, ControllerFaultError)):
             raise failed
@@ -269,7 +270,7 @@ class Settings:
             spel.speed_s(*before.speed_s_mm_s),
             spel.power_high() if before.power_high else spel.power_low(),
         ):
-            # One garbled acknowledgement must not keep the rest from being put back.
+            # One garbled acknowledgement must not prevent the rest from being restored.
             with suppress(UnclearAnswerError):
                 self._window.command(statement)
         if self.read() != before:

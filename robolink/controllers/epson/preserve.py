@@ -108,7 +108,7 @@ class EpsonPreserver(Preserver):
 
     def _tool(self) -> int:
         tool = self._table.selected()
-        assert tool is not None  # noqa: S101 - an EPSON controller always tells
+        assert tool is not None  # noqa: S101 - an EPSON controller always reports it
         return tool
 
     def _restore_more(self, marker: Marker) -> None:

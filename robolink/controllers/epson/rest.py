@@ -20,11 +20,11 @@ from robolink.protocols.epson_text import ErrorCode, Reply, StatusFlags, parse_s
 from robolink.timing import Clock, Deadline
 
 REST_S: Final = 5.0
-"""Longest time from the first Abort to a confirmed stop (docs/reference/rules.md 5)."""
+"""Longest time from the first Abort to a confirmed stop, in s (docs/reference/rules.md 5)."""
 
 _POLL_S: Final = 0.02
 _AGAIN_S: Final = 1.0
-"""A movement that still goes on after this long is aborted again: stopping may be repeated."""
+"""Time in s after which a movement that still goes on is aborted again: a stop may be repeated."""
 
 Ask = Callable[[str], Reply]
 """Sends the request of that name and returns its reply; a refusal is a ``RejectedError``."""
@@ -70,7 +70,7 @@ def bring_to_rest(ask: Ask, clock: Clock, *, controller: str) -> tuple[StatusFla
 
 
 def _abort(ask: Ask) -> None:
-    # Older firmware has none (docs/reference/epson.md 1.9); the Stop that follows tells what is so.
+    # Older firmware has no Abort (docs/reference/epson.md 1.9); the Stop that follows decides.
     with suppress(RejectedError):
         ask("Abort")
 

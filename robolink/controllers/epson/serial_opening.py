@@ -19,8 +19,8 @@ from robolink.timing import Deadline
 from robolink.transport import LinkUrl, Transport, UrlOptions
 
 _QUIET_S: Final = 0.1
-"""USB adapters and device servers hand over what they receive in portions, tens of milliseconds
-apart; a shorter pause is not silence."""
+"""Shortest pause that counts as silence, in s: USB adapters and device servers deliver data in
+portions, tens of milliseconds apart."""
 
 _LONGEST_S: Final = 3.0
 _MOST_BYTES: Final = 65536

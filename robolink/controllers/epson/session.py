@@ -110,7 +110,7 @@ class PendingExecute:
 
 
 _SHOWN = 120
-"""Characters of an unexpected answer in a sentence; a text may be thousands long."""
+"""Largest number of characters of an unexpected answer in a sentence; a text may have thousands."""
 
 
 class EpsonSession(EpsonConversation):
@@ -173,8 +173,8 @@ class EpsonSession(EpsonConversation):
                 self._admit(request, what)
                 try:
                     self._expect_silence()
-                    # What the codec refuses never leaves, and nothing would end the wait for it.
-                    # From here on some of it may leave, however the sending ends.
+                    # A request that the codec refuses is never sent, and nothing would end the wait
+                    # for it. From here on a part may be sent, however the sending ends.
                     data = self._codec.send(request)
                     self._pending = pending
                     deadline = Deadline.after(self.clock, self.timeout_s)
@@ -203,7 +203,7 @@ class EpsonSession(EpsonConversation):
 
     def await_pending(self, *, wait_s: float) -> None:
         """Wait up to ``wait_s`` for bytes, without the lock, then read what is there."""
-        # The answer may have come in one piece with that of the last request.
+        # The answer may have arrived together with that of the last request.
         self._collect()
         if self._pending is None or self._pending.answer is None:
             self._transport.wait_readable(deadline=Deadline.after(self.clock, wait_s))
@@ -237,7 +237,7 @@ class EpsonSession(EpsonConversation):
         self._check_usable(request)
         self.latch.admit(command_class_of(request), what)
         if self._pending is not None and request.name == "Abort":
-            # Whatever ends it from here on was asked for.
+            # From here on, any end of the statement counts as requested.
             self._pending.abort_requested = True
 
     def _check_usable(self, request: Request) -> None:
@@ -257,7 +257,7 @@ class EpsonSession(EpsonConversation):
 
     def _answers(self, event: Reply | Refusal, wanted: str) -> bool:
         name = event.name.lower()
-        # One without a name can be ours only when nothing else is outstanding.
+        # An answer without a name can be ours only if nothing else is outstanding.
         return name == wanted or (isinstance(event, Refusal) and not name and self._pending is None)
 
     def _expect_silence(self) -> None:
@@ -334,7 +334,7 @@ def _prove_in_step(session: EpsonSession) -> None:
     try:
         session.exchange("GetCurRobot")
     except RejectedError:
-        return  # a refusal is an answer to it, too
+        return  # a refusal is an answer too
     except (RemoteProtocolError, TransportTimeoutError) as error:
         error.remedy = tr(
             "Connect again. If it happens twice, the controller writes numbers in another "

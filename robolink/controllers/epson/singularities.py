@@ -86,29 +86,31 @@ def _printed_pose(window: CommandWindow, query: spel.Statement, *, tool: int | N
 
 
 KEPT_CLEAR_DEG: Final = 10.0
-"""Joint 5 stays so far from 0 in straight movements: the controller's own default of
-SingularityAngle, and what EPSON's tool wizard asks for (docs/reference/epson-robots.md,
+"""Smallest angle of joint 5 from 0 in straight movements, degrees: the controller's default for
+SingularityAngle, and the value that EPSON's tool wizard requires (docs/reference/epson-robots.md,
 "Singularities")."""
 
 KEPT_CLEAR_MM: Final = 30.0
-"""The wrist stays so far from the axis of joint 1: the controller's own default of
+"""Smallest distance of the wrist from the axis of joint 1, in mm: the controller's default for
 SingularityDist (docs/reference/epson-robots.md, "Singularities")."""
 
 _SWING: Final = 1
 _WRIST: Final = 5
 _FREE_DEG: Final = 5.0
-"""Joint 1 may turn by this in any straight movement: a jog of 2.6 mm so near the axis would."""
+"""Turn of joint 1 that is allowed in any straight movement, degrees: this close to the axis, a jog
+of 2.6 mm causes it."""
 
 _FOLLOWING: Final = 1.5
 
 _TURNED_DEG: Final = 0.01
 
 _LOOKED_AT_EVERY_MM: Final = 25.0
-"""Joint 5 is asked for along a straight way so often: on the smallest arm it turns by 6 degrees
-meanwhile at most, less than it is kept clear by."""
+"""Distance between the points of a straight move at which joint 5 is checked, in mm: on the
+smallest arm joint 5 turns by at most 6 degrees between them, less than its margin."""
 
 _AHEAD_DEG: Final = 1.0
-"""So much more in a look ahead: where a tip stops beside its place is drawn later."""
+"""Extra margin for a check in advance, degrees: where the tip stops beside its place is chosen
+later."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,10 +25,10 @@ from robolink.protocols import spel
 from robolink.protocols.epson_text import ErrorCode, Request, VariableType
 
 DECIMALS: Final = 3
-"""Places that a printed point shows (docs/reference/epson.md 3.3, from a real capture)."""
+"""Number of decimals of a printed point (docs/reference/epson.md 3.3, from a real capture)."""
 
 TOLERANCE: Final = 0.5 * 10**-DECIMALS
-"""Two values that this controller prints alike are equal."""
+"""Largest difference between equal values: this controller prints them alike."""
 
 _TOOLS: Final = range(1, 16)
 
@@ -164,7 +164,7 @@ class _FlashWrite(ToolWrite):
         self._window.command(self._statement)
 
     def read_back(self) -> ToolOffset | None:
-        # A tool that was set just now is defined.
+        # A tool that was just set is defined.
         return self.read_doubted() if self.requested is None else _printed(self._window, self.tool)
 
     def read_doubted(self) -> ToolOffset | None:
@@ -172,7 +172,7 @@ class _FlashWrite(ToolWrite):
 
 
 def _stored_tool(window: CommandWindow, tool: int) -> ToolOffset | None:
-    # What TLSet(n) gives for an undefined tool is not documented, so that is asked first.
+    # The answer of TLSet(n) for an undefined tool is not documented, so ask first if it is defined.
     defined = window.printed(spel.print_tool_defined(tool))
     return _printed(window, tool) if spel.parse_boolean(defined) else None
 
@@ -183,7 +183,7 @@ def _printed(window: CommandWindow, tool: int) -> ToolOffset:
 
 
 LAYOUT: Final = 1
-"""Number of the arrangement below; the program writes it into its state."""
+"""Number of the layout below; the program writes it into its state."""
 
 _BEGIN: Final = "robolink_begin"
 _END: Final = "robolink_end"
@@ -228,8 +228,8 @@ def read_published(variables: EpsonVariables) -> PublishedTools | None:
 
     try:
         for _ in range(_ATTEMPTS):
-            # The program counts up the one before and the other after it changes the
-            # table; read the other way about, equal counts enclose a whole table.
+            # The program increments one counter before and the other after it changes the table.
+            # Read in the opposite order, equal counters prove that the table is complete.
             publication = whole(_END)
             state = variables.read_array(_STATE, (0,), VariableType.LONG, count=_STATE_COUNT)
             table = variables.read_array(_TABLE, (0,), VariableType.DOUBLE, count=_TABLE_COUNT)

@@ -110,8 +110,8 @@ class ValueChange(MarkedCommand[ValueT]):
 
 
 _HIGHEST: Final = 0xFFFF
-"""Two bytes carry a bit or port number (docs/reference/epson.md 2.2); which exist depends on the
-hardware."""
+"""Highest bit or port number that two bytes hold (docs/reference/epson.md 2.2); the hardware
+decides which exist."""
 
 _BIT: Final = re.compile("[01]")
 _BYTE: Final = re.compile("[0-9A-Fa-f]{2}")
@@ -231,11 +231,11 @@ def _checked(number: int) -> int:
 
 
 MOST_ELEMENTS: Final = 100
-"""Elements of an array that one request may ask for (docs/reference/epson.md 1.2 note 4)."""
+"""Largest number of array elements in one request (docs/reference/epson.md 1.2 note 4)."""
 
 _NAME: Final = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,31}\$?", re.ASCII)
-# Commas, quotes and parentheses would be cut elsewhere; the rest is left out because nothing
-# says how it fares.
+# Commas, quotes and parentheses would split the text; other characters are excluded because their
+# handling is not documented.
 _TEXT: Final = re.compile(r"[A-Za-z0-9_.:/+-](?:[A-Za-z0-9 _.:/+-]{0,253}[A-Za-z0-9_.:/+-])?")
 _MOST_SUBSCRIPTS: Final = 3
 _LARGEST_REAL: Final = 3.4028235e38
@@ -245,7 +245,8 @@ _RANGES: Final = {
     VariableType.LONG: (-(2**31), 2**31 - 1),
 }
 _RELATIVE: Final = {VariableType.REAL: 5e-6, VariableType.DOUBLE: 5e-14}
-"""Half of the last of the valid digits, 6 and 14 (docs/reference/spel.md 2)."""
+"""Half of the last valid digit, relative: the types have 6 and 14 digits (docs/reference/spel.md
+2)."""
 
 
 class EpsonVariables(DriverPart):

@@ -31,11 +31,12 @@ _PLACES: Final = "robolink_look_xy"
 _MOST_PLACES: Final = 16
 
 _LONGEST_S: Final = 15.0
-"""A picture takes some tenths of a second; what is not over then hangs."""
+"""Longest time for a look, in s: a picture takes some tenths of a second, so a longer one hangs."""
 
 _POLL_S: Final = 0.02
 _UNSEEN_S: Final = 1.0
-"""How long a program may not show yet: its flag may follow the answer to Start (assumed)."""
+"""Time in s in which a program need not show as running: its flag may follow the answer to Start
+(assumed)."""
 
 
 class EpsonLooks:
@@ -100,7 +101,7 @@ class _Look(MarkedCommand[tuple[int, tuple[Spot, ...]]]):
 
     @property
     def details(self) -> Mapping[str, object]:
-        # What a program of the project did can be told by a person only.
+        # Only a person can tell what a program of the project did.
         return {"raw": True}
 
     def send(self) -> None:

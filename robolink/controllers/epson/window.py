@@ -119,7 +119,7 @@ class CommandWindow:
         """
         answer = self._session.ask(execution(query))
         if isinstance(answer, Reply) and answer.text is not None:
-            # A failed statement may be answered by a text too; the flags would show it.
+            # A failed statement may also be answered by a text; the flags would show the failure.
             if not answer.text.lstrip().startswith("!"):
                 return answer.text
         elif isinstance(answer, Reply) and answer.fields == ("0",):
@@ -151,7 +151,8 @@ class CommandWindow:
         self._was_ready = False
         controller = self._session.identity
         code = answer.code if isinstance(answer, Refusal) else 0
-        # 20 says that a condition is missing; the flags say which (docs/reference/epson.md 1.6).
+        # Code 20 means that a condition is missing; the flags show which (docs/reference/epson.md
+        # 1.6).
         if code in NOT_EXECUTED and code != _NOT_READY and isinstance(answer, Refusal):
             return rejected(answer, controller=controller, request=statement)
         status = self.status()

@@ -36,7 +36,7 @@ from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.timing import Clock
 from robolink.transport import LinkUrl, open_modbus
 
-if TYPE_CHECKING:  # to pyright a cached_property is no property, and its owner no Controller
+if TYPE_CHECKING:  # pyright does not accept a cached_property as a property of Controller
     from builtins import property as cached_property
 else:
     from functools import cached_property
@@ -85,10 +85,10 @@ class MappedInputs(DriverPart):
 
 _FAR_MM: Final = 100_000.0
 _FAR_DEG: Final = 36_000.0
+"""Largest plausible distance, in mm, and turn, in degrees, of a head."""
 
 _IN_PROCESS: Final = "sim"
-"""The medium of a simulator of this process, with which its tools end."""
-"""No head stands farther away or is turned more often."""
+"""Medium of a simulator in this process; its tools are lost when the process ends."""
 
 
 class FlangeReader(MotionGroupCore):

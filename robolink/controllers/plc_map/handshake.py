@@ -78,7 +78,7 @@ class Handshake:
         registers.switch(commit.request, on=True)
         try:
             code = self._answered(commit.request)
-        except RejectedError as error:  # of a look or of taking back: the PLC may have acted
+        except RejectedError as error:  # of reading or resetting: the PLC may have acted
             raise self._unknown(error.what) from error
         if code is not None:
             raise RejectedError(
@@ -138,7 +138,7 @@ class Handshake:
             if code is not None or self._registers.is_on(self._commit.answer):
                 return code
             if deadline.expired:
-                with suppress(RobolinkError):  # what is said below holds in any case
+                with suppress(RobolinkError):  # the error raised below applies in any case
                     self._registers.switch(asked, on=False, kind=CommandClass.CALM)
                 raise self._unknown(
                     tr(

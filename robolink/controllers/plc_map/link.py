@@ -210,7 +210,7 @@ class Registers:
 
 
 _AROUND: Final = 8
-"""How many registers before and behind its place it is looked for."""
+"""Number of registers before and after its declared place that are searched."""
 
 
 def _diagnosis(registers: Registers, probe: MapProbe) -> str:
@@ -246,7 +246,7 @@ def _found(registers: Registers, probe: MapProbe) -> Number | None:
     stop = min(0x10000, number.registers.stop + _AROUND)
     try:
         words = registers.read(number.table, range(start, stop))
-    except RejectedError:  # the table may end sooner; then its own place has to do
+    except RejectedError:  # the table may end sooner; then read only the declared place
         start, stop = number.registers.start, number.registers.stop
         words = registers.read(number.table, number.registers)
     places = sorted(range(start, stop - count + 1), key=lambda at: abs(at - number.address))
@@ -319,7 +319,7 @@ class MappedPlc(DriverLink):
             return Identity(place, address, place)
         words = self.registers.read_twice(number.table, number.registers)
         if not any(words):
-            # Zeroed by a watchdog, or the program has not started
+            # A watchdog cleared the registers, or the program has not started
             # (docs/reference/softmotion.md 4.1).
             return Identity(place, address, place, certain=False)
         return Identity(f"plc:{''.join(f'{word:04X}' for word in words)}", address, place)

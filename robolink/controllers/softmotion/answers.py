@@ -20,17 +20,17 @@ from robolink.protocols.mailbox import (
 )
 
 _FAULTS: Final = frozenset({6, 7, 9})
-"""Hundreds of error classes that say that something broke, not that something was refused."""
+"""Hundreds of error classes that mean a failure, not a refusal."""
 
 _POSED: Final = frozenset(
     {Opcode.MOVE_DIRECT, Opcode.MOVE_LINEAR, Opcode.MOVE_UNTIL_INPUT, Opcode.WRITE_TOOL}
 )
 
 DISPOSSESSED: Final = frozenset({ErrorClass.NOT_OWNER, ErrorClass.STALE_EPOCH})
-"""Error classes that say that the mailbox is not ours any more."""
+"""Error classes that mean that this client no longer owns the mailbox."""
 
 _OUTSIDE_MOTION_TASK: Final = 12108
-"""ErrorID of a movement block that another task calls (docs/reference/softmotion.md 1.4)."""
+"""ErrorID of a movement block called by another task (docs/reference/softmotion.md 1.4)."""
 
 
 class Ended(NamedTuple):
@@ -50,7 +50,7 @@ def describe(command: Command) -> str:
     return _in_words(int(opcode), name, command.operands, pose)
 
 
-@lru_cache(maxsize=64)  # a write asks for its own some four times
+@lru_cache(maxsize=64)  # a write asks for its own command about four times
 def _in_words(opcode: int, name: str, operands: tuple[int, ...], pose: tuple[float, ...]) -> str:
     carried = [str(int(operand)) for operand in operands]
     while carried and carried[-1] == "0":
@@ -116,7 +116,7 @@ def motion_failure(request: str, now: Response, error_class: int) -> ControllerE
 
 def _meaning(error_class: int, now: Response) -> str:
     meaning = error_meaning(error_class)
-    # The PLC's own number belongs to the command that stands in the response now.
+    # The PLC's own number belongs to the command now shown in the response.
     if now.error_class == error_class and now.raw_error:
         return tr(
             "{meaning} ({number}; the PLC's ErrorID is {raw})",

@@ -75,7 +75,7 @@ _CLASSES: Final = {
     Opcode.WRITE_TOOL: CommandClass.WRITE,
     Opcode.CLEAR_TOOL: CommandClass.WRITE,
 }
-"""Every other opcode acts."""
+"""Class of opcodes that do not act; every other opcode acts."""
 
 
 def command_class_of(command: Command) -> CommandClass:
@@ -91,20 +91,21 @@ def command_class_of(command: Command) -> CommandClass:
 
 
 REST_S: Final = 5.0
-"""Longest time from the stop to a confirmed stop state (docs/reference/rules.md 5)."""
+"""Longest time from the stop to a confirmed stop state, in s (docs/reference/rules.md 5)."""
 
 _ALREADY: Final = frozenset({ErrorClass.STOPPING, ErrorClass.DISABLED, ErrorClass.ERRORSTOP})
 _LOOK_S: Final = 0.1
 _STILL: Final = 0.05
-"""An axis that changed by less than this, in its units, in :data:`_LOOK_S` stands: drives hold
-a position within microns and millidegrees, and robolink moves no slower than 1 mm/s."""
+"""Largest change of a stopped axis within :data:`_LOOK_S`, in its units: drives hold a position
+within microns and millidegrees, and robolink moves no slower than 1 mm/s."""
 
 COMPLETION_S: Final = 10.0
-"""Longest time between the acknowledgement and the end of what is not a movement."""
+"""Longest time from acknowledgement to end of a command that is not a movement, in s."""
 
 _WRITES: Final = 3
 _OVERTAKEN: Final = frozenset({Opcode.STOP, Opcode.HALT})
-"""Commands whose end another stop or halt may hide: it does the same, and rest is looked for."""
+"""Commands whose end a second stop or halt may hide: it has the same effect, and the stop is
+confirmed by reading."""
 
 
 class CommandSender:
@@ -176,13 +177,13 @@ class CommandSender:
                 if deadline.expired:
                     raise self._restless()
                 now = snapshots.news(now)
-            # A stop of another thread that came meanwhile ends ours before the group stands.
+            # A stop from another thread ends ours before the group has stopped.
             stands = not now.bits & Bits.BUSY
         except RejectedError as error:
             if error.code not in _ALREADY:
                 raise
             now, stands = snapshots.take(), False
-        # Here, because nothing may stand before the frame of a stop (docs/reference/rules.md 5).
+        # Imported here, because nothing may delay the frame of a stop (docs/reference/rules.md 5).
         from robolink.controllers.softmotion.condition import is_moving
 
         while is_moving(now) or not stands:
@@ -208,14 +209,15 @@ class CommandSender:
         Raises:
             KeyboardInterrupt: Ctrl-C came before a movement was sent; it was not.
         """
-        # Who begins a movement is there; at most four begin before one has to be waited on.
+        # A caller that starts a movement is present; at most four start before it has to wait on
+        # one.
         with self._naming(draft), self._wire.uninterrupted(), self._wire.attended():
             self._possess(draft)
             command, now = self._send(draft, ride=draft.opcode != Opcode.JOG)
             if now.state == CommandState.ERROR:
                 self._wire.motions.forget(command.sequence)
                 raise self._refusal(command, now, now.error_class)
-            # On a slow line the answer took its time; who waits now begins with a whole patience.
+            # On a slow line the answer took time; a caller that waits now gets the full time again.
             self._wire.beat()
             return command
 
@@ -274,7 +276,7 @@ class CommandSender:
             return Ended(command, CommandState.DONE, ErrorClass.NONE, now)
         if now.ack_owner != command.owner:
             raise self._wire.ended(self._overtaken(command, now))
-        # Our own stop or halt was accepted after it, from another thread.
+        # Our own stop or halt, from another thread, was accepted after this command.
         ends = (end for end in now.finished if end.sequence == command.sequence)
         end = next((Ended(command, end.state, end.error_class, now) for end in ends), None)
         if end is None and command.opcode not in _OVERTAKEN:
@@ -290,7 +292,7 @@ class CommandSender:
             command = self._addressed(draft, before)
             words = self._encode(command)
             if ride and self._wire.interrupted:
-                raise KeyboardInterrupt  # held back until here: nothing begins to move after it
+                raise KeyboardInterrupt  # held back until here: no movement starts after it
             if ride:
                 self._wire.motions.begin(command.sequence)
             for _ in range(_WRITES):
@@ -353,7 +355,7 @@ class CommandSender:
                 silence = self._silence(
                     tr("{request!r} was not acknowledged.", request=describe(command))
                 )
-                # Something stronger must be able to follow what should have ended a movement.
+                # If a command to end a movement fails, it must be possible to send a stronger one.
                 raise silence if command.only_ends else self._wire.ended(silence)
 
     def _addressed(self, draft: Command, before: Response) -> Command:
@@ -404,8 +406,8 @@ class CommandSender:
         )
 
     def _unseen(self, command: Command) -> UnclearAnswerError:
-        # Only what a stop ends is kept among the last ends; what had ended before it, well or
-        # not, is not shown any more (docs/reference/mailbox.md, "When a command counts").
+        # The list of ended commands only keeps those that a stop ended; the end of an earlier one,
+        # good or bad, is no longer shown (docs/reference/mailbox.md, "When a command counts").
         return UnclearAnswerError(
             tr(
                 "A stop came before robolink read the end of {request!r}.",

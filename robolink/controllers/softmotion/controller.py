@@ -43,7 +43,7 @@ from robolink.protocols.mailbox import (
 from robolink.timing import Deadline
 from robolink.transport import LinkUrl, MailboxLink, open_mailbox_link
 
-if TYPE_CHECKING:  # to pyright a cached_property is no property, and its owner no Controller
+if TYPE_CHECKING:  # pyright does not accept a cached_property as a property of Controller
     from builtins import property as cached_property
 else:
     from functools import cached_property
@@ -57,15 +57,15 @@ _RESETS: Final = (
     (GroupState.ERRORSTOP, Command(0, Opcode.RESET)),
     (GroupState.STOPPING, Command(0, Opcode.STOP, operands=(1, 0, 0, 0))),
 )
-"""What brings a group out of a state; after an error a stop may still be held."""
+"""Commands that lead out of a state of the group; after an error, a stop may still be active."""
 
 _SIMULATED: Final = "sim"
 
 MACHINE_WAITS: Final = "machine_waits"
-"""In the marker of a change: the machine's program goes on once the mailbox is given back."""
+"""Key in the marker of a change: the machine's program continues once the mailbox is released."""
 
 _LEAVING_S: Final = 1.0
-"""Longest time from the end of a reset to the state that follows it."""
+"""Longest time from the end of a reset to the next state, in s."""
 
 
 class SoftMotionController(ControllerCore):
@@ -122,7 +122,7 @@ class SoftMotionController(ControllerCore):
         return self._mailbox.wire.exchanges
 
     def _read_status(self) -> ControllerStatus:
-        # It keeps nothing going: a movement or jog ends unless somebody waits on it.
+        # Reading the status sends no heartbeat: a movement or jog ends unless somebody waits on it.
         return status_of(self._mailbox.snapshots.take())
 
     def facts(self) -> ControllerFacts:
@@ -291,7 +291,7 @@ def open_softmotion_url(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
 
 def _own_kinematics(url: LinkUrl) -> tuple[LinkUrl, str]:
     """Return a URL for its link, and the class of the machine builder's own kinematics."""
-    # A plus that was not escaped has become a space.
+    # An unescaped plus sign has become a space.
     named = url.options.get("kinematics", "").replace(" ", "+")
     if url.medium == _SIMULATED:
         return url, named if is_custom(named) else ""

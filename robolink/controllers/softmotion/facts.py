@@ -114,10 +114,10 @@ def block_name(code: int) -> str:
 
 
 _LOOKS: Final = 20
-"""Heads that are read to see how the heartbeat moves and how long an answer takes."""
+"""Number of heads read to measure the heartbeat and the answer time."""
 
 _SLOW_S: Final = 0.1
-"""An answer that takes longer leaves little of the half second between beats."""
+"""Answer time in s above which little is left of the half second between beats."""
 
 
 @dataclass(frozen=True, slots=True)

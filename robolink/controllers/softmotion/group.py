@@ -209,7 +209,7 @@ class SoftMotionGroup(MotionGroupCore):
                     self._current = [*(m for m in self._current if not m.settled), motion]
                 return motion
         except (KeyboardInterrupt, StoppedError):
-            # Nobody will be given this motion to wait on.
+            # The caller gets no motion object to wait on.
             self.abort_unfinished()
             raise
 
@@ -220,7 +220,7 @@ class SoftMotionGroup(MotionGroupCore):
             try:
                 command = mailbox.commands.start(draft)
             except (ControllerError, ConfigError, StoppedError, KeyboardInterrupt):
-                mailbox.markers.clear(marker)  # it was not sent, or refused
+                mailbox.markers.clear(marker)  # it was not sent, or was refused
                 raise
         return SoftMotionMotion(target, command, marker, mailbox)
 
@@ -245,8 +245,8 @@ class SoftMotionGroup(MotionGroupCore):
 
     def _require_settled(self, request: str) -> None:
         """Refuse ``request``, before the mailbox is taken, while a job is unfinished."""
-        # The markers of our own movements under way do not count; what was open before the
-        # first of them would have held that one back.
+        # Markers of our own movements under way do not count; an earlier open marker would have
+        # prevented the first of these movements.
         if not self._mailbox.wire.motions.unread:
             self._mailbox.markers.require_settled(request)
 

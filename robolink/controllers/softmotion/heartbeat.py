@@ -19,20 +19,22 @@ from robolink.protocols.mailbox import heartbeat_word
 from robolink.timing import NS_PER_S
 
 FROZEN_S: Final = 1.0
-"""A motion task counts every few milliseconds; without a count for this long it is dead."""
+"""Time without a new count after which a motion task counts as dead, in s: a running one counts
+every few milliseconds."""
 
 BUSY_BEAT_S: Final = 0.05
-"""Between beats while something moves: the PLC halts it after 0.5 s without one.
+"""Interval between beats while something moves, in s: the PLC halts the movement after 0.5 s
+without one.
 
-The rest of that half second is for a computer that has something else to do.
+The rest of that half second is left for a computer that is busy.
 """
 
 MOST_LOOK_S: Final = 0.4
-"""Where the line alone takes longer for a whole look and a beat, nothing may move: there is no
-beat within the PLC's 0.5 s, of which the PLC itself and the adapters need the rest."""
+"""Longest time on the line for a whole look and a beat, in s. On a slower line nothing may move: no
+beat would arrive within the PLC's 0.5 s, part of which the PLC and the adapters need."""
 
 IDLE_BEAT_S: Final = 1.0
-"""Between beats otherwise: an owner that is silent for 10 s may be displaced."""
+"""Interval between beats at rest, in s: an owner that is silent for 10 s may be replaced."""
 
 
 class PlcHeartbeat:
@@ -87,10 +89,10 @@ class ClientHeartbeat:
 
 
 _PATIENCE_S: Final = 1.0
-"""Longest time without a sign of the waiter: the PLC has ended by then what moved."""
+"""Longest time without a sign from the waiter, in s: by then the PLC has ended the movement."""
 
 _LONGEST_EXCHANGE_S: Final = 10.0
-"""Longest time in which an exchange of another thread ends; a link's own deadline is shorter."""
+"""Longest time in s in which another thread's exchange ends; the deadline of a link is shorter."""
 
 
 class Turns:
@@ -121,7 +123,7 @@ class Turns:
                 self._waiters += 1
                 counted = True
                 self._sign_s = _now_s()
-                # Ctrl-C may end this wait.
+                # Ctrl-C may interrupt this wait.
                 self._changed.wait_for(self._nobody_inside, _LONGEST_EXCHANGE_S)
             yield
         finally:
@@ -142,13 +144,13 @@ class Turns:
             self._sign_s = _now_s()
             return True
 
-    # Not as a generator: every exchange comes here, and would pay for it.
+    # No generator: every exchange passes here and would be slower.
     def __enter__(self) -> None:
         """Wait until the waiter, if there is one, lets this thread in for one exchange."""
         with self._changed:
             self._waiting += 1
             try:
-                # Real time: a clock that stands still would keep this thread out for ever.
+                # Real time: a clock that does not advance would block this thread for ever.
                 while self._waiters and not self._let_in:
                     left_s = self._sign_s + _PATIENCE_S - _now_s()
                     if left_s <= 0:

@@ -40,13 +40,14 @@ from robolink.protocols.mailbox import (
 from robolink.timing import Deadline
 
 _REST_S = 5.0
-"""Longest time in which a jog comes to rest."""
+"""Longest time in which a jog stops, in s."""
 
 _BRAKING_S: Final = 1.0
-"""What moves for longer after another client took the mailbox is moved by that client."""
+"""Longest braking time after another client took the mailbox, in s; a longer movement is that
+client's."""
 
 _STRONGER: Final = (Command(0, Opcode.HALT), Command(0, Opcode.STOP))
-"""What brings the group to rest when the end of a jog is not taken."""
+"""Commands that stop the group if the end of a jog is refused."""
 
 _AXES = range(6)
 _LENGTHS = frozenset({0, 1, 2})
@@ -202,7 +203,7 @@ class JogWatch:
     def _bad_end(self, now: Response) -> Finished | None:
         command = self._command
         if command is None:
-            return None  # its beginning was not acknowledged
+            return None  # its start was not acknowledged
         ends = [end for end in now.finished if end.sequence == command.sequence]
         if is_own(command, now) and has_ended(now.state):
             ends.insert(0, Finished(command.sequence, now.state, now.error_class))

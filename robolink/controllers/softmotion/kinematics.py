@@ -46,7 +46,8 @@ _OPEN: Final[Mapping[int, OrientationSpace]] = {
     Kinematics.POLAR_Z: _DIRECTED,
     Kinematics.POS_RRR: OrientationSpace.unknown(),
 }
-"""Position kinematics whose flange turns with the machine; on all others it is known."""
+"""Orientation spaces of position kinematics whose flange turns with the machine; on all others the
+orientation is known."""
 
 _WHOLE: Final = frozenset(Kinematics) - {Kinematics.NONE, Kinematics.CUSTOM, *_OPEN}
 
@@ -252,7 +253,7 @@ def _name(now: Response) -> str:
 def _parts(space: OrientationSpace, shift: tuple[float, float, float]) -> str:
     parts = zip("XYZ", space.impossible(shift), strict=True)
     found = [f"{axis} {part:.3f} mm" for axis, part in parts if abs(part) >= _SHOWN_MM]
-    # A shift that stands off by less than what is shown still does.
+    # A part too small to be shown is still a deviation.
     return ", ".join(found) or tr("a part below {least} mm", least=_SHOWN_MM)
 
 

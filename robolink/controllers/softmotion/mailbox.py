@@ -34,7 +34,7 @@ from robolink.protocols.mailbox import (
 from robolink.timing import SteppedClock
 
 _READS: Final = 3
-"""A PLC may be drawing its number just while it is read for the first time."""
+"""Number of readings: a PLC may be drawing its number during the first one."""
 
 
 class DeviceReading(Protocol):
@@ -57,7 +57,7 @@ def read_device_id(link: DeviceReading) -> int | None:
     for _ in range(_READS):
         try:
             words = link.read_device()
-        except RejectedError:  # there is nothing at that place
+        except RejectedError:  # nothing exists at that address
             return None
         device_id = decode_device_id(words)
         if device_id is not None or not any(words[:2]):
@@ -81,11 +81,11 @@ def identity_of(wire: MailboxWire, device_id: int | None) -> Identity:
 
 
 TOLERANCE = 1e-9
-"""Two LREALs this near are equal: user units, and elements of a rotation matrix
+"""Largest difference between equal LREALs: user units, and elements of a rotation matrix
 (docs/reference/rules.md 3)."""
 
 ROUNDED_TILT_DEG = 1e-6
-"""A smaller tilt is what a PLC's arithmetic leaves: 0.02 um at the end of a tool of 1 m."""
+"""Largest tilt that is only rounding in the PLC, degrees: 0.02 um at the end of a tool of 1 m."""
 
 
 class Mailbox(DriverLink):
@@ -134,7 +134,7 @@ class Mailbox(DriverLink):
 
     def show_life(self) -> None:
         """Beat for the ownership alone: nothing while a movement or jog is unfinished."""
-        # Time that only a test lets pass goes on for nobody beside it.
+        # If only a test advances the time, no time passes for others meanwhile.
         if runtime.steps_time() or not isinstance(self.clock, SteppedClock):
             self.wire.beat_at_rest()
 

@@ -29,13 +29,13 @@ from robolink.protocols.mailbox import Command, CommandState, ErrorClass, Finish
 from robolink.timing import Deadline
 
 _REST_S = 1.0
-"""Longest time between the end of a movement and the rest of its group."""
+"""Longest time from the end of a movement to the stop of its group, in s."""
 
 _LOOKS_APART = 10
-"""Whole looks, in the time that one takes on the line, while nothing is new."""
+"""Time between whole looks while nothing is new, in times that a whole look takes on the line."""
 
 _HALT_S = 10.0
-"""Longest time in which a halt brings a group to rest."""
+"""Longest time in which a halt stops a group, in s."""
 
 
 class SoftMotionMotion:
@@ -86,8 +86,8 @@ class SoftMotionMotion:
         ):
             if self._end is None and mailbox.wire.motions.end_of(self.command.sequence) is None:
                 self._halted = True
-                # It may have just ended by itself, or by a stop; its end is awaited. A stop that is
-                # under way ends it too, and a halt after it would only hide the end of the stop.
+                # The movement may have just ended by itself or by a stop; wait for its end. A stop
+                # under way ends it too, and a halt after that would only hide the end of the stop.
                 if not mailbox.wire.latch.closed:
                     with suppress(RejectedError, ControllerFaultError):
                         mailbox.commands.carry_out(Command(0, Opcode.HALT))
@@ -141,7 +141,7 @@ class SoftMotionMotion:
             return True
         begun_ns = mailbox.wire.clock.now_ns()
         slow = mailbox.wire.whole_look_s > 0
-        # On a slow line the block that showed its acceptance, or a later one, has to do.
+        # On a slow line, the block that showed its acceptance, or a later one, must be enough.
         now = mailbox.snapshots.latest if slow else mailbox.snapshots.take()
         while mailbox.wire.motions.end_of(sequence) is None:
             if mailbox.wire.motions.missing(sequence, now):
@@ -232,18 +232,20 @@ class SoftMotionMotionUntilInput:
 
 
 _RAMP_S: Final = 0.5
-"""In this time a straight movement reaches its speed, and in this time its acceleration: SoftMotion
-wants all four numbers above 0, and a tip near a pin gains nothing from a harder start."""
+"""Time in s in which a straight movement reaches its speed, and again its acceleration: SoftMotion
+requires all four numbers above 0, and a harder start brings nothing near a pin."""
 
 _PAST_AN_EDGE_MM: Final = 0.05
-"""A tip that is stopped by an input comes to rest within this, the PLC's cycle apart."""
+"""Distance in mm within which a tip stopped by an input comes to rest, apart from the PLC's cycle.
+"""
 
 _EDGE_RAMP_S: Final = 0.02
-"""In this time such a movement reaches its deceleration."""
+"""Time in s in which such a movement reaches its deceleration."""
 
 LATCH_CYCLE_S: Final = 0.004
-"""The longest usual cycle of a motion task. A program notes where an edge was in the cycle in which
-it sees it (the companion's program does), and no mailbox tells how long that is."""
+"""Longest usual cycle of a motion task, in s. A program records the position of an edge in the
+cycle in which the edge is seen (the companion's program does), and the mailbox does not report the
+cycle time."""
 
 _UM_PER_MM: Final = 1000.0
 

@@ -20,21 +20,21 @@ from robolink.protocols.mailbox import Command, CommandState, ErrorClass, Opcode
 from robolink.timing import Deadline, local_label
 
 SILENCE_S: Final = 10.0
-"""After this long without a sign of its owner a PLC gives the mailbox away."""
+"""Time in s without a sign of its owner after which a PLC releases the mailbox."""
 
 _LONGEST_SILENCE_S: Final = SILENCE_S + 2.0
-"""For so long a run that has ended is waited out: its last sign came before its end, and the
-rest is for a computer and a PLC that have something else to do."""
+"""Longest wait in s for a run that has ended: its last sign came before its end, and the margin is
+for a computer and a PLC that are busy."""
 
 _ASK_S: Final = 0.5
-"""Between two requests for a mailbox that becomes free by itself."""
+"""Pause between two requests for a mailbox that becomes free by itself, in s."""
 
 _LONGEST_STOP_S: Final = 1.0
 _LONGEST_COMMAND_S: Final = 10.0
 _AGAIN_S: Final = 0.05
 _GIVE_BACK: Final = Command(0, Opcode.OWNERSHIP)
 _LOOK_S: Final = 0.5
-"""From one look at a link to the next while nothing is asked of it."""
+"""Interval between two looks at an idle link, in s."""
 
 
 def take_command(*, insist: bool) -> Command:
@@ -143,9 +143,9 @@ class Ownership:
     def _ask(self, *, insist: bool) -> None:
         token = f"{self._wire.owner:08X}"
         if self._outcomes is not None:
-            # Before it is sent: killed right after, the token is on record.
+            # Recorded before it is sent: after a kill, the token is known.
             self._outcomes.note_client(token)
-        # A Ctrl-C before the answer is read would leave it taken by nobody who knows of it.
+        # Ctrl-C before the answer is read would leave the mailbox taken without a known owner.
         with self._wire.uninterrupted():
             end = self._sent(take_command(insist=insist))
             answer = end.now.answer
@@ -178,7 +178,7 @@ class Ownership:
             except LeaseHeldError as held:
                 run = self._run_of(held)
                 if waited or (run is not None and run.lives is not None):
-                    raise  # it lives, or its silence has been waited out
+                    raise  # its owner lives, or the silence has been waited out
                 self._wait_for_silence(held)
                 waited = True
             except RejectedError as error:
@@ -277,7 +277,7 @@ class Ownership:
         deadline = Deadline.after(self._wire.clock, _LONGEST_SILENCE_S)
         while not deadline.expired:
             self._wire.clock.sleep(_LOOK_S)
-            self._wire.read_head()  # the end of a link is noticed meanwhile
+            self._wire.read_head()  # detects meanwhile if the link ends
 
     def _give_back(self) -> None:
         """Release the ownership, after the stop of another client that may be in work yet."""

@@ -39,7 +39,7 @@ from robolink.timing import NS_PER_S, Deadline
 from robolink.transport import MailboxLink
 
 PASSING: Final = frozenset({BlockFault.TORN, BlockFault.CRC})
-"""What a read in the middle of a change gives, and the next one may not."""
+"""Faults of a block read during a change; the next reading may be free of them."""
 
 
 def read_block(words: Sequence[int], *, controller: str) -> Response:
@@ -101,17 +101,18 @@ def _foreign(meaning: str, controller: str) -> RemoteProtocolError:
 
 
 POLL_S: Final = 0.04
-"""Longest time from one look at the head of the response block to the next."""
+"""Longest time between two looks at the head of the response block, in s."""
 
 _SHORTEST_POLL_S: Final = 0.0005
 _POLLS_PER_WAIT: Final = 4
-"""Looks come as often as this in the time waited so far, so each wait gets little longer by them.
+"""Number of looks in the time waited so far, so that the looks prolong each wait only slightly.
 
-Most commands end within a PLC cycle or two; where a question takes as long itself, the next one
-follows at once."""
+Most commands end within one or two PLC cycles; if a look itself takes that long, the next one
+follows at once.
+"""
 
 LOOK_S: Final = 0.3
-"""Longest time between two snapshots while something is awaited."""
+"""Longest time between two snapshots while waiting for something, in s."""
 
 _READS: Final = 3
 
@@ -242,10 +243,11 @@ class Snapshots:
                 break
             waited_s = (now_ns - begun_ns) / NS_PER_S
             period_s = min(max(waited_s / _POLLS_PER_WAIT, _SHORTEST_POLL_S), POLL_S)
-            # Not beyond the end of the wait: a jog is released then.
+            # Not beyond the end of the wait, when a jog is released.
             took_ns = now_ns - looked_ns
             pause_ns = min(period_s * NS_PER_S - took_ns, until_ns - now_ns)
-            # One that is shorter than the look spares the PLC little, and is overslept by as much.
+            # A pause shorter than the look relieves the PLC little, and sleeping overruns by as
+            # much.
             if pause_ns > took_ns:
                 clock.sleep(pause_ns / NS_PER_S)
             looked_ns = clock.now_ns()

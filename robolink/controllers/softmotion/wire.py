@@ -37,7 +37,7 @@ from robolink.transport import MailboxHead, MailboxLink
 from robolink.transport.byte_stream import link_closed
 
 MOST: Final = 4
-"""Movements whose end may be unread."""
+"""Largest number of movements whose end has not been read."""
 
 
 class MotionTracker:
@@ -125,8 +125,8 @@ _LOG: Final = PackageLog(__package__)
 
 _READS: Final = 3
 _LOOK_BACK_S: Final = 0.7
-"""Longest time for a look at what ended the session: a request to a PLC that is gone ends within
-1 s of its deadline, this look included (docs/reference/faults.md F11)."""
+"""Longest time in s for a look at what ended the session: a request to a PLC that is gone ends
+within 1 s of its deadline, including this look (docs/reference/faults.md F11)."""
 
 T = TypeVar("T")
 ErrorT = TypeVar("ErrorT", bound=RobolinkError)
@@ -346,7 +346,7 @@ class MailboxWire:
                 lost.append(error)
                 silent = last and isinstance(error, TransportTimeoutError)
                 if silent or isinstance(error, TransportClosedError):
-                    break  # nobody is there, or the link cannot be used any more
+                    break  # nobody answers, or the link can no longer be used
         raise self._over(lost[0])
 
     def _over(self, error: RobolinkError) -> RobolinkError:
@@ -361,7 +361,7 @@ class MailboxWire:
         if self.look_back is None or isinstance(error, RemoteProtocolError):
             return error
         if self.whole_look_s and isinstance(error, TransportTimeoutError):
-            return error  # a start cuts no serial line: who is silent there has nothing to tell
+            return error  # no restart cuts a serial line: the silent PLC has nothing to report
         self._link.close()
         _LOG.decided("the link ended; looked at once more over a new one", controller=self.identity)
         try:

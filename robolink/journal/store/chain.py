@@ -8,9 +8,9 @@ from typing import Any, Final
 from robolink.messages import in_english, tr
 
 FIRST: Final = ""
-"""What the first entry holds in place of the hash of the one before."""
+"""Value in the first entry in place of the hash of the previous one."""
 
-# What holds itself is not looked for: it ends in a RecursionError all the same.
+# No check for circular values: those raise a RecursionError anyway.
 _ENCODER: Final = json.JSONEncoder(
     sort_keys=True, separators=(",", ":"), allow_nan=False, check_circular=False
 )
@@ -102,7 +102,7 @@ def head_is_missing() -> str:
 def _is_unchanged(row: Mapping[str, Any]) -> bool:
     try:
         return bool(row["hash"] == digest(row))
-    except (TypeError, ValueError):  # a field holds what robolink never stores
+    except (TypeError, ValueError):  # a field contains something that robolink never stores
         return False
 
 

@@ -25,7 +25,7 @@ Values: TypeAlias = Mapping[str, object]
 
 NOTHING: Final[Values] = {}
 
-_SCHEMA_LOCK: Final = 0x726F626F  # any number that no other user of the database takes
+_SCHEMA_LOCK: Final = 0x726F626F  # any number that no other user of the database uses
 _PLACE: Final = r":(\w+)"
 
 
@@ -102,7 +102,7 @@ class DatabaseConnection:
     def rows(self, statement: str, values: Values = NOTHING) -> Sequence[Sequence[Any]]:
         """Return all that a query finds."""
         self._cursor.execute(self._worded(statement) if values else statement, values)
-        # To the end: a result left open would keep SQLite at what it reads.
+        # All rows: an open result would keep SQLite at that state of the file.
         found: Sequence[Sequence[Any]] = self._cursor.fetchall()
         return found
 
@@ -141,24 +141,25 @@ def _for_psycopg(statement: str) -> str:
 
 
 BUSY_S: Final = 3.0
-"""How long a write waits for another program that writes."""
+"""Longest wait of a write for another program that writes, in s."""
 
 GLANCE_S: Final = 1.0
-"""How long a look waits for one; after that the journal, opened to write, says what is wrong."""
+"""Longest wait of a read for another program, in s; after that the journal is opened for writing,
+which reports the problem."""
 
 _AGAIN_S: Final = 0.01
-"""Pause before a new file is asked again for its write-ahead log."""
+"""Pause before a new file is asked again for its write-ahead log, in s."""
 
 _PAGE_BYTES: Final = 2048
-"""Of a new file. A commit writes whole pages, six or seven of them for two or three short rows:
-half of SQLite's usual size makes it about 8 % quicker; a quarter hardly more, and then the
+"""Page size of a new file. A commit writes whole pages, six or seven for two or three short rows:
+half of SQLite's usual size makes a commit about 8 % faster; a quarter is hardly faster still, and
 longer entries no longer fit."""
 
 _LOG_PAGES: Final = 200
-"""How long the write-ahead log grows before it is carried over and written from its start again:
-400 KiB, some ten changes of a tool (with SQLite's own 1,000 pages, some fifty). To write over
-blocks that a file has already takes a little more than half the time of making it longer; to carry
-over often and little costs less than that saves (100 and 300 pages were slower)."""
+"""Number of pages after which the write-ahead log is copied back and rewritten from its start: 400
+KiB, about ten tool changes (with SQLite's own 1,000 pages, about fifty). Overwriting existing
+blocks of a file takes a little more than half the time of extending the file; copying back often
+and little costs less than that saves (100 and 300 pages were slower)."""
 
 _NOTICED: Final = {
     "connect_timeout": int(BUSY_S),
@@ -167,8 +168,8 @@ _NOTICED: Final = {
     "keepalives_interval": 1,
     "keepalives_count": 2,
 }
-"""A server whose network is cut is missed after :data:`BUSY_S`, also in the middle of a transaction
-(docs/reference/faults.md F78); the system's own patience is two hours."""
+"""Connection options that detect a server behind a cut network after :data:`BUSY_S`, even during a
+transaction (docs/reference/faults.md F78); the system's default is two hours."""
 
 _SERVER: Final = r"""
     (?:(?P<user>[^:/]*)(?::(?P<password>[^@]*))?@)?
@@ -223,7 +224,7 @@ def backend_of(place: JournalPlace, *, read_only: bool, glance: bool = False) ->
             return Backend(lambda: DatabaseConnection(_connect(_uri(path, "mode=ro"), GLANCE_S)))
         return Backend(
             lambda: DatabaseConnection(_connect(_uri(path, "mode=ro"))),
-            # A read-only folder has no room for the shared memory that SQLite reads through.
+            # A read-only folder has no room for the shared memory that SQLite uses for reading.
             last_resort=lambda: DatabaseConnection(_connect(_uri(path, "immutable=1"))),
         )
     _make_file(path)
@@ -241,8 +242,8 @@ def _to_write(path: Path) -> DatabaseConnection:
 
 
 def _connect(uri: str, wait_s: float | None = None) -> sqlite3.Connection:
-    # Transactions are begun by us, so that a write takes its lock first; one lock of the store
-    # keeps threads apart.
+    # Our own code begins transactions, so that a write takes its lock first; a lock of the store
+    # separates threads.
     return sqlite3.connect(
         uri, uri=True, timeout=wait_s or BUSY_S, isolation_level=None, check_same_thread=False
     )
@@ -250,7 +251,7 @@ def _connect(uri: str, wait_s: float | None = None) -> sqlite3.Connection:
 
 def _prepare(connection: sqlite3.Connection) -> None:
     if connection.execute("PRAGMA journal_mode").fetchone() != ("wal",):
-        connection.execute(f"PRAGMA page_size={_PAGE_BYTES}")  # of no effect in a file with tables
+        connection.execute(f"PRAGMA page_size={_PAGE_BYTES}")  # no effect in a file that has tables
         _begin_wal(connection)
     connection.execute("PRAGMA synchronous=FULL")
     connection.execute(f"PRAGMA wal_autocheckpoint={_LOG_PAGES}")

@@ -58,7 +58,7 @@ T = TypeVar("T")
 _Head: TypeAlias = tuple[int, str]
 
 _LOOKS: Final = 100
-"""After so many in which others wrote each time something else is wrong."""
+"""Largest number of attempts; if others wrote during each of them, something else is wrong."""
 
 _SIGNATURE: Final = tuple(field.name for field in fields(Signature))
 _PLACES: Final = dict.fromkeys(sorted(name for name in COLUMNS if name != "hash"))
@@ -73,7 +73,7 @@ class EntryRows:
 
     def __init__(self, connection: DatabaseConnection) -> None:
         self._connection = connection
-        self._head: _Head | None = None  # a guess: others add entries too
+        self._head: _Head | None = None  # a guess: other processes add entries too
 
     def append(
         self, controller: str, signature: Signature, change: str, entries: Sequence[NewEntry]
@@ -167,7 +167,7 @@ class EntryRows:
 
     def _locked_head(self) -> _Head:
         rows = self._connection.rows(statements.HEAD + self._connection.row_lock)
-        if len(rows) != 1 or None in rows[0]:  # a disk that lied kept the page of another table
+        if len(rows) != 1 or None in rows[0]:  # a faulty disk returned the page of another table
             raise DamagedHeadError(head_is_missing())
         number, last_hash = rows[0]
         return number, last_hash
@@ -187,7 +187,7 @@ def _chained(
     rows = []
     details, text = None, ""
     for entry in entries:
-        if entry.details is not details:  # what was read back and what is done share theirs
+        if entry.details is not details:  # the read-back and the done entry share their details
             details, text = entry.details, canonical(plain(entry.details))
         number += 1
         row = {**common, **_fields(entry, change), "details": text}

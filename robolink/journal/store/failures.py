@@ -69,14 +69,14 @@ def _reason(error: BaseException) -> str:
     if isinstance(error, PermissionError):
         return "forbidden"
     if isinstance(error, UnicodeDecodeError):
-        return "damaged"  # a bent byte in a text, or in the name that SQLite complains of
+        return "damaged"  # a damaged byte in a text, or in the name in SQLite's message
     code = getattr(error, "sqlite_errorcode", None)
     if isinstance(code, int):
         return _SQLITE.get(code & 0xFF, "")
     state = getattr(error, "sqlstate", None)
     if isinstance(state, str):
         return _POSTGRESQL.get(state) or _POSTGRESQL.get(state[:2], "")
-    # psycopg names no state when it could not even connect.
+    # psycopg gives no state if it could not connect at all.
     return "unreachable" if type(error).__module__.startswith("psycopg") else ""
 
 

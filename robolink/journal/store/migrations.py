@@ -95,10 +95,10 @@ def _run_all(connection: DatabaseConnection, script: str) -> None:
 MIGRATIONS: tuple[Callable[[DatabaseConnection], None], ...] = (_first_tables, _names, _robots)
 
 NAMED: Final = 2
-"""From this version on a journal tells names from addresses."""
+"""First schema version that separates names from addresses."""
 
 OF_ROBOTS: Final = 3
-"""From this version on it tells the robots of one controller from each other."""
+"""First schema version that separates the robots of one controller."""
 
 
 def stored_version(connection: DatabaseConnection, name: str) -> int:

@@ -78,8 +78,8 @@ class _Stored(NamedTuple):
 
 
 _SUM: Final = "_sum"
-"""Where the checksum stands. Earlier markers have none, and nothing tells that one is bent; or
-one that leaves the name of their controller out."""
+"""Key of the checksum. Earlier markers have none, so damage to them, or a missing controller name,
+cannot be detected."""
 
 
 class MarkerRows:
@@ -100,7 +100,7 @@ class MarkerRows:
             "request": storable(marker.request),
             "begun_at": storable(marker.begun_at),
         }
-        # As it will be read: other keys and numbers than JSON's are told apart no more.
+        # As it will be read back: keys and numbers that JSON lacks are converted here.
         details = json.loads(canonical(plain(marker.details)))
         stored = _Stored(
             controller=values["of_controller"],

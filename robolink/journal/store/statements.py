@@ -18,7 +18,7 @@ COLUMNS: Final = (
     *(field.name for field in fields(Signature)),
     *("previous", "hash"),
 )
-"""Of the entries."""
+"""Columns of the entries."""
 
 _LISTED: Final = ", ".join(COLUMNS)
 
@@ -36,12 +36,12 @@ MOVE_HEAD: Final = (
 )
 
 NAME, KIND = "name_", "kind_"
-"""How the places of several names and kinds begin."""
+"""Prefixes of the parameters for several names and kinds."""
 
 _WHERE: Final = {
     "tool": "tool = :tool",
     "proved_tool": "proved_tool = :proved_tool",
-    # An index over some entries only is used by statements that say the same, word by word.
+    # SQLite uses a partial index only for statements that repeat its condition word by word.
     "change": "change = :change AND change <> ''",
     "before": "number < :before",
     "after": "number > :after",
@@ -61,8 +61,8 @@ def entries_where(places: tuple[str, ...], *, newest_first: bool, outside: bool)
     if outside:
         wanted.append("change = ''")
     if any(name.startswith(NAME) for name in places):
-        # A change has few entries and an index of its own. SQLite prefers the index that gives
-        # the order, and would walk through all that the controller has on record.
+        # A change has few entries and an index of its own. SQLite would prefer the index that gives
+        # the order, and then scan all entries of the controller.
         column = "coalesce(controller, '')" if "change" in places else "controller"
         wanted.append(_one_of(column, NAME, places))
     if any(name.startswith(KIND) for name in places):
@@ -136,7 +136,7 @@ RENEW_LEASE: Final = f"UPDATE leases SET beat = beat + 1, beat_ns = :now_ns WHER
 RELEASE_LEASE: Final = f"UPDATE leases SET token = '' WHERE {_OURS}"
 TAKE_LEASE: Final = f"UPDATE leases SET {_CLAIMED} WHERE {_OURS} AND beat = :of_beat"
 END_LEASE: Final = f"UPDATE leases SET {_CLAIMED} WHERE controller = :of_controller"
-# Where the controller has a lease under its own name, that one counts.
+# A lease under the controller's own name has priority.
 MOVE_LEASE: Final = """
     UPDATE leases SET controller = :to_name WHERE controller = :of_name
     AND NOT EXISTS (SELECT 1 FROM leases AS other WHERE other.controller = :to_name)

@@ -25,7 +25,7 @@ from robolink.journal.store.state_rows import LeaseRows, MarkerRows, NameRows
 from robolink.messages import tr
 
 _NEWEST: Final = 20
-"""How many entries are looked at, of the journal and of the controller."""
+"""Number of newest entries checked, of the journal and of the controller."""
 
 _OF_FILES: Final = (OSError, UnicodeDecodeError)
 
@@ -164,7 +164,7 @@ class Store:
         with self.read(consequence) as tables:
             found = next(tables.damage(names), "")
             if not found:
-                tables.markers.of_all()  # one under a name that is damaged would block nobody
+                tables.markers.of_all()  # a marker with a damaged name would block nobody
         if found:
             raise damaged_error(found, self._place.name, consequence)
 
@@ -288,4 +288,4 @@ class Store:
         if tables is not None:
             tables.connection.close()
         if self._place.path is not None:
-            self._backend = None  # a file that is gone is made anew
+            self._backend = None  # a file that is gone is created again

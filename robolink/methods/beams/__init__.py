@@ -42,7 +42,8 @@ if TYPE_CHECKING:
 
 
 _LEAST_ANGLE_DEG: Final = 20.0
-"""Beams that cross at less leave one direction badly known, as the solver says too."""
+"""Smallest angle between two beams; below it one direction is poorly known. The solver has the same
+limit."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -174,7 +175,7 @@ class BeamsParameters(SampledParameters):
         Args:
             sigma_stated: Whether somebody stated the standard deviation of a crossing.
         """
-        # X, Y and a lag for each beam; turned, by how far each beam was moved as well.
+        # Unknowns: X, Y and a lag for each beam; if turned, also the displacement of each beam.
         count, unknowns = (8, 6) if self.turn_deg else (4, 4)
         return may_end_early(count * self.repeats, unknowns=unknowns, sigma_stated=sigma_stated)
 
@@ -258,7 +259,7 @@ def farthest_from(first_deg: float, last_deg: float) -> float:
     """
     between_deg = angle_difference_deg(first_deg, last_deg)
     if abs(between_deg) == _HALF_A_TURN_DEG:
-        # Both ways are as far.
+        # Both directions are equally far.
         between_deg = math.copysign(_HALF_A_TURN_DEG, last_deg)
     turn_deg = between_deg / 2 - math.copysign(_HALF_A_TURN_DEG, last_deg or -1.0)
     target_deg = last_deg + turn_deg
@@ -311,13 +312,13 @@ class BeamsSource(InputSource[BeamsParameters]):
         Raises:
             CalibrationError: ``run_up_too_short``.
         """
-        from robolink.methods.beams.drive import require_run_up  # numpy, a look does without
+        from robolink.methods.beams.drive import require_run_up  # numpy, imported only when used
 
         require_run_up(group, self.plan, change_mm)
 
     def steps(self, stored: ToolOffset | None, here: Pose) -> "Procedure[BeamsResult]":
         """Return the steps of the measurement."""
-        from robolink.methods.beams.procedure import cross_beams  # numpy, a look does without
+        from robolink.methods.beams.procedure import cross_beams  # numpy, imported only when used
 
         return cross_beams(self, stored, here)
 

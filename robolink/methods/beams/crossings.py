@@ -97,7 +97,7 @@ class CrossingSolver:
             if math.dist((tip.x_mm, tip.y_mm), (before.x_mm, before.y_mm)) < _STILL_MM:
                 break
         if found.lean is None:
-            # Nobody saw the shaft, so nothing tells where the end below it is.
+            # The shaft was not seen, so the place of the end below it is uncertain.
             unseen = ErrorSource.of_lengths("bend_deg", 2, gain=self.dip_mm * _SLOPE_A_DEGREE)
             found = replace(found, sources=(*(found.sources or ()), unseen))
         return replace(found, seen_above_mm=self.dip_mm)
@@ -227,7 +227,7 @@ class CrossingSampler:
         )
         require_straight(result, plan.max_lean_deg)
         if not known:
-            # Where the beams are is not relied on, so nothing tells yet how sure the tip is.
+            # The place of the beams is not relied on, so the accuracy of the tip is still unknown.
             return replace(result, half_width95=(), region95_radius_mm=None)
         return result if self.shaft or not plan.shaft_mm else self._widened(result, crossings)
 

@@ -22,14 +22,14 @@ from robolink.runner import Move, Procedure, Seek
 from robolink.stations import BeamStation
 
 LEAST_ACCELERATION_MM_S2: Final = 100.0
-"""Where a controller does not tell how it speeds up. Robots at low power do with 200 and more;
-braking with less than this is believed of none (docs/reference/evidence.md 13)."""
+"""Acceleration assumed if a controller does not report its own. Robots in low power reach 200 and
+more; a braking deceleration below this is not accepted (docs/reference/evidence.md 13)."""
 
 HALF_THICKNESS_MM: Final = 0.5
-"""Of needle and beam together: a needle of 0.8 mm in a beam of 0.2."""
+"""Half the thickness of needle and beam together, in mm: a needle of 0.8 mm in a beam of 0.2 mm."""
 
 _LATENCY_S: Final = 0.01
-"""An input that is read so late may hide that the tip was still speeding up at the edge."""
+"""Reading delay of an input, in s; it may hide that the tip was still accelerating at the edge."""
 
 _SLOWER_MM_S: Final = (15.0, 12.0, 10.0, 8.0, 6.0, 5.0, 4.0, 3.0, 2.0, 1.0, 0.5)
 
@@ -111,7 +111,7 @@ def require_run_up(group: MotionGroup, plan: BeamsParameters, change_mm: float) 
     shift_mm = believed_shift_mm(plan, change_mm)
     if needs.search_mm(shift_mm) <= plan.search_mm:
         return
-    # A larger search asks for a larger shift, up to the largest change that is believed.
+    # A larger search distance requires a larger shift, up to the largest change accepted.
     rest_mm = needs.search_mm(0.0)
     least_mm = _rounded_up(min(2 * rest_mm, change_mm + rest_mm))
     raise CalibrationError(
@@ -292,7 +292,7 @@ class BeamScan:
         found = Crossing(self.beam, entry, leaving)
         needs = RunUp.at(drive.plan.crossing_mm_s, drive.told_run_up_mm)
         try:
-            # Where nothing moves, because it is foreseen only, each search ends at its target.
+            # In a preview nothing moves, so each search ends at its target.
             if leaving is not end:
                 require_reached(needs, drive.plan, found, start, end)
         except CalibrationError:

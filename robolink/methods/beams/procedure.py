@@ -35,7 +35,7 @@ from robolink.runner import Procedure
 from robolink.stations import BeamStation
 
 REFERENCE_ASIDES_MM: Final = (-12.0, -6.0, 6.0, 12.0)
-"""Places along a beam that tell its direction well enough, in a sensor of 30 mm."""
+"""Places along a beam that give its direction accurately enough, in mm, in a sensor of 30 mm."""
 
 
 def cross_beams(
@@ -162,7 +162,7 @@ def verify_by_crossing(
         yield from travel.lifted()
         found = solve_crossed_beams(_unturned(crossings), station.beams).offset
         plane = FlangePlane.of(drive.frame)
-        # The tip dips below the beams, which see the shaft above it.
+        # The tip is below the beams, which detect the shaft above it.
         up_mm = plan.dip_mm / abs(plane.r33)
         dx, dy = plane.in_base(
             aside.x_mm + lean[0] * up_mm,

@@ -219,7 +219,7 @@ class OneTouchSource(ProvesAgain):
         self,
         context: MeasurementContext,
         stored: ToolOffset | None,
-        result: CalibrationResult,  # noqa: ARG002 - it rests on the touch that is made again
+        result: CalibrationResult,  # noqa: ARG002 - not used: the touch is repeated
         again: int | None,  # noqa: ARG002
     ) -> CalibrationResult:
         """Touch again; see :class:`~robolink.procedures.TouchesFurther`."""
@@ -251,7 +251,7 @@ class OneTouchSource(ProvesAgain):
 
         Z was measured, or its change: where an input shows contact the height counts as drift.
         """
-        from robolink.calibration import toward_zero  # numpy, which a look does without
+        from robolink.calibration import toward_zero  # numpy, imported only when used
 
         return TurnTest(
             **basis.common,
@@ -274,7 +274,7 @@ def _solver(parameters: OneTouchParameters, site: Site) -> Absolute | Difference
     from robolink.stations import pin_of
 
     if parameters.basis == "absolute":
-        # Whoever does not know how sure the pin is cannot say how sure the tip is.
+        # If the accuracy of the pin is unknown, so is that of the tip.
         return Absolute(pin_of(site.station), site.sigma_mm if site.station.sigma_mm else None)
     limits = replace(_limits(parameters, site.interval_mm), max_change_mm=site.max_change_mm)
     return difference_from_last(
@@ -297,14 +297,14 @@ def _changes_left(parameters: OneTouchParameters, history: ToolHistory) -> int |
 
     last = newest_touch(history.kept, history.station)
     if last is None or (history.holds is not None and history.holds != last.value):
-        return None  # it would be refused, and says why then
+        return None  # the calibration would be refused, with the reason
     return left_of(last, history.sigma_mm, _limits(parameters, history.interval_mm))
 
 
 def _source(parameters: OneTouchParameters, site: Site) -> "TipSource":
     from robolink.procedures import LazySource
 
-    # The last touch is read when it is needed: a plan alone reads nothing.
+    # The last touch is read only when needed: a plan alone reads nothing.
     def make() -> "MovingSource":
         return OneTouchSource(_solver(parameters, site), parameters.touch)
 

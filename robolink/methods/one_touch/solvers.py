@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 
 
 KEPT = (EntryKind.DONE, EntryKind.DECISION)
-"""Entries that say that a value stays, and its basis."""
+"""Entries that record that a value is kept, and its basis."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +146,8 @@ def _last_touch(entry: Recorded, station: str) -> LastTouch | None:
         place_mm=(float(said["x_mm"]), float(said["y_mm"]), float(said["z_mm"])),
         u_deg=float(said["u_deg"]),
         value=value,
-        # Records of before do not say ``full_sigma_mm``; their chain starts where it had got to.
+        # Older records lack ``full_sigma_mm``; their chain starts from the uncertainty reached by
+        # then.
         chain=from_fields(NeedleChain, said, partial=True),
         touch_sigma_mm=None if sigma_mm is None else float(sigma_mm),
         nozzle=entry.signature.nozzle,
@@ -192,7 +193,7 @@ class Difference:
 
     def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
         """Solve exactly one touch; see :class:`~robolink.procedures.PoseMethod`."""
-        from robolink.calibration import (  # numpy, which a look does without
+        from robolink.calibration import (  # numpy, imported only when used
             StoredZ,
             pin_touched,
             solve_needle_change,
@@ -210,7 +211,7 @@ class Difference:
             chain=self.last.chain,
             sigma_mm=self.sigma_mm,
             limits=self.limits,
-            # The old tip is where its own touch left it; nobody touches it again.
+            # The old tip is not touched again: its place comes from its own touch.
             shared_touch=True,
         )
         known = self.stored_z or StoredZ(old.z_mm)
@@ -258,7 +259,7 @@ class Absolute:
 
     def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
         """Solve exactly one touch; see :class:`~robolink.procedures.PoseMethod`."""
-        from robolink.calibration import solve_one_touch  # numpy, which a look does without
+        from robolink.calibration import solve_one_touch  # numpy, imported only when used
 
         return solve_one_touch(one_of(flange), self.pin, stored=stored, sigma_mm=self.sigma_mm)
 
@@ -363,7 +364,8 @@ def one_of(poses: Sequence[Pose]) -> Pose:
 
 
 _SAME_MM: Final = 0.001
-"""Within this a value that was read back is the one that was written: EPSON keeps 0.001 mm."""
+"""Largest difference between a value written and the same value read back, in mm: EPSON keeps 0.001
+mm."""
 
 
 @dataclass(slots=True)
@@ -409,7 +411,7 @@ def traced(entries: Iterable[Recorded], stored: ToolOffset) -> StoredZ:
     kept: Recorded | None = None
     for entry in entries:
         if entry.kind is EntryKind.CALIBRATION:
-            # A measurement stands before the entry that kept its value; others were not kept.
+            # A measurement precedes the entry that kept its value; others were not kept.
             if kept is None or kept.change != entry.change:
                 continue
             found = _measured(trace, kept, entry)
@@ -441,13 +443,13 @@ def _measured(trace: _Trace, kept: Recorded, calibration: Recorded) -> tuple[flo
     if "z_mm" not in measured or not isinstance(halves, Sequence) or not halves:
         return None
     if trace.nozzle and _nozzle(kept) != trace.nozzle:
-        return None  # of another needle than the one that is stored
+        return None  # of another needle than the stored one
     value, tip = read_offset(kept.details.get("value")), read_offset(kept.details.get("tip"))
     if value is None or tip is None or abs(value.z_mm - tip.z_mm) > _SAME_MM:
-        return None  # what was written is not where the tip was found
+        return None  # the written value differs from the place where the tip was found
     earlier, half_mm = said.get("stored_z"), float(halves[list(measured).index("z_mm")])
     if isinstance(earlier, Mapping) and isinstance(earlier.get("half95_mm"), float):
-        # Touches between cancel, so that differences do not add up: it goes back to the start.
+        # Touches between the two cancel, so differences do not add up: go back to the start.
         return float(earlier["half95_mm"]), int(earlier["entry"])
     return half_mm, calibration.number
 

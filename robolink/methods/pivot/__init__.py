@@ -78,7 +78,7 @@ class PivotParameters(PinParameters):
 
 
 LEAST_AXES: Final = 5
-"""X, Y, Z and a turn take four; whatever tilts needs another one."""
+"""Smallest number of axes that can tilt a tool: X, Y, Z and a turn use four."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -241,7 +241,7 @@ class PivotTouches(TiltedTouches):
 
     def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
         """Solve three poses and more; see :class:`~robolink.procedures.PoseMethod`."""
-        from robolink.calibration import solve_pivot  # numpy, which a look does without
+        from robolink.calibration import solve_pivot  # numpy, imported only when used
 
         return solve_pivot(flange, stored=stored, sigma_mm=self.sigma_mm)
 

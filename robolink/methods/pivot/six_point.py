@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 
 
 USUAL_WAY_MM: Final = 50.0
-"""From which on the solver finds a way long enough; it needs numpy, which --help does without."""
+"""Length of a move that the solver accepts as long enough, in mm; repeated here because the solver
+imports numpy, which --help does not need."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -232,7 +233,7 @@ class SixPoints:
 
         See :class:`~robolink.procedures.PoseMethod`.
         """
-        from robolink.calibration import solve_six_point  # numpy, which a look does without
+        from robolink.calibration import solve_six_point  # numpy, imported only when used
 
         if len(flange) < LEAST_OF_SIX_POINTS:
             raise CalibrationError(

@@ -22,8 +22,8 @@ from robolink.runner import Consider, Move, Notify, Procedure
 TURNS_DEG: Final = (0.0, 60.0, 120.0, 180.0, -120.0, -60.0)
 
 STEP_DEG: Final = 10.0
-"""A tool leans by at most this in one movement. Between two poses with the tip at one height the
-joints let it sink by L a^2 / 8, with L from the wrist to the tip: by 0.4 % of L."""
+"""Largest tilt of a tool in one movement, degrees. Between two poses with the tip at one height the
+joints lower the tip by L a^2 / 8, with L from the wrist to the tip: by 0.4 % of L."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +177,8 @@ class TiltedNames(TouchNames):
 
 
 MOST_DEVIATION_DEG: Final = 1.0
-"""A robot that stands further from the orientation it was sent to cannot take it up."""
+"""Largest difference from the commanded orientation, degrees; a robot further off cannot reach that
+orientation."""
 
 
 def tilt_in_air(over: OverPin, stands: Tilt, goal: Tilt, lift_mm: float) -> Procedure[None]:
@@ -214,7 +215,7 @@ def tilt_in_air(over: OverPin, stands: Tilt, goal: Tilt, lift_mm: float) -> Proc
 
 
 LEAST_TILTS: Final = 3
-"""With the first touch that makes four, the fewest that a pivot is measured with."""
+"""Smallest number of tilts: with the first touch four poses, the fewest for a pivot."""
 
 
 def tilts_in_reach(

@@ -36,13 +36,14 @@ from robolink.procedures.samples import ResultT
 from robolink.runner import Notify, Procedure, TakenAgainError, TouchedAt
 
 PROVING_TOUCHES: Final = 4
-"""Three components, and one touch that may contradict."""
+"""Number of touches: three for the components, and one that may contradict them."""
 
 _LEFT: Final = 0.5
-"""Of the clearance, where a tip is wrong by as much as that."""
+"""Share of the clearance that must remain if the tip is wrong by as much as the clearance."""
 
 FAINT: Final = 1e-6
-"""Makes two plans comparable before any combination of their touches shows everything."""
+"""Regularisation: makes two plans comparable before any combination of touches determines every
+unknown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -237,10 +238,10 @@ def verify_on_surface(
 _TIP_COLUMNS = 3
 
 SIX: Final = 6
-"""Axes of a robot that leans its tool about two axes of the flange."""
+"""Number of axes of a robot that tilts its tool about two axes of the flange."""
 
 TURNED_DEG: Final = 30.0
-"""By how much the tilts of a proof are turned against those that were measured in."""
+"""Turn of the test's tilts relative to those of the measurement, degrees."""
 
 
 class SurfaceSampler(TiltedNames, ABC, Generic[SurveyT, ResultT]):

@@ -171,7 +171,7 @@ class PlaneTouches(TiltedTouches):
 
     def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
         """Solve seven poses and more; see :class:`~robolink.procedures.PoseMethod`."""
-        from robolink.calibration import solve_plane_touch  # numpy, which a look does without
+        from robolink.calibration import solve_plane_touch  # numpy, imported only when used
 
         return solve_plane_touch(flange, stored=stored, sigma_mm=self.sigma_mm)
 

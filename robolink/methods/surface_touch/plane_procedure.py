@@ -51,7 +51,7 @@ from robolink.procedures.tilt_proof import TiltingProof
 from robolink.runner import Procedure
 
 _LEAST_ALTITUDE = 0.3
-"""Of a triangle, as a share of its longest side: 0.87 where all sides are equal."""
+"""Smallest altitude of a triangle, as a share of its longest side: 0.87 if all sides are equal."""
 
 
 def normal_of(places_mm: Sequence[Vector]) -> Vector:
@@ -167,7 +167,7 @@ def require_observable(columns: Floats) -> None:
     if tip_is_told(fit, SIX):
         return
     variances = fit.unit_covariance.diagonal()[:3]
-    # Columns of very different lengths: which of X, Y and Z is weak shows unscaled.
+    # The columns have very different lengths: only unscaled ones show which of X, Y and Z is weak.
     weak = "XYZ"[int(np.abs(np.linalg.svd(columns)[2][-1][:3]).argmax())]
     if np.isfinite(variances).all():
         weak = "XYZ"[int(variances.argmax())]
@@ -194,7 +194,7 @@ class _PlaneSampler(SurfaceSampler[PlaneSurvey, PlaneTouchResult]):
     def derivatives(self, poses: Sequence[Pose]) -> Floats:
         return plane_columns(poses, self.stored, self._normal())
 
-    def normal_at(self, place_mm: Vector) -> Vector:  # noqa: ARG002 - a plane has one
+    def normal_at(self, place_mm: Vector) -> Vector:  # noqa: ARG002 - a plane has one normal
         return self._normal()
 
     def aligned(self, spot: SurfaceSpot) -> SurfaceSpot:
@@ -210,7 +210,8 @@ class _PlaneSampler(SurfaceSampler[PlaneSurvey, PlaneTouchResult]):
         self.touches.require_made(columns, _upward(misses_mm, plane.normal))
 
     def _upright(self, place: int) -> tuple[SurfaceSpot, float]:
-        # As if nothing were known yet: one that is made again may be what the others contradict.
+        # As if nothing were known yet: the touch being repeated may be the one that the others
+        # contradict.
         at = on_plane(self.upright_places()[0], _LEVEL, self.survey.beside_mm(place))
         return SurfaceSpot(UPRIGHT, at, _LEVEL), self.survey.rise_mm
 

@@ -185,7 +185,7 @@ class SphereTouches(TiltedTouches):
 
     def solve(self, flange: Sequence[Pose], stored: ToolOffset | None) -> CalibrationResult:
         """Solve eight poses and more; see :class:`~robolink.procedures.PoseMethod`."""
-        from robolink.calibration import solve_sphere_touch  # numpy, which a look does without
+        from robolink.calibration import solve_sphere_touch  # numpy, imported only when used
 
         return solve_sphere_touch(flange, stored=stored, sigma_mm=self.sigma_mm)
 

@@ -48,7 +48,7 @@ from robolink.runner import Procedure
 
 _LEAST_ALONG = 0.5
 """Cosine of the largest angle between the tool's shaft and the outward direction: beyond it the
-shaft comes too near to the sphere beside the tip."""
+shaft comes too close to the sphere beside the tip."""
 
 _MOST_OFF = 0.2
 
@@ -107,7 +107,7 @@ def reachable(
     spots = []
     for tilt in tilts:
         spot = spot_on(centre_mm, radius_mm, tilt, (0.0, 0.0, 1.0))
-        # Where a shaft points that stands straight up in the first orientation.
+        # Direction of a shaft that is vertical in the first orientation.
         shaft = (rotation_of(drive.pose(spot)) @ upright.T)[:, 2]
         spots += [
             spot_on(centre_mm, radius_mm, tilt, side)
@@ -180,7 +180,8 @@ class _SphereSampler(SurfaceSampler[SphereSurvey, SphereTouchResult]):
         self.touches.require_made(columns, apart_mm - result.radius_mm)
 
     def _upright(self, place: int) -> tuple[SurfaceSpot, float]:
-        # As if nothing were known yet: one that is made again may be what the others contradict.
+        # As if nothing were known yet: the touch being repeated may be the one that the others
+        # contradict.
         survey, first = self.survey, self.upright_places()[0]
         centre = _below(first, survey.radius_mm)
         spot = spot_on(centre, survey.radius_mm, UPRIGHT, survey.upright_side(place))
@@ -279,7 +280,8 @@ class SphereTest(TiltingProof):
     def _apart_mm(self, found: Pose) -> Vector:
         (place,) = places_of([found], tilted_from(self.written, self.tip))
         out = [at - middle for at, middle in zip(place, self.sphere.centre_mm, strict=True)]
-        # Straight up from beside the top the sphere is in the way: that is far away, however near.
+        # Vertically above a point beside the top the sphere is in the way: treated as far away,
+        # however near.
         on_top = math.hypot(*out[:2]) <= self.survey.most_aside * self.sphere.radius_mm
         nearest = out if on_top and out[2] > 0 else [0.0, 0.0, 1.0]
         share = self.sphere.radius_mm / math.hypot(*nearest)

@@ -8,11 +8,12 @@ from typing import ClassVar, Final, TypeVar
 Vector = tuple[float, float, float]
 
 _CORNER_DEG: Final = 60.0
-"""The first three places are an equilateral triangle: it stays one that tells how the plane lies
-when a person jogs square to a leaning plane, which shifts the second and the third alike."""
+"""Angle between the first three places, which form an equilateral triangle: it still shows the
+slope of the plane if a person jogs square to a leaning plane, which shifts the second and the third
+place alike."""
 
 _TURN_DEG: Final = 100.0
-"""From one further place to the next; no two of the first eighteen are the same."""
+"""Angle between successive further places, degrees; the first eighteen are all different."""
 
 _AZIMUTHS: Final = 8
 
@@ -32,13 +33,14 @@ class PlaneSurvey:
     spread_mm: float = 10.0
 
     least_count: ClassVar[int] = 9
-    """Six unknowns and the share of the distances leave two by which they are judged."""
+    """Smallest number of touches: six unknowns and the share of the distances leave two for
+    checking them."""
 
     uprights: ClassVar[int] = 3
-    """Touches in one orientation: they tell how the plane lies, however wrong the tip is."""
+    """Touches in one orientation: they show the slope of the plane, even if the tip is wrong."""
 
     most_lean_deg: ClassVar[float] = 30.0
-    """By how much a plane may lean from the level, while nobody knows it."""
+    """Largest lean of a plane from level, degrees, while the lean is unknown."""
 
     @property
     def rise_mm(self) -> float:
@@ -69,18 +71,20 @@ class SphereSurvey:
     tilt_deg: float = 30.0
 
     least_count: ClassVar[int] = 11
-    """Seven unknowns and the share of the distances leave three by which they are judged. With two
-    that share is told so badly on six axes that good runs are refused
+    """Smallest number of touches: seven unknowns and the share of the distances leave three for
+    checking them. With two, six axes determine that share so badly that good runs are refused
     (docs/reference/touches.md 6)."""
 
     uprights: ClassVar[int] = 4
-    """Touches in one orientation: they tell where the sphere is, but for the error of the tip."""
+    """Touches in one orientation: they show where the sphere is, apart from the error of the tip.
+    """
 
     most_aside: ClassVar[float] = 0.3
-    """How far from the top the first touch may be, as a share of the radius."""
+    """Largest distance of the first touch from the top, as a share of the radius."""
 
     side_deg: ClassVar[float] = 45.0
-    """How far from the top it is touched: further down a tool that leans would meet it."""
+    """Angle from the top of the touches on the side, degrees: further down, a leaning tool would
+    hit the sphere."""
 
     @property
     def aside_mm(self) -> float:

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 
 _SPEEDS_APART: Final = 1.5
-"""Speeds that differ by less than this factor do not tell the latency, says the solver too."""
+"""Smallest ratio of the speeds that separates the latency; the solver has the same limit."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,7 +128,7 @@ class ZTouchParameters(SampledParameters):
         Args:
             sigma_stated: Whether somebody stated the standard deviation of a touch.
         """
-        # Z and the latency.
+        # Unknowns: Z and the latency.
         return may_end_early(len(self.speeds_mm_s), unknowns=2, sigma_stated=sigma_stated)
 
     def problems(self, check: Check) -> Iterator[Problem]:
@@ -199,7 +199,7 @@ class ZTouchSource(InputSource[ZTouchParameters]):
 
     def steps(self, stored: ToolOffset | None, here: Pose) -> "Procedure[ZTouchResult]":
         """Return the steps of the measurement."""
-        from robolink.methods.z_touch.procedure import touch_surface  # numpy, late
+        from robolink.methods.z_touch.procedure import touch_surface  # numpy, imported late
 
         return touch_surface(self, stored, here)
 
@@ -210,7 +210,7 @@ class ZTouchSource(InputSource[ZTouchParameters]):
 
         context, tool = basis.context, basis.tool
         here = context.stands or context.controller.groups[0].pose()
-        # After a measurement that is the flange; else whatever is in force.
+        # After a measurement the flange is selected; otherwise it may be any tool.
         frame = here if here.tool == tool else tip_pose(here, basis.result.offset, tool=tool)
         return ProbeTest(
             **basis.common,

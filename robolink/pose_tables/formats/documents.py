@@ -38,10 +38,10 @@ from robolink.pose_tables.values import (
 )
 
 Found = dict[str, object] | list[list[float]]
-"""An object that is a pose, its values by their names; or the rows of a matrix."""
+"""A pose as an object, with its values by name, or the rows of a matrix."""
 
 COMPONENTS: Final = frozenset({*LENGTHS, *ANGLES, *QUATERNION, *MATRIX})
-"""Names of columns or keys for the place of a pose and its orientation."""
+"""Names of columns or keys for the position and orientation of a pose."""
 
 _PARTS: Final = ("position", "orientation", "translation", "rotation")
 _LISTED: Final = {"position": "xyz", "translation": "xyz"}
@@ -151,7 +151,7 @@ def _flat(node: dict[str, object]) -> dict[str, object]:
         elif part in _LISTED and isinstance(value, list):
             if len(value) != len(_LISTED[part]):
                 if not {"orientation", "rotation"} & {str(one).lower() for one in node}:
-                    continue  # positions of joints, for example
+                    continue  # for example joint positions
                 why = tr("{name} holds {count} numbers", name=key, count=len(value))
                 raise UnusableText(why)
             flat |= {f"{part}.{axis}": one for axis, one in zip(_LISTED[part], value, strict=True)}

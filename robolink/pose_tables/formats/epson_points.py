@@ -47,7 +47,7 @@ _LINE: Final = re.compile(
     r"\s*(?=(?:[nr]\w*=-?[0-9][0-9.]*(?:E[+-][0-9]+)?|b\w*=(?:True|False)|s\w*=\"[^\"]*\")\s*$)"
     r"(\w+)=.*"
 )
-"""A key whose first letter says what its value is: n and r a number, b a truth, s a text."""
+"""A key whose first letter gives the type of its value: n and r a number, b a boolean, s a text."""
 _LABEL: Final = re.compile(r'^\s*sLabel="(.*)"\s*$', re.MULTILINE)
 _XYZU: Final = 0b1111
 _HANDS: Final = {1: Hand.RIGHT, 2: Hand.LEFT}

@@ -20,7 +20,7 @@ _FLOW: Final = re.compile(r"\s*([\[\]{},:]|\"[^\"]*\"|'[^']*'|[^\[\]{},:\"']+)")
 _DEEPEST: Final = 40
 
 Entry = tuple[int, int, str]
-"""Line, indent, text."""
+"""Line number, indent and text."""
 
 
 def looks_indented(lines: Sequence[str]) -> bool:

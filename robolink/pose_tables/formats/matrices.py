@@ -25,7 +25,7 @@ _FEWEST_NUMBERS: Final = 2
 _LAST: Final = (0.0, 0.0, 0.0, 1.0)
 
 Block = tuple[int, str, list[list[float]]]
-"""Line, name, and the rows as they stand."""
+"""Line number, name, and the rows as written."""
 
 
 def read_matrices(lines: Sequence[str]) -> RawTable | None:
@@ -136,7 +136,7 @@ def _stored_by_columns(blocks: Sequence[Block]) -> bool | None:
     """Return whether blocks were written column by column; ``None`` if they are no matrices."""
     shape = (len(blocks[0][2]), len(blocks[0][2][0]))
     if shape == (4, 3):
-        return None  # rows and a place below, or columns: nothing in it tells
+        return None  # rows with the position below, or columns: nothing shows which
     if shape == (3, 4):
         turned = [[value for row in rows for value in row[:3]] for _, _, rows in blocks]
         return False if any(map(is_rotation, turned)) else None

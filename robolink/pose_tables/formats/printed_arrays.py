@@ -34,7 +34,7 @@ _TOKEN: Final = re.compile(
 _NOT_FINITE: Final = re.compile(r"[+-]?(?:nan|inf)", re.IGNORECASE)
 
 Row = tuple[int, list[float]]
-"""Line of the opening bracket, and the numbers."""
+"""Line number of the opening bracket, and the numbers."""
 
 
 def read_arrays(text: str, choices: ReadingChoices) -> RawTable | None:

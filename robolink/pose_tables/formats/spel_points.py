@@ -30,7 +30,7 @@ _NO_COORDINATES: Final = re.compile(
     r"|[A-Za-z_]\w*\s*(?:[+:/@]|\((?![^)]*,[^)]*,)))",
     re.IGNORECASE,
 )
-"""What a point may be set to besides coordinates."""
+"""Values other than coordinates that may be assigned to a point."""
 _STATEMENT: Final = re.compile(
     r"\s*(?:Go|Jump3?(?:CP)?|Move|Arc3?|TGo|TMove|BGo|BMove|CVMove|Pass|TLSet|Local|Base|Arm(?:Set)?|Box"
     r"|Plane|Pallet|ECPSet|Tool|Speed[RS]?|Accel[RS]?|Weight|Print|Input|If|ElseIf|While|For|Do|Loop"

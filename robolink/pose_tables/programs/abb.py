@@ -129,7 +129,7 @@ def _targets(
     if len(lists) != len(parts) or any(_nested(part) for part in lists):
         raise UnusableText(tr("it is not a target"), line)
     if len(parts) == 2 and kind != "pose":
-        # Two brackets alone do not say which number is the scalar.
+        # Two brackets alone do not show which number is the scalar.
         raise UnusableText(tr("it is not a target: a pose has to be declared as one"), line)
     if len(parts) not in (2, 4) or (len(parts) == 4 and kind == "pose"):
         raise UnusableText(tr("it is not a target"), line)

@@ -17,11 +17,12 @@ from robolink.pose_tables.numbers import number_of, why_no_number
 from robolink.pose_tables.values import LengthUnit, RawPose, RawTable, UnusableText
 
 _TURNED_MOST_DEG: Final = 720.0
-"""Makers print angles within a turn, and people type two at most."""
+"""Largest angle in a program, degrees: makers print angles within one turn, and people type at most
+two turns."""
 
 _NO_LINE_END: Final = re.compile(r"[^\n]")
 _LEADING_ZERO: Final = re.compile(r"[+-]?0[0-9]+")
-"""What a decimal comma leaves of the decimals; nobody writes a whole number so."""
+"""The decimals after a decimal comma; nobody writes a whole number like that."""
 
 _CLOSING: Final = {"{": "}", "[": "]", "(": ")"}
 

@@ -36,7 +36,7 @@ _NO_PLACES: Final = frozenset(
         *("get_inverse_kin_has_solution", "calculate_tcp", "add_frame", "str_cat", "to_str"),
     }
 )
-"""Functions whose poses are no places that the robot goes to."""
+"""Functions whose poses are not places that the robot moves to."""
 _JOINTS_OF: Final = frozenset({"movej", "movel", "movep", "movec", "servoj", "speedj", "stopj"})
 _JOINT_NAME: Final = re.compile(r"(?:.*_)?(?:q|qn|qnear|joints?)\d*", re.IGNORECASE)
 _SIX: Final = 6

@@ -52,7 +52,7 @@ _WHOLE: Final = (
     {"roll", "pitch", "yaw"},
 )
 _ONLY_TOGETHER: Final = ({"o", "t"}, {"p"})
-"""Letters that are more often time, point or something else than a part of three angles."""
+"""Letters that mean time, point or something else more often than one of three angles."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,7 +132,7 @@ def _by_angles(
     if set(names) == {"u"} and rule in (None, EPSON):
         return _angles_by(EPSON, ("u",), unit)
     if set(names) == {"rz"} and rule is None:
-        return _angles_by(EPSON, ("rz",), unit)  # about Z, a vector and an angle are the same
+        return _angles_by(EPSON, ("rz",), unit)  # about Z, vector and angle are the same
     if set(names) not in _WHOLE:
         raise UnclearText(which_rotation(heads))
     if rule is None and set(names) == set(EPSON.letters):
@@ -186,7 +186,7 @@ _BENIGN: Final = frozenset(
         *("speed", "force", "temperature", "rms", "residual", "error"),
     }
 )
-"""Columns of numbers that nobody takes for a turn."""
+"""Columns of numbers that are never mistaken for angles."""
 
 _HANDS: Final = {
     **dict.fromkeys(("right", "r", "/r", "righty", "1"), Hand.RIGHT),
@@ -313,7 +313,7 @@ class PoseColumns:
                 continue
             filled = any(row[place] not in ("", None) for _, row in rows)
             for line, row in rows if filled else ():
-                # A row may say nothing of all that a robot adds to a pose, as a typed one does.
+                # A row may leave out everything that a robot adds to a pose, as a typed row does.
                 silent = len(frames) > 1 and all(row[one] in ("", None) for one in frames)
                 if row[place] in ("", None) and not (place in frames and silent):
                     text = self._heads[place].text.strip() or name

@@ -169,7 +169,7 @@ _LONG_NAMES: Final = (
     *(f"{axis}_{unit}" for axis in LENGTHS for unit in ("mm", "cm", "in")),
     *(f"{angle}_{unit}" for angle in ANGLES for unit in ("deg", "rad")),
 )
-"""Names in which one wrong letter shows; ``u`` for example is one letter away from any other."""
+"""Names long enough to show one wrong letter; ``u``, for example, is one letter from any other."""
 
 
 def nearly_named(text: str) -> str:

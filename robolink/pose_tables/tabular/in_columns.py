@@ -45,10 +45,11 @@ from robolink.pose_tables.values import (
 _SEPARATORS: Final = ("\t", ";", "|", ",", " ")
 _SIGN: Final = re.compile(r"^(\s*[^\s:=;,|\t\"]+(?:\s*[(\[][^)\]]*[)\]])?)\s*[:=]\s*")
 _MOST: Final = 60
-"""Lines; components, names and remarks are fewer."""
+"""Largest number of lines; components, names and remarks take fewer."""
 
 _FEWEST: Final = 3
-"""Lines that begin with the name of a component; a table of fewer is no pose."""
+"""Smallest number of lines that begin with the name of a component; a table with fewer is no pose.
+"""
 
 _NAMES: Final = frozenset({"", "name", "number", "unit", "units"})
 
@@ -82,7 +83,7 @@ def read_in_columns(lines: Sequence[str], choices: ReadingChoices) -> RawTable |
     count = len(next(row.cells for row in rows if _meaning(row.label) == "x"))
     first = rows[0]
     if separator == " " and not _meaning(first.label) and len(first.cells) == count - 1:
-        # Blanks in front of the names of the poses are no cell.
+        # Blanks before the names of the poses are not a cell.
         rows[0] = _Line(first.line, "", [first.label, *first.cells])
     form = TableForm(separator, _decimal(rows))
     rows_in_comments(lines, form, count + 1)

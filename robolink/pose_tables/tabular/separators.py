@@ -17,24 +17,25 @@ from robolink.pose_tables.numbers import NUMBER, number_of, plain
 from robolink.pose_tables.values import UnusableText
 
 Line = tuple[int, str]
-"""Number of the line, and its text."""
+"""Line number and text."""
 
 _SEPARATORS: Final = (("\t", ";", "|"), (",", " "))
-"""The first stand in no number and no name, so that the second are tried only without them."""
+"""Separators in two groups: those of the first occur in no number or name, so those of the second
+are tried only if there are none of the first."""
 _WORDS: Final = re.compile(r'"[^"]*"|\S+')
 _NUMBER: Final = re.compile(NUMBER)
 _THOUSANDS: Final = {
     ",": re.compile(r"[+-]?[0-9]{1,3}(?:\.[0-9]{3})+,[0-9]+"),
     ".": re.compile(r"[+-]?[0-9]{1,3}(?:,[0-9]{3})+\.[0-9]+"),
 }
-"""Groups of three and a decimal part, by the decimal sign. Without the decimal part a group and a
-fraction look alike, so that such a number is none."""
+"""Numbers with groups of three digits and a decimal part, by decimal sign. Without a decimal part a
+group and a fraction look alike, so such a text is not accepted as a number."""
 _NOT_FINITE: Final = re.compile(r"[+-]?(?:nan|inf|infinity|-?1\.#\w+)", re.IGNORECASE)
 _COMMENT: Final = re.compile(r"\s*(#|//|!|%(?!time,)|--(?![\d.])|;)")
 _BEHIND: Final = re.compile(r"(?<=[\d.,;|\t)])\s+(?:#|//|!).*$")
 _LOOKED_AT: Final = 200
 FEWEST: Final = 2
-"""Numbers that a line of values holds at least."""
+"""Smallest number of numbers in a line of values."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,15 +171,15 @@ def decimal_sign(cell: str) -> str:
 
 def _is_comment(text: str) -> bool:
     found = _COMMENT.match(text)
-    # A semicolon in front may also be an empty first cell.
+    # A leading semicolon may also be an empty first cell.
     return found is not None and not (found[0].strip() == ";" and ";" in text[found.end() :])
 
 
 def _columns_of_numbers(form: TableForm, lines: Sequence[Line]) -> int:
     """Return how many columns hold numbers throughout; 0 where lines do not agree."""
     rows = [cells for line in lines if (cells := _cells_of(form, line)) is not None]
-    # What stands above the values may be a title; most values decide, and a line that has other
-    # columns than most is refused by its number later.
+    # Lines above the values may be a title. Most value lines decide; a line with different columns
+    # is refused later, with its number.
     rows = [row for row in rows if sum(map(is_number, row)) >= FEWEST]
     if not rows:
         return 0
@@ -189,7 +190,7 @@ def _columns_of_numbers(form: TableForm, lines: Sequence[Line]) -> int:
     numbers = [row[place] for row in values for place in columns if is_number(row[place])]
     signs = Counter(sign for cell in numbers if (sign := decimal_sign(cell)))
     other = "." if form.decimal == "," else ","
-    # One cell with the other sign is refused by its line later; most decide, and a tie nothing.
+    # A single cell with the other sign is refused later by line; most cells decide, a tie nothing.
     if signs[other] >= max(signs[form.decimal], 1) or (form.decimal == "," and not signs[","]):
         return 0
     return len(columns) if len(columns) >= FEWEST else 0

@@ -82,8 +82,8 @@ def write_answer(answer: Reply | Refusal, dialect: Dialect) -> bytes:
     """
     letter = letter_of(answer.name)
     if isinstance(answer, Refusal):
-        # A refusal carries the letter that came, known or not (docs/reference/epson.md 2.1); what
-        # was no frame has none, and the manual does not say what stands there.
+        # A refusal repeats the letter received, known or not (docs/reference/epson.md 2.1). A
+        # message that was no frame has no letter, and the manual does not say what is sent then.
         echoed = letter.byte if letter is not None else ord(answer.name[:1] or "\0")
         return framed(NAK, echoed, _code(answer, dialect))
     if letter is None:

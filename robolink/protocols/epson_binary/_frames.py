@@ -47,19 +47,19 @@ class NakCode(StrEnum):
     """How the two bytes of a refusal's code are written; the manual says only how many."""
 
     DIGITS = "digits"
-    """Two decimal digits, as the code of GetStatus is four of them."""
+    """Two decimal digits, just as GetStatus writes its code in four."""
     BINARY = "binary"
-    """One number, most significant byte first."""
+    """A binary number, most significant byte first."""
 
 
 class Letters(StrEnum):
     """Which letters are sent."""
 
     DOCUMENTED = "documented"
-    """Only those that a manual prints."""
+    """Only letters that a manual prints."""
     GUESSED = "guessed"
-    """Also the upper-case twins of readers for their setters, and A for Abort: a pattern, seen in
-    each pair that is printed and stated nowhere."""
+    """Also the upper-case counterparts of read commands for writing, and A for Abort: a pattern
+    that every printed pair follows, but that is stated nowhere."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,7 +91,7 @@ class Data(Enum):
     WORD = auto()
     """A number of two bytes."""
     WORD_PORT = auto()
-    """The number of a port of words; how long it is, the dialect says."""
+    """The number of a word port; its length depends on the dialect."""
     HEX_BYTE = auto()
     """One byte that Remote Ethernet prints as two hexadecimal digits."""
     HEX_WORD = auto()
@@ -157,7 +157,7 @@ LETTERS: Final[tuple[Letter, ...]] = (
     _letter("GetMemIOWord", "u", _WORD_PORT, (Data.HEX_WORD,)),
     _letter("GetStatus", "S", (), (Data.STATUS,)),
     _letter("Execute", "X", (Data.QUOTED,), (Data.QUOTED,)),
-    # The manual's table prints u once more, which is taken; in the pattern it is v.
+    # The manual's table prints u again, which is taken; by the pattern it is v.
     Letter("GetVariable", ord("v"), _TEXT, _TEXT, documented=False),
     _guessed("SetMemIO", "O", (Data.WORD, Data.BYTE)),
     _guessed("SetIOByte", "B", (Data.BYTE, Data.BYTE)),
@@ -186,10 +186,10 @@ NAK: Final = 0x15
 QUOTE: Final = ord('"')
 
 _LEAD: Final = 2
-"""The first byte and the letter."""
+"""Length of the first byte and the letter."""
 
 _TAIL: Final = 2
-"""ETX and the check sum."""
+"""Length of ETX and the checksum."""
 
 _CODE_BYTES: Final = 2
 _STATUS_DIGITS: Final = 4
@@ -259,7 +259,7 @@ class FrameBuffer:
         self._dialect = dialect
         self._max_frame = max_frame
         self._role = role
-        self._scanned, self._sum = 1, 0  # of a text: what was looked at, and its check sum
+        self._scanned, self._sum = 1, 0  # of a text: number of bytes scanned, and their checksum
 
     @property
     def held(self) -> bytes:

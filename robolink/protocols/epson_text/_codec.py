@@ -146,7 +146,7 @@ class MessageBuffer:
             self._scanned = self._opening + 1
         closing = self._earliest(b'"\r', b'"\n')
         if closing < 0:
-            # The last byte may be the closing quote whose line end is still to come.
+            # The last byte may be the closing quote, with its line end still to come.
             self._scanned = max(self._opening + 1, len(self._data) - 1)
             return -1
         return closing + 1
@@ -191,7 +191,8 @@ _ENCODINGS: Final = frozenset(
     codecs.lookup(name).name
     for name in ("latin-1", "cp1252", "utf-8", "shift_jis", "cp932", "gb18030", "big5")
 )
-"""Encodings in which no longer character holds the byte of a comma, a quote or a line end."""
+"""Encodings in which no multi-byte character contains the byte of a comma, a quote or a line end.
+"""
 
 
 class _Held(Protocol):
@@ -225,7 +226,7 @@ class EpsonCodec(ABC):
         self._failure: RemoteProtocolError | None = None
 
     def __repr__(self) -> str:
-        # What is held may be a login, so only its length is shown.
+        # The bytes held may be a login, so only their length is shown.
         return f"<{type(self).__name__} {self._role.name} holding {len(self._arrived.held)} bytes>"
 
     @property
@@ -264,7 +265,7 @@ class EpsonCodec(ABC):
         if self._failure is not None:
             raise self._failed_again(self._failure)
         if not self._arrived and not self._ended:
-            return NEED_DATA  # asked twice in every exchange, and mostly true
+            return NEED_DATA  # called twice in every exchange, and mostly true
         try:
             return self._next_event()
         except RemoteProtocolError as error:
@@ -391,7 +392,7 @@ class EpsonTextCodec(EpsonCodec):
         super().__init__(role, self._buffer)
         self._blank_allowed = False
 
-    def carries(self, name: str, *parameters: str) -> bool:  # noqa: ARG002 - here all alike
+    def carries(self, name: str, *parameters: str) -> bool:  # noqa: ARG002 - the text form carries all commands
         """Return whether a command can be sent: here all, known or not to the firmware."""
         return bool(name)
 

@@ -92,7 +92,7 @@ class RemoteCommand:
 
 _AUTO: Final = frozenset({"auto"})
 _READY: Final = frozenset({"auto", "ready"})
-# Auto is missing there (docs/reference/epson.md 1.2, note 2).
+# The manual's table does not list Auto here (docs/reference/epson.md 1.2, note 2).
 _READY_ONLY: Final = frozenset({"ready"})
 _UNSAFE: Final = frozenset({"emergency_stop", "safeguard"})
 # One manual prints "Safeguard on" for Start; the guard must be closed (docs/reference/epson.md 1.2
@@ -161,7 +161,7 @@ COMMANDS: Final[tuple[RemoteCommand, ...]] = (
     RemoteCommand("Execute", 1, 1, _READY, _UNFIT, form=_STATEMENT, reply=ReplyShape.TEXT),
     RemoteCommand("Abort", needs=_AUTO, during_execute=5),
     RemoteCommand("GetAlm", reply=ReplyShape.FIELDS, in_monitoring=True, since=7),
-    # Its preconditions are not documented; Auto is what accepts remote commands at all.
+    # Its preconditions are not documented; any remote command requires Auto.
     RemoteCommand("ResetAlm", 1, 1, _AUTO, since=7),
     _extended("GetContName"),
     _extended("GetContNo"),
@@ -187,7 +187,7 @@ COMMANDS: Final[tuple[RemoteCommand, ...]] = (
     _extended("GetHealthRB", 3),
     _extended("GetPartWarning", 1),
 )
-"""The table, in the order of docs/reference/epson.md 1.2, then 1.8."""
+"""Table of the commands, in the order of docs/reference/epson.md 1.2, then 1.8."""
 
 _BY_NAME: Final[Mapping[str, RemoteCommand]] = MappingProxyType(
     {command.name.lower(): command for command in COMMANDS}
@@ -196,5 +196,5 @@ _BY_NAME: Final[Mapping[str, RemoteCommand]] = MappingProxyType(
 
 def find_command(name: str) -> RemoteCommand | None:
     """Return the command called ``name`` in any case, ``None`` when there is none."""
-    # The Kelvin sign and its like are lower-cased to ASCII letters; they are no names.
+    # The Kelvin sign and similar characters become ASCII letters in lower case, but are no names.
     return _BY_NAME.get(name.lower()) if name.isascii() else None

@@ -21,7 +21,7 @@ class Request:
     parameters: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
-        # A password must not reach a log through a careless {request!r}.
+        # A careless {request!r} must not write a password to a log.
         shown = "('***',)" if self.name.lower() == "login" else repr(self.parameters)
         return f"Request(name={self.name!r}, parameters={shown})"
 

@@ -22,7 +22,8 @@ from robolink.protocols.epson_text._commands import (
 from robolink.protocols.epson_text._events import BadRequest, ErrorCode, Refusal, Reply, Request
 
 _MAX_TEXT: Final = 4060
-"""Most bytes of a statement, and of what it prints (docs/reference/epson.md 1.5)."""
+"""Largest number of bytes of a statement, and of its printed output (docs/reference/epson.md 1.5).
+"""
 
 _QUOTE: Final = '"'
 
@@ -33,7 +34,7 @@ _MAX_CODE_DIGITS: Final = 5
 _MAX_CODE: Final = 99_999
 
 _SHORT: Final = 32
-"""Bytes of a request that is kept to be recognised."""
+"""Number of bytes kept of a request, to recognise the request later."""
 
 _A_REQUEST: Final = rb"(\$(?:%s)(?=[,\r\n]))" % b"|".join(c.name.encode() for c in COMMANDS)
 _BEHIND_REQUEST: Final = re.compile(_A_REQUEST, re.IGNORECASE)
@@ -57,7 +58,7 @@ def read_answer(line: bytes, encoding: str) -> Reply | Refusal:
             fields = [field.decode(encoding, _UNDECODABLE) for field in payload.split(b",")]
             return Reply(name.decode("ascii"), tuple(fields))
     elif mark == b"!":
-        # The name may be an echo of anything, commas included (docs/reference/epson.md 1.6).
+        # The name may repeat any text, including commas (docs/reference/epson.md 1.6).
         name, comma, code = line[1:].rpartition(b",")
         if comma and code.isdigit() and len(code) <= _MAX_CODE_DIGITS:
             return Refusal(name.decode(encoding, _UNDECODABLE), int(code))
@@ -269,7 +270,7 @@ def write_parameters(command: RemoteCommand, parameters: tuple[str, ...]) -> str
     """Return ``parameters`` as one text, ``None`` when a device could read anything else."""
     payload = ",".join(parameters)
     if command.form is ParameterForm.STATEMENT:
-        if _QUOTE in payload:  # there is no escape for it (docs/reference/spel.md 1)
+        if _QUOTE in payload:  # a quote cannot be escaped (docs/reference/spel.md 1)
             return None
         payload = f"{_QUOTE}{payload}{_QUOTE}"
     missing = len(parameters) < command.min_parameters

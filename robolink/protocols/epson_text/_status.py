@@ -129,7 +129,7 @@ class Preference(IntEnum):
 
 
 INVERTED: Final = frozenset({Preference.INDEPENDENT_MODE, Preference.GLOBALS_CLEARED_AT_START})
-"""These are on where their bit is 0."""
+"""Preferences that are on if their bit is 0."""
 
 DIGITS: Final = 23
 

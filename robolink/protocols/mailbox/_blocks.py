@@ -49,7 +49,7 @@ from robolink.protocols.mailbox._layout import (
 )
 
 _RELEASE: Final = 1
-"""Operand i0 of a stop that lets the group go."""
+"""Operand i0 of a stop that releases the group."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -355,7 +355,7 @@ def _require_whole(words: Sequence[int], version: int, head: int, tail: int) -> 
         raise BlockError(BlockFault.CRC)
 
 
-@lru_cache(maxsize=64)  # they stay the same from one snapshot to most others
+@lru_cache(maxsize=64)  # the same in most successive snapshots
 def _finished(ends: tuple[int, ...]) -> tuple[Finished, ...]:
     return tuple(
         Finished(sequence, known(CommandState, state), known(ErrorClass, error_class))

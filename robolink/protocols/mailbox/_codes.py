@@ -342,7 +342,7 @@ OPCODES: Final[Mapping[Opcode, OpcodeFacts]] = MappingProxyType(
         ),
     }
 )
-"""Every opcode, in the order of its number."""
+"""Every opcode, in numerical order."""
 
 
 def opcodes_of(profile: ExportProfile) -> tuple[Opcode, ...]:

@@ -72,7 +72,7 @@ def frames_match(one: Six, other: Six, *, tolerance: float) -> bool:
         return False
     if all(
         map(eq, one[3:], other[3:])
-    ):  # two tuples are equal where both hold one and the same NaN
+    ):  # two tuples compare equal if both contain the same NaN object
         return True
     rows = zip(_of_zyz(*one[3:]), _of_zyz(*other[3:]), strict=True)
     elements = (pair for row in rows for pair in zip(*row, strict=True))
@@ -102,7 +102,7 @@ def _of_zyz(a_deg: float, b_deg: float, c_deg: float) -> _Matrix:
 def _zyz_deg(r: _Matrix) -> _Row:
     sine = hypot(r[0][2], r[1][2])
     if sine < _SINGULAR:
-        # At B = 180 the second column is (-sin A, cos A) just as at B = 0.
+        # At B = 180 the second column is (-sin A, cos A), as at B = 0.
         return degrees(atan2(-r[0][1], r[1][1])), 0.0 if r[2][2] > 0 else 180.0, 0.0
     a = atan2(r[1][2], r[0][2])
     ca, sa = cos(a), sin(a)

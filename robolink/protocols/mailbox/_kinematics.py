@@ -88,7 +88,8 @@ _CARRIES_NONE: Final = frozenset(
         Kinematics.FIVE_AXES,
     }
 )
-"""Position kinematics that turn the flange themselves, so that none is coupled to them."""
+"""Position kinematics that turn the flange themselves, so that no orientation kinematics can be
+added."""
 
 _FIRST_ORIENTATION: Final = 32
 

@@ -33,8 +33,8 @@ def _crc_of_byte(value: int) -> int:
     return value
 
 
-# A word is as wide as the checksum, so it displaces all of it: what its two bytes leave behind
-# are looked up and joined.
+# A word is as wide as the checksum and replaces all of it: the checksums of its two bytes are
+# looked up and combined.
 _CRC_OF_HIGH: Final = tuple(map(_crc_of_byte, range(256)))
 _CRC_OF_LOW: Final = tuple(crc >> 8 ^ _CRC_OF_HIGH[crc & 0xFF] for crc in _CRC_OF_HIGH)
 
@@ -70,7 +70,7 @@ Words = tuple[int, ...]
 """16-bit words, each 0..65535, as in registers."""
 
 Six = tuple[float, float, float, float, float, float]
-"""X, Y, Z in the PLC's user units and A, B, C in degrees; or six axes."""
+"""X, Y, Z in the PLC's user units and A, B, C in degrees; or six axis values."""
 
 Four = tuple[float, float, float, float]
 """Velocity, acceleration, deceleration, jerk."""
@@ -258,13 +258,13 @@ def decode_name(field: bytes) -> str:
 
 
 VERSION: Final = 0x0100
-"""Major version in the high byte, minor in the low one."""
+"""Version of the layout: major in the high byte, minor in the low byte."""
 
 PROBE: Final = 12.3456
-"""The value of the probe when words are in the right order at the right place."""
+"""Value of the probe if the words are in the right order and place."""
 
 SLOTS: Final = range(1, 16)
-"""The tool slots."""
+"""Numbers of the tool slots."""
 
 UINT, INT, UDINT, DINT = WordType.UINT, WordType.INT, WordType.UDINT, WordType.DINT
 REAL, LREAL, CHARS = WordType.REAL, WordType.LREAL, WordType.CHARS
@@ -354,13 +354,13 @@ SLOT: Final = Layout(
     Field(34, "crc", UINT, note="CRC-16/MODBUS over the bytes of words 0..33"),
     Field(35, "counter_tail", UINT, note="= counter in a whole slot"),
 )
-"""PLC to client: one of fifteen, behind the response block."""
+"""PLC to client: the layout of each of the fifteen slots, after the response block."""
 
 DEVICE: Final = Layout(
     Field(0, "device_id", UDINT, note="retained, drawn once, never 0; 0 in a program without it"),
     Field(2, "device_id_complement", UDINT, note="its one's complement: every bit the other way"),
 )
-"""PLC to client, behind the last slot: which PLC this is, on any link."""
+"""PLC to client, after the last slot: identifies the PLC on any link."""
 
 COMMAND_WORDS: Final = COMMAND.words
 RESPONSE_WORDS: Final = RESPONSE.words
@@ -374,7 +374,7 @@ def slot_start(slot: int) -> int:
 
 
 DEVICE_START: Final = slot_start(SLOTS.stop)
-"""The word of the device block's start, counted likewise."""
+"""First word of the device block, with the same numbering as the slots."""
 
 
 _PROBE_WORDS: Final = struct.unpack("<4H", struct.pack("<d", PROBE))

@@ -25,8 +25,8 @@ from robolink.protocols.spel._statements import LAST_TOOL, Statement, check_rang
 from robolink.protocols.spel._values import NUMBER, decimal, parse_integer, unreadable
 
 _LAST_OUTPUT = 0xFFFF
-"""Two bytes carry a bit number (docs/reference/epson.md 2.2); which exist depends on the
-hardware."""
+"""Highest bit number that two bytes hold (docs/reference/epson.md 2.2); the hardware decides which
+exist."""
 
 _LAST_SPEED = 3
 _LAST_JOINT = 6

@@ -22,10 +22,10 @@ from robolink.model import Hand, Pose, Posture, ToolOffset
 from robolink.protocols.spel._values import decimal, posture_marks
 
 Statement = NewType("Statement", str)
-"""One SPEL+ statement, fit for Execute."""
+"""One SPEL+ statement, valid for Execute."""
 
 MAX_STATEMENT: Final = 4060
-"""Most bytes of a statement (docs/reference/epson.md 1.5)."""
+"""Largest number of bytes of a statement (docs/reference/epson.md 1.5)."""
 
 _HANDS: Final = {Hand.RIGHT: " /R", Hand.LEFT: " /L"}
 LAST_TOOL: Final = 15
@@ -191,7 +191,7 @@ def print_reachable(target: Pose, *, six_axes: bool) -> Statement:
     """
     posture = target.posture
     if posture is not None and six_axes:
-        # In their first turns: which turn a movement takes is another question.
+        # In the first turn of each joint: the turn that a movement uses is a separate question.
         posture = Posture(posture.elbow, posture.wrist)
     plain = replace(target, posture=posture)
     return Statement(f"Print TargetOK({_point(plain, six_axes=six_axes)})")
@@ -265,8 +265,8 @@ def check_range(what: str, value: int, low: int, high: int) -> None:
 
 
 _LAST_INPUT = 0xFFFF
-"""Two bytes carry a bit number (docs/reference/epson.md 2.2); which exist depends on the
-hardware."""
+"""Highest bit number that two bytes hold (docs/reference/epson.md 2.2); the hardware decides which
+exist."""
 
 
 def move_till(target: Pose, bit: int, *, on: bool, six_axes: bool) -> Statement:

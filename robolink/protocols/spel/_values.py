@@ -21,7 +21,7 @@ from robolink.messages import tr
 from robolink.model import Elbow, Hand, Posture, ToolOffset, Wrist
 
 NUMBER: Final = r"[+-]?[0-9]{1,18}(?:\.[0-9]{1,18})?"
-"""A plain decimal, as a part of larger patterns."""
+"""Pattern of a plain decimal, for use in larger patterns."""
 
 _NUMBER: Final = re.compile(NUMBER + r"(?:E[+-][0-9]{2,3})?")
 _INTEGER: Final = re.compile(r"[+-]?[0-9]{1,18}")
@@ -49,7 +49,7 @@ _LINE: Final = re.compile(
 _HIGHEST_TOOL: Final = 15
 
 Layout = Literal["plain", "padded", "four"]
-"""How a simulated controller lists tools; see :func:`format_tool_listing`."""
+"""Format of a simulated controller's tool list; see :func:`format_tool_listing`."""
 
 
 def decimal(value: float, places: int = 3) -> str:

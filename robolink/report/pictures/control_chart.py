@@ -10,7 +10,7 @@ from robolink.report._markup import element
 from robolink.report.pictures.drawing import WIDTH, Drawing, Place, circle, line, step_up, words
 
 MOST_POINTS: Final = 120
-"""More values than these cannot be told apart on paper; the newest are drawn."""
+"""Largest number of values drawn, the newest first: more cannot be distinguished on paper."""
 
 _LEFT, _RIGHT, _TOP, _HEIGHT, _BELOW = 58.0, 70.0, 8.0, 110.0, 30.0
 _LEAST_REACH_MM: Final = 0.005

@@ -11,7 +11,7 @@ from robolink.report._markup import element
 
 _CELL: Final = 2.0
 _TRIES: Final = 2
-"""How many distances are tried before a name is given up."""
+"""Number of distances tried before a name is left out."""
 
 _DIRECTIONS: Final = ((1, -1), (1, 0), (1, 1), (0, -1), (0, 1), (-1, -1), (-1, 0), (-1, 1))
 
@@ -67,7 +67,7 @@ WIDTH: Final = 640.0
 _LOWEST: Final = 230.0
 _HIGHEST: Final = 430.0
 _MARGIN: Final = 60.0
-"""Room around the outermost points, for their arrows and names."""
+"""Space around the outermost points, for their arrows and names."""
 
 _NARROWEST_MM: Final = 40.0
 _LOWEST_MM: Final = 10.0
@@ -156,7 +156,7 @@ def _multiples(start_mm: float, length_mm: float, step_mm: float) -> Iterator[fl
 
 
 Place: TypeAlias = tuple[float, float]
-"""A place on paper, from the upper left corner."""
+"""A position on paper, from the upper left corner."""
 
 _HEAD: Final = 7.0
 """Length of an arrow's head."""

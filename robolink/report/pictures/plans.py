@@ -29,7 +29,7 @@ from robolink.report.pictures.drawing import (
 )
 
 _TURN: Final = 26.0
-"""Length of the arrow that shows U, on paper."""
+"""Length on paper of the arrow that shows U."""
 
 _CROSS: Final = 6.0
 _LOWEST_MM: Final = 2.0
@@ -78,7 +78,7 @@ def _stands(panel: PlotPanel, poses: Sequence[Pose], rejected: Sequence[int]) ->
 def _turned(panel: PlotPanel, pose: Pose) -> tuple[Place, Place]:
     x, y = panel.at(pose.x_mm, pose.y_mm)
     angle = math.radians(pose.u_deg)
-    # Paper counts downwards, so a positive turn has a negative step.
+    # On paper Y points down, so a positive turn has a negative step.
     return (x, y), (x + _TURN * math.cos(angle), y - _TURN * math.sin(angle))
 
 
@@ -91,7 +91,7 @@ def _reference(panel: PlotPanel, point: Sequence[float]) -> Iterator[Element]:
 
 _LEFT, _TOP, _BELOW = 46.0, 10.0, 66.0
 _STILL_MM: Final = 5e-7
-"""A displacement below this is a rounding, and has no direction."""
+"""Largest displacement that is only rounding and has no direction, in mm."""
 
 
 def draw(impact: Impact) -> Drawing:
@@ -234,7 +234,7 @@ def _scales(plane: Plane, factor: float | None, longest_mm: float) -> Element:
 
 
 _LOWEST_SCALE_MM: Final = 0.05
-"""A panel shows at least so much to each side: less is noise."""
+"""Smallest range of a panel to each side, in mm: less is noise."""
 
 
 def tip_drawings(report: Report) -> Iterator[Drawing]:

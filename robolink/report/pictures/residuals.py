@@ -22,10 +22,11 @@ from robolink.report.pictures.drawing import (
 )
 
 _LOWEST_MM: Final = 0.005
-"""A panel shows at least so much to each side: less is below what a controller prints."""
+"""Smallest range of a panel to each side, in mm: less is below the last printed digit."""
 
 Axes = tuple[float, float, float]
-"""Half of the long and of the short axis, mm, and the angle of the long one from X, degrees."""
+"""Half of the long and of the short axis, in mm, and the angle of the long axis from X, in degrees.
+"""
 
 
 def fit_drawings(
@@ -129,7 +130,7 @@ def _interval(result: CalibrationResult, axes: Axes, within_mm: float | None) ->
 
 _LEFT, _RIGHT, _TOP, _HEIGHT, _BELOW = 46.0, 96.0, 10.0, 130.0, 30.0
 _LEAST: Final = 3
-"""Fewer residuals have no order to look at."""
+"""Smallest number of residuals whose order is worth showing."""
 _KINDS: Final = ("x", "y", "z")
 
 
@@ -204,7 +205,7 @@ class _Plot:
         self._count = count
         self._reach_mm = largest_mm * 1.15
         self._width = WIDTH - _LEFT - _RIGHT
-        # As many lines as can be told apart and named.
+        # As many lines as can be distinguished and labelled.
         self._step_mm = step_up(self._reach_mm / 3)
 
     def at(self, number: int, value_mm: float) -> Place:

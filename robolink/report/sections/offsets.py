@@ -66,7 +66,7 @@ def offsets(report: Report) -> OffsetTables | None:
         return None
     components = tuple(_components(report))
     if not report.determined:
-        # Neither a measurement nor typed components are on record: all that is known changed.
+        # Neither a measurement nor typed components are recorded: list all that changed.
         return OffsetTables(components, tr("Offset"), (), "")
     own = tuple(
         one for one, name in zip(components, COMPONENTS, strict=True) if name in report.determined

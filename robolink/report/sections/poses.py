@@ -55,7 +55,7 @@ def pose_tables(report: Report) -> list[PoseRows]:
     """Return the poses of the measurement, and those of refused measurements."""
     tables = []
     if report.poses:
-        # What does not determine Z was never asked for a height; typed poses have none.
+        # A measurement that does not determine Z needs no height; typed poses have none.
         heights = report.record is not None or "z_mm" in report.determined
         title = tr("Poses of the flange that it was computed from")
         tables.append(_table(title, "", report.poses, report.fit, heights=heights))
@@ -101,6 +101,6 @@ def _named(number: int, count: int, fit: CalibrationResult | None, *, left_out: 
     six_point = fit is not None and fit.method in ("six-point", "six_point")
     if fit is None or not six_point or number < len(fit.residuals_mm):
         return str(number + 1)
-    # The last two show the axes; the one before them, where it is no touch, is where they begin.
+    # The last two show the axes; the one before is where they begin, unless it is a touch.
     part = (tr("where the moves begin"), tr("along X"), tr("second move"))[number - count]
     return tr("{number} ({part})", number=number + 1, part=part)

@@ -23,7 +23,7 @@ _TONES: Final = {
     Outcome.UNFINISHED: "bad",
     Outcome.CONFLICT: "bad",
 }
-"""How each looks; what matters most stands last."""
+"""Appearance of each outcome; the most important one is last."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,7 +32,7 @@ from robolink.transport._url import LinkUrl, UrlOptions
 from robolink.transport.byte_stream import link_closed
 from robolink.transport.traffic import Traffic
 
-# It writes to standard error when nobody listens; every failure is an exception here.
+# Without a handler it writes to standard error; here, every failure is an exception.
 logging.getLogger("can").addHandler(logging.NullHandler())
 
 _LOG: Final = PackageLog(__package__)
@@ -41,7 +41,7 @@ SLICE_S: Final = 0.05
 _MULTICAST_PORT: Final = 43113
 _SOCKETCAND_PORT: Final = 29536
 _BUS_OFF: Final = 0x40
-"""In the identifier of an error frame, as Linux reports it (linux/can/error.h)."""
+"""Flag in the identifier of an error frame, as reported by Linux (linux/can/error.h)."""
 
 
 def open_can_bus(
@@ -183,18 +183,19 @@ HEARTBEAT: Final = 0x700
 _NMT: Final = 0x000
 _START: Final = 1
 _BOOT_UP: Final = 0
-"""What a node's first heartbeat says."""
+"""Content of a node's first heartbeat."""
 
 _HEAD: Final = struct.Struct("<HBBHH")
-"""TPDO1: ack, state, group_state, error_class, heartbeat (docs/reference/softmotion.md 4.7)."""
+"""Content of TPDO1: ack, state, group_state, error_class, heartbeat (docs/reference/softmotion.md
+4.7)."""
 _MISSED: Final = 3
 _SHORTEST_LOSS_S: Final = 0.5
 
 _MOST_WAITING: Final = 10_000
-"""Frames that may have come while nobody listened: more than a second of a full bus at 1 Mbit/s
-(about 9,000), and a reader is many times faster than that."""
+"""Largest number of waiting frames: more than a full bus at 1 Mbit/s carries in a second (about
+9,000), and a reader is many times faster."""
 _MOST_ANSWERS: Final = 64
-"""SDO answers kept; each transfer begins with none and asks for one at a time."""
+"""Largest number of SDO answers kept; each transfer starts with none and requests one at a time."""
 
 
 def identifiers(node: int) -> tuple[int, ...]:

@@ -97,7 +97,8 @@ class CanopenMailboxLink:
     """
 
     whole_look_s: Final = 0.0
-    """A bus at 125 kbit/s carries the block in some 60 ms, one at 1 Mbit/s in 8."""
+    """Zero, because a whole look is short: a bus carries the block in about 60 ms at 125 kbit/s, in
+    8 ms at 1 Mbit/s."""
 
     def __init__(
         self,

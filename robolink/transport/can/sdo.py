@@ -22,7 +22,8 @@ _FRAME_BYTES: Final = 8
 _SEGMENT_BYTES: Final = 7
 _EXPEDITED_BYTES: Final = 4
 _MOST_BYTES: Final = 1024
-"""More than any block has: a node that never ends a transfer is cut short."""
+"""Largest number of bytes of a transfer, larger than any block: a node that never ends one is cut
+off."""
 
 _SERVICE: Final = 0xE0
 _DOWNLOAD_SEGMENT: Final = 0x00
@@ -46,7 +47,7 @@ class SdoLine(Protocol):
     """What a transfer sends to and waits on."""
 
     answers: deque[bytes]
-    """What the node's SDO server sent, oldest first."""
+    """Answers of the node's SDO server, oldest first."""
 
     def ask(self, request: bytes) -> None:
         """Send a frame to the node's SDO server."""

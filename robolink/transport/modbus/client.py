@@ -31,10 +31,10 @@ from robolink.transport.modbus.frames import (
 )
 
 _RETRY_S: Final = 0.75
-"""How long all repeats of a question that was not answered may take together."""
+"""Longest time for all repeats of an unanswered request together, in s."""
 
 _REACTION_S: Final = 0.2
-"""What a server takes to answer, on a line so slow that its time counts."""
+"""Reaction time of a server, in s, on a line so slow that it matters."""
 
 
 class Exchange(Protocol):

@@ -22,7 +22,7 @@ _SHOWN_BYTES: Final = 256
 _GATEWAY_NO_PATH: Final = 0x0A
 _GATEWAY_NO_ANSWER: Final = 0x0B
 _NOT_DONE: Final = frozenset({1, 2, 3, 6})
-"""Codes after which a write has certainly not been carried out."""
+"""Exception codes after which a write was certainly not carried out."""
 
 
 def describe(request: ModbusRequest) -> str:

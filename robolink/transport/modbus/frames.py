@@ -149,7 +149,7 @@ class TcpFraming:
 class RtuFraming:
     """Unit in front, CRC behind; the length follows from the function."""
 
-    def pack(self, request: ModbusRequest, transaction: int) -> bytes:  # noqa: ARG002 - not numbered
+    def pack(self, request: ModbusRequest, transaction: int) -> bytes:  # noqa: ARG002 - RTU frames have no number
         """See ``Framing.pack``."""
         frame = bytes([request.unit]) + _payload(request)
         return frame + _crc(frame)
@@ -172,7 +172,7 @@ class RtuFraming:
 
 
 _HEADER: Final = struct.Struct(">HHHB")
-_MOST_BYTES_COUNTED: Final = 254  # unit and PDU, in the header of a TCP frame
+_MOST_BYTES_COUNTED: Final = 254  # unit and PDU, counted in the header of a TCP frame
 _SHORTEST_RTU: Final = 5
 _REFUSED: Final = 0x80
 _COIL_WORDS: Final = {0: 0x0000, 1: 0xFF00}
@@ -181,7 +181,7 @@ _COIL_VALUES: Final = {word: value for value, word in _COIL_WORDS.items()}
 _READS_BITS: Final = frozenset({1, 2})
 
 _LENGTHS: Final = {1: 0, 2: 0, 3: 0, 4: 0, WRITE_COIL: 5, WRITE_REGISTERS: 5}
-"""Bytes of a whole answer, by its function; 0 where the answer counts what follows."""
+"""Length in bytes of a whole answer, by function; 0 if the answer contains its own length."""
 
 
 def _payload(request: ModbusRequest) -> bytes:

@@ -101,7 +101,7 @@ class ModbusMailboxLink:
     """
 
     durable: bool = True
-    """A PLC outlives this process."""
+    """True: a PLC outlives this process."""
 
     def __init__(
         self,

@@ -18,19 +18,20 @@ if TYPE_CHECKING:
     from robolink.transport.serial_port import SerialSettings
 
 MOST_REGISTERS: Final = "most_registers"
-"""Option of a URL: how many registers the server gives in one read."""
+"""URL option: the number of registers that the server returns in one read."""
 
 TCP_MEDIUM: Final = "modbus-tcp"
 RTU_MEDIUM: Final = "modbus-rtu"
 
 _DEFAULT_UNITS: Final = {TCP_MEDIUM: 255, RTU_MEDIUM: 1}
-"""A TCP server that is no gateway is asked as 255 (Modbus messaging on TCP/IP 1.0b)."""
+"""Default unit, by medium: a TCP server that is no gateway has unit 255 (Modbus messaging on TCP/IP
+1.0b)."""
 
 _PORT: Final = 502
 _FASTEST_TIMED_BAUD: Final = 19_200
 _QUIET_CHARACTERS: Final = 10
 _QUIET_S: Final = 0.02
-"""USB adapters hand over what they receive every 16 ms; a shorter pause is not silence."""
+"""Shortest pause that counts as silence, in s: USB adapters deliver data every 16 ms."""
 
 _LOG: Final = PackageLog(__package__)
 
@@ -120,7 +121,7 @@ def _open_rtu(
     timeout_s: float,
     clock: Clock,
 ) -> ModbusClient:
-    # Here, because over TCP nothing of a serial line is needed.
+    # Imported here, because TCP needs nothing of a serial line.
     from robolink.transport.modbus.rtu import RtuExchange, RtuLine
     from robolink.transport.serial_port import open_serial, take_settings
 

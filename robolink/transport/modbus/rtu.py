@@ -25,7 +25,7 @@ from robolink.transport.modbus.frames import (
 )
 
 _AROUND: Final = 3
-"""The unit in front of a frame and its checksum behind."""
+"""Number of bytes around a PDU: the unit before and the checksum after."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,16 +58,16 @@ class RtuExchange:
 
     recovers: Final = True
     units: Final = range(1, 248)
-    """0 is a broadcast, which nobody answers."""
+    """Units that answer; 0 is a broadcast, which nobody answers."""
 
-    # An answer that comes later than this many questions is not expected any more.
+    # An answer that comes later than this number of requests is no longer expected.
     _REMEMBERED: Final = 16
-    # Lengths that nothing else on a mailbox reads, so that each names its own question.
+    # Lengths not used for anything else on a mailbox, so that each identifies its request.
     _UNUSUAL: Final = range(3, 3 + 2 * (_REMEMBERED + 1), 2)
 
-    # Sixteen of the longest frames: more late answers than that are not expected either.
+    # Sixteen of the longest frames: more late answers are not expected.
     _MOST_UNASKED_BYTES: Final = 256 * _REMEMBERED
-    # Four of the longest frames in a row without the pause that has to follow each.
+    # Four of the longest frames in a row without the pause required after each.
     _MOST_WITHOUT_PAUSE: Final = 1024
 
     def __init__(
@@ -112,7 +112,7 @@ class RtuExchange:
     def _get_in_step(self, unit: int, deadline: Deadline) -> None:
         self._fall_silent(deadline)
         probe = self._unlike_all_doubts(unit)
-        # A refusal says no length: it proves something when only this question can have it.
+        # A refusal contains no length: it is proof only if no other request can have caused it.
         refusal_is_its_own = probe.function not in {doubt.function for doubt in self._doubts}
         reply = self._ask_once(probe, deadline)
         while not probe.is_answered_by(reply) or not (reply.refusal is None or refusal_is_its_own):
@@ -136,7 +136,7 @@ class RtuExchange:
         return ModbusRequest(unit, function, area, self._line.probe_address, count)
 
     def _fall_silent(self, deadline: Deadline) -> None:
-        self._transport.receive_waiting()  # it may have gathered for minutes, pauses and all
+        self._transport.receive_waiting()  # data may have gathered for minutes, with pauses
         passed = 0
         while True:
             self._transport.clock.sleep(self._line.quiet_s)
@@ -155,7 +155,7 @@ class RtuExchange:
 
     def _ask_once(self, request: ModbusRequest, deadline: Deadline) -> ModbusReply:
         self._buffer.clear()
-        self._transport.receive_waiting()  # what came unasked answers nothing
+        self._transport.receive_waiting()  # unrequested data answer nothing
         self._keep_distance()
         self._in_step.discard(request.unit)
         self._doubts.append(request)
@@ -199,14 +199,14 @@ class RtuExchange:
 
     def _could_be_echo(self, request: ModbusRequest, sent: bytes) -> bool:
         """Whether to wait for more, because so far the line repeats what was sent."""
-        if request.function == WRITE_COIL or not sent:  # its answer is the request itself
+        if request.function == WRITE_COIL or not sent:  # its answer equals the request
             return False
         if self._buffer.startswith(sent):
             raise errors.echoing(self._identity, request, bytes(self._buffer))
         return sent.startswith(self._buffer)
 
     def _receive(self, request: ModbusRequest, deadline: Deadline) -> None:
-        if deadline.expired:  # also when frames of no request of ours keep coming
+        if deadline.expired:  # even if frames of other requests keep arriving
             raise errors.unanswered(self._identity, request, bytes(self._buffer), serial=True)
         try:
             came = self._transport.receive(deadline=deadline)

@@ -9,8 +9,9 @@ from robolink.transport.modbus import errors as errors
 from robolink.transport.modbus.frames import FrameError, Framing, ModbusReply, ModbusRequest
 
 _MOST_UNASKED_BYTES: Final = 16_384
-"""Sixty of the longest frames. Late answers are fewer: after a time-out the link is closed. Who
-sends more between a question and its answer does not stop."""
+"""Largest number of unrequested bytes: sixty of the longest frames. Late answers are fewer, because
+the link is closed after a time-out. A server that sends more between a request and its answer will
+not stop."""
 
 
 class TcpExchange:
@@ -27,13 +28,13 @@ class TcpExchange:
         self._transaction = 0
         self._unasked = 0
 
-    def takes_s(self, sent_bytes: int, answered_bytes: int) -> float:  # noqa: ARG002 - the form of all exchanges
+    def takes_s(self, sent_bytes: int, answered_bytes: int) -> float:  # noqa: ARG002 - signature of all exchanges
         """See :meth:`robolink.transport.modbus.client.Exchange.takes_s`."""
         return 0.0
 
     def ask(self, request: ModbusRequest, deadline: Deadline) -> ModbusReply:
         """See :meth:`robolink.transport.modbus.client.Exchange.ask`."""
-        # A server that hung up while nothing was asked is noticed before anything is sent.
+        # A connection that the server closed while idle is noticed before anything is sent.
         self._unasked = 0
         waiting = self._transport.receive_waiting()
         if waiting is not None:
@@ -75,7 +76,7 @@ class TcpExchange:
                 ) from error
             if reply is not None:
                 return reply
-            if deadline.expired:  # also when frames of no request of ours keep coming
+            if deadline.expired:  # even if frames of other requests keep arriving
                 raise errors.unanswered(self._identity, request, bytes(self._buffer), serial=False)
             try:
                 self._keep(self._transport.receive(deadline=deadline), request)

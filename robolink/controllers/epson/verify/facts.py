@@ -127,7 +127,7 @@ _WIDTHS: Final = (8, 9)
 _WRAPPED_DEG: Final = 180.0
 
 Reading = Callable[[str], tuple[str, OptionValue] | None]
-"""From a printed text to what it shows and the option's value; ``None`` for neither."""
+"""Returns what a printed text shows and the option's value; ``None`` if it shows neither."""
 
 
 def closing_quote(interview: Interview) -> Fact:

@@ -101,7 +101,7 @@ def _asked(transport: Transport, dialect: Dialect, line: str, timeout_s: float) 
     codec = EpsonBinaryCodec(Role.HOST, dialect)
     opening = codec.send(Opening())
     transport.send(opening, deadline=Deadline.after(transport.clock, _SEND_S))
-    # Whether EOT is answered is not known; an answer to it is none to the question.
+    # It is unknown if EOT is answered; such an answer does not answer the question.
     received = _heard(transport, _LISTENED_S)
     question = codec.send(Request(_STATUS))
     transport.send(question, deadline=Deadline.after(transport.clock, _SEND_S))

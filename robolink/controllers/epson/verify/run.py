@@ -97,7 +97,7 @@ def verify_epson(
     line = open_line(_with_every_letter(parse_url(url)), timeout_s=timeout_s, traces=traces)
     session = log_in(line, password, timeout_s=timeout_s)
     try:
-        # It only reads, and the login sees to it that nobody else is there.
+        # The run only reads, and the login ensures that no other client is connected.
         outcomes = memory_journal(session.identity).log(session.identity)
         controller = EpsonController(session, outcomes, remote_timeout_s=0.0)
         try:

@@ -115,12 +115,12 @@ def redacted(dialogue: Dialogue) -> Dialogue:
 
 
 def _each_hidden(match: re.Match[bytes]) -> bytes:
-    # The number of fields stays, so that the dialogue can be replayed.
+    # The number of fields stays the same, so that the dialogue can be replayed.
     return b"#%s,%s%s" % (match[1], match[2], (b"," + _HIDDEN) * match[3].count(b","))
 
 
 _PATIENCE_S = 0.5
-"""How long an answer to a request without its end is waited for."""
+"""Wait for an answer to a request sent without its terminator, in s."""
 
 _LONGEST_WAIT_S = 5.0
 _POLL_S = 0.1

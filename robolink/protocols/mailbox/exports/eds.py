@@ -93,7 +93,7 @@ HEAD_FIELDS: Final = (
     Entry("error_class", UNSIGNED16, mapped=True),
     Entry("heartbeat", UNSIGNED16, mapped=True),
 )
-"""What TPDO1 carries, in its order."""
+"""Content of TPDO1, in this order."""
 
 MAILBOX_OBJECTS: Final = (
     _variable(0x2100, Entry("command", DOMAIN, "rw")),
@@ -111,7 +111,7 @@ MAILBOX_OBJECTS: Final = (
     _record(0x2110, "command_fields", *COMMAND_FIELDS),
     _array(0x2200, "tool_slot", *(Entry(f"slot_{n}", DOMAIN) for n in SLOTS)),
 )
-"""As docs/reference/mailbox.md says, and 0x2103: a PDO can only carry what stands somewhere."""
+"""Objects of docs/reference/mailbox.md, and 0x2103: a PDO can only carry values of an object."""
 
 
 def _mapping(index: int, entries: tuple[Entry, ...]) -> Iterator[Entry]:
@@ -165,7 +165,8 @@ COMMUNICATION_OBJECTS: Final = (
     ),
     _record(0x1A00, "TPDO1 mapping", *_mapping(0x2103, HEAD_FIELDS)),
 )
-"""The node that sends the client's NMT heartbeat is written into 0x1016 on site."""
+"""Communication objects; the node that sends the client's NMT heartbeat is entered in 0x1016 on
+site."""
 
 
 _DOMAIN_CODE: Final = 2

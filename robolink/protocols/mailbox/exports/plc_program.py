@@ -53,7 +53,7 @@ PROGRAM_FILES: Final = (
     "robolink_softmotion.st",
     "robolink_program.st",
 )
-"""The sources, each after those that it uses."""
+"""Source files, each after those that it uses."""
 
 _MARKED_SECTION: Final = (
     r"[ ]*(?:\(\*|//) {name}:(?: \*\))?\n(.*?)[ ]*(?:\(\*|//) end {name}(?: \*\))?\n"
@@ -346,10 +346,10 @@ class PlcopenSchema(StrEnum):
     """
 
     CODESYS = "0200"
-    """What CODESYS itself writes."""
+    """The format that CODESYS itself writes."""
 
     OPENPLC = "0201"
-    """The only one that OpenPLC, Beremiz and IronPLC read."""
+    """The only format that OpenPLC, Beremiz and IronPLC read."""
 
 
 def plcopen_xml(texts: Mapping[str, str], schema: PlcopenSchema = PlcopenSchema.CODESYS) -> str:

@@ -13,6 +13,7 @@ import pytest
 DOCS = Path(__file__).parents[2] / "docs"
 INDEX = DOCS / "README.md"
 PAGES = sorted(page for page in DOCS.glob("*.md") if page != INDEX)
+REFERENCE = sorted((DOCS / "reference").glob("*.md"))
 READERS = ("technicians", "integrators", "programmers", "maintainers")
 READ_THROUGH = ("Tutorial", "How-to", "Sheet")
 LOOKED_UP = ("Overview", "Reference")
@@ -73,6 +74,13 @@ def test_a_page_says_for_whom_and_what_it_is_and_keeps_to_its_length(page):
     )
     if said.kind in READ_THROUGH:
         assert words(text) <= MOST_WORDS, "move what is looked up to docs/reference, or shorten it"
+
+
+@pytest.mark.parametrize("page", REFERENCE, ids=lambda page: page.name)
+def test_a_page_of_the_reference_says_for_whom_it_is(page):
+    said = head(page.read_text(encoding="utf-8"))
+    assert said, "line 3 has to be a line such as *For programmers. Reference.*"
+    assert said.kind == "Reference"
 
 
 def test_the_index_lists_each_page_once_under_one_of_its_readers():

@@ -34,7 +34,7 @@ def touching(tip, u_deg, *, pin=PIN, hand=None):
 
 
 def rotation(u_deg, v_deg, w_deg):
-    """Return Rz(U) Ry(V) Rx(W), written out the long way."""
+    """Return Rz(U) Ry(V) Rx(W), written out in full."""
     u, v, w = (math.radians(angle) for angle in (u_deg, v_deg, w_deg))
     turn = np.array([[math.cos(u), -math.sin(u), 0], [math.sin(u), math.cos(u), 0], [0, 0, 1]])
     lean = np.array([[math.cos(v), 0, math.sin(v)], [0, 1, 0], [-math.sin(v), 0, math.cos(v)]])
@@ -61,7 +61,7 @@ def shaken(poses, random, sigma_mm, *, axes=2):
 
 
 def coverage(measure, truth, trials, *, seed=7):
-    """Return how often each measured component's interval held the truth.
+    """Return the share of runs in which each measured component's interval held the truth.
 
     Args:
         measure: Called with a random generator; returns a result.

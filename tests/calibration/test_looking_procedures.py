@@ -78,7 +78,7 @@ class IdealCell:
 
     @property
     def placed(self):
-        """The looks at places; the others are beside them."""
+        """The looks at places; the other looks are beside them."""
         return [look for look in self.looks if not look.purpose.startswith("Checking whether")]
 
     def _take(self, step):

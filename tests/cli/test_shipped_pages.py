@@ -1,4 +1,4 @@
-"""docs and recipe: the pages and recipes that come with robolink."""
+"""docs and recipe: the pages and recipes shipped with robolink."""
 
 import json
 import re

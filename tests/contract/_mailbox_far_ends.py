@@ -40,7 +40,7 @@ class FarEnd(Protocol):
         """Set the PLC's device number, as two words."""
 
     def command(self) -> list[int]:
-        """Return the command block as it was written."""
+        """Return the command block as written."""
 
     def heartbeat(self) -> int:
         """Return the client's heartbeat word."""

@@ -143,7 +143,7 @@ def test_a_sensor_measures_at_its_station_and_nobody_is_asked(cell, method, stat
 def test_a_sensor_stops_inside_the_tolerance_and_its_worst_is_offered_for_retaking(
     tmp_path, monkeypatch, kind, words, which
 ):
-    """The simulated person accepts each offer; the answers are on record."""
+    """The simulated person accepts each offer; the answers are recorded."""
     monkeypatch.setattr(
         "robolink_cli.session.check_before_start.agree_to_motion", lambda *_, **__: None
     )

@@ -302,7 +302,7 @@ def turn(request):
 
 @pytest.fixture
 def parallel(machine, turn):
-    """A client of a machine with a long tool, whose TCP stands parallel to MCS."""
+    """A client of a machine with a long tool, whose TCP is parallel to MCS."""
     client = machine("Kin_5Axes")
     axes = (*client.now().axes[:3], *turn.wrist, 0.0)
     now = client.tell(Opcode.MOVE_DIRECT, 0, 0, ACS, 0, pose=axes, dynamics=FACTORS)

@@ -1,4 +1,4 @@
-"""The runs that are disturbed: recipes, each on a kind of controller."""
+"""The disturbed runs: recipes, each on a kind of controller."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager

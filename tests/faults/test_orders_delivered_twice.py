@@ -100,7 +100,7 @@ def test_f79_an_order_is_not_told_as_done_while_something_is_not_put_back():
 
 @pytest.mark.fault("F79")
 def test_f79_a_first_order_begins_nothing_while_something_is_unsettled():
-    """Its job may move before anything is written, and would find out at its end only."""
+    """Its job may move before anything is written, and would find out only at its end."""
     desk = Desk()
     with desk.connected() as controller:
         left = Marker("killed", MarkerKind.SELECTION, "calibrate tool 1", "then", {"tool": 1})

@@ -1,4 +1,4 @@
-"""``python -m tests.mutants.adversary FOLDER``: records which lines the adversary executes.
+"""``python -m tests.mutants.adversary FOLDER``: record the lines that the adversary executes.
 
 Its histories are the same each time, so it cannot find a mutant in another line.
 """

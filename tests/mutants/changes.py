@@ -116,7 +116,7 @@ _SENTENCES: Final = frozenset({"tr", "declared", "spoken", "joined", "TypeVar", 
 """Calls whose arguments are for people, or are names without effect."""
 
 _FOR_PEOPLE: Final = frozenset({"help", "short_help", "epilog", "metavar", "remedy", "strict"})
-"""Keywords whose values are for people; and ``strict`` of ``zip``, which asserts only."""
+"""Keywords whose values are for people; and ``strict`` of ``zip``, which only asserts."""
 
 _ALIKE: Final = frozenset(
     [

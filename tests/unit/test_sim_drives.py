@@ -214,7 +214,7 @@ def test_torque_values_are_listed_two_a_row():
 
 @pytest.mark.parametrize("power", ["High", "Low"])
 def test_a_torque_is_told_as_a_share_of_its_limit_and_never_above(power):
-    """Help on the torque restriction: the limit counts as 1 for what is measured after it."""
+    """Help on the torque restriction: the limit counts as 1 for later measurements."""
     cell = Cell()
     word = "LimitTorque" if power == "High" else "LimitTorqueLP"
     other = "LimitTorqueLP" if power == "High" else "LimitTorque"

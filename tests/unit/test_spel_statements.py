@@ -230,7 +230,7 @@ def test_an_assigned_variable_is_read_over_the_wire_and_back(login):
 
 
 def refused_words():
-    """Return the statements and the functions that a program may hold and that are refused."""
+    """Return the statements and functions that a program may contain and the simulator refuses."""
     known = {"pdef", *PLAIN_FUNCTIONS, *MACHINE_FUNCTIONS, *POINT_FUNCTIONS, *STATE_FUNCTIONS}
     known |= {*TASK_FUNCTIONS, *FUNCTIONS_OF_ARRAYS, *OF_POINT_NUMBERS}
     return UNSIMULATED - WINDOW_ONLY, UNSIMULATED_FUNCTIONS - known

@@ -63,7 +63,7 @@ def moments_of(method: str) -> tuple[str, ...]:
 
 @dataclass
 class FlowHand:
-    """Goes through a change.
+    """Goes through a change at the screens or lines, as a hand does.
 
     Attributes:
         cell: The simulated cell.

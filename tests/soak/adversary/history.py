@@ -113,7 +113,7 @@ class Habit:
 
     @property
     def careful(self) -> bool:
-        """Whether each touch is made as it should be."""
+        """Whether each touch is made correctly."""
         return not (self.stays_share or self.types_ahead or self.bias_mm or self.tires_mm)
 
 

@@ -126,7 +126,7 @@ class ResultsFile:
         return found
 
     def done(self, hours: int) -> set[int]:
-        """Return the seeds that this state of the code has run for so many hours."""
+        """Return the seeds that this state of the code has run for this many hours."""
         return {r.seed for r in self.results() if r.hours == hours and r.source == source_digest()}
 
     def add(self, result: SeedResult) -> None:

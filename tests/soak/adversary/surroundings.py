@@ -299,7 +299,7 @@ class SteppedLock:
 
 
 class SteppedRoom:
-    """A condition variable in which waiting takes virtual time only."""
+    """A condition variable whose waits take virtual time only."""
 
     def __init__(self, turns: TurnTaking) -> None:
         self._turns = turns

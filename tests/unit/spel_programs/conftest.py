@@ -98,7 +98,7 @@ def failure(cell):
 
 @pytest.fixture
 def faults(cell):
-    """Return what is wrong with a program's text."""
+    """Return the faults in a program's text."""
 
     def look(text, **options):
         try:

@@ -201,7 +201,7 @@ def test_subroutines_return_to_where_they_were_called(printed, failure):
 
 
 def test_directives_choose_and_replace(cell):
-    """P. 58 to 63; a macro with a semicolon stands in EPSON's library (check 19 of programs)."""
+    """P. 58 to 63; EPSON's library has a macro with a semicolon (check 19 of programs)."""
     made = cell(
         '#include "d.inc"\n#ifdef LOUD\n#define WORD "loud"\n#else\n#define WORD "quiet"\n#endif\n'
         "Function main\nInteger f\nPrint WORD ' WORD\nIf 0 Then SET(f, 3)\nPrint f\n"

@@ -125,7 +125,7 @@ def test_a_named_point_takes_modifiers_and_starts_motions(cell):
 
 
 def test_an_output_switches_half_way(printed):
-    """P. 55 to 57; ambiguity 3: what stands between ! and ! belongs to the motion."""
+    """P. 55 to 57; ambiguity 3: the text between ! and ! belongs to the motion."""
     lines = (
         "Real way",
         "Xqt follow",

@@ -186,7 +186,7 @@ def test_tcspeed_holds_the_speed_under_torque_control_alone(plate):
     ],
 )
 def test_a_limit_of_the_torque_stops_the_motion_by_its_number(plate, power, limit, stop, number):
-    """P. 498, 500: each power has a limit and a switch of its own."""
+    """P. 498, 500: each power mode has its own limit and switch."""
     made = plate(f"Power {power}", limit, f"{stop} On", "Go Here -Z(12)", "Print 1")
     shown = made.run()
     failure = made.runner.failure

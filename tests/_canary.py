@@ -1,8 +1,8 @@
-"""Whether a password shows up in anything that a test made robolink write, say or log.
+"""Searches everything that a test makes robolink write, print or log for the test's passwords.
 
-Each password that a test makes, as ``Secret``, is a canary: at the end of the test it is looked for
-in the files of the test (journals, traces, backups, reports, state), in what was printed here and
-by processes that were started, in what was logged, and in every error that was made, shown or not.
+Each ``Secret`` that a test makes is a canary. At the end of the test its text is looked for in the
+files of the test (journals, traces, backups, reports, state), in the output of this process and of
+started processes, in the log, and in every error object, shown or not.
 """
 
 import logging
@@ -19,17 +19,17 @@ from robolink.errors import RobolinkError
 from robolink.model import Secret
 
 SHORTEST: Final = 7
-"""A shorter password may stand in a text by chance, so a test must not make one."""
+"""A shorter password could occur in a text by chance, so tests must not use one."""
 
 _MOST_KEPT: Final = 20_000
 
 
 class Watch:
-    """What was said since :meth:`begin`, and which passwords there were.
+    """Records all output and all passwords since :meth:`begin`.
 
     Attributes:
-        passwords: What must not be said.
-        said: Where something was said, and what.
+        passwords: The texts that must not appear.
+        said: Each recorded text, with its source.
     """
 
     def __init__(self) -> None:
@@ -37,18 +37,18 @@ class Watch:
         self.said: deque[tuple[str, str]] = deque(maxlen=_MOST_KEPT)
 
     def begin(self) -> None:
-        """Forget everything."""
+        """Forget everything recorded."""
         self.passwords.clear()
         self.said.clear()
 
     def hear(self, where: str, what: object) -> None:
-        """Note what was said."""
+        """Record an output."""
         if what:
             text = what.decode("latin-1") if isinstance(what, bytes) else str(what)
             self.said.append((where, text))
 
     def leaks(self, *folders: Path) -> list[str]:
-        """Return where a password was said, or stands in a file; never the password."""
+        """Return the outputs and files that contain a password; never the password itself."""
         found = []
         for password in sorted(self.passwords):
             found += [where for where, what in self.said if password in what]
@@ -58,7 +58,7 @@ class Watch:
 
 
 def install(watch: Watch) -> None:
-    """Let ``watch`` hear of every password, error, printed text and log record from now on."""
+    """Make ``watch`` record every password, error, output and log entry from now on."""
     _after(Secret, "__init__", lambda _none, _self, value: _note(watch, value))
     _after(
         RobolinkError,
@@ -116,5 +116,5 @@ def _holds(file: Path, password: bytes) -> bool:
         data = file.read_bytes()
     except OSError:
         return False
-    # The file that a test gave the password in.
+    # The file in which a test supplied the password.
     return password in data and data.split(b"\n", 1)[0].strip(b"\xef\xbb\xbf \r") != password

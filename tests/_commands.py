@@ -1,4 +1,4 @@
-"""A command in this process: how it ended and what it showed."""
+"""Runs a command in this process and returns its exit code and output."""
 
 import contextlib
 import io
@@ -12,12 +12,12 @@ from robolink_cli import main
 from robolink.locale.languages import translator
 
 chinese = cache(partial(translator, "zh"))
-"""Returns what translates; thousands of sentences are read once, not for each test."""
+"""Returns the Chinese translator. Its thousands of sentences are read once for all tests."""
 
 
 @dataclass(frozen=True)
 class Ended:
-    """How a command ended and what it showed."""
+    """The exit code and the output of a command."""
 
     code: int
     out: str
@@ -25,7 +25,7 @@ class Ended:
 
     @property
     def document(self) -> dict[str, Any]:
-        """The JSON document."""
+        """The JSON document that was printed."""
         found: dict[str, Any] = json.loads(self.out)
         return found
 

@@ -1,7 +1,7 @@
-"""Whether every document that a command printed in this process fits its published schema.
+"""Checks every document that a command prints in this process against its published schema.
 
-What is looked at is what reached a program: each text that goes out through the one place that
-prints JSON. A test whose command is made up says so with :meth:`Documents.forgive`.
+All JSON is printed by one function, and each text that passes through it is checked. A test that
+uses a made-up command calls :meth:`Documents.forgive`.
 """
 
 import json
@@ -21,12 +21,12 @@ _MARK: Final = '"schema": "robolink/'
 
 
 def key_of(schema: str) -> str:
-    """Return where the schema of a document stands: ``status-1`` of ``robolink/status/1``."""
+    """Return the key of a document's schema: ``status-1`` for ``robolink/status/1``."""
     return schema.removeprefix("robolink/").replace("/", "-")
 
 
 def wrong_in(document: dict[str, Any]) -> list[str]:
-    """Return what is wrong with a document, each with its place."""
+    """Return the faults of a document, each with its place."""
     schema = document["schema"]
     described = PUBLISHED.get(key_of(schema))
     if described is None:
@@ -35,34 +35,34 @@ def wrong_in(document: dict[str, Any]) -> list[str]:
 
 
 class Documents:
-    """What was wrong with documents since :meth:`begin`."""
+    """Collects the faults of documents printed since :meth:`begin`."""
 
     def __init__(self) -> None:
         self.wrong: list[str] = []
         self._forgiven = False
 
     def begin(self) -> None:
-        """Forget everything."""
+        """Forget everything collected."""
         self.wrong.clear()
         self._forgiven = False
 
     def forgive(self) -> None:
-        """Look at no document of this test: they are made up."""
+        """Skip the documents of this test: they are made up."""
         self._forgiven = True
         self.wrong.clear()
 
     def hear(self, text: object) -> None:
-        """Look at what was printed."""
+        """Check a printed text."""
         if self._forgiven or not isinstance(text, str) or _MARK not in text[:40]:
             return
         rest = text
-        while rest:  # what a process said that has ended is handed over as one text
+        while rest:  # the output of a process that ended comes as one text
             document, end = _DECODER.raw_decode(rest)
             self.wrong += wrong_in(document)
             rest = rest[end:].lstrip()
 
     def install(self) -> None:
-        """Look at all that is printed from here on."""
+        """Check everything printed from now on."""
         printed = click.echo
 
         @wraps(printed)
@@ -74,4 +74,4 @@ class Documents:
 
 
 DOCUMENTS: Final = Documents()
-"""Of the test that runs."""
+"""The collector for the running test."""

@@ -1,7 +1,7 @@
-"""A small check of a document against a JSON schema, of the keywords that ours has.
+"""Checks a document against a JSON schema, for the keywords that our schemas use.
 
-A key that no schema names is wrong here, although a client has to bear it: so nothing is
-answered that is not described.
+A key that no schema names counts as a fault here, although clients must accept unknown keys: every
+key of an answer must be described.
 """
 
 import re
@@ -27,7 +27,7 @@ _PARTS: Final = ("allOf", "oneOf", "anyOf")
 
 
 class Schemas:
-    """The schemas of a document of OpenAPI.
+    """The schemas of an OpenAPI document.
 
     Args:
         document: The document.
@@ -37,7 +37,7 @@ class Schemas:
         self._document = document
 
     def answer_to(self, path: str, method: str, status: int) -> dict[str, Any]:
-        """Return what describes the answer of an operation."""
+        """Return the schema for the answer of an operation."""
         responses = self._document["paths"][path][method]["responses"]
         told = responses.get(str(status), responses["default"])
         told = self._referred(told) if "$ref" in told else told
@@ -45,8 +45,8 @@ class Schemas:
         return schema
 
     def wrong(self, schema: dict[str, Any], value: object, at: str = "") -> list[str]:
-        """Return what is wrong with a value, each with its place."""
-        if not schema:  # anything
+        """Return the faults of a value, each with its place."""
+        if not schema:  # any value is valid
             return []
         found = self._differs(schema, value, at)
         if isinstance(value, dict) and not self._says_what_else(schema):
@@ -64,7 +64,7 @@ class Schemas:
                 found.append(f"{at} fits {tried.count([])} of {len(tried)}: {tried}")
         if "anyOf" in schema:
             parts = schema["anyOf"]
-            if all(self._differs(part, value, at) for part in parts):  # to the first that fits
+            if all(self._differs(part, value, at) for part in parts):  # up to the first fit
                 found.append(f"{at} fits none of {len(parts)}")
         if "pattern" in schema and not re.search(schema["pattern"], value):
             found.append(f"{at} is {value!r}")
@@ -102,7 +102,7 @@ class Schemas:
         return found
 
     def _says_what_else(self, schema: dict[str, Any]) -> bool:
-        """Return whether a schema itself says which other keys there may be, or one of several."""
+        """Return whether the schema, or one of its parts, says which other keys are allowed."""
         if "$ref" in schema:
             return self._says_what_else(self._referred(schema))
         parts = [it for key in _PARTS for it in schema.get(key, ())]
@@ -114,7 +114,7 @@ class Schemas:
         return [f"{at}/{name} is not described" for name in sorted(unnamed)]
 
     def _names(self, schema: dict[str, Any]) -> set[str]:
-        """Return the keys that a schema names, whichever of several it is."""
+        """Return the keys that the schema and its parts name."""
         if "$ref" in schema:
             return self._names(self._referred(schema))
         parts = [it for key in _PARTS for it in schema.get(key, ())]

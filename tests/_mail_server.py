@@ -1,4 +1,4 @@
-"""A mail server on loopback that keeps what it is given."""
+"""A mail server on loopback that keeps the mails it receives."""
 
 import socketserver
 import threading
@@ -9,11 +9,11 @@ from email.message import EmailMessage
 from typing import cast
 
 REFUSED = "nobody@plant"
-"""A mail to this address is refused."""
+"""Mail to this address is refused."""
 
 
 class _Dialogue(socketserver.StreamRequestHandler):
-    """SMTP, as far as a client that sends one mail needs it (RFC 5321)."""
+    """The part of SMTP (RFC 5321) that a client needs to send one mail."""
 
     def handle(self) -> None:
         self.wfile.write(b"220 here\r\n")
@@ -38,7 +38,7 @@ class _Server(socketserver.ThreadingTCPServer):
 
 @contextmanager
 def mail_server() -> Iterator[tuple[str, list[EmailMessage]]]:
-    """Serve for the block; give ``HOST:PORT`` and the list of what came."""
+    """Run the server during the block; yield ``HOST:PORT`` and the list of received mails."""
     with _Server() as server:
         thread = threading.Thread(target=server.serve_forever, args=(0.01,))
         thread.start()

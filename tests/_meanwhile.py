@@ -1,4 +1,4 @@
-"""Time that passes only where somebody waits, and something that happens then."""
+"""A runtime in which waiting takes no time and the first wait can trigger an event."""
 
 import threading
 from collections.abc import Callable
@@ -7,13 +7,13 @@ from robolink import runtime
 
 
 class Meanwhile(runtime.SystemRuntime):
-    """Surroundings in which a wait takes no time.
+    """A runtime in which a wait takes no time.
 
     Args:
-        happens: What is done at the first wait, once.
+        happens: Called once, at the first wait.
 
     Attributes:
-        slept_s: How long was waited in all.
+        slept_s: The sum of all waits.
     """
 
     def __init__(self, happens: Callable[[], None] = lambda: None) -> None:

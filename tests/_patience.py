@@ -1,7 +1,8 @@
-"""How long is waited for what certainly comes."""
+"""The longest time that a test waits for an event that must happen."""
 
 from typing import Final
 
 PATIENCE_S: Final = 120.0
-"""Such a wait ends with what is waited for. Only what never comes takes this long: a computer that
-does much else besides gives a process a hundredth of its time."""
+"""Such a wait ends as soon as the event happens; only a missing event takes this long. On a busy
+computer a process may get a hundredth of its usual CPU time.
+"""

@@ -1,9 +1,9 @@
 """Shares the tests of a run among processes: ``pytest --processes 2``.
 
-The tests are collected once, by the process that prints; then it forks. To import and collect all
-of them takes a third of a minute, so each process would pay that anew, and two would compile the
-same modules side by side. A process takes one test module after the other, so that what a module
-sets up serves all of its tests, and sends its reports through a pipe.
+The process that prints collects the tests once and then forks. Importing and collecting all tests
+takes 20 s, which each process would otherwise repeat, and two would compile the same modules side
+by side. A process takes one test module at a time, so that all tests of a module share its
+fixtures, and sends its reports through a pipe.
 """
 
 import os
@@ -20,15 +20,15 @@ from typing import Any
 import pytest
 
 _NUMBER = struct.Struct("H")
-"""How the number of a module stands in the pipe from which the processes take them."""
+"""The format of a module's number in the pipe from which the processes take their work."""
 _LONGEST_KEPT_S = 0.1
-"""A report of a test that passed is handed on with the first one after so long."""
+"""Reports of passed tests are collected for this long, then sent together."""
 _OF_THE_PRINTER = ("LFPlugin", "NFPlugin", "StepwisePlugin", "LogXML")
-"""Plug-ins that write down how the whole run went; none of the processes knows."""
+"""Plug-ins that record the whole run; the test processes do without them."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """Offer ``--processes``."""
+    """Add the option ``--processes``."""
     parser.addoption(
         "--processes",
         type=int,
@@ -39,7 +39,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_runtestloop(session: pytest.Session) -> bool | None:
-    """Run the tests in as many processes as were asked for; ``None`` leaves it to pytest."""
+    """Run the tests in as many processes as requested; ``None`` leaves the run to pytest."""
     count = session.config.getoption("processes")
     if count < 2 or session.config.option.collectonly or session.testsfailed:
         return None
@@ -55,7 +55,7 @@ def pytest_runtestloop(session: pytest.Session) -> bool | None:
         _hear(session, runs)
     finally:
         for end, pid in runs.items():
-            end.close()  # what still runs ends at its next report
+            end.close()  # a process that still runs ends at its next report
             os.waitpid(pid, 0)
     if session.shouldfail:
         raise session.Failed(session.shouldfail)
@@ -65,7 +65,7 @@ def pytest_runtestloop(session: pytest.Session) -> bool | None:
 
 
 def _numbers(count: int) -> int:
-    """Return the end of a pipe that holds 0 to ``count`` - 1; whoever reads one has it alone."""
+    """Return the reading end of a pipe that holds 0 to ``count`` - 1; each number is read once."""
     reading, writing = os.pipe()
     os.set_blocking(writing, False)
     for number in range(count):
@@ -89,7 +89,7 @@ def _start(
         sender.send()
         writing.send_bytes(b"")
     except (BrokenPipeError, KeyboardInterrupt):
-        pass  # the printer wants no more
+        pass  # the printing process has stopped reading
     except BaseException:
         traceback.print_exc(file=sys.__stderr__)
     finally:
@@ -97,7 +97,7 @@ def _start(
 
 
 def _prepare(config: pytest.Config, writing: Connection, number: int) -> "_Sender":
-    """Give this process captures and a folder of its own, and lead its reports to the printer."""
+    """Give this process its own captures and folder; send its reports to the printing one."""
     capture = config.pluginmanager.getplugin("capturemanager")
     if capture is not None and capture.is_globally_capturing():
         capture.stop_global_capturing()
@@ -118,16 +118,16 @@ def _prepare(config: pytest.Config, writing: Connection, number: int) -> "_Sende
 
 
 class _Silent:
-    """Stands where pytest and plug-ins look for what prints."""
+    """Replaces the terminal reporter that pytest and plug-ins look for."""
 
     def __init__(self, writer: Any) -> None:
         self._tw = writer
 
 
 class _Sender:
-    """A plug-in that hands reports on, some together: to wake the printer costs as much as a test.
+    """A plug-in that sends reports in batches, because waking the printer takes as long as a test.
 
-    What did not pass is handed on at once.
+    A test that did not pass is reported at once.
     """
 
     def __init__(self, config: pytest.Config, writing: Connection) -> None:
@@ -137,7 +137,7 @@ class _Sender:
         self._sent_s = 0.0
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        """Send a report, or keep it for a moment."""
+        """Send a report, or keep it for the next batch."""
         hook = self._config.hook
         self._reports.append(hook.pytest_report_to_serializable(config=self._config, report=report))
         now_s = time.monotonic()
@@ -146,14 +146,14 @@ class _Sender:
             self.send()
 
     def send(self) -> None:
-        """Send what is kept."""
+        """Send the reports that were kept."""
         reports, self._reports = self._reports, []
         if reports:
             self._writing.send_bytes(pickle.dumps(reports))
 
 
 def _run(session: pytest.Session, modules: list[list[pytest.Item]], queue: int) -> None:
-    """Run the tests of one module after the other."""
+    """Run the tests, module by module."""
     tests = (test for number in _taken(queue) for test in modules[number])
     test = next(tests, None)
     while test is not None and not (session.shouldstop or session.shouldfail):
@@ -169,7 +169,7 @@ def _taken(queue: int) -> Iterator[int]:
 
 
 def _hear(session: pytest.Session, runs: dict[Connection, int]) -> None:
-    """Let the plug-ins of this process see the reports of the others until all have ended."""
+    """Pass the processes' reports to the plug-ins here until all have ended."""
     hook = session.config.hook
     open_ends = set(runs)
     while open_ends and not (session.shouldstop or session.shouldfail):

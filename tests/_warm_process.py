@@ -1,10 +1,11 @@
-"""Starts ``python -m robolink_cli`` by a fork of a process that has imported it already.
+"""Starts ``python -m robolink_cli`` by forking a process that has already imported it.
 
-Two of three seconds of a command that a test starts went into imports. What is started here is a
-process all the same: a child of the test's process, with a number, descriptors, signals, session
-and environment of its own; it ends as any Python does. Only how Python begins is not shown, so
-that is asked with ``-c``. Where the interpreter would begin otherwise (other ``PYTHON`` variables
-or locale), for more than descriptors 0 to 2, and on other systems than Linux, a new Python starts.
+Imports took two of the three seconds of a command that a test starts. A forked command is still a
+process of its own: a child of the test's process, with its own number, descriptors, signals,
+session and environment, and it ends as any Python process does. Only the start of the interpreter
+is not tested this way; tests of the start use ``-c``. A new Python is started where the interpreter
+would begin differently (other ``PYTHON`` variables or locale), for more than descriptors 0 to 2,
+and on other systems than Linux.
 """
 
 import atexit
@@ -33,7 +34,7 @@ _started: dict[int, "_WarmProcess"] = {}
 
 
 def install() -> None:
-    """Let every command that this process starts from here on be forked, where that can be."""
+    """Fork every command that this process starts from now on, where possible."""
     if sys.platform != "linux":
         return
     usual: Any = subprocess.Popen._execute_child  # type: ignore[attr-defined]
@@ -62,13 +63,13 @@ def install() -> None:
 
 
 def end() -> None:
-    """End what this process forks from, so that what it cost is counted."""
+    """End the process that is forked, so that its CPU time is counted."""
     if (warm := _started.pop(os.getpid(), None)) is not None:
         warm.end()
 
 
 def _warm(environment: dict[str, str]) -> "_WarmProcess | None":
-    """Return what begins with such an environment as a Python would."""
+    """Return the process to fork if a new Python would begin the same way in this environment."""
     warm = _started.get(os.getpid())
     if warm is None:
         warm = _started[os.getpid()] = _WarmProcess()
@@ -76,7 +77,7 @@ def _warm(environment: dict[str, str]) -> "_WarmProcess | None":
 
 
 class _WarmProcess:
-    """A process that has imported the command, waits, and is forked."""
+    """A process that has imported the command and waits to be forked."""
 
     def __init__(self) -> None:
         self._own, far = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -100,7 +101,7 @@ class _WarmProcess:
     def fork(
         self, words: list[str], cwd: str, env: dict[str, str], new_session: bool, ends: list[int]
     ) -> int:
-        """Start a command; return the number of its process, a child of this one."""
+        """Start a command; return its process number. The process is a child of this one."""
         asked = json.dumps([os.getpid(), words, cwd, env, new_session]).encode()
         assert len(asked) < _LONGEST
         _take_orphans(True)
@@ -111,13 +112,13 @@ class _WarmProcess:
             _take_orphans(False)
 
     def end(self) -> None:
-        self._own.shutdown(socket.SHUT_RDWR)  # whatever else holds it
+        self._own.shutdown(socket.SHUT_RDWR)  # also ends it where another process holds the socket
         self._own.close()
         self._process.wait()
 
 
 def _of_the_beginning(environment: dict[str, str]) -> dict[str, str]:
-    """Return what of an environment a Python heeds when it begins."""
+    """Return the variables that Python reads when it starts."""
     return {
         name: value
         for name, value in environment.items()
@@ -130,9 +131,9 @@ def _take_orphans(yes: bool) -> None:
 
 
 def _serve(requests: socket.socket) -> None:
-    """Fork a command for each request, until nobody is left to ask."""
+    """Fork a command for each request until the requesting process is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the commands
-    gc.disable()  # nothing of what is imported is garbage
+    gc.disable()  # imported objects are not garbage
     _import_all()
     gc.freeze()
     gc.enable()
@@ -144,7 +145,7 @@ def _serve(requests: socket.socket) -> None:
         if between := os.fork():
             os.close(writing)
             number = os.read(reading, 64)
-            os.waitpid(between, 0)  # from here on its child is one of the test's process
+            os.waitpid(between, 0)  # from now on its child belongs to the test's process
             requests.send(number)
             for descriptor in (*ends, reading):
                 os.close(descriptor)
@@ -170,7 +171,7 @@ def _import_all() -> None:
 
 
 def _become(asked: tuple[int, list[str], str, dict[str, str], bool], ends: list[int]) -> NoReturn:
-    """Be a Python that was just started with a command line."""
+    """Behave as a Python that was just started with this command line."""
     parent, words, cwd, env, new_session = asked
     while os.getppid() != parent:
         time.sleep(0.0002)
@@ -205,7 +206,7 @@ def _become(asked: tuple[int, list[str], str, dict[str, str], bool], ends: list[
 
 
 def _opened(before: Any, descriptor: int) -> io.TextIOWrapper:
-    """Open a stream as Python does when it begins."""
+    """Open a stream as Python does at its start."""
     binary: Any = open(  # noqa: SIM115 - as long as the process runs
         descriptor,
         "wb" if descriptor else "rb",

@@ -1,4 +1,4 @@
-"""What all tests have in common."""
+"""Fixtures and hooks that all tests share."""
 
 import gc
 import os
@@ -14,31 +14,31 @@ from tests._canary import Watch, install
 from tests._documents import DOCUMENTS
 from tests._processes import pytest_addoption, pytest_runtestloop  # noqa: F401 - hooks
 
-# Nothing of what is imported and collected is garbage: a search for it begins with the tests.
+# Imported modules and collected tests are not garbage: collection is off until the tests begin.
 gc.disable()
 
-# Before anything imports numpy: threads for matrices of six rows cost far more than they bring,
-# the more so the more cores a machine has.
+# Must be set before numpy is imported: threads for six-row matrices cost more than they save, and
+# more so with every core.
 for _library in ("OPENBLAS", "OMP", "MKL"):
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
 
 
-# What tests write stands in memory where there is room: a new journal with one entry takes 1.8 ms
-# of CPU there, 4.7 ms on a disk; and that it outlives a killed process shows there too.
+# Tests write to memory where there is room: a new journal with one entry takes 1.8 ms of CPU there
+# and 4.7 ms on a disk. A journal outlives a killed process there too.
 if sys.platform == "linux":
-    with suppress(AttributeError, OSError):  # no statvfs where POSIX is taken away
+    with suppress(AttributeError, OSError):  # no statvfs if POSIX is blocked
         _memory = os.statvfs("/dev/shm")
         if os.access("/dev/shm", os.W_OK) and _memory.f_bavail * _memory.f_frsize > 4 << 30:
             os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", "/dev/shm")
 
 
 collect_ignore = ["integrator"]
-"""A project of its own, which ``tests/packaging/test_wheel.py`` runs against the wheel."""
+"""A separate project, which ``tests/packaging/test_wheel.py`` runs against the wheel."""
 
 CANARIES = Watch()
-"""Every password of the test that runs, and what it made robolink say."""
+"""The passwords of the running test, and everything that it made robolink print or log."""
 
-# Sentences are compared in English, in whatever language the tester's desktop is.
+# Tests compare English sentences, whatever language the desktop is set to.
 for _name in ("LC_ALL", "LC_MESSAGES", "LANG"):
     if os.environ.get(_name):
         os.environ[_name] = "C.UTF-8"
@@ -46,9 +46,10 @@ os.environ.pop("LANGUAGE", None)
 
 
 def pytest_configure(config):
-    """Start a pytest inside of a test without Hypothesis: no use for it, and it takes longer.
+    """Leave Hypothesis out of a pytest run inside a test: not needed there, and it costs time.
 
-    The workers of xdist are not inside of a test: what starts them passes nothing on.
+    The workers of xdist do not count as inside a test: the process that starts them passes nothing
+    on.
     """
     starts_workers = bool(getattr(config.option, "numprocesses", 0)) and not hasattr(
         config, "workerinput"
@@ -60,8 +61,8 @@ def pytest_configure(config):
 
 def pytest_sessionstart():
     """Prepare what every test of this process needs."""
-    # The tester's own passwords are nobody's business; and looking anew for a package that is not
-    # there is a tenth of a short command's time.
+    # The tester's own passwords stay private; and searching again for a missing package takes a
+    # tenth of a short command's time.
     sys.modules["keyring"] = None  # type: ignore[assignment]
     hear_signals()
     install(CANARIES)
@@ -70,16 +71,16 @@ def pytest_sessionstart():
 
 
 def pytest_sessionfinish():
-    """End what this process started for its tests."""
+    """End the process that this one started for its tests."""
     _warm_process.end()
 
 
 def hear_signals():
-    """Undo what a shell does to jobs in the background, and ``nohup`` to all: signals ignored.
+    """Restore signals that a shell (background jobs) or ``nohup`` has set to be ignored.
 
-    Whatever the tests start would inherit that. A signal that has a handler is the usual one again
-    in a program that is started; so this process outlives a closed window, as ``nohup`` wants it,
-    and a command under test does not.
+    Started programs would inherit the ignored signals. A signal with a handler has its default
+    again in a started program; so this process survives a closed window, as ``nohup`` intends, and
+    a command under test does not.
     """
     if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
         signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -89,14 +90,15 @@ def hear_signals():
 
 
 def _outlived(_number, _frame):
-    """Go on."""
+    """Do nothing."""
 
 
 @pytest.fixture
 def signals_of_a_terminal(monkeypatch):
-    """Ctrl-C, a termination and a closed window do in this process what they usually do.
+    """Give Ctrl-C, SIGTERM and a closed window their usual effect in this process.
 
-    A session that an earlier test left open is not heard, and keeps nothing from being given back.
+    A session that an earlier test left open gets no signals and does not prevent the handlers from
+    being restored.
     """
     from robolink import interrupts
 
@@ -115,9 +117,9 @@ def signals_of_a_terminal(monkeypatch):
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_runtest_setup():
-    """Forget what was said and printed before this test.
+    """Forget everything recorded before this test.
 
-    What is done for each test is a hook: a fixture for it would cost ten times as much.
+    This is a hook because a fixture for every test would cost ten times as much.
     """
     CANARIES.begin()
     DOCUMENTS.begin()
@@ -125,9 +127,9 @@ def pytest_runtest_setup():
 
 @pytest.hookimpl(wrapper=True, trylast=True)
 def pytest_runtest_teardown(item):
-    """Close the journal of each test, and look at what it said.
+    """Close the test's journals, and check its output for passwords and its documents for faults.
 
-    Thousands of open files would be too many. What a test left unread is heard before its capture
+    Thousands of journals left open would be too many. Unread output is read before its capture
     ends.
     """
     given = getattr(item, "funcargs", {})
@@ -147,7 +149,7 @@ def pytest_runtest_teardown(item):
 
 
 def _no_password_shows(given):
-    """Fail a test whose password stands in anything that was written, said or logged."""
+    """Fail a test whose password appears in a file, an output or a log."""
     if not CANARIES.passwords:
         return
     folders = {given[name] for name in ("tmp_path", "robolink_state") if name in given}
@@ -156,24 +158,24 @@ def _no_password_shows(given):
 
 
 def _documents_fit_their_schemas():
-    """Fail a test in which a command printed a document that docs/documents.schema.json denies."""
+    """Fail a test in which a command printed a document that breaks docs/documents.schema.json."""
     if DOCUMENTS.wrong:
         pytest.fail("\n".join(DOCUMENTS.wrong[:9]), pytrace=False)
 
 
 def pytest_itemcollected(item):
-    """Give what is there for its length 15 minutes, where it asks for no other limit."""
+    """Allow soak tests 15 minutes unless they set another limit."""
     if item.get_closest_marker("soak") and not item.get_closest_marker("timeout"):
         item.add_marker(pytest.mark.timeout(900))
 
 
 def pytest_collection_modifyitems(config, items):
-    """Leave out what ``make soak`` is for, unless the command line speaks of it."""
-    # A test is asked for by its name, so a name may hold no address in memory.
+    """Leave out the soak tests unless the command line names their mark."""
+    # Tests are selected by name, so a name must not contain a memory address.
     if changing := [item.nodeid for item in items if " at 0x" in item.nodeid]:
         raise pytest.UsageError(f"give this test ids that are alike in each run: {changing[0]}")
     for item in items:
-        # The process that prints the table of faults sees reports, not items.
+        # The process that prints the table of faults sees reports but no items.
         rows = {row for mark in item.iter_markers("fault") for row in mark.args}
         item.user_properties += [("fault", row) for row in sorted(rows)]
     if "soak" in config.option.markexpr:
@@ -185,9 +187,9 @@ def pytest_collection_modifyitems(config, items):
 
 
 def pytest_collection_finish():
-    """Leave thousands of collected tests out of each later search for garbage; it is rarer, too."""
+    """Keep thousands of collected tests out of garbage collection, and collect less often."""
     gc.collect()
     gc.freeze()
     gc.enable()
-    # And search less often: a test makes and drops much, and little of it is garbage in circles.
+    # A test creates and drops many objects, few of them in reference cycles.
     gc.set_threshold(10_000, 10, 10)

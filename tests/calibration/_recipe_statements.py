@@ -1,4 +1,4 @@
-"""What each shipped recipe is accurate to: its own course, made exactly, with the usual scatter.
+"""The accuracy that each shipped recipe states for an exact run with the usual scatter.
 
 ``python -m tests.calibration._recipe_statements`` prints the table of
 docs/reference/recipe-rules.md 4.
@@ -55,7 +55,7 @@ PERSON_MM, PROBE_MM, BEAMS_MM, CAMERA_MM = 0.01, 0.005, 0.003, 0.002
 HERE, PIN_MM = Pose(300, 100, 20, 0), (310.0, 95.0, -40.0)
 TIP, STORED = ToolOffset(12.3, -3.9, -20.6), ToolOffset(12, -4, -20)
 PIXELS = CameraModel(((0.02, 0.0), (0.0, -0.02)), (293.6, 84.8))
-"""A camera whose pixel (320, 240) looks at the middle of its image, X 300, Y 80."""
+"""A camera whose pixel (320, 240) sees the middle of its image, X 300, Y 80."""
 
 
 def _pin(course: Procedure[CalibrationResult]) -> CalibrationResult:
@@ -175,14 +175,14 @@ _COURSES: dict[str, tuple[Callable[[Any, float], CalibrationResult], float]] = {
 
 @dataclass(frozen=True, slots=True)
 class Statement:
-    """What a recipe says, and what comes out.
+    """The statement of a recipe, and its limit.
 
     Attributes:
-        name: Of its file.
-        limit_mm: Its own limit, ``None`` for none.
-        by_default: What is said where nobody knows a row, the station learnt just now.
+        name: The file's name.
+        limit_mm: The recipe's own limit, ``None`` for none.
+        by_default: The statement with default rows and a station learnt just now.
         in_two_months: The same two months later.
-        by_recipe: With the rows that it states.
+        by_recipe: The statement with the rows that the recipe states.
         stated: These rows.
     """
 
@@ -195,7 +195,7 @@ class Statement:
 
     @property
     def row(self) -> list[str]:
-        """Its line of the table."""
+        """The recipe's line of the table."""
         limit = "-" if self.limit_mm is None else f"{self.limit_mm:g}"
         states = ", ".join(f"`{key} = {value:g}`" for key, value in self.stated.items()) or "-"
         return [
@@ -210,7 +210,7 @@ class Statement:
 
 
 def statement(name: str) -> Statement:
-    """Return what one shipped recipe is accurate to, its station learnt just now."""
+    """Return the accuracy that one shipped recipe states, with a station learnt just now."""
     recipe = load_recipe(EXAMPLES / f"{name}.toml").recipe
     course, usual_mm = _COURSES[recipe.source.of_method.name]
     result = course(recipe, recipe.tolerances.sigma_mm or usual_mm)

@@ -1,4 +1,4 @@
-"""Quantiles by scipy's special functions, which ``scipy.stats`` itself goes by.
+"""Quantiles from scipy's special functions, which ``scipy.stats`` itself uses.
 
 Importing ``scipy.stats`` costs each process of the suite 0.6 s more.
 """

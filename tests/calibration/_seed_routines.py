@@ -1,4 +1,4 @@
-"""EPSON's two routines as its chapter on tools writes them, in SPEL+ Atan2's X-first order."""
+"""EPSON's two routines from its chapter on tools, with SPEL+ Atan2's X-first arguments."""
 
 import math
 
@@ -9,7 +9,7 @@ def atan2_x_first(x, y):
 
 
 def in_tool_0(seen, flange):
-    """The polar steps that both routines share."""
+    """Convert to the polar form that both routines use."""
     x, y = seen
     x0, y0, u0 = flange
     dx, dy = x - x0, y - y0

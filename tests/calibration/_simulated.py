@@ -1,4 +1,4 @@
-"""Poses of a tip whose place is known, with and without noise."""
+"""Poses of a tip at a known place, with and without noise."""
 
 import math
 from contextlib import contextmanager
@@ -14,14 +14,17 @@ from robolink.model import Pose, rotate_xy
 PIN = (310.0, 95.0, -40.0)
 TRIALS = 2000
 SAMPLE = 500
-"""A quarter of the trials, and so bounds twice as wide: an interval that is narrower by a quarter,
-or wider by a half, is still found."""
+"""A quarter of the trials, so bounds are twice as wide; an interval a quarter too narrow or a half
+too wide is still found.
+"""
 
 LEAST, MOST = 0.93, 0.97
-"""What a 95 % interval may hold in 2,000 trials (the standard deviation is 0.5 %)."""
+"""Limits for the share of 95 % intervals that hold the truth in 2,000 trials (the standard
+deviation is 0.5 %).
+"""
 
 MOST_OF_WIDER = 0.998
-"""Where the wider of two intervals is taken, the estimated and the stated one."""
+"""The largest share where the wider of an estimated and a stated interval is taken."""
 
 
 def touching(tip, u_deg, *, pin=PIN, hand=None):
@@ -31,7 +34,7 @@ def touching(tip, u_deg, *, pin=PIN, hand=None):
 
 
 def rotation(u_deg, v_deg, w_deg):
-    """Return Rz(U) Ry(V) Rx(W), written out the long way."""
+    """Return Rz(U) Ry(V) Rx(W), written out in full."""
     u, v, w = (math.radians(angle) for angle in (u_deg, v_deg, w_deg))
     turn = np.array([[math.cos(u), -math.sin(u), 0], [math.sin(u), math.cos(u), 0], [0, 0, 1]])
     lean = np.array([[math.cos(v), 0, math.sin(v)], [0, 1, 0], [-math.sin(v), 0, math.cos(v)]])
@@ -58,12 +61,12 @@ def shaken(poses, random, sigma_mm, *, axes=2):
 
 
 def coverage(measure, truth, trials, *, seed=7):
-    """Return how often each measured component's interval held the truth.
+    """Return the share of runs in which each measured component's interval held the truth.
 
     Args:
         measure: Called with a random generator; returns a result.
-        truth: The true value of each measured component, in their order.
-        trials: How often it is called.
+        truth: The true value of each measured component, in order.
+        trials: The number of calls.
     """
     random = np.random.default_rng(seed)
     hits = np.zeros(len(truth))
@@ -75,12 +78,12 @@ def coverage(measure, truth, trials, *, seed=7):
 
 
 def margin(trials):
-    """Return four standard deviations of a share of 95 % that is seen in so many trials."""
+    """Return four standard deviations of a 95 % share in this many trials."""
     return (MOST - LEAST) / 2 * math.sqrt(TRIALS / trials)
 
 
 def assert_about(shares, share, trials):
-    """Every one of the shares is the same but for chance."""
+    """Check that all shares are the same within chance."""
     assert all(abs(seen - share) <= margin(trials) for seen in shares), shares
 
 
@@ -88,10 +91,10 @@ def assert_honest(shares, trials, *, stated=False, most=None):
     """Every component's interval holds the truth in 93 to 97 %; in more where sigma was stated.
 
     Args:
-        shares: How often each did.
-        trials: In how many; the fewer, the more is chance.
+        shares: The share of each component.
+        trials: The number of trials; with fewer, chance counts more.
         stated: Whether sigma was stated.
-        most: The largest share, where it is known otherwise.
+        most: The largest allowed share, if it differs.
     """
     if most is None:
         most = MOST_OF_WIDER if stated else 0.95 + margin(trials)
@@ -100,7 +103,7 @@ def assert_honest(shares, trials, *, stated=False, most=None):
 
 @contextmanager
 def refused(code):
-    """The block is refused with ``code``, and the refusal says what to do."""
+    """Check that the block is refused with ``code`` and a remedy."""
     with pytest.raises(CalibrationError) as caught:
         yield caught
     assert caught.value.code == code

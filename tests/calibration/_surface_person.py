@@ -1,4 +1,4 @@
-"""A person who brings a tip onto a surface, and a robot that tilts its tool, for procedures."""
+"""A person who touches a surface, and a robot that tilts its tool, for procedure tests."""
 
 import math
 import random
@@ -23,7 +23,7 @@ _SLIPS = {"right": (0, 0, 0), "x": (0.3, 0, 0), "y": (0, 0.3, 0), "z": (0, 0, 0.
 def slips(*robots):
     """Return each robot with a tip that slipped in each direction or in none.
 
-    Each direction is tried with one of two robots; with the other one it is left to ``make soak``.
+    Each direction is tried with one of two robots; the other runs only in ``make soak``.
     """
     return [
         pytest.param(
@@ -38,7 +38,7 @@ def slips(*robots):
 
 
 class Plate:
-    """A plane that leans toward a direction of the base."""
+    """A plane, tilted toward a direction of the base."""
 
     def __init__(self, lean_deg=0.0, toward_deg=0.0, point=(300.0, 100.0, -60.0)):
         lean, toward = math.radians(lean_deg), math.radians(toward_deg)
@@ -70,15 +70,15 @@ class Ball:
 
 
 class SurfacePerson:
-    """Brings the tip the shortest way onto a surface, but for ``hover``.
+    """Brings the tip onto a surface by the shortest way, except for ``hover``.
 
     Args:
-        surface: What is touched.
-        tip: Where the tip really is.
+        surface: The surface.
+        tip: The real tip.
         hover: Returns how far from the surface touch ``number`` ends, given the height before.
 
-    ``lowest`` is how near the tip came in any movement, ``flown`` at the ends of those that are not
-    straight, ``swung`` how far it went sideways while the tool was tilted.
+    ``lowest`` is the least distance of the tip in any movement, ``flown`` the same at the ends of
+    movements that are not straight, ``swung`` the sideways travel while the tool was tilted.
     """
 
     def __init__(self, surface, *, start=START, sigma_mm=0.01, seed=1, tip=TIP, hover=None):
@@ -90,7 +90,7 @@ class SurfacePerson:
         self.flown, self.swung = math.inf, 0.0
 
     def run(self, procedure):
-        """Answer every step; return the result."""
+        """Carry out every step; return the result."""
         answer = None
         try:
             while True:

@@ -1,4 +1,4 @@
-"""A person at a pin and a robot that tilts its tool, as procedures meet them."""
+"""A person at a pin and a robot that tilts its tool, for procedure tests."""
 
 import math
 import random
@@ -17,7 +17,7 @@ PIN = np.array([300.0, 100.0, -60.0])
 PLAN = TouchPlan(lift_mm=10.0, clearance_mm=2.0)
 FRAMES = (
     Pose(0.0, 0.0, 0.0, 72.0, tool=0),
-    # A six-axis arm whose flange points down, and one that stands askew.
+    # A six-axis arm whose flange points down, and one with a tilted flange.
     Pose(0.0, 0.0, 0.0, -150.0, 0.0, 180.0, hand=Hand.RIGHT, tool=0),
     Pose(0.0, 0.0, 0.0, 30.0, 8.0, -12.0, tool=0),
 )
@@ -25,18 +25,18 @@ UPRIGHT = FRAMES[0]
 
 
 def tip_mm(pose, tip=TIP):
-    """Return where the tip is with the flange in a pose."""
+    """Return the place of the tip with the flange in a pose."""
     return np.array(pose.coordinates()[:3]) + rotation_of(pose) @ tip.components()[:3]
 
 
 def turned_deg(one, other):
-    """Return by which angle two orientations differ."""
+    """Return the angle between two orientations."""
     cosine = (np.trace(rotation_of(one).T @ rotation_of(other)) - 1) / 2
     return math.degrees(math.acos(np.clip(cosine, -1.0, 1.0)))
 
 
 class Person:
-    """Touches the pin with an error, and keeps where the flange went."""
+    """Touches the pin with an error, and records the flange poses."""
 
     def __init__(
         self,
@@ -58,7 +58,7 @@ class Person:
         self.subjects = []
 
     def run(self, procedure, tip=TIP):
-        """Answer every step; return the result."""
+        """Carry out every step; return the result."""
         answer = None
         try:
             while True:

@@ -1,4 +1,4 @@
-"""How often a calibration is simulated where the share of something is asked."""
+"""The number of simulated calibrations in tests of a share."""
 
 import pytest
 
@@ -12,6 +12,6 @@ from tests.calibration._simulated import SAMPLE, TRIALS
     ]
 )
 def trials(request) -> int:
-    """A sample each time; as many as tell a small error of an interval in ``make soak``."""
+    """A sample normally; in ``make soak`` enough to show a small error of an interval."""
     number: int = request.param
     return number

@@ -1,4 +1,4 @@
-"""Every bad input gives its named code and never a number; no good one an interval of 0."""
+"""Bad input gives its named code and never a number; good input never gives an interval of 0."""
 
 import math
 

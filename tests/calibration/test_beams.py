@@ -1,4 +1,4 @@
-"""Two crossed beams: found with a pin, then used for a needle."""
+"""Two crossed beams: located with a pin, then used for a needle."""
 
 import math
 from dataclasses import replace
@@ -24,7 +24,7 @@ PIN = (0.4, -0.2)
 
 
 def crossing(beam, tip, *, u_deg=0.0, way=1, along_mm=0.0, lag_mm=0.0, noise=(0, 0), beams=TRUE):
-    """Drive ``tip`` straight through a beam; edges come late by ``lag_mm``."""
+    """Move ``tip`` straight through a beam; edges come late by ``lag_mm``."""
     line = beams[beam]
     nx, ny = line.normal
     tx, ty = rotate_xy(tip[0], tip[1], u_deg)
@@ -161,9 +161,9 @@ def test_the_interval_holds_the_truth(angles, stated, trials):
 
 
 def needle_crossings(frame, tip, lean, *, dip_mm, beams=TRUE, dz_mm=0.0):
-    """Cross both beams both ways with a needle that leans, at the height of the beams, -30.
+    """Cross both beams both ways with a tilted needle, at the height of the beams, -30.
 
-    The frame is brought where the expected tip, which is ``dz_mm`` shorter along the flange's axis
+    The frame is moved so that the expected tip, which is ``dz_mm`` shorter along the flange's axis
     than the real one, is ``dip_mm`` below the beams.
     """
     turn = rotation_of(frame)
@@ -206,7 +206,7 @@ LEANING_FRAMES = [
 def test_what_was_seen_of_a_needle_that_leans_is_brought_down_to_its_end(frame, lean_deg, turn_deg):
     slope = math.tan(math.radians(lean_deg))
     lean = slope * math.cos(0.7), slope * math.sin(0.7)
-    # Found at two angles it does not matter that the beams were moved.
+    # If it is found at two angles, moved beams do not matter.
     beams = (replace(TRUE[0], y_mm=80.3), replace(TRUE[1], x_mm=299.8)) if turn_deg else TRUE
     seen, stored = needle_crossings(frame, TIP, lean, dip_mm=1.5, beams=beams)
     if turn_deg:
@@ -226,7 +226,7 @@ def test_what_was_seen_of_a_needle_that_leans_is_brought_down_to_its_end(frame, 
     times = {0.0: 1.58, 90.0: 1.38, 180.0: 1.73}[turn_deg]
     assert found.sigma_gain / plain.sigma_gain == pytest.approx(times, abs=0.1)
     assert found.dof == plain.dof
-    # Had it been 0.5 mm longer than was thought, the interval would hold that too.
+    # Had it been 0.5 mm longer than expected, the interval would hold that too.
     seen, stored = needle_crossings(frame, TIP, lean, dip_mm=1.5, dz_mm=0.5)
     deeper, _ = needle_crossings(frame, TIP, lean, dip_mm=4.5, dz_mm=0.5)
     longer = CrossingSolver(TRUE, frame, 1.5, stored, sigma_mm=0.004)
@@ -255,7 +255,7 @@ def test_the_step_of_a_latch_counts_however_often_it_repeats_itself():
     "frame", [Pose(0, 0, 0, 0, 9, 0, tool=0), Pose(0, 0, 0, 25, 4, -6, tool=0)]
 )
 def test_an_unsure_height_enters_x_and_y_as_it_moves_them(frame):
-    """By how much each moves is what a height that is 1 mm off makes of it."""
+    """The uncertainty of a height counts by the shift of X and Y for a height that is 1 mm off."""
     seen, stored = needle_crossings(frame, TIP, (0.0, 0.0), dip_mm=0.0)
 
     def found(off_mm=0.0, sigma_mm=None):

@@ -1,4 +1,4 @@
-"""A held board from two fiducials and from more, and what it carries of the camera that saw it."""
+"""A held board from two or more fiducials, and its uncertainty from the camera that saw it."""
 
 import cmath
 import math
@@ -27,7 +27,7 @@ BOARD = (3.0, -2.0, 21.8)
 
 
 def seen_at(place, pose, noise=(0.0, 0.0), hand=None):
-    """Return the sighting of what is at ``place`` in the flange's axes."""
+    """Return the sighting of a point at ``place`` in the flange's axes."""
     dx, dy = rotate_xy(place[0], place[1], pose[2])
     flange = Pose(pose[0], pose[1], 0, pose[2], hand=hand, tool=0)
     return Sighting(flange, pose[0] + dx + noise[0], pose[1] + dy + noise[1])
@@ -174,7 +174,7 @@ def test_the_intervals_of_a_fit_hold_the_truth(count, stated, trials):
     assert_honest(coverage(measure, BOARD, trials), trials, stated=stated is not None)
 
 
-# What a board carries of the camera that saw it.
+# The uncertainty that a board has from the camera that saw it.
 
 CAMERA = CameraModel(
     ((0.02, 0.0), (0.0, -0.02)),
@@ -212,7 +212,7 @@ def seen_by_a_camera_that_is_off(angles, drawing, place=0j, turn=0j, turned_deg=
     ],
 )
 def test_a_board_carries_what_its_camera_is_unsure_of(angles, drawing, solve):
-    """Against cameras that are off as they say: the part is the covariance of what they find."""
+    """The stated part equals the covariance of results with cameras that are off by as much."""
     rng = np.random.default_rng(6)
     exact = seen_by_a_camera_that_is_off(angles, drawing)
     told = np.array(solve(exact, sigma_mm=1e-9, camera=CAMERA).covariance)
@@ -239,11 +239,11 @@ def test_a_board_is_no_surer_than_the_camera_that_saw_it():
     assert result.region95_radius_mm > 1.2 * result.half95_mm
     assert [row.kind for row in result.budget.rows] == ["B", "B"]
     assert result.budget.rows[-1].name == "place and scale of the camera"
-    # The robot brings both marks near the centre, 5 of 40 mm apart: so much of the camera's own
+    # The robot brings both marks near the centre, 5 of 40 mm apart: that share of the camera's own
     # direction counts, and nothing of its place.
     own_deg = math.degrees(math.hypot(0.002 * 5 / 40, math.sqrt(2) * 0.001 / 40))
     assert result.half_width95[2] == pytest.approx(1.96 * own_deg, rel=0.01)
-    # Over a turn the round finds what the camera's place is off by.
+    # Looks over a whole turn find the error of the camera's place.
     twice = seen_by_a_camera_that_is_off((0.0, 180.0), SEEN_BOARD)
     sure = CameraModel(CAMERA.mm_per_px, (0.0, 0.0), (100.0, 50.0), 0.02, 0.0)
     alone = solve_board_round(twice, SEEN_BOARD * 2, sigma_mm=0.001)
@@ -259,7 +259,7 @@ def test_a_board_is_no_surer_than_the_camera_that_saw_it():
     ],
 )
 def test_a_board_that_hangs_the_wrong_way_round_is_known_as_well_as_any(solve):
-    """At 180 degrees, where an angle goes on at -180."""
+    """At 180 degrees, where angles continue at -180."""
     some, other = (
         solve(seen_by_a_camera_that_is_off((30.0,), SEEN_BOARD, turned_deg=turned_deg)).covariance[
             2

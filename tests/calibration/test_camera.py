@@ -96,7 +96,7 @@ TURNS = [(0.3, 0, 45), (0, 0.2, 90), (0, 0, 135), (0.5, 0, 180), (0, -0.4, -90)]
 
 
 def sighting(dx, dy, u_deg, *, noise_px=(0.0, 0.0), matrix=MATRIX):
-    """Return the picture when the tip is (dx, dy) off a place near the image's middle."""
+    """Return the picture of a tip that is (dx, dy) from a place near the image's middle."""
     at = np.array([310.3 + dx, 44.8 + dy])
     px, py = (np.linalg.inv(matrix) @ (at - ORIGIN) + noise_px).tolist()
     tx, ty = rotate_xy(*TIP, u_deg)
@@ -216,7 +216,7 @@ SQUARE = np.array([[0.02, 0.0], [0.0, -0.02]])
 
 @pytest.mark.parametrize("sigma_px", [0.01, 0.1, 1.0])
 def test_a_spot_that_stands_still_is_no_camera_however_it_scatters(sigma_px):
-    """It was solved: 139,462 micrometres a pixel, shear 78 degrees."""
+    """Such data used to be solved: 139,462 micrometres a pixel, shear 78 degrees."""
     rng = np.random.default_rng(3)
     still = [
         replace(one, px=640 + rng.normal(0, sigma_px), py=512 + rng.normal(0, sigma_px))

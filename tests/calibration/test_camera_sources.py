@@ -1,4 +1,4 @@
-"""How errors of a camera enter what it measured: as they do when the sightings are really wrong."""
+"""The budget's camera errors match those of sightings that are really wrong."""
 
 import math
 from dataclasses import replace
@@ -30,7 +30,7 @@ DRAWING = cells.DRAWING
 
 
 def look(u_deg, place, *, aside, v_deg=0.0, w_deg=0.0):
-    """Return how a place of the flange's axes is seen that was brought near the middle."""
+    """Return the sighting of a point of the flange that was brought near the middle."""
     at = Pose(0, 0, -60, u_deg, v_deg, w_deg)
     dx, dy = FlangePlane.of(at).in_base(place[0], place[1], STORED.z_mm)
     x_mm, y_mm = MIDDLE[0] + aside[0], MIDDLE[1] + aside[1]
@@ -100,7 +100,7 @@ def components(result: CalibrationResult):
 
 
 def changed(seen, solve, move, step=1e-4):
-    """Return by how much the result changes for one unit of something."""
+    """Return the change of the result for one unit of an input."""
     ends = []
     for by in (step, -step):
         moved = []
@@ -128,7 +128,7 @@ def test_a_camera_that_turned_or_is_of_another_scale(name):
 
         expected = changed(seen, solve, away)
         assert gain_of(result, row)[:, 0] == pytest.approx(expected, abs=2e-6)
-        # None of them is trivially nothing.
+        # None of them is trivially zero.
         assert np.abs(expected).max() > 1e-4
 
 
@@ -143,7 +143,7 @@ def test_the_place_counts_where_nothing_finds_it(name):
         return
     gain = gain_of(result, "place_mm")
     if len(result.measured) > 2 and "z_mm" in result.measured:
-        # In space it is as long in every direction, however the flange stands.
+        # In space it has the same length in every direction, however the flange is tilted.
         assert (gain == np.eye(3)).all()
         assert np.hypot.reduce(expected) == pytest.approx(1.0)
     else:

@@ -1,4 +1,4 @@
-"""How often 95 % intervals hold the truth, by method and under errors that real touches have."""
+"""The share of 95 % intervals that hold the truth, by method and for errors of real touches."""
 
 import math
 import sys
@@ -123,7 +123,7 @@ def test_two_pose_with_its_stated_sigma(arc_deg, trials):
 
 @pytest.mark.parametrize("count", [6, 12])
 def test_a_robust_fit_is_less_honest_refuses_nothing_good_and_that_is_known(count, trials):
-    # It takes the odd good pose for an outlier; docs/solvers.md shows these shares.
+    # It takes an occasional good pose for an outlier; docs/solvers.md shows these shares.
     exact = poses(count)
 
     def measure(rng):
@@ -148,12 +148,12 @@ Measure = Callable[[np.random.Generator], CalibrationResult]
 
 @dataclass(frozen=True)
 class Line:
-    """One way to be wrong.
+    """A kind of error.
 
     Attributes:
-        name: What happens.
+        name: The error.
         measure: One calibration.
-        least, most: Share of runs, in %, in which 2,000 runs hold X alone and Y alone.
+        least, most: The share of runs, in %, that hold X alone and Y alone, in 2,000 runs.
         tip: The truth.
     """
 
@@ -166,7 +166,7 @@ class Line:
 
 @dataclass
 class Shares:
-    """Shares of runs in %, of those that were not refused."""
+    """Shares in % of the runs that were not refused."""
 
     before: float
     alone: float
@@ -179,7 +179,7 @@ def exact(count, tip=REALISTIC_TIP, angles=ORDER):
 
 
 def gridded(count, step_mm, sigma_mm):
-    """Jogged in steps from a round place: a touch ends where a step ends, not where the pin is."""
+    """Jog in steps from a round place: a touch ends at the end of a step, not at the pin."""
 
     def measure(rng):
         aside = rng.uniform(-0.5, 0.5, 2)
@@ -207,7 +207,7 @@ def stated(count, times):
 
 
 def encoder(length_mm, *, common, counted, u_deg=0.01):
-    """U is off by 0.01 degrees: anew in each touch, or in all touches alike."""
+    """Put U off by 0.01 degrees: anew in each touch, or alike in all."""
     tip = np.array([length_mm, 0.0])
 
     def measure(rng):
@@ -219,7 +219,7 @@ def encoder(length_mm, *, common, counted, u_deg=0.01):
         tangential = (math.radians(u_deg) * length_mm) ** 2
         if not counted:
             return result
-        # An error of all angles alike turns the offset, at right angles to itself.
+        # An error that all angles share turns the offset, at right angles to itself.
         parts = ((0.0, 0.0), (0.0, tangential)) if common else np.eye(2) * tangential / 8
         return with_station(result, StationPart("angle of U", [list(row) for row in parts], 50))
 
@@ -227,7 +227,7 @@ def encoder(length_mm, *, common, counted, u_deg=0.01):
 
 
 def biased(kind):
-    """A person who comes from one side touches 0.05 mm too early."""
+    """Touch 0.05 mm too early, as a person does who always comes from one side."""
 
     def measure(rng):
         poses = realistic_shaken(exact(8), rng, 0.02)
@@ -247,7 +247,7 @@ def biased(kind):
 
 
 def bumped(count, by_mm):
-    """Somebody bumps the pin between two touches."""
+    """Bump the pin between two touches."""
 
     def measure(rng):
         after = int(rng.integers(2, count - 1))
@@ -265,7 +265,7 @@ def bumped(count, by_mm):
 
 
 def lonely(rng):
-    """The one touch far from the others is five times as rough."""
+    """Make the one touch far from the others five times as rough."""
     poses = realistic_shaken(exact(5, angles=(0.0, 10.0, 20.0, 30.0, 180.0)), rng, 0.02)
     (rough,) = realistic_shaken(poses[-1:], rng, 0.1)
     return solve_n_angle([*poses[:-1], rough])
@@ -335,7 +335,7 @@ NAMES = [line.name for line in LINES]
 
 
 def run(line, trials):
-    """Return the shares of a line."""
+    """Return the shares for a kind of error."""
     rng = np.random.default_rng(11)
     held = np.zeros(3)
     told = 0
@@ -354,7 +354,7 @@ def run(line, trials):
 
 
 def before95_mm(result):
-    """Return half the interval that trusted a stated sigma, and else the residuals."""
+    """Return half the interval by the former rule: a stated sigma, otherwise the residuals."""
     if result.sigma_stated:
         return 1.959964 * 0.02 * result.sigma_gain
     kept = [e for k, e in enumerate(result.residuals_mm) if k not in result.rejected]
@@ -378,7 +378,7 @@ def test_a_sample_of_the_table(name):
 
 
 def test_what_moved_is_told():
-    """A bumped pin is told nearly always, and a good run in 1 or 2 of 100."""
+    """A bumped pin is reported nearly always, and a good run in 1 or 2 of 100."""
     assert run(LINES[NAMES.index("pin bumped by 0.1 mm, 8 touches")], 60).told > 70
     assert run(LINES[NAMES.index("pin bumped by 0 mm, 8 touches")], 100).told < 8
     assert run(LINES[NAMES.index("one lonely touch, five times as rough")], 5).told == 100

@@ -1,9 +1,9 @@
-"""How often the tip lies within what a result says it is accurate to, for what sensors do wrong.
+"""The share of tips within the stated accuracy, for the errors of real sensors.
 
-Each line is a cell in which something is wrong that no residual shows, and which states it as a
-row of the budget. ``repeatable`` is how often the truth lies within the statement of scatter alone,
-``accurate`` within the one with all rows, ``understated`` the same with rows a fifth as wide. The
-figures of 2,000 runs a line (``make soak``) stand in docs/reference/evidence.md 19.
+Each line is a cell with an error that no residual shows, and which the cell states as a row of the
+budget. ``repeatable`` is the share of truths within the statement of scatter alone, ``accurate``
+within the one with all rows, ``understated`` the same with rows a fifth as wide.
+docs/reference/evidence.md 19 has the figures of 2,000 runs a line (``make soak``).
 """
 
 import math
@@ -49,14 +49,14 @@ Measure = Callable[[Random], CalibrationResult]
 
 @dataclass(frozen=True)
 class Line:
-    """A way to be wrong.
+    """A kind of error.
 
     Attributes:
-        name: What is wrong.
+        name: The error.
         measure: One calibration.
-        rows: What the cell states of it; of all other rows that there is nothing.
-        repeatable: At most so many of 100 lie within the statement of scatter.
-        least, most: So many of 100 lie within the one with all rows, in 2,000 runs.
+        rows: The rows that the cell states; all others are stated as zero.
+        repeatable: The largest share of runs, in %, within the statement of scatter.
+        least, most: The limits of the share, in %, within the one with all rows, in 2,000 runs.
     """
 
     name: str
@@ -67,7 +67,7 @@ class Line:
     most: float = 99.5
 
     def facts(self, share: float = 1.0) -> AccuracyFacts:
-        """Return what the cell states, or a share of it."""
+        """Return the facts that the cell states, or a share of them."""
         keys = (
             *("tip_image_px", "place_mm", "camera_turn_deg", "camera_scale_percent"),
             *("print_mm", "touch_mm"),
@@ -78,12 +78,12 @@ class Line:
 
 
 def anywhere(random: Random) -> complex:
-    """Return a direction."""
+    """Return a random direction."""
     return complex(np.exp(2j * math.pi * random.random()))
 
 
 def within(random: Random, half_width: float) -> complex:
-    """Return a vector whose coordinates are each as likely anywhere within a half width."""
+    """Return a vector with each coordinate uniform within a half width."""
     return complex(*random.uniform(-half_width, half_width, 2).tolist())
 
 
@@ -101,13 +101,13 @@ def seen(
     """Return looks at a tip.
 
     Args:
-        random: Of the scatter.
-        angles_deg: U of each.
+        random: Draws the scatter.
+        angles_deg: U of each look.
         aside: How far beside the middle the tip is brought, in the axes of the tool.
-        error: Relative error of the camera's scale, and as imaginary part of its turn.
-        place: What the camera's place is off by.
+        error: Relative error of the camera's scale, with its turn as imaginary part.
+        place: The error of the camera's place.
         image: How far beside the tip it is seen, in the axes of the tool.
-        wobble: How far the tip is beside its offset, by exp(iU).
+        wobble: The distance of the tip from its offset, by exp(iU).
         sigma_mm: Scatter of one coordinate.
     """
     looks = []
@@ -122,7 +122,7 @@ def seen(
 
 
 def off_centre(angles_deg, error, *, sigma_mm=ROUGH_MM):
-    """The tip is looked at 0.8 mm beside the middle, by a camera that is wrong by ``error``."""
+    """Look at the tip 0.8 mm beside the middle, with a camera that is wrong by ``error``."""
 
     def measure(random):
         aside = 0.8 * anywhere(random)
@@ -133,7 +133,7 @@ def off_centre(angles_deg, error, *, sigma_mm=ROUGH_MM):
 
 
 def somewhere(angles_deg, half_width):
-    """The same with a scale that is wrong by anything within a half width."""
+    """The same, with a scale error drawn within a half width."""
 
     def measure(random):
         return off_centre(angles_deg, random.uniform(-half_width, half_width))(random)
@@ -142,7 +142,7 @@ def somewhere(angles_deg, half_width):
 
 
 def all_at_once(angles_deg, rows):
-    """Every row is somewhere within its half width."""
+    """Draw every row's error within its half width."""
 
     def measure(random):
         scale, turn = (
@@ -163,7 +163,7 @@ def all_at_once(angles_deg, rows):
 
 
 def wobbling(angles_deg, term, *, image_px=0.0, jitter_deg=0.0):
-    """A spindle adds a harmonic of 0.06 mm."""
+    """Add a spindle harmonic of 0.06 mm."""
 
     def measure(random):
         amplitude = 0.06 * anywhere(random)
@@ -180,7 +180,7 @@ def wobbling(angles_deg, term, *, image_px=0.0, jitter_deg=0.0):
 
 
 def printed(angles_deg, drawing=DRAWING, *, sigma_mm=None):
-    """Fiducials lie up to 10 um beside their drawing, and the camera was moved by 0.05 mm."""
+    """Shift fiducials up to 10 um from their drawing, and the camera by 0.05 mm."""
 
     def measure(random):
         aside = random.uniform(-PRINT_MM, PRINT_MM, (len(drawing), 2)).tolist()
@@ -204,7 +204,7 @@ def printed(angles_deg, drawing=DRAWING, *, sigma_mm=None):
 
 
 def of_unknown_place(random, image_px=0.5):
-    """A camera that is found with the tip sees it up to half a pixel beside."""
+    """Find a camera together with the tip, which it sees up to half a pixel off."""
     image = within(random, image_px)
     places = [(dx, dy, 0.0) for dx in (-3.0, 3.0) for dy in (-3.0, 3.0)]
     places += [(0.0, 0.0, u_deg) for u_deg in HALF_ROUND]
@@ -305,12 +305,12 @@ class Shares:
 
 
 def error_mm(result: CalibrationResult) -> float:
-    """Return how far the tip that was found is from the true one."""
+    """Return the distance of the found tip from the true one."""
     return abs(complex(result.offset.x_mm, result.offset.y_mm) - TIP)
 
 
 def run(line: Line, trials: int) -> Shares:
-    """Return the shares of a line."""
+    """Return the shares for a kind of error."""
     random = np.random.default_rng(19)
     held, widths = np.zeros(3), []
     for _ in range(trials):
@@ -343,14 +343,14 @@ def test_a_sample_of_the_table(name):
 
 @pytest.mark.parametrize(("name", "measure"), HARMONICS[:1])
 def test_a_wobble_leaves_the_region_as_it_is(name, measure):
-    """Both coordinates are held in 95 %, where an interval an axis holds them in 87 to 91."""
+    """The region holds both coordinates in 95 %; an interval an axis holds them in 87 to 91."""
     held = region_and_axis(measure, 200)
     assert held[0] > 88, (name, held)
     assert held[0] > held[1], (name, held)
 
 
 def region_and_axis(measure, trials):
-    """Return how often the region holds the tip, and a radius like the interval of one axis."""
+    """Return the shares of tips in the region, and within a radius like one axis's interval."""
     random = np.random.default_rng(23)
     held = np.zeros(2)
     for _ in range(trials):
@@ -365,7 +365,7 @@ def region_and_axis(measure, trials):
 
 
 def test_a_single_look_or_touch_is_repeatable_to_a_region():
-    """All lengths together: 2.448 sigma in the plane and 2.795 in space, not 1.96 an axis."""
+    """All lengths together: 2.448 sigma in the plane and 2.795 in space, not 1.96 for each axis."""
     flange, tip = Pose(300, 100, -60, 0), ToolOffset(12, -3.5, -20)
     seen = Sighting(flange, 312.3, 96.3)
     pair = Sighting(flange, 320.0, 96.0), Sighting(flange, 280.0, 96.0)
@@ -380,7 +380,7 @@ def test_a_single_look_or_touch_is_repeatable_to_a_region():
 
 
 def test_a_row_never_makes_a_result_better_than_its_scatter():
-    """Few residuals have a wide factor, and a row that is known lets it shrink."""
+    """Few residuals have a wide factor, which a known row would otherwise reduce."""
     random = np.random.default_rng(29)
     line = LINES[NAMES.index("fiducials printed to 10 um, 2 at 2 angles")]
     for _ in range(12):

@@ -1,4 +1,4 @@
-"""The drives through beams and onto a plate, fed with an ideal tip: what moves, and where."""
+"""The moves through beams and onto a plate, with an ideal tip: every move and its target."""
 
 import random
 import re
@@ -34,13 +34,13 @@ SLIP_MM = 0.4
 
 
 class IdealCell:
-    """Takes the steps of a procedure; the tip breaks a beam within its width.
+    """Carries out the steps of a procedure; the tip breaks a beam within its width.
 
     Attributes:
-        frame: Where the frame is.
-        steps: The steps taken that move or seek.
-        told: What a person was told.
-        offers: What a person was offered; so many are accepted.
+        frame: The place of the frame.
+        steps: The steps so far that move or seek.
+        told: Messages to the person.
+        offers: Offers to the person, of which so many are accepted.
     """
 
     def __init__(self, tip, *, here=HERE, silent=(), slips=(), noise_mm=0.0, accepts=0):
@@ -104,7 +104,8 @@ class IdealCell:
         nx, ny = beam.normal
         turned = rotation_of(frame)
         dx, dy, dz = turned @ self.tip.components()[:3]
-        # The beam sees the shaft, which runs along the axis of the frame, where it is that high.
+        # The beam sees the part of the shaft at its height; the shaft runs along the axis of the
+        # frame.
         up_mm = (STATION.z_mm - frame.z_mm - dz) / turned[2, 2]
         dx, dy = dx + up_mm * turned[0, 2], dy + up_mm * turned[1, 2]
         return nx * (frame.x_mm + dx) + ny * (frame.y_mm + dy) - beam.distance_mm
@@ -125,7 +126,7 @@ def test_an_ideal_tip_is_found_exactly_and_the_rest_is_kept(turn_deg):
 
 
 HANGING = [(0.0, 180.0), (180.0, 0.0), (5.0, -4.0), (3.0, 176.0)]
-"""V and W of a flange that hangs otherwise than upright."""
+"""V and W of a flange that is not upright."""
 TRUE_Z = replace(STORED, z_mm=TIP.z_mm)
 TRUE_XY = replace(TIP, z_mm=STORED.z_mm)
 
@@ -137,14 +138,14 @@ def test_a_flange_that_hangs_otherwise_is_led_and_solved_as_it_hangs(v_deg, w_de
         plan = BeamsParameters(turn_deg=turn_deg)
         cell = IdealCell(TIP, here=here)
         found = cell.run(measure_beams(STATION, plan, here=here, stored=TRUE_Z)).offset
-        # A tip that is 0.2 mm beside where it is stored dips otherwise: 2 um here, if it is left.
+        # A tip 0.2 mm from its stored place dips by another amount: 2 um here, if ignored.
         assert (found.x_mm, found.y_mm) == pytest.approx((TIP.x_mm, TIP.y_mm), abs=1e-5)
     touching = measure_z_touch(PLATE, ZTouchParameters(), here=here, stored=TRUE_XY)
     assert IdealCell(TIP, here=here).run(touching).offset.z_mm == pytest.approx(TIP.z_mm)
 
 
 def proofs(here, true, told):
-    """Return the drift of a proof by beams and of one by touching, mm."""
+    """Return the drift in a turn test by beams and in one by touching, mm."""
     crossing = verify_by_crossing(
         STATION, BeamsParameters(), here=here, angles_deg=(100.0,), tolerance_mm=0.1, aside=told
     )
@@ -188,7 +189,7 @@ def test_nothing_turns_and_no_joint_moves_while_the_tip_is_among_the_beams():
 
 
 def require_safe_ways(steps):
-    """Among the beams it goes straight and keeps U; it comes and goes straight up and down."""
+    """Check that moves among the beams are straight with constant U, and the others vertical."""
     safe_mm = STATION.z_mm + BeamsParameters().lift_mm - STORED.z_mm - 1e-9
     before = HERE
     for step in steps:
@@ -205,9 +206,10 @@ PLANS = [
     (0.0, 3, 4, "Crossing 4 at beam 2 is 0.", 4),
     (180.0, 2, 14, "Crossing 10 at beam 1 and U -60.0 is 0.", 3),
 ]
-"""Second angle, repeats, the crossing in which the needle slips, how it is named, and its input.
+"""Second angle, repeats, the crossing in which the needle slips, its name, and its input.
 
-The four of the shaft, made before the tool turns, have no number."""
+The four crossings of the shaft, before the tool turns, have no number.
+"""
 
 
 def test_each_crossing_that_others_check_tells_how_it_fits_and_what_it_repeats_to():
@@ -279,7 +281,7 @@ def test_who_declines_keeps_the_crossings_with_their_doubt():
     [(None, 0.0, 0.03, 8), (0.003, 0.0, 0.3, 5), (None, 180.0, 0.03, 43)],
 )
 def test_crossings_end_when_the_interval_is_narrow_enough(sigma_mm, turn_deg, until_mm, least):
-    """With two angles not before the tool has turned; the shaft is measured in any case."""
+    """With two angles not before the tool has turned; the shaft is always measured."""
     cell = IdealCell(TIP, noise_mm=0.003)
     plan = BeamsParameters(repeats=10, turn_deg=turn_deg, until_mm=until_mm)
     found = cell.run(

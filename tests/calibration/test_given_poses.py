@@ -32,7 +32,7 @@ from tests.calibration._simulated import PIN as JOINT_PIN
 from tests.calibration._simulated import PIN as SUGGEST_PIN
 from tests.calibration._simulated import assert_honest, pivoting, refused, shaken, touching
 
-# Poses that exist already: how many, how upright, and which tool they fit.
+# Existing poses: how many, how upright, and which tool they fit.
 
 PIN = (310.0, 195.0)
 STORED = {1: ToolOffset(12, -3.5, -20), 2: ToolOffset(-8, 40, -15, 30), 3: ToolOffset(0, 25, 0)}
@@ -146,7 +146,7 @@ def test_an_offset_that_no_tool_has_is_said_by_its_whole_length():
     assert caught.value.code == "implausible_offset"
 
 
-# Poses that tell the most, inside what the robot can do.
+# The most informative poses within the robot's reach.
 
 GUESS = ToolOffset(12, -4, 60)
 
@@ -310,7 +310,7 @@ def test_the_difference_of_tools_is_known_better_than_each():
     result = solve_joint(near, sigma_mm=0.05)
     difference = result.difference(1, 2)
     assert difference.vector_mm == pytest.approx((32.4, -8.3))
-    # Six placements at three angles: what is left is three differences of two.
+    # Six placements at three angles: three differences of two remain.
     assert difference.half_width95_mm == pytest.approx([1.959964 * 0.05 * (2 / 3) ** 0.5] * 2)
     assert max(difference.half_width95_mm) < 0.7 * max(result.tools[1].half_width95)
     assert solve_joint(touches).difference(2, 1).vector_mm == pytest.approx((-32.4, 8.3), abs=0.2)
@@ -354,7 +354,7 @@ KINDS = [(threshold, outliers) for threshold in (0.12, 0.16, 0.3) for outliers i
 
 
 def agreement_of(seed, outliers, monkeypatch):
-    """Return what the search asks of touches of one point, some of them elsewhere."""
+    """Return the search's criterion for touches of one point, some of them elsewhere."""
     random = np.random.default_rng(seed)
     count = int(random.integers(6, 40))
     turned = quaternion_rotations(random.normal(size=(count, 4)) * (0.3, 0.3, 1.0, 1.0))

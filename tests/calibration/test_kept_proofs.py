@@ -1,4 +1,4 @@
-"""A proof where another offset was written, and a new offset that is not believed."""
+"""A turn test where another offset was written, and a new offset that is not trusted."""
 
 import math
 from dataclasses import dataclass, replace
@@ -64,10 +64,10 @@ from tests.calibration._surface_person import Ball, Plate
 HERE = Pose(300.0, 100.0, 20.0, 0.0, tool=0)
 STORED = ToolOffset(12.0, -4.0, -20.0, 35.0)
 TRUE = ToolOffset(12.3, -3.9, -20.4, 35.0)
-"""Where the tip is. The tool is turned against the flange, so that axes mixed up show."""
+"""The real tip. The tool is turned against the flange, so that mixed-up axes show."""
 
 ASIDE = {"x_mm": 1.7, "y_mm": -1.1, "z_mm": 1.8}
-"""By so much another value is written: that of a reference."""
+"""The difference between the written and the measured value: that of a reference."""
 
 SURFACES = PlaneTest, SphereTest
 PIN = (310.0, 95.0, -40.0)
@@ -77,14 +77,14 @@ WITH_BEAMS = {3: lambda at: abs(at[1] - 80) >= 0.4, 4: lambda at: abs(at[0] - 30
 ON_PLATE = {5: lambda at: at[2] < -50}
 STATION = CameraStation(300, 80, -30)
 OFF_MM = 0.3, -0.5
-"""What the camera is off by, which a measurement at several angles finds."""
+"""The error of the camera, which a measurement at several angles finds."""
 
 
 ALL_ROUND = AllRoundPlan(turns_deg=tuple(30.0 * step for step in range(12)))
 
 
 class Eye:
-    """A camera that answers in millimetres; what it sees the paper cell says."""
+    """A camera that answers in millimetres with the sightings of the paper cell."""
 
     identity, unit, resolution_px, settle_s = "eye", SpotUnit.BASE_MM, None, 0.0
 
@@ -96,7 +96,7 @@ class Eye:
 
 
 class Cell(PaperCell):
-    """A paper cell whose camera is off, and in which a proof works as in a change."""
+    """A paper cell whose camera is off, with turn tests as in a change."""
 
     written: ToolOffset | None = None
     wobble_mm = 0.0
@@ -120,7 +120,7 @@ class Cell(PaperCell):
 
     def _seen(self, step):
         seen = super()._seen(step)
-        # A tip that runs out is beside its place as the flange is turned, twice a turn.
+        # A tip with runout is off its place when the flange turns, twice a turn.
         own_deg = self.written.u_deg if self.written else 0.0
         twice = 2 * math.radians(self.here.u_deg - own_deg)
         x_mm = seen.spot.x + OFF_MM[0] + self.wobble_mm * math.cos(twice)
@@ -134,7 +134,7 @@ def onto(surface):
 
 @dataclass(frozen=True)
 class Case:
-    """A source, and the paper cell in which it measures; ``slip`` is what its proof has to see."""
+    """A source and its paper cell; ``slip`` is the shift that its turn test must detect."""
 
     source: Any
     cell: dict[str, Any]
@@ -169,7 +169,7 @@ CASES = {
 
 
 def paper(case, here, tip):
-    """Return a cell in which a frame holds a tip, and a board if that is what is measured."""
+    """Return a cell whose frame holds a tip, and a board if that is measured."""
     of_board = isinstance(case.source, BoardSource)
     marks = dict(enumerate(BOARD.seen_from(tip), start=1)) if of_board else None
     cell = Cell(here, tip, marks=marks, **case.cell)
@@ -178,7 +178,7 @@ def paper(case, here, tip):
 
 
 def seen_from(frame, flange, tip):
-    """Return where a tip of the flange is, seen from a frame, by plain matrices."""
+    """Return the tip of a flange, seen from a frame, by plain matrices."""
     place = rotation_of(flange) @ tip.components()[:3] + flange.coordinates()[:3]
     x_mm, y_mm, z_mm = (rotation_of(frame).T @ (place - frame.coordinates()[:3])).tolist()
     return ToolOffset(x_mm, y_mm, z_mm)
@@ -186,7 +186,7 @@ def seen_from(frame, flange, tip):
 
 @pytest.fixture(scope="module")
 def measured():
-    """Return each measurement, made once, and where its flange is then."""
+    """Return each measurement, made once, and the final flange pose."""
     made: dict[str, Any] = {}
 
     def measure(method):
@@ -201,7 +201,7 @@ def measured():
 
 
 def kept(case, result, flange):
-    """Return the proof of a difference that was written, and that offset."""
+    """Return the turn test of a written difference, and the written offset."""
     found = result.offset
     aside = ASIDE | ({"u_deg": 4.0} if "u_deg" in result.measured else {})
     written = replace(found, **{name: getattr(found, name) + by for name, by in aside.items()})
@@ -216,7 +216,7 @@ def kept(case, result, flange):
 
 
 def moved_away(flange):
-    """Return where somebody brought it meanwhile: the tip over the pin again, and turned."""
+    """Return the place to which somebody moved it meanwhile: over the pin again, and turned."""
     turned = replace(flange, u_deg=flange.u_deg - 110.0)
     x_mm, y_mm, z_mm = (PIN - rotation_of(turned) @ TRUE.components()[:3]).tolist()
     return replace(turned, x_mm=x_mm, y_mm=y_mm, z_mm=z_mm + 15.0)
@@ -269,16 +269,16 @@ def test_a_difference_that_was_written_is_proved_by_the_tip_that_was_found(
         asked = [step.foreseen for step in cell.steps if isinstance(step, Ask) and step.foreseen]
         before = [tip_pose(pose, written, tool=1) for pose in result.inputs]
         fresh = [min(apart_deg(at, pose) for pose in before) > 10.0 for at in asked]
-        # A pin is touched once more where it was touched; a surface only as it never was.
+        # A pin is touched again where it was touched; a surface only at new places.
         assert all(fresh) if isinstance(proof, SURFACES) else any(fresh) or not proof.by_touch
         if proof.method == "pivot":
             own = rotation_of(Pose(0.0, 0.0, 0.0, *written.components()[3:]))
             for move in (step.target for step in cell.steps if isinstance(step, Move)):
-                # A robot of five axes leans its tool about the flange's own Y alone.
+                # A five-axis robot tilts its tool about the flange's own Y only.
                 assert uvw_deg(rotation_of(move) @ own.T)[2] == pytest.approx(0.0, abs=1e-6)
     right, wrong = found
     assert right.passed
-    # Between two looks of its table a runout is known by interpolation.
+    # Between two looks of its table the runout is interpolated.
     assert right.max_drift_mm < (0.03 if case.wobble_mm else 1e-3)
     assert not wrong.passed
     assert wrong.max_drift_mm > 0.3
@@ -312,7 +312,7 @@ def test_a_jump_is_refused_and_the_limit_can_be_set():
 
 @pytest.mark.parametrize("gain", [-1.0, -0.6, 2.05, 2.2])
 def test_a_loop_with_a_wrong_sign_or_gain_is_stopped_at_its_second_turn(gain):
-    # Each turn measures the error that is left and applies gain times too much of it.
+    # Each turn measures the remaining error and applies gain times too much of it.
     error, stored = 0.4, STORED_BEFORE
     history: list[float] = []
     with refused("diverging"):
@@ -347,7 +347,7 @@ POINTS = st.builds(Pose, LENGTH, LENGTH, LENGTH, ANGLE)
 
 
 def driven(point, believed, real):
-    """Return where a ``real`` tip is when a controller drives the ``believed`` one to ``point``."""
+    """Return the ``real`` tip's place when a controller moves the ``believed`` one to a point."""
     flange_u = point.u_deg - believed.u_deg
     tip_x, tip_y = rotate_xy(real.x_mm - believed.x_mm, real.y_mm - believed.y_mm, flange_u)
     return (
@@ -419,11 +419,11 @@ def test_points_that_cannot_be_judged_are_named_and_left_out():
 
 @pytest.mark.parametrize("pose", [Pose(250, 200, 0, 40, 0, 180), Pose(250, 200, 0, 40, 20, -150)])
 def test_a_leaning_tool_is_judged_in_space(pose):
-    """The flange with the old offset, and what it carries, worked out the long way."""
+    """The flange with the old offset, and the shift that it causes, written out in full."""
     old, new = ToolOffset(12, -3, 120, 10, 5, -4), ToolOffset(12.4, -3.3, 119.5, 12, 6, -4)
     flange = flange_of(pose, old)
     entry = at(pose, old, new)
-    # The tip that is on the arm sits at the new offset: there it goes with the old one.
+    # The tip on the arm is at the new offset: there it moves with the old one.
     there = tip_pose(flange, new, tool=1)
     moved = [a - b for a, b in zip(pose.coordinates(), there.coordinates(), strict=True)][:3]
     assert (entry.dx_mm, entry.dy_mm, entry.dz_mm) == pytest.approx(moved)

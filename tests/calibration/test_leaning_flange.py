@@ -1,7 +1,7 @@
-"""Every method with a flange that leans, or hangs upside down: solved in full, or refused by name.
+"""Every method with a tilted or inverted flange: solved in full, or refused by name.
 
-What is simulated goes through the whole rotation matrix, what is solved does not; a sign that is
-wrong for Y, or a forgotten height, shows as millimetres.
+The simulation uses the whole rotation matrix, the solvers do not; a wrong sign of Y or a forgotten
+height shows as millimetres.
 """
 
 import math
@@ -58,7 +58,7 @@ def flange(u, lean, x=310.4, y=-52.7):
 
 
 def placed(pose, tip=TIP):
-    """Return where the tip is in the base."""
+    """Return the place of the tip in the base."""
     return np.array(pose.coordinates()[:3]) + rotation_of(pose) @ tip.components()[:3]
 
 
@@ -145,7 +145,7 @@ def test_a_board_by_two_fiducials_and_by_four(lean):
 
 
 def travels(lean, turns=(30.0,), tip=TIP):
-    """Return one crossing a beam, both ways, at each angle."""
+    """Return one crossing of a beam, both ways, at each angle."""
     found = []
     for u in turns:
         for number, beam in enumerate(BEAMS):
@@ -284,7 +284,7 @@ def test_poses_of_a_tool_or_a_local_are_no_flange_poses_in_the_base(code, tool, 
 
 
 def test_what_the_height_is_unsure_by_is_in_the_interval(trials):
-    # A stored Z that is off by its own sigma, 8 degrees of lean, and noise of the looks.
+    # A stored Z that is off by its own sigma, a tilt of 8 degrees, and noise of the looks.
     rng, hits = np.random.default_rng(7), np.zeros(2)
     lean, sigma = (8.0, 180.0), 0.005
     poses = [flange(u, lean) for u in TURNS]
@@ -297,7 +297,7 @@ def test_what_the_height_is_unsure_by_is_in_the_interval(trials):
         height = TipHeight(120.0 + rng.normal(0, 0.1), 0.1)
         result = solve_camera_round(looks, height=height, sigma_mm=sigma)
         hits += np.abs(np.subtract(xy(result), (12, -5))) <= result.half_width95
-    # The widest of what is stated and what is seen is never too narrow, and a little wide.
+    # The wider of the stated and the observed one is never too narrow, and slightly too wide.
     assert_honest(hits / trials, trials, most=0.995)
     unaware = solve_camera_round(exact, stored=STORED, sigma_mm=sigma)
     assert max(result.half_width95) > 3 * max(unaware.half_width95)

@@ -1,4 +1,4 @@
-"""The drives before an up-looking camera, fed with an ideal cell: what moves, and what follows."""
+"""The moves at an up-looking camera, with an ideal cell: every move and its result."""
 
 import math
 from dataclasses import replace
@@ -28,17 +28,17 @@ HERE = Pose(280.0, 90.0, 20.0, 120.0, tool=0)
 BOARD = BoardDrawing(((20.0, 12.5), (-20.0, 12.5), (-20.0, -12.5), (20.0, -12.5)))
 HELD = ToolOffset(12.3, -3.2, -20.0, 8.2)
 OFF_MM = (0.25, -0.15)
-"""By how much the simulated camera was moved since its calibration."""
+"""The shift of the simulated camera since its calibration."""
 
 
 class IdealCell:
-    """Takes the steps of a procedure; the camera sees the true marks, in pixels.
+    """Carries out the steps of a procedure; the camera sees the true marks, in pixels.
 
     Attributes:
-        frame: Where the frame is.
-        steps: The steps taken.
-        told, offers: What a person heard; the first offer is accepted.
-        wrong: By how many pixels which looks are wrong.
+        frame: The place of the frame.
+        steps: The steps so far.
+        told, offers: Messages and offers to the person; the first offer is accepted.
+        wrong: The error of each wrong look, in pixels.
     """
 
     def __init__(self, marks, *, here=HERE, off_mm=OFF_MM, blind=None, unit=SpotUnit.PIXEL):
@@ -78,7 +78,7 @@ class IdealCell:
 
     @property
     def placed(self):
-        """The looks at places; the others are beside them."""
+        """The looks at places; the other looks are beside them."""
         return [look for look in self.looks if not look.purpose.startswith("Checking whether")]
 
     def _take(self, step):
@@ -128,7 +128,7 @@ def test_a_tip_and_what_the_camera_is_off_by_are_told_apart(unit):
 
 
 HANGING = [(0.0, 180.0), (180.0, 0.0), (5.0, -4.0), (3.0, 176.0)]
-"""V and W of a flange that hangs otherwise than upright."""
+"""V and W of a flange that is not upright."""
 
 
 @pytest.mark.parametrize(("v_deg", "w_deg"), HANGING)

@@ -198,7 +198,7 @@ def test_a_stated_sigma_gives_two_poses_an_interval():
     assert result.sigma_stated
 
 
-# Many touches, live: the progress that is told, the early end, the pose taken again.
+# Many touches, live: the reported progress, the early end, the repeated pose.
 
 LIVE_TIP = ToolOffset(12.3, -3.9, -20.0)
 LIVE_PIN = (300.0, 100.0, -60.0)
@@ -218,7 +218,7 @@ class Person:
         self.told = []
 
     def run(self, procedure):
-        """Answer every step; return the result."""
+        """Carry out every step; return the result."""
         here = Pose(0.0, 0.0, -40.0, 0.0, tool=0)
         step = next(procedure)
         try:
@@ -294,7 +294,7 @@ def test_with_a_stated_sigma_three_touches_may_do():
 
 
 def test_an_early_end_is_judged_as_the_result_will_be():
-    """X and Y are judged together, so an end at which each alone is good enough is too early."""
+    """X and Y are judged together, so it is too early to stop when each alone is good enough."""
     three = course(Person(), until_mm=0.2, sigma_mm=0.01)
     until_mm = 1.05 * three.half95_mm
     assert until_mm < 0.95 * three.region95_radius_mm
@@ -353,7 +353,9 @@ def test_the_first_turns_tell_the_most():
     [(150, 0.89, 0.985), pytest.param(1000, 0.91, 0.97, marks=pytest.mark.soak)],
 )
 def test_the_interval_of_an_early_end_holds_the_truth_about_as_often_as_it_says(runs, least, most):
-    """An estimated scatter stops more gladly on a lucky fit; from four touches it costs 2 %."""
+    """With an estimated scatter a lucky fit ends early more often; from four touches it costs 2
+    %.
+    """
     held = total = 0
     for seed in range(runs):
         result = course(Person(seed=seed), until_mm=0.012)
@@ -364,7 +366,7 @@ def test_the_interval_of_an_early_end_holds_the_truth_about_as_often_as_it_says(
 
 
 class Pair:
-    """Two touches of a plate that check each other alone; implements ``Sampler``."""
+    """Two touches of a plate that check only each other; implements ``Sampler``."""
 
     known = "Z"
 
@@ -390,7 +392,7 @@ class Pair:
 
 
 def test_of_two_that_check_each_other_it_is_the_other_s_turn():
-    """Nobody can tell which of them is off; the first alone would be made again for ever."""
+    """It is unknown which of them is off; otherwise the first one would be repeated for ever."""
     pair, offered, answer = Pair(), list[str](), None
     steps: Any = finalize_samples(
         pair, [0, 10], [Touch(-30.0, 2.0), Touch(-30.1, 2.0)], retake=True

@@ -1,4 +1,4 @@
-"""A pin that is known: one touch, a new tip, and going on from its values."""
+"""A known pin: one touch, a new tip, and further changes from its values."""
 
 import math
 from dataclasses import replace
@@ -170,7 +170,7 @@ def test_the_interval_holds_the_truth_at_every_length_of_the_chain(trials):
     assert_honest(hits / trials, trials)
 
 
-# Going on with a measurement at a pin from its values: where the robot goes, what is judged.
+# Using the result of a measurement at a pin: where the robot goes, what is judged.
 
 HERE = Pose(300.0, 100.0, 20.0, 0.0, tool=0)
 STORED = ToolOffset(12.0, -4.0, -20.0)
@@ -191,7 +191,7 @@ def cell_at(here, touched=KNOWN_PIN):
 
 
 class OnPaper:
-    """Takes the steps in a paper cell, in place of a change."""
+    """Carries out the steps in a paper cell, in place of a change."""
 
     def __init__(self, cell):
         self.measure = lambda steps: cell.run(steps(cell.here))
@@ -199,7 +199,7 @@ class OnPaper:
 
 @cache
 def measured(method, stored=STORED):
-    """Return a measurement, and where the flange is after it; nobody changes either."""
+    """Return a measurement and the final flange pose; no test changes either."""
     cell = cell_at(HERE)
     source = SOURCES[method]
     result = cell.run(source.procedure(stored, HERE))
@@ -207,7 +207,7 @@ def measured(method, stored=STORED):
 
 
 def heights_mm(cell):
-    """Yield each movement, and how high above the pin the tip is then."""
+    """Yield each movement, and the height of the tip above the pin after it."""
     for step in cell.steps:
         if isinstance(step, Move):
             at = rotation_of(step.target) @ TRUE.components()[:3] + step.target.coordinates()[:3]
@@ -235,7 +235,7 @@ def test_one_touch_is_made_again_over_the_pin_and_nothing_turns_near_it(method, 
     assert anew.offset.components() == pytest.approx(result.offset.components(), abs=1e-6)
     lift_mm = source.touch.lift_mm
     for step, height_mm in heights_mm(cell):
-        # The stored tip, by which the robot goes, is 0.5 mm beside the true one.
+        # The stored tip, which guides the robot, is 0.5 mm from the true one.
         assert height_mm > source.touch.clearance_mm - 0.5
         assert step.path is Path.STRAIGHT or height_mm > lift_mm - 0.5
     assert height_mm > lift_mm - 0.5, "it ends lifted"
@@ -267,7 +267,7 @@ def test_a_touch_made_again_in_the_air_is_refused_with_all_others(method, code):
 
 
 class Slantwise(PaperCell):
-    """Its person shows the second way anywhere in the tool's XZ plane, between +X and +Z."""
+    """Its person shows the second move anywhere in the tool's XZ plane, between +X and +Z."""
 
     def _along(self, axis):
         there = super()._along(axis)

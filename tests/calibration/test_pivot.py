@@ -53,7 +53,7 @@ TIP = (4.2, -7.9, 131.6)
 
 
 def cone(count, half_deg=30.0, spin=True):
-    """Orientations on a cone, each turned about the tool besides."""
+    """Return orientations on a cone, each also turned about the tool."""
     found = []
     for k in range(count):
         lean = Rotation.from_euler("z", 360 * k / count, degrees=True)
@@ -261,8 +261,8 @@ def test_it_tilts_in_the_air_only_in_small_steps_and_never_far_from_above_the_pi
             assert there.coordinates()[:2] == here.coordinates()[:2]
             assert turned_deg(here, there) == pytest.approx(0.0, abs=1e-4)
             continue
-        # The stored tip is 0.7 mm beside the true one, and is what it goes by; it stops up to
-        # 1.2 mm beside the pin.
+        # The stored tip, which guides the robot, is 0.7 mm from the true one; the robot stops up to
+        # 1.2 mm from the pin.
         assert tip_mm(there)[2] > TILTED_PIN[2] + PLAN.lift_mm - 0.5
         assert math.dist(tip_mm(there)[:2], TILTED_PIN[:2]) < 2.7
         same_lean = rotation_of(here)[2] == pytest.approx(rotation_of(there)[2], abs=1e-9)
@@ -302,7 +302,7 @@ def test_a_robot_that_does_not_take_up_the_tilt_stands_lifted_and_is_refused():
 
 
 def leans_to_one_side(pose):
-    """Tell what an arm takes up that stands against a wall."""
+    """Return tilts to one side, for an arm that stands at a wall."""
     return float(rotation_of(pose)[0, 2]) > -0.02
 
 
@@ -314,7 +314,7 @@ def test_tilts_out_of_reach_are_replaced_by_others_before_the_tool_tilts():
     assert len(person.touches) == 6
     errors = np.subtract(result.offset.components()[:3], TILTED_TIP.components()[:3])
     assert (np.abs(errors) <= result.half_width95).all()
-    # Nothing is said, and nothing chosen anew, where all of them are in reach.
+    # If all of them are in reach, nothing is reported or replaced.
     free = Person(UPRIGHT)
     course(free)
     assert not any("cannot be reached" in text for text in free.told)
@@ -389,7 +389,7 @@ def miss_mm(result):
 
 
 class SlipsALittle(Person):
-    """Slips by 0.1 mm: more is refused before anybody is asked for a write."""
+    """Slips by 0.1 mm: a larger slip is refused before the question about the write."""
 
     def __init__(self, slip):
         super().__init__(sigma_mm=0.0)
@@ -429,7 +429,7 @@ def test_a_touch_made_again_that_is_refused_leaves_the_tool_upright():
 
 
 class GoesBack(Person):
-    """Wants touch 2 again when asked for the fourth."""
+    """Asks for touch 2 again in place of the fourth."""
 
     def run_back(self, procedure):
         step = next(procedure)

@@ -1,4 +1,4 @@
-"""What poses show about themselves: each check finds what it is for, and lets good poses pass."""
+"""Checks of given poses: each finds its fault and passes good poses."""
 
 import math
 from dataclasses import replace
@@ -57,7 +57,7 @@ def budget_of(result):
 
 
 def moved(poses, after, x_mm, y_mm=0.0, z_mm=0.0):
-    """Return the poses as they are when the pin was moved after some of them."""
+    """Return the poses for a pin that was moved after some of them."""
     return [
         replace(p, x_mm=p.x_mm + x_mm, y_mm=p.y_mm + y_mm, z_mm=p.z_mm + z_mm)
         if index >= after
@@ -101,7 +101,7 @@ def test_a_warming_arm_is_a_drift(solve, exact):
 def test_exact_poses_show_no_order_and_five_touches_cannot():
     for result in (solve_n_angle(PLAIN), solve_pivot(SPATIAL)):
         assert result.warnings == ()
-        # Nothing scatters, so what the interval rests on is how finely positions are told.
+        # Nothing scatters, so the interval rests on the resolution of the positions.
         assert result.notes == ("resolution_floor",)
         assert order_of(result).step_f == 0.0
     rough = [replace(pose, x_mm=pose.x_mm + 0.02 * (-1) ** k) for k, pose in enumerate(PLAIN)]
@@ -219,7 +219,7 @@ def as_matrix(x, y, z, u, v, w):
 @pytest.mark.parametrize("local", [ToolOffset(10, -20, 5, 30), ToolOffset(10, -20, 5, 30, 8, -4)])
 @pytest.mark.parametrize("tool", [ToolOffset(30, 8, -15, 25), ToolOffset(30, 8, -15, 25, 40, -10)])
 def test_poses_of_a_tool_in_a_local_become_flange_poses(tool, local):
-    """Against the matrices: flange = Local * pose * inverse(Tool)."""
+    """Compared with matrices: flange = Local * pose * inverse(Tool)."""
     flange = np.array([as_matrix(*pose.coordinates()) for pose in SPATIAL])
     inverse = np.linalg.inv(as_matrix(*local.components()))
     for pose, matrix in zip(SPATIAL, inverse @ flange @ as_matrix(*tool.components()), strict=True):
@@ -282,14 +282,14 @@ def test_the_uncertainty_of_a_station_is_added_as_squares():
 
 
 def scattered(count, tips, random):
-    """Return touches of which each belongs to the tip that its index says."""
+    """Return touches, each with the tip that its index names."""
     angles = random.uniform(-180, 180, count)
     return shaken([touching(tip, u) for tip, u in zip(tips, angles, strict=True)], random, 0.02)
 
 
 @pytest.mark.parametrize("count", [12, 60, 400])
 def test_the_largest_set_is_the_same_whatever_the_seed(count):
-    """A quarter of the touches agree on another tip; from 201 touches on the samples are drawn."""
+    """A quarter of the touches agree on another tip; from 201 touches on, samples are drawn."""
     tips = [(14.3, -1.0) if index % 4 == 2 else TIP for index in range(count)]
     poses = scattered(count, tips, np.random.default_rng(8))
     found = [solve_n_angle(poses, robust=Robust(0.1, seeds=(seed,))) for seed in range(6)]
@@ -340,7 +340,7 @@ def test_poses_out_of_reach_are_suspect():
 
 
 def approached(turns, bias_mm, seed=6):
-    """Touches that are off by a bias toward where the tip came from, and these standoffs."""
+    """Return touches with a bias toward the approach direction, and their standoffs."""
     random = np.random.default_rng(seed)
     sides = [(math.cos(turn), math.sin(turn)) for turn in turns]
     poses = [
@@ -381,7 +381,7 @@ def test_a_touch_that_a_person_brought_from_somewhere_does_not_disturb_the_bias(
     assert told(without).approach_bias_mm == pytest.approx(told(alone).approach_bias_mm, abs=1e-9)
     assert told(without).approach_bias_mm == pytest.approx(0.06, abs=0.02)
     assert "approach_bias" in without.warnings
-    # Seven touches exceed three standard uncertainties by chance in some per cent.
+    # Seven touches exceed three standard uncertainties by chance in a few per cent.
     strict = with_approach_bias(solve_n_angle(poses[1:]), sides[1:], false_alarm=1e-12)
     assert "approach_bias" not in strict.warnings
 

@@ -1,4 +1,4 @@
-"""What a turning tip shows: offset, ellipse, second harmonic, a table by angle."""
+"""Results from a turning tip: offset, ellipse, second harmonic, a table by angle."""
 
 import cmath
 import math
@@ -12,7 +12,7 @@ from robolink.methods import AllRoundPlan
 from robolink.model import Pose
 from tests.calibration._simulated import LEAST, MOST, assert_honest, refused
 
-# What a turning tip shows: offset, ellipse, second harmonic.
+# Results from a turning tip: offset, ellipse, second harmonic.
 
 TIP, CENTRE = 0.25 - 0.1j, 0.05 + 0.02j
 
@@ -89,7 +89,7 @@ def test_the_interval_of_the_offset_holds_the_truth(count, stated, trials):
         ((10.1, 190.1, 370.1, -169.9) * 2, 2),
         ((0.0, 90.0, 180.0) * 3, 3),
         ((0.0, 90.0) * 4, 2),
-        ((0.0, 0.5, 180.0, 180.5) * 2, 4),  # four, and too near each other to tell anything
+        ((0.0, 0.5, 180.0, 180.5) * 2, 4),  # four, and too close together to show anything
     ],
 )
 def test_angles_that_cannot_tell_an_offset_from_an_ellipse_say_so(angles, rank):
@@ -98,7 +98,7 @@ def test_angles_that_cannot_tell_an_offset_from_an_ellipse_say_so(angles, rank):
     assert report.warnings == ("wobble_not_identifiable",)
     assert (report.rank, report.distinct_angles) == (rank, rank)
     assert (report.ellipse_mm, report.second_mm, report.amplitude_limit_mm) == (None, None, None)
-    # Half of it is what the shortest solution would give.
+    # Half of it is the result of the shortest solution.
     assert complex(*report.tip_mm) == pytest.approx(TIP, abs=0.01)
 
 
@@ -108,7 +108,7 @@ def test_one_angle_is_no_turn():
 
 
 def test_a_wobble_hidden_from_two_angles_is_half_the_story():
-    # What two angles cannot see goes into the offset in full, and only the warning says so.
+    # The error that two angles cannot show goes into the offset in full; only the warning says so.
     seen = turning(angles=(0.0, 180.0) * 4, ellipse=0.06 + 0j)
     report = runout_report(seen)
     assert complex(*report.tip_mm) == pytest.approx(TIP + 0.06)
@@ -138,7 +138,7 @@ def test_an_ellipse_of_three_times_the_scatter_is_found():
     assert sum(found) > 94
 
 
-# A table of runout by angle: against a tip that wobbles in a known way.
+# A table of runout by angle, for a tip with known runout.
 
 TABLE_TIP, TABLE_CENTRE, ELLIPSE, SECOND = 0.3 - 0.1j, 0.05 + 0.02j, 0.04j, 0.03 - 0.02j
 TWELVE = tuple(30.0 * k for k in range(12))

@@ -33,7 +33,7 @@ WAY_MM = 120.0
 
 
 def moved(pose, tool_vector):
-    """Return the pose after a way in the tool's own axes."""
+    """Return the pose after a move along the tool's own axes."""
     x, y, z = (rotation_of(pose) @ rotation(*ANGLES) @ tool_vector).tolist()
     return replace(pose, x_mm=pose.x_mm + x, y_mm=pose.y_mm + y, z_mm=pose.z_mm + z)
 
@@ -70,7 +70,7 @@ def test_the_ways_may_start_where_there_is_room():
     result = solve_six_point(pivot, *ends, start=start, sigma_mm=0.05)
     assert result.offset.components() == pytest.approx((*TIP, *ANGLES), abs=1e-9)
     assert result.inputs == (*pivot, start, *ends)
-    # The place of the tip is as sure as ever, and so is each angle to about sigma sqrt2 / way.
+    # The tip is as accurate as before, and each angle to about sigma sqrt2 / way.
     at_pin = solve(poses, sigma_mm=0.05)
     assert result.half_width95[:3] == pytest.approx(at_pin.half_width95[:3])
     assert result.half_width95[3:] == pytest.approx(at_pin.half_width95[3:], rel=0.3)
@@ -156,7 +156,7 @@ def test_random_rotations_survive_both_ways():
         assert back == pytest.approx(matrix, abs=1e-9)
 
 
-# Six points with a person: touches, then the axes shown in the air; what is wrong said at once.
+# Six points with a person: touches, then the axes shown in the air; errors are reported at once.
 
 TURN_DEG = (15.0, 8.0, -5.0)
 TOOL = ToolOffset(*SHOWN_TIP.components()[:3], *TURN_DEG)
@@ -167,10 +167,10 @@ ANY_Z = {TeachPrompt.ALONG_X: X, TeachPrompt.ALONG_Z: 0.7 * X + 0.7 * Z}
 
 
 class Guide(Person):
-    """Shows axes too: each time the next of ``shows``, and in the end as is right.
+    """Shows axes too: the next of ``shows`` each time, and in the end the right one.
 
-    A step to show is a vector in the flange's axes, mm, and by how much the tool is turned. Where a
-    way begins is sighted with an error just as where it ends.
+    A shown step is a vector in the flange's axes, mm, and the turn of the tool. Both ends of a move
+    are sighted with an error.
     """
 
     def __init__(self, start=FRAMES[0], *, shows=(), ways=WAYS, **more):
@@ -182,7 +182,7 @@ class Guide(Person):
         self.asked.append(step.shown)
         here = self._here
         if step.shown is TeachPrompt.ROOM:
-            # A flange that points down needs the room of a way below it.
+            # A flange that points down needs room for the move below it.
             down_mm = min(0.0, *(60 * (rotation_of(here) @ way)[2] for way in self._ways.values()))
             way, turn_deg, error = (0.0, 0.0, -down_mm), 0.0, self._error()
             self._aside = error

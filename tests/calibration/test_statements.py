@@ -1,4 +1,4 @@
-"""The two statements in words, and shipped recipes that keep within their limits by them."""
+"""The two statements in words; shipped recipes stay within their limits by them."""
 
 import math
 import re
@@ -35,7 +35,7 @@ from robolink.calibration import (
 from robolink.model import Pose, ToolOffset
 from tests.calibration._recipe_statements import EXAMPLES, names, statement
 
-# The two statements in words, and what a turn test says about them.
+# The two statements in words, and a turn test's verdict on them.
 
 TOUCHES = Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)
 STATED = AccuracyFacts(rows={"touch_mm": RowFact(0.01, "stated", told="cell file")})
@@ -169,7 +169,7 @@ def test_what_a_shift_would_have_to_be_is_said_where_it_is_more_than_is_stated(s
     assert len(more) == bool(said)
     assert all(said in one for one in more), more
     assert TurnJudgement.from_json(stated.as_json()) == stated
-    # Nothing is left to hold where it is contradicted, and nothing to hold to without a statement.
+    # A contradicted statement is no limit any more, and without a statement there is none.
     for none in (replace(stated, code="proof_contradicts_accuracy"), judged()):
         assert not any(
             "may not show" in one or "height" in one for one in turn_test_sentences(none)
@@ -281,7 +281,7 @@ def test_seating_is_a_line_of_its_own():
     assert "+-0.130 mm" in seating_sentence(0.13, 12)
 
 
-# Shipped recipes keep within their own limits by what they state, and the page says so.
+# Shipped recipes stay within their own limits by their statements, and the page says so.
 
 PAGE = (EXAMPLES.parents[1] / "docs/reference/recipe-rules.md").read_text(encoding="utf-8")
 AGAIN = "run: python -m tests.calibration._recipe_statements"

@@ -1,6 +1,6 @@
-"""What a station is unsure of goes into every result that was measured there.
+"""The uncertainty of a station enters every result measured there.
 
-A moved station is told from new nozzles, as often as its limits promise.
+New nozzles show a moved station as often as its limits promise.
 """
 
 import math
@@ -39,7 +39,7 @@ CENTRE = (350.0, 40.0)
 
 
 def crossings(beams, tip=TIP, *, at=CENTRE, noise=lambda: 0.0, places=(0.0,), u_deg=0.0):
-    """Drive a tip both ways through beams that may lie elsewhere than they are believed to."""
+    """Move a tip both ways through beams whose real place may differ from the believed one."""
     turn = math.radians(u_deg)
     tip_x = math.cos(turn) * tip[0] - math.sin(turn) * tip[1]
     tip_y = math.sin(turn) * tip[0] + math.cos(turn) * tip[1]
@@ -70,7 +70,7 @@ def test_a_beam_is_believed_as_far_as_it_is_known():
     found = solve_crossed_beams(crossings(BELIEVED), BELIEVED, sigma_mm=0.01)
     assert (found.offset.x_mm, found.offset.y_mm) == pytest.approx(TIP)
     u_mm = [math.sqrt(found.covariance[i][i]) for i in (0, 1)]
-    # Y rests on the beam along X, 8 mm from where that was found.
+    # Y rests on the beam along X, 8 mm from the place where that was found.
     lever = 8 * math.radians(0.05)
     assert u_mm[0] == pytest.approx(math.hypot(0.01 / math.sqrt(2), 0.02))
     assert u_mm[1] == pytest.approx(math.hypot(0.01 / math.sqrt(2), 0.02, lever))
@@ -111,7 +111,7 @@ def test_find_beams_knows_how_sure_it_is():
 
 
 def test_intervals_hold_the_truth_although_the_beams_are_off():
-    """Beams off by 0.02 that do not count leave 18 % (docs/reference/evidence.md 12)."""
+    """Ignoring beams that are off by 0.02 would leave 18 % (docs/reference/evidence.md 12)."""
     assert coverage(counted=False, runs=40) < 0.45
     assert coverage(counted=True, runs=80) == pytest.approx(0.95, abs=0.07)
 
@@ -123,7 +123,7 @@ def test_intervals_hold_the_truth_in_two_thousand_runs():
 
 
 def coverage(*, counted, runs, seed=2):
-    """Return how often half_width95 of X holds the truth; beams found with 0.02, crossings 0.01."""
+    """Return the share of X within half_width95; beams found with 0.02, crossings with 0.01."""
     rng = np.random.default_rng(seed)
     held = 0
     for _ in range(runs):
@@ -178,7 +178,7 @@ def test_a_chain_of_shared_touches_does_not_grow():
     shared = [chain_sigma_mm(0.02, 0.01, k, shared_touch=True) for k in range(4)]
     assert grown == pytest.approx([math.sqrt(4e-4 + 2 * k * 1e-4) for k in range(4)])
     assert shared == pytest.approx([0.02, *[math.sqrt(6e-4)] * 3])
-    # A record that does not say how its chain began is never made better than it was.
+    # A record without the start of its chain is never improved.
     old = NeedleChain(0.03, 4).after(0.01, shared_touch=True)
     assert old.sigma_mm == pytest.approx(math.hypot(0.03, 0.01))
 
@@ -246,7 +246,7 @@ def test_half_a_millimetre_common_to_new_nozzles_is_the_station():
 def test_a_tenth_is_how_new_nozzles_sit():
     found = judged(shifts((0.11, 0.06, 0.03), (0.05, 0.12, -0.02)))
     assert not found.moved
-    # Shifts of less than this would hide behind the seating of two nozzles.
+    # Smaller shifts would be hidden by the seating of two nozzles.
     assert found.detectable_mm == pytest.approx(0.3905, rel=0.01)
     assert found.undecided(0.2)
     assert not found.undecided(0.5)
@@ -287,7 +287,7 @@ def test_a_shift_without_scatter_is_no_evidence():
     ("changes", "limit"), [(5, 51.5), (8, 30.6), (15, 22.3), (30, 18.9), (math.inf, 16.27)]
 )
 def test_seating_from_few_changes_widens_the_limit(changes, limit):
-    # The figures were simulated, from as many changes, by somebody else.
+    # The figures were simulated independently, from as many changes.
     assert shift_limit([changes] * 3) == pytest.approx(limit, rel=0.03)
 
 

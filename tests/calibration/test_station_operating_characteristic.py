@@ -1,6 +1,6 @@
-"""How often a station that moved is seen, and one that did not is called moved: 4,000 runs a cell.
+"""The shares of moved stations detected and of unmoved ones called moved: 4,000 runs a cell.
 
-The table stands in docs/reference/evidence.md 11; `python -m
+docs/reference/evidence.md 11 has the table; `python -m
 tests.calibration.test_station_operating_characteristic` prints it anew.
 """
 
@@ -25,9 +25,9 @@ def share(seat: tuple[float, float], tools: int, moved_mm: float, runs: int = RU
 
     Args:
         seat: Scatter of the seating in the plane and along Z, mm; 0 for nozzles that stayed.
-        tools: How many tools take part.
-        moved_mm: By how much the station moved, in any direction.
-        runs: How many runs.
+        tools: The number of tools.
+        moved_mm: The shift of the station, in any direction.
+        runs: The number of runs.
     """
     rng = np.random.default_rng([17, tools, round(1000 * moved_mm), round(1000 * seat[0])])
     seats = (seat[0], seat[0], seat[1]) if seat[0] else ()
@@ -56,7 +56,7 @@ def row(seat: tuple[float, float]) -> str:
 
 
 def documented(seat: tuple[float, float]) -> dict[tuple[int, float], float]:
-    """Return what the page says, by number of tools and movement."""
+    """Return the figures of the page, by number of tools and movement."""
     start = f"| {name_of(seat)} |"
     (line,) = [one for one in PAGE.read_text().splitlines() if one.startswith(start)]
     cells = line.removeprefix(start).strip("|").split("|")

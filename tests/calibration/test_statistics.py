@@ -1,4 +1,4 @@
-"""Quantiles, control charts and the turn that shows an error twice."""
+"""Quantiles, control charts, and the reversal test, which doubles an error."""
 
 import itertools
 import math
@@ -145,7 +145,7 @@ LONG = [12 - 0.01128, 12 + 0.01128] * 20
 
 
 def first_of(values, baseline=LONG):
-    """Return after how many values the charts speak: single points, weighted mean."""
+    """Return the number of values until each chart signals: single points, weighted mean."""
     chart = control_chart(baseline, values)
     out = chart.points_out[0] + 1 if chart.points_out else None
     return out, None if chart.ewma_first is None else chart.ewma_first + 1
@@ -338,7 +338,7 @@ def test_a_file_may_hold_its_axes_in_any_order(order):
     assert found["interaction_p"] == pytest.approx(expected.interaction_p)
 
 
-# Turning about an offset shows its error, twice.
+# Turning about an offset shows its error, doubled.
 
 TIP = (12.3, -3.9)
 TIP_3D = (4.2, -7.9, 131.6)

@@ -1,4 +1,4 @@
-"""plane-touch and sphere-touch with a person: what they find, and what does not fool them."""
+"""plane-touch and sphere-touch with a person: their results, and the errors that they detect."""
 
 from dataclasses import replace
 from functools import cache
@@ -32,7 +32,7 @@ from tests.calibration._surface_person import (
     slips,
 )
 
-# plane-touch with a person at the surface: what it finds, and what it is not fooled by.
+# plane-touch with a person at the surface: its result, and the errors that it detects.
 
 DOWN = Pose(300.0, 100.0, -20.0, -150.0, 0.0, 180.0, tool=0)
 ASKEW = Pose(300.0, 100.0, -45.0, 30.0, 8.0, -12.0, tool=0)
@@ -63,7 +63,7 @@ def test_exact_touches_give_tip_and_plane_and_the_tip_keeps_clear(start, lean_de
     result = measured(person)
     assert result.offset.components()[:3] == pytest.approx(LENGTHS, abs=1e-7)
     assert np.abs(np.array(result.plane.normal) @ person.surface.normal) == pytest.approx(1.0)
-    # The stored tip is 0.7 mm beside the true one, and is what the robot goes by.
+    # The stored tip, which guides the robot, is 0.7 mm from the true one.
     assert person.lowest > PLAN.clearance_mm - 0.5
     final = person.moves[-1].target
     assert rotation_of(final) == pytest.approx(rotation_of(person.touches[0]), abs=1e-9)
@@ -135,7 +135,7 @@ def test_a_plane_that_shows_too_little_or_leans_too_much_is_told_after_three_tou
 
 @cache
 def measured_once(axes, lean_deg):
-    """Return a plate and what is found on it, of which no test changes anything."""
+    """Return a plate and its measurement, which no test changes."""
     plate = Plate(lean_deg, 50.0)
     return plate, measured(SurfacePerson(plate, sigma_mm=0.0), axes=axes)
 
@@ -154,7 +154,7 @@ def test_the_proof_shows_a_tip_that_slipped_in_any_direction(axes, lean_deg, asi
 
 
 def proved(plate, result: PlaneTouchResult, tip, *, axes):
-    """Prove a result with a tip, in a frame that is turned as the flange is."""
+    """Run a turn test of a result with a tip, in a frame turned like the flange."""
     written = result.offset
     here = OverPin(START, tuple(plate.point.tolist()), written).pose(Tilt(), PLAN.lift_mm)
     x, y, z = (np.array(here.coordinates()[:3]) + rotation_of(here) @ LENGTHS).tolist()
@@ -187,7 +187,7 @@ def test_a_drift_near_the_tolerance_is_touched_at_every_place_twice_more_and_is_
 
 
 def test_touches_of_a_surface_that_show_nothing_in_some_direction_prove_nothing():
-    """All upright on a level plane: the tip may be anywhere sideways."""
+    """All touches are upright on a level plane: the tip may be anywhere sideways."""
     proof = SurfaceProof(START, tolerance_mm=0.1, u_mm=0.01)
     for u_deg in (0.0, 40.0, 80.0, 120.0):
         place = Pose(300.0, 100.0, -40.0, u_deg)
@@ -197,13 +197,13 @@ def test_touches_of_a_surface_that_show_nothing_in_some_direction_prove_nothing(
     assert not proof.result().passed
 
 
-# sphere-touch with a person at the sphere: what it finds, and what it is not fooled by.
+# sphere-touch with a person at the sphere: its result, and the errors that it detects.
 
 ORIENTATIONS = {"up": (72.0, 0.0, 0.0), "down": (-150.0, 0.0, 180.0), "askew": (30.0, 8.0, -12.0)}
 
 
 def over_top(ball, *, turned="up", aside=(1.0, -1.0), tip=TIP):
-    """Return the flange pose with a tip 5 mm above a ball, so far beside its top."""
+    """Return the flange pose with a tip 5 mm above a ball, this far beside its top."""
     u, v, w = ORIENTATIONS[turned]
     at = Pose(0.0, 0.0, 0.0, u, v, w, tool=0)
     above = ball.centre + np.array([*aside, ball.radius + 5.0])
@@ -226,7 +226,7 @@ def test_exact_touches_give_tip_and_sphere_and_the_tip_keeps_clear(turned, axes)
     assert result.offset.components()[:3] == pytest.approx(LENGTHS, abs=1e-6)
     assert result.reference_point_mm == pytest.approx(ball.centre.tolist(), abs=1e-6)
     assert result.radius_mm == pytest.approx(10.0, abs=1e-6)
-    # The stored tip is 0.7 mm beside the true one, and is what the robot goes by.
+    # The stored tip, which guides the robot, is 0.7 mm from the true one.
     assert person.lowest > PLAN.clearance_mm - 1.0
     final = person.moves[-1].target
     assert rotation_of(final) == pytest.approx(rotation_of(person.touches[0]), abs=1e-9)
@@ -251,7 +251,7 @@ def test_the_interval_of_a_sphere_holds_the_truth_about_as_often_as_it_says():
 @pytest.mark.soak
 @pytest.mark.timeout(600)
 def test_with_the_least_number_of_touches_no_good_run_is_refused():
-    """With one touch fewer 27 of these 60 were."""
+    """With one touch fewer, 27 of these 60 were refused."""
     ball = Ball(10.0)
     for seed in range(60):
         person = SurfacePerson(ball, start=over_top(ball), seed=seed, sigma_mm=0.05)
@@ -301,7 +301,7 @@ def test_a_start_beside_the_top_or_another_radius_is_told_after_four_touches(
 
 @cache
 def sphere_measured_once(axes):
-    """Return a ball and what is found on it, of which no test changes anything."""
+    """Return a ball and its measurement, which no test changes."""
     ball = Ball(10.0)
     return ball, sphere_measured(SurfacePerson(ball, start=over_top(ball), sigma_mm=0.0), axes=axes)
 
@@ -325,5 +325,5 @@ def test_the_proof_on_a_sphere_shows_a_tip_that_slipped_in_any_direction(axes, a
     slipped = ToolOffset(*map(float, aside))
     found = SurfacePerson(ball, start=frame, sigma_mm=0.0, tip=slipped).run(proof.steps(frame))
     assert found.passed is not any(aside)
-    # A sphere is no plane: beside the expected place its way along the normal is a little longer.
+    # A sphere is not flat: beside the expected place the move along the normal is a little longer.
     assert found.max_drift_mm == pytest.approx(float(np.linalg.norm(aside)), abs=0.02)

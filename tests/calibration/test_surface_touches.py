@@ -109,7 +109,7 @@ def test_a_tip_and_the_sphere_it_touched_are_found_exactly(radius):
 
 
 def covered(solve, runs):
-    """Return in which share of the runs each axis of the interval holds the truth."""
+    """Return the share of runs in which the interval of each axis holds the truth."""
     rng, hits = np.random.default_rng(7), np.zeros(3)
     for _ in range(runs):
         result = solve(rng)
@@ -139,7 +139,7 @@ def test_the_interval_holds_the_truth_in_a_sample(solve):
 @pytest.mark.parametrize("solve", [plane_of_sixteen, sphere_of_sixteen])
 def test_the_interval_holds_the_truth(solve, stated):
     shares = covered(lambda rng: solve(rng, stated), 2000)
-    # A stated sigma is widened by residuals that are large by chance, and never narrowed.
+    # Residuals that are large by chance widen the result of a stated sigma, and never narrow it.
     most = MOST if stated is None else 0.99
     assert all(LEAST <= share <= most for share in shares), shares
 
@@ -216,10 +216,10 @@ _MEASURED: dict[str, tuple[Any, Any, Any]] = {
 
 
 class Undecided(SurfacePerson):
-    """Goes back at some of the touches, and has some of the offers.
+    """Goes back at some of the touches, and accepts some of the offers.
 
-    ``slips`` maps a touch, counted from 0 as it is asked for, to how far off the surface it ends;
-    ``back`` maps one to the number of the touch that is wanted again in its place.
+    ``slips`` maps a touch, counted from 0 in order of the questions, to its distance from the
+    surface; ``back`` maps one to the number of the touch to repeat in its place.
     """
 
     def __init__(self, kind, *, slips=(), back=(), accepts=0):
@@ -271,7 +271,7 @@ def miss_mm(result):
 
 
 def ends_well(person):
-    """Tell whether the tip kept clear, turned where it was lifted, and ends upright and lifted."""
+    """Return whether the tip kept clear, turned only when lifted, and ends upright and lifted."""
     assert person.lowest > PLAN.clearance_mm - 1.0
     assert person.flown > PLAN.lift_mm - 4.0
     assert person.swung < 2.0, "it tilts about the tip, over where that is"
@@ -294,7 +294,7 @@ def test_from_the_values_one_touch_is_made_again_in_its_place_and_tilt(kind, aga
     assert [touch for number, touch in enumerate(result.inputs) if number != again] == kept
     assert result.inputs[again].arrival is not None, "made from a standoff, the first one too"
     if again < UPRIGHTS[kind]:
-        # It may be the one that the others contradict: as if nobody knew the surface yet.
+        # It may be the one that the others contradict, so the surface counts as unknown.
         survey = _MEASURED[kind][2]
         unknown_mm = survey.rise_mm if kind == "plane" else survey.aside_mm
         assert math.hypot(*result.inputs[again].standoff_mm) > PLAN.clearance_mm + unknown_mm

@@ -1,4 +1,4 @@
-"""Touches that were made and those that were only answered; what one needs to count."""
+"""Touches that were made and touches that were only answered; the conditions for one to count."""
 
 import json
 import math
@@ -51,7 +51,7 @@ def moved(pose, dx, dy, dz):
 
 
 def touched(orientations, person, seed, *, sigma_mm=0.03, planar=True, clearance_mm=2.0):
-    """Return touches of a new needle; ``person`` says what is captured after each arrival."""
+    """Return touches of a new needle; ``person`` returns the pose captured after each arrival."""
     noise = np.random.default_rng(seed)
     series = StandoffSeries(seed, clearance_mm, planar=planar)
     touches, taken = [], []
@@ -65,7 +65,7 @@ def touched(orientations, person, seed, *, sigma_mm=0.03, planar=True, clearance
         standoff = series.next(taken, orientation)
         expected = contact(STORED, angles)
         arrival = moved(expected, standoff.x_mm, standoff.y_mm, standoff.z_mm)
-        # Where the person left the tip on the pin tells how high the next one is.
+        # The place where the person left the tip on the pin shows the height of the next touch.
         captured = person(number, arrival, on_pin)
         touches.append(WitnessedTouch(captured, arrival, standoff, 12.0))
         taken.append((captured, standoff))
@@ -244,7 +244,7 @@ def test_there_are_shared_cases_of_touches():
     assert len(shared_cases()) >= 11
 
 
-# What a touch of a pin needs to count, and where the tip is when one does not.
+# The conditions for a touch of a pin to count, and the place of the tip when it does not.
 
 PLAN = TouchPlan(seed=3)
 FIRST = TouchedAt.of(Pose(298.0, 99.0, -20.0, 0.0, tool=0))

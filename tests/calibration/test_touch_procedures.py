@@ -1,4 +1,4 @@
-"""The procedures, fed with numbers by an arm that exists only in this file."""
+"""The touching procedures, fed with numbers by an arm that exists only in this file."""
 
 import math
 from dataclasses import replace
@@ -35,7 +35,7 @@ START = Pose(300, 100, 0, 0, tool=0)
 
 
 class PerfectPerson:
-    """Puts the physical tip on the pin, whatever frame the poses are given in."""
+    """Puts the physical tip on the pin, whatever frame the poses are in."""
 
     def __init__(self, tip, believed=None, *, start=START):
         self.tip, self.believed = tip, believed or ToolOffset()
@@ -78,7 +78,7 @@ def measured(tip, stored, start_u_deg=0.0):
 
 
 class Beside(PerfectPerson):
-    """Touches the second time below the tip of the pin, beside it."""
+    """Touches the second time beside the pin, below its tip."""
 
     def answer(self, step):
         answer = super().answer(step)
@@ -129,7 +129,7 @@ def test_the_stored_offset_brings_the_tip_down_near_the_pin():
     _, person = measured(ToolOffset(30.2, 0, -20), ToolOffset(30, 0, -20))
     down = [s for s in person.log if isinstance(s, Move)][2].target
     tip_x, tip_y = rotate_xy(30.2, 0, down.u_deg)
-    # The tip is 0.2 mm beside the stored one, so 0.4 mm after half a turn.
+    # The tip is 0.2 mm from the stored one, so 0.4 mm after half a turn.
     assert 0.8 - 0.4 < math.dist((down.x_mm + tip_x, down.y_mm + tip_y), PIN[:2]) < 1.2 + 0.4
     touch_z = PIN[2] + 20
     assert touch_z + PLAN.clearance_mm - 1e-9 < down.z_mm < touch_z + PLAN.clearance_mm + 1.81
@@ -205,7 +205,7 @@ def test_a_drift_too_near_to_the_tolerance_is_touched_again_and_does_not_pass(
 
 
 def earlier_shown(person):
-    """Return what stood beside each question of a turn test, off rounded to 0.01 mm."""
+    """Return the earlier looks shown beside each question of a turn test, rounded to 0.01 mm."""
     subjects = [step.subject for step in person.log if isinstance(step, Ask)]
     return [
         [(one.u_deg, round(one.off_mm, 2), one.within) for one in subject.earlier]
@@ -226,7 +226,7 @@ def test_each_touch_of_the_turn_test_is_asked_for_with_what_the_earlier_ones_hav
     row = [(90.0, error_mm, within), (0.0, error_mm, within)]
     assert shown[:2] == [[], row[:1]]
     assert shown[2:] == [row] * (last - 2)
-    # What was shown of an angle is what the verdict counts there.
+    # The verdict counts the value that was shown for each angle.
     assert [one.distance_mm for one in outcome.drifts] == pytest.approx([error_mm] * 2)
     _, measuring = measured(ToolOffset(12.3, -3.9, -20), ToolOffset(12, -4, -20))
     assert earlier_shown(measuring) == [[], []]
@@ -269,7 +269,7 @@ def test_the_mean_of_touches_at_one_angle_is_surer_and_may_pass():
 
 def test_touches_of_the_proof_at_another_height_do_not_count():
     class Floating(PerfectPerson):
-        """Touches the pin in the measurement, and the air above it in the proof."""
+        """Touches the pin in the measurement, and the air above it in the turn test."""
 
         def answer(self, step):
             pose = super().answer(step)
@@ -300,7 +300,7 @@ def test_a_look_ahead_draws_nothing_and_says_how_far_beside_the_pin_it_may_stop(
 
 
 def followed(procedure):
-    """Follow a procedure as a look ahead does; yield its steps with where each leads."""
+    """Follow a procedure as a preview does; yield each step and its target."""
     here, step = START, next(procedure)
     while True:
         if isinstance(step, Consider):

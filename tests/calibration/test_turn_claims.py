@@ -1,8 +1,8 @@
 """A turn test contradicts a right result in 1 of 1,000 tests, and a wrong one nearly always.
 
-The cells are simulated by plain arithmetic: a tip, looks or touches with Gaussian scatter, rows of
-the budget that are as wide as the cell states. What is drawn goes through the same solvers,
-statement and judgement as a measurement in a cell.
+Plain arithmetic simulates the cells: a tip, looks or touches with Gaussian scatter, and rows of the
+budget that are as wide as the cell states. The drawn data go through the same solvers, statement
+and verdict as a measurement in a cell.
 """
 
 import math
@@ -57,18 +57,18 @@ Random = np.random.Generator
 
 
 def stated(**rows: float) -> AccuracyFacts:
-    """Return a cell that states all rows, those that are not named as nothing."""
+    """Return a cell that states all rows; those not named as zero."""
     return AccuracyFacts({key: RowFact(rows.get(key, 0.0), "stated") for key in ALL_ROWS})
 
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell that is as it says.
+    """A cell whose statements are true.
 
     Attributes:
-        measure: One measurement, and what draws one drift of its proof at an angle.
-        angles_deg: Of the proof, the first one, two or three.
-        facts: What the cell states.
+        measure: One measurement, with a function that draws one drift of its turn test at an angle.
+        angles_deg: The angles of the turn test, of which the first one, two or three are used.
+        facts: The facts that the cell states.
     """
 
     measure: "Callable[[Random], tuple[CalibrationResult, Callable[[float], list[Drift]]]]"
@@ -77,7 +77,7 @@ class Cell:
 
 
 def look_drift(random: Random, result: CalibrationResult, u_deg: float, **wrong) -> list[Drift]:
-    """Return the drift of a tip that is brought to the middle and seen, as a proof tells it."""
+    """Return the drift of a tip that is brought to the middle and seen, as a turn test gives it."""
     z = complex(np.exp(1j * math.radians(u_deg)))
     believed = complex(result.offset.x_mm, result.offset.y_mm)
     (look,) = cells.seen(random, (u_deg,), aside=TIP - believed, sigma_mm=SIGMA_MM, **wrong)
@@ -89,7 +89,7 @@ def look_drift(random: Random, result: CalibrationResult, u_deg: float, **wrong)
 
 
 def looking(angles_deg: Sequence[float], solve=solve_camera_round, *, place_sigma_mm=0.0, **wrong):
-    """Looks of a camera whose place is off by chance, proved through the same camera."""
+    """Return looks of a camera at a random place, and a turn test with the same camera."""
 
     def measure(random):
         off = complex(*random.normal(0, place_sigma_mm, 2)) if place_sigma_mm else 0.0
@@ -101,7 +101,7 @@ def looking(angles_deg: Sequence[float], solve=solve_camera_round, *, place_sigm
 
 
 def touching_pin(angles_deg: Sequence[float], solve):
-    """Touches of one pin, proved by fresh ones against the pin that was found."""
+    """Return touches of one pin, and a turn test by fresh touches of the found pin."""
 
     def measure(random):
         tip = (TIP.real, TIP.imag)
@@ -138,7 +138,7 @@ CELLS = {
 
 
 def judged(cell: Cell, random: Random, counts: Sequence[int]) -> list[TurnJudgement]:
-    """Return what a measurement and its proofs with so many angles say."""
+    """Return the verdicts of a measurement and its turn tests with this many angles."""
     result, proof = cell.measure(random)
     result = assessed(result, cell.facts)
     claim = turn_claim(result, cell.facts)
@@ -151,7 +151,7 @@ def judged(cell: Cell, random: Random, counts: Sequence[int]) -> list[TurnJudgem
 
 
 def alarms(cell: Cell, trials: int, counts: Sequence[int] = (1, 2, 3)) -> list[tuple[int, int]]:
-    """Return how many tests contradict any statement, and that of accuracy, for each count."""
+    """Return how many tests contradict any statement, and the accuracy, for each count."""
     random = np.random.default_rng(20)
     found = np.zeros((len(counts), 2), dtype=int)
     for _ in range(trials):
@@ -178,7 +178,7 @@ def test_one_in_a_thousand_right_results_is_contradicted(name):
 @pytest.mark.soak
 @pytest.mark.timeout(300)
 def test_accuracy_is_contradicted_as_seldom_where_its_row_is_what_it_says():
-    """The place is off by chance, with the standard uncertainty of its row."""
+    """The camera's place is random, with the standard uncertainty of its row."""
     facts = stated(place_mm=0.02)
     cell = Cell(looking((0.0,), place_sigma_mm=0.02 / math.sqrt(3)), (180.0, 90.0, -90.0), facts)
     shares = [accuracy / 200 for _, accuracy in alarms(cell, 20_000)]
@@ -190,7 +190,7 @@ def test_accuracy_is_contradicted_as_seldom_where_its_row_is_what_it_says():
 
 
 def slipped(random: Random, claim: TurnClaim, drifts: Sequence[Drift]) -> TurnJudgement:
-    """Return what a test says of a tip that shifted by exactly what it says that it shows."""
+    """Return the verdict on a tip that shifted by exactly what the test claims to show."""
     right = held_to_claim(claim, VerifyResult(tuple(drifts), tolerance_mm=9.0))
     assert right.shows_from_mm is not None
     shift = right.shows_from_mm * cells.anywhere(random)
@@ -202,7 +202,7 @@ def slipped(random: Random, claim: TurnClaim, drifts: Sequence[Drift]) -> TurnJu
 
 
 def shown(cell: Cell, trials: int, count: int) -> float:
-    """Return in what share of tests with so many angles such a shift is contradicted, percent."""
+    """Return the share of tests with this many angles that contradict such a shift, percent."""
     random, found = np.random.default_rng(28), 0
     for _ in range(trials):
         result, proof = cell.measure(random)
@@ -220,14 +220,14 @@ def test_a_shift_from_which_on_it_is_said_to_show_shows_in_95_percent(name):
     one, *several = (shown(CELLS[name], 2_000, count) for count in (1, 2, 3))
     sys.stdout.write(f"| {name} | {one:.1f} | {' | '.join(map(str, several))} |\n")
     assert 93.0 <= one <= 97.0, one
-    # What the measurement does to several drifts is taken as the same for all: more show it then.
+    # The measurement's effect on several drifts is assumed equal for all: then more is detected.
     assert all(93.0 <= share <= 99.5 for share in several), several
 
 
 @pytest.mark.parametrize("nu", [None, 4.0, 6.0])
 @pytest.mark.parametrize("in_space", [False, True])
 def test_such_a_shift_shows_as_often_whatever_tells_the_scatter(nu, in_space):
-    """Plain arithmetic: two looks, and a scatter that is known or was estimated."""
+    """Plain arithmetic: two looks, and a known or estimated scatter."""
     random, found, trials = np.random.default_rng(29), 0, 1_500
     for _ in range(trials):
         told = 1.0 if nu is None else math.sqrt(random.chisquare(nu) / nu)
@@ -240,7 +240,7 @@ def test_such_a_shift_shows_as_often_whatever_tells_the_scatter(nu, in_space):
 
 
 def beams_claim() -> TurnClaim:
-    """Return that of one fresh crossing of beams whose place is relied on."""
+    """Return the claim of one fresh crossing of beams whose place is relied on."""
     return TurnClaim(
         look_sigma_mm=0.003,
         offset_sigma_mm=0.003,
@@ -260,7 +260,7 @@ def test_the_limit_of_beams_is_that_of_their_row(turn_deg, limit_mm):
 
 
 def contradicted(moved_mm: float, turn_deg: float, trials: int) -> tuple[float, float]:
-    """Return how often beams that were moved contradict accuracy, and repeatability alone."""
+    """Return how often moved beams contradict accuracy, and repeatability alone."""
     random, found = np.random.default_rng(21), np.zeros(2)
     for _ in range(trials):
         shift = moved_mm * cells.anywhere(random)
@@ -307,7 +307,7 @@ def test_one_look_relies_on_the_place_and_several_find_it():
     found = claim_of(several, place_mm=0.03)
     assert (found.finds_place, found.place_u_mm, found.by_camera) == (True, 0.0, True)
     assert found.headings_deg == pytest.approx(cells.HALF_ROUND)
-    # Nothing is known of the scatter of a single look: a tenth of a pixel, then.
+    # The scatter of a single look is unknown, so a tenth of a pixel is assumed.
     assert claim.look_sigma_mm == pytest.approx(0.002)
 
 
@@ -327,9 +327,9 @@ def test_a_camera_that_turned_counts_by_how_far_the_tip_went_round():
 
 @pytest.mark.parametrize("error", [complex(0, math.radians(10)), complex(0.25, 0)])
 def test_a_camera_that_was_turned_or_moved_nearer_contradicts_accuracy(error):
-    """The tip is 1 mm elsewhere; the camera believes to have brought it to the middle."""
+    """The tip is 1 mm away, where the camera believes to have it in the middle."""
     random = np.random.default_rng(24)
-    # What is left of a correction that was seen through the wrong camera.
+    # The rest of a correction that was seen through the wrong camera.
     left = -1.0 * error
     seen = cells.seen(
         random, cells.HALF_ROUND, aside=left * cells.anywhere(random), error=error, sigma_mm=0.002
@@ -347,7 +347,7 @@ def test_a_camera_that_was_turned_or_moved_nearer_contradicts_accuracy(error):
         drifts.append(Drift(u_deg, *beside(look, result)))
     judgement = held_to_claim(claim, VerifyResult(tuple(drifts), tolerance_mm=0.2))
     assert judgement.contradicts_accuracy
-    # It was seen through what is wrong.
+    # It was seen through the faulty camera.
     assert not judgement.offers_wider
 
 
@@ -361,18 +361,18 @@ def beside(look: Sighting, result: CalibrationResult) -> tuple[float, float]:
     return look.x_mm - error_x - look.flange.x_mm - x, look.y_mm - error_y - look.flange.y_mm - y
 
 
-# ----- what lies beside the middle of the tool, is held to a table, or was tilted
+# ----- tips off the tool's middle, compared with a table, or tilted
 
 
 def board_cell(angles_deg, drawing, *, print_mm=0.0):
-    """A board whose fiducials lie beside their drawing by chance, proved one by one."""
+    """A board whose fiducials are randomly off their drawing, tested one by one."""
 
     def measure(random):
         aside = random.normal(0, print_mm / math.sqrt(3), (len(drawing), 2)).tolist()
         held = ToolOffset(TIP.real, TIP.imag, 0.0, 5.0)
 
         def seen(offset, k, u_deg):
-            """One fiducial, brought to the middle by an offset, as it is seen."""
+            """Return the sighting of one fiducial that an offset brought to the middle."""
             z = complex(np.exp(1j * math.radians(u_deg)))
             (x, y), (dx, dy) = drawing[k], aside[k]
             expected = believed_at(offset, x, y)
@@ -418,7 +418,7 @@ def place_of(offset: ToolOffset, mark: tuple[float, float]) -> tuple[float, floa
 
 
 def wobbling_cell(random):
-    """A tip on a spindle that wobbles by 0.06 mm, proved against its table."""
+    """A tip with 0.06 mm of spindle runout, tested against its table."""
     amplitude = 0.06 * cells.anywhere(random)
 
     def wobble(z):
@@ -511,7 +511,7 @@ def test_no_more_than_one_in_a_thousand_of_another_kind_is_contradicted(name):
 
 
 def test_what_a_board_says_of_a_turned_camera_counts_where_its_fiducials_are():
-    """Both fiducials in one picture: the direction of the board is off as the camera is."""
+    """Both fiducials are in one picture: the board's direction is off by the camera's error."""
     flange = Pose(300.0, 80.0, -60.0, 0.0)
     seen = Sighting(flange, 320.0, 80.0), Sighting(flange, 280.0, 80.0)
     result = solve_board(*seen, camera=cells.CAMERA, sigma_mm=SIGMA_MM)
@@ -545,11 +545,11 @@ def test_a_test_of_a_tilted_tip_has_the_leverage_of_the_fit_of_tip_and_pin():
 
 
 def test_rough_looks_say_so_themselves():
-    """Four looks that scatter five times as much as a tenth of a pixel, and no stated scatter."""
+    """Four looks with five times the scatter of a tenth of a pixel, and no stated scatter."""
     random = np.random.default_rng(25)
     seen = cells.seen(random, cells.HALF_ROUND, sigma_mm=0.02)
     rough = claim_of(solve_camera_round(seen, camera=cells.CAMERA))
-    # What is usual counts as six degrees of freedom: four alone would let 0.1 mm pass.
+    # The usual value counts as six degrees of freedom: four alone would let 0.1 mm pass.
     assert rough.look_nu == 10.0
     assert 0.006 < rough.look_sigma_mm < 0.02
     quiet = cells.seen(random, cells.HALF_ROUND, sigma_mm=0.001)
@@ -559,7 +559,7 @@ def test_rough_looks_say_so_themselves():
 
 
 def test_few_touches_that_agree_let_no_drift_pass_that_the_statement_excludes():
-    """Four residuals, finer than is usual of a person; the statement is made by them."""
+    """Four residuals, finer than is usual for a person; they make the statement."""
     tip, random = (TIP.real, TIP.imag), np.random.default_rng(27)
     touches = [touching(tip, u_deg) for u_deg in (0.0, 90.0, 180.0, -90.0)]
     fine, usual = (shaken(touches, random, sigma_mm) for sigma_mm in (0.004, 0.03))
@@ -578,7 +578,7 @@ def test_few_touches_that_agree_let_no_drift_pass_that_the_statement_excludes():
 
 
 def test_a_stated_scatter_stands_until_it_is_contradicted():
-    """Few residuals make the interval wider by Student's t, though they may be small."""
+    """Few residuals widen the interval by Student's t, although they may be small."""
     random = np.random.default_rng(26)
     claims = [
         claim_of(solve_camera_round(seen, sigma_mm=SIGMA_MM))

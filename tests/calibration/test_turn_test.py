@@ -1,4 +1,4 @@
-"""A turn test: its first contact after a break, and one that is made again."""
+"""A turn test: its first contact after a break, and its repetition."""
 
 import math
 from dataclasses import replace
@@ -24,7 +24,7 @@ from robolink.model import Hand, Pose, ToolOffset
 from robolink.procedures import TouchPlan, TurnTest
 from robolink.runner import Ask, Consider, TouchedAt
 
-# A turn test that is made again: all its looks count together, and none is picked out.
+# A turn test that is repeated: all its looks count together, and none is picked out.
 
 BEAMS = TurnClaim(
     look_sigma_mm=0.003,
@@ -102,7 +102,7 @@ def test_what_was_scatter_is_gone_and_the_doubt_stays_by_name():
 
 @pytest.mark.parametrize("good", [1, 2])
 def test_a_good_look_does_not_undo_a_bad_one(good):
-    """Whoever touches until it fits: the mean is small, and the looks lie apart."""
+    """Repeating until it fits: the mean is small, and the looks lie apart."""
     judgement = held_together(PIN, (at_90(0.1), *[at_90(0.0)] * good))
     assert judgement.code
     assert judgement.apart_mm == pytest.approx(0.1)
@@ -175,7 +175,7 @@ def test_how_often_a_tip_is_refused_before_and_after_it_was_made_again(off_mm, f
 # The first contact of a turn test after a break: where it is, and whether the tool is upright.
 
 UPRIGHT = Pose(310.0, 95.0, -40.0, 30.0, 0.0, 180.0, tool=1)
-"""Of the new tool, whose frame is where its tip is: at the pin, on the plane, atop the ball."""
+"""Poses of the new tool, with its frame at the tip: at the pin, on the plane, atop the ball."""
 
 OF_ALL: dict[str, Any] = {
     "tool": 1,
@@ -204,7 +204,7 @@ TESTS = TILTED | {
 
 
 def first_contact(test, pose):
-    """Answer the first question of a proof after a break; return the steps, and the next one."""
+    """Answer the first question of a turn test after a break; return the steps and the next one."""
     steps = test.steps_after_a_break(*(() if isinstance(test, TurnTest) else (UPRIGHT,)))
     assert isinstance(next(steps), Ask)
     lift = steps.send(TouchedAt.of(pose))
@@ -220,13 +220,13 @@ def first_contact(test, pose):
         ("turned", {"z_mm": -37.0}),
         ("plane", {"z_mm": -37.0}),
         ("sphere", {"z_mm": -37.0}),
-        # On the ball all the same, but so far down that straight up from there it is in the way.
+        # Still on the ball, but so far down that the ball is in the way straight up from there.
         ("sphere", {"x_mm": 319.0, "z_mm": -50.0 + 19.0**0.5}),
     ],
 )
 @pytest.mark.parametrize("tolerance_mm", [0.2, 5.0], ids="tolerance {}".format)
 def test_a_first_contact_that_is_elsewhere_ends_it_before_anything_tilts(kind, aside, tolerance_mm):
-    """Also where the process could bear it: the robot would come down too near."""
+    """Also where the process could tolerate the error: the robot would come down too near."""
     test = replace(TESTS[kind], tolerance_mm=tolerance_mm)
     steps, lift = first_contact(test, replace(UPRIGHT, **aside))
     with pytest.raises(StopIteration) as ended:

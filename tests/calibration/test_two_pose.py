@@ -1,4 +1,4 @@
-"""Two poses, and what a seen movement says of the spot and of the camera."""
+"""Two poses, and the conclusions about spot and camera from a seen movement."""
 
 import cmath
 import math
@@ -137,14 +137,14 @@ def test_the_refused_near_degenerate_case_names_its_gain():
     assert caught.value.code == "insufficient_rotation"
 
 
-# What a seen movement says of the spot and of the camera.
+# Conclusions about spot and camera from a seen movement.
 
 ROWS = CameraChangeRows()
 KNOWN = (1.0, 1.0)
 
 
 def seen_by(factor, known=KNOWN, noise=0.003):
-    """What a camera sees whose map multiplies each way by a complex factor."""
+    """The sighting by a camera that scales each direction by a complex factor."""
     moved = complex(*known) * factor
     return SeenMovement(known, (moved.real, moved.imag), noise)
 
@@ -200,7 +200,7 @@ def test_chance_alone_is_no_alarm(sigma_px):
         seen = (1.0 + rng.gauss(0, sigma), 1.0 + rng.gauss(0, sigma))
         verdict = SeenMovement(KNOWN, seen, sigma).judged(ROWS, play_mm=0)
         alarms += verdict is not MovementVerdict.AS_KNOWN
-    # One alone has a closer look; only two of them in a row refuse.
+    # A single one leads to a closer look; only two of them in a row refuse.
     assert alarms <= 2
 
 
@@ -208,7 +208,7 @@ def test_movements_are_alike_whatever_their_length():
     whole, half = seen_by(turned(10.0)), seen_by(turned(10.0), known=(0.5, 0.5))
     assert whole.like(half, within=0.1)
     assert not seen_by(turned(10.0) + 0.4).like(half, within=0.1)
-    # A spot that stands still is like none, however wide the scatter makes the limit.
+    # A spot that stands still counts as none, however wide the scatter makes the limit.
     assert not seen_by(0.0, noise=1.0).like(whole, within=0.1)
     assert whole.along(half)
     assert not whole.along(SeenMovement((1.0, -1.0), (1.0, -1.0), 0.003))

@@ -1,4 +1,4 @@
-"""What a result is accurate to: its rows, where they come from, and which is the largest."""
+"""The accuracy of a result: its rows, their sources, and the largest one."""
 
 import math
 from dataclasses import replace
@@ -90,7 +90,7 @@ def region_mm(sigma_mm, gain=0.5**0.5):
 
 
 def test_a_person_aims_at_a_pin_whose_contact_an_input_shows():
-    """The input tells that there is contact and how high: sideways they err as by eye."""
+    """The input shows contact and height: sideways a person aims by eye."""
     bare = two_pose(sigma_mm=None)
     by_person = judged(bare, AccuracyFacts(by_contact=True))
     by_program = judged(bare, AccuracyFacts(by_contact=True, by_program=True))
@@ -135,7 +135,7 @@ def test_of_a_tool_whose_axes_were_shown_the_angles_stay_as_sure_as_they_are():
 
 
 def test_what_no_person_aimed_is_not_held_to_their_aim():
-    """A case by hand may say of a camera that an input showed each touch: nobody aimed it."""
+    """A hand-written case may claim an input for a camera, but nobody aimed a camera."""
     seen = replace(
         two_pose(sigma_mm=None), half_width95=(0.01, 0.01), region95_radius_mm=0.0125,
         covariance=((0.0051**2, 0.0), (0.0, 0.0051**2)), dof=6, interval_from="residuals",
@@ -155,13 +155,13 @@ def test_an_input_tells_the_height_of_a_touch_better_than_a_person_aims_it():
 
 
 def held_at(found, sigma_mm, shift_mm):
-    """Return how often the truth lies within U beside an error that is always the same."""
+    """Return the share of truths within U for a constant error."""
     return chndtr((found.accurate_to_mm / sigma_mm) ** 2, 2, (shift_mm / sigma_mm) ** 2)
 
 
 @pytest.mark.parametrize("half_width", [0.2, 0.6, 1.0, 1.6, 3.0])
 def test_an_error_at_the_end_of_a_row_of_one_number_is_held(half_width):
-    """By a / sqrt(3) alone it was held in 93 % where it is about as large as the scatter."""
+    """With a / sqrt(3) alone it was held in 93 %, where it is about as large as the scatter."""
     sigma_mm = 0.01
     bare = replace(
         two_pose(sigma_mm=sigma_mm * math.sqrt(2)),
@@ -171,7 +171,7 @@ def test_an_error_at_the_end_of_a_row_of_one_number_is_held(half_width):
     found = judged(bare, AccuracyFacts(rows))
 
     assert held_at(found, sigma_mm, 0.01 * half_width) > 0.9499
-    # Never wider than the error and the scatter that goes with it.
+    # Never wider than the error together with its scatter.
     assert found.accurate_to_mm < 0.01 * half_width + 2.45 * sigma_mm
     for half_mm, gain in zip(found.accuracy.half_width95, (0.006, 0.008), strict=True):
         off = gain * half_width / sigma_mm

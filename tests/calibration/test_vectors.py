@@ -1,4 +1,4 @@
-"""Cases with exact or published answers: kept here, shared, and of real trackers."""
+"""Cases with exact or published answers: our own, shared ones, and data of real trackers."""
 
 import json
 import math
@@ -178,7 +178,7 @@ def test_the_outliers_are_found_among_real_poses(robust):
     not DATA.is_dir(), reason="the tracker data lie beside the repository and are not there"
 )
 def test_every_seed_finds_the_same_set_among_real_poses():
-    """Single seeds of plain refits gave 11 answers, 0.6 mm apart, on such data."""
+    """On such data, plain refits under single seeds gave 11 answers, 0.6 mm apart."""
     spoilt = poses("lsqrrecipes_pivot_outliers.txt")
     found = {solve_pivot(spoilt, robust=Robust(2.0, seeds=(k,))).rejected for k in range(8)}
     assert len(found) == 1

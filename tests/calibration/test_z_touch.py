@@ -1,4 +1,4 @@
-"""A tool's length, and one that shows by the heights of the touches."""
+"""A tool's length, and a changed length that shows in the heights of the touches."""
 
 import math
 
@@ -18,7 +18,7 @@ SPEEDS = (2.0, 2.0, 8.0, 8.0)
 
 
 def touches(speeds=SPEEDS, rng=None, sigma_mm=0.0, *, latency_s=LATENCY, overshoot=0.0):
-    """The flange is lower than where the tip touched when the trigger is read."""
+    """The flange is lower at the reading than at the contact."""
     noise = rng.normal(0, sigma_mm, len(speeds)) if rng else [0.0] * len(speeds)
     return [
         Touch(SURFACE - LENGTH - v * latency_s - v * v * overshoot + e, v)
@@ -95,7 +95,7 @@ def test_a_latency_that_a_slow_network_has_is_none(latency_s):
 
 
 def test_scatter_alone_makes_no_latency_implausible():
-    # Around zero the estimate is often below -0.002 s; within three sigma that says nothing.
+    # Around zero the estimate is often below -0.002 s; within three sigma that shows nothing.
     rng = np.random.default_rng(5)
     for _ in range(150):
         solve_z_touch(touches((1.0, 2.0) * 4, rng, 0.01, latency_s=0.0), SURFACE, sigma_mm=0.01)
@@ -136,7 +136,7 @@ def test_braking_that_the_controller_tells_is_taken_out_with_two_speeds_too():
     told = solve_z_touch(seen, SURFACE, deceleration_mm_s2=200, deceleration_told=True)
     assert told.offset.z_mm == pytest.approx(LENGTH)
     assert told.latency_s == pytest.approx(LATENCY)
-    # As wide as what was taken out: that the robot does brake so is the controller's word.
+    # As wide as the correction: only the controller says that the robot brakes like that.
     assert told.budget is not None
     (row,) = [row for row in told.budget.rows if row.name == "braking"]
     assert row.u_mm == pytest.approx(0.005 / 3**0.5)
@@ -176,7 +176,7 @@ def test_what_two_speeds_cannot_see_is_a_row_of_the_budget():
     assert rows["braking"].u_mm == pytest.approx(2 * 20 / 600 / 3**0.5)
     assert rows["scatter"].kind == "A"
     assert budget_rows((1.0, 2.0) * 2)[-1].u_mm < 0.003
-    # Three speeds show it, or how small it must be.
+    # Three speeds show it, or its upper limit.
     assert budget_rows(THREE)[-1].u_mm < 0.001
 
 
@@ -247,7 +247,7 @@ def test_intervals_hold_the_truth_however_the_robot_brakes(speeds, latency_s):
             assert held / runs >= 0.93, (braking_mm_s2, sigma_mm, held)
 
 
-# Another length shows by the heights of the touches; what cannot show it is refused.
+# A changed length shows in the heights of the touches; touches that cannot show it are refused.
 
 BEFORE = (-60.01, -59.98, -60.02, -59.99)
 

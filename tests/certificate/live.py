@@ -1,7 +1,7 @@
-"""Live nozzle changes in which the tip is known: by every method, on both kinds of controllers.
+"""Live nozzle changes with a known tip: by every method, on both kinds of controllers.
 
-The real driver and the real procedures work on a simulator in process, in virtual time. What is
-wrong in a cell is put into it after its stations were described, so that nobody is told.
+The real driver and procedures run on a simulator in this process, in virtual time. Errors are put
+into a cell after its stations were described, so that no part of robolink is told.
 """
 
 import math
@@ -62,31 +62,31 @@ from tests.contract._camera_cell import camera_station, furnish
 from tests.contract._sensor_cell import PLATE_INPUT, TOOL, plc_sensor_cell, sensor_cell
 
 QUICK: Final = Limits(speed_percent=100, speed_mm_s=2000.0)
-"""Faster than commands let it, which changes nothing but how long a test takes."""
+"""Faster than commands allow, which only shortens the test."""
 
 BEAM_NOISE: Final = {"noise_mm": 0.003}
 PLATE_NOISE: Final = {"noise_mm": 0.002}
 PERSON_SIGMA_MM: Final = 0.01
-"""What a cell states of its person: what the eye errs by."""
+"""The cell's statement about its person: the error of the eye."""
 
 ABOVE_BALL_MM: Final = 15.0
 CONTACT: Final = 9
-"""The input that nozzle and pin switch, where they are wired."""
+"""The input of the nozzle-and-pin contact, if wired."""
 
 
 @dataclass(frozen=True)
 class Ended:
-    """How a change ended.
+    """The end of a change.
 
     Attributes:
-        code: Why it was refused; empty where the value was written and stands.
-        taken_back: Whether it had been written and the old value came back.
-        doubts: What was doubted by name, though the value stands.
-        off_mm: How far what was found is from the truth, all measured lengths together.
-        accurate_mm: What it is said to be accurate to at the end.
-        repeatable_mm: What it is said to be repeatable to.
-        proof: The turn test, with what it says about the measurement.
-        proposal: What was proposed.
+        code: The reason of a refusal; empty if the value was written and stays.
+        taken_back: Whether it had been written and the old value was restored.
+        doubts: The named doubts about a value that stays.
+        off_mm: The error of the result, over all measured lengths.
+        accurate_mm: The stated accuracy at the end.
+        repeatable_mm: The stated repeatability.
+        proof: The turn test, with its verdict on the measurement.
+        proposal: The proposal.
     """
 
     code: str = ""
@@ -100,12 +100,12 @@ class Ended:
 
     @property
     def good(self) -> bool:
-        """Whether the value stands and nothing is said against it."""
+        """Whether the value stays without any doubt."""
         return not self.code and not self.doubts
 
     @property
     def share(self) -> float:
-        """How far off the truth it is, as a multiple of what it is said to be accurate to."""
+        """The error as a multiple of the stated accuracy."""
         assert self.off_mm is not None
         assert self.accurate_mm is not None, "it says nothing"
         return self.off_mm / self.accurate_mm
@@ -113,17 +113,17 @@ class Ended:
 
 @dataclass(frozen=True)
 class Course:
-    """A method on a controller, and what there is in its cell.
+    """A method on a controller, and its cell.
 
     Attributes:
-        method: Its name, with its manner where there are several.
-        kind: Of controller.
+        method: Its name, with its variant if there are several.
+        kind: The kind of controller.
         opened: Sets a cell up, by a seed.
-        source: Returns what measures in it. It may draw how.
-        rows: The rows of its budget that a cell can be wrong by.
+        source: Returns the source of measurements, possibly with random parameters.
+        rows: The rows of its budget in which a cell can be wrong.
         proves: Whether there is a turn test.
-        approach: Returns where it begins; ``None`` for wherever the robot is.
-        truth: What the measurement is held to.
+        approach: Returns the start; ``None`` for the robot's present place.
+        truth: The true value for the comparison.
     """
 
     method: str
@@ -142,7 +142,7 @@ class Course:
 
 
 class Hears(Listener):
-    """Keeps what was proposed and what the turn test said, and lets the world change meanwhile."""
+    """Keeps the proposal and the turn test, and lets the world change meanwhile."""
 
     def __init__(self, at_write: Callable[[], None] = lambda: None) -> None:
         self.proposal: Proposal | None = None
@@ -150,22 +150,23 @@ class Hears(Listener):
         self._at_write = at_write
 
     def proposed(self, proposals: Sequence[Proposal]) -> None:
-        """Keep it."""
+        """Keep the proposal."""
         (self.proposal,) = proposals
 
     def wrote(self, receipt: ToolReceipt) -> None:
-        """Let happen what happens while the tool is written."""
+        """Run the event planned for the write."""
         self._at_write()
 
     def verified(self, tool: int, result: VerifyResult) -> None:
-        """Keep it."""
+        """Keep the turn test."""
         self.proof = result
 
 
 class Person(AssistedOperator):
-    """The person of the cell, who answers questions with yes or no by a rule.
+    """The person of the cell, who answers yes or no by a rule.
 
-    Of rows they choose the first, unless ``chooses`` names another one by some of its words.
+    Of several rows they choose the first, unless ``chooses`` names another one by some of its
+    words.
     """
 
     says: Callable[[str], bool] = staticmethod(lambda _question: True)
@@ -179,7 +180,7 @@ class Person(AssistedOperator):
         super().ask(question, kind)
 
     def poll(self, wait_s: float) -> str | None:
-        """Answer."""
+        """Answer it."""
         answer = super().poll(wait_s)
         if answer is not None and self._kind is Question.CHOICE:
             return row_of(self.asked[-1], self.chooses()) or answer
@@ -213,19 +214,19 @@ def change(
     rows: Mapping[str, float] | None = None,
     role: str = "",
 ) -> Ended:
-    """Change the nozzle in a new cell, and return how that ended.
+    """Change the nozzle in a new cell, and return the end.
 
     Args:
-        course: By what, on what.
-        seed: Of the cell and of its errors.
-        wrong: What is otherwise in the cell than it was when its stations were described.
-        at_write: What happens while the tool is written.
-        attended: Whether a person is asked; else all of it is as under ``--yes``.
-        person: Who they are.
-        interval_mm: What the process allows the tip to be off.
-        drift_mm: What it allows a turn test to drift.
-        rows: What the cell states of the rows of its budget.
-        role: Of whoever does it, where the cell names people.
+        course: The method and its cell.
+        seed: The seed of the cell and of its errors.
+        wrong: Puts errors into the cell after its stations were described.
+        at_write: Called while the tool is written.
+        attended: Whether a person is asked; otherwise everything is as under ``--yes``.
+        person: The person.
+        interval_mm: The tip error that the process allows.
+        drift_mm: The drift that it allows in a turn test.
+        rows: The rows of its budget that the cell states.
+        role: The role of the person, if the cell names people.
     """
     with course.opened(seed) as cell:
         source = course.source(cell, random.Random(f"{course.name} {seed}"))
@@ -258,7 +259,7 @@ def change(
 
 
 def named(error: RobolinkError) -> str:
-    """Return the code of an error, or what it is where it has none."""
+    """Return the code of an error, or its class if it has none."""
     return str(getattr(error, "code", "") or type(error).__name__)
 
 
@@ -292,7 +293,7 @@ def _ended(
 
 @contextmanager
 def tilting(seed: int, **world: Any) -> Iterator[Any]:
-    """Set a PLC up whose flange leaves the vertical."""
+    """Set up a PLC whose flange tilts."""
     simulator, clock = SoftMotionSimulator("Kin_5Axes", seed=seed), ManualClock()
     with served(simulator, clock=clock) as url:
         cell: Any = SimpleNamespace(simulator=simulator, url=url, clock=clock)
@@ -302,7 +303,7 @@ def tilting(seed: int, **world: Any) -> Iterator[Any]:
 
 @contextmanager
 def on_a_plate(seed: int) -> Iterator[Any]:
-    """A plane is touched in place of the pin."""
+    """Touch a plane in place of the pin."""
     leaning = {"plane_lean_deg": 20.0, "plane_lean_toward_deg": 30.0}
     with tilting(seed, person_touches="plane", **leaning) as cell:
         yield cell
@@ -310,13 +311,13 @@ def on_a_plate(seed: int) -> Iterator[Any]:
 
 @contextmanager
 def on_a_ball(seed: int) -> Iterator[Any]:
-    """A sphere is touched in place of the pin."""
+    """Touch a sphere in place of the pin."""
     with tilting(seed, person_touches="sphere") as cell:
         yield cell
 
 
 def over_the_pin(cell: Any) -> Pose:
-    """Return the flange pose in which the stored tip is straight over the pin."""
+    """Return the flange pose with the stored tip straight above the pin."""
     stored = cell.simulator.plc.memory.defined()[TOOL].tool
     x_mm, y_mm, z_mm = cell.simulator.world.pin_mm
     u_deg = cell.simulator.world.robot.flange().u_deg
@@ -332,7 +333,7 @@ KINDS: Final = {"EPSON": sensor_cell, "PLC": plc_sensor_cell}
 
 
 def stated(rng: random.Random, sigma_mm: float) -> float | None:
-    """Return what is stated of the scatter: half the cells do."""
+    """Return the stated scatter: half the cells state it."""
     return sigma_mm if rng.random() < 0.5 else None
 
 
@@ -348,7 +349,7 @@ def n_angle(_cell: Any, rng: random.Random) -> Any:
 
 
 def by_input(cell: Any, rng: random.Random) -> Any:
-    """Four touches that an input shows as well."""
+    """Four touches that an input confirms as well."""
     furnish(cell, contact_input=CONTACT)
     touch = TouchPlan(contact=InputEdge(CONTACT))
     sigma_mm = stated(rng, PERSON_SIGMA_MM)
@@ -356,7 +357,7 @@ def by_input(cell: Any, rng: random.Random) -> Any:
 
 
 def one_touch(cell: Any, _rng: random.Random) -> Any:
-    """One touch of a pin whose place is known."""
+    """One touch of a pin at a known place."""
     x_mm, y_mm, z_mm = cell.simulator.world.pin_mm
     pin = Pin(x_mm, y_mm, z_mm, sigma_mm=0.005)
     return OneTouchSource(Absolute(pin, PERSON_SIGMA_MM))
@@ -413,12 +414,12 @@ def camera_one_look(cell: Any, _rng: random.Random) -> Any:
 
 
 def camera_affine(cell: Any, _rng: random.Random) -> Any:
-    """A camera of which nothing is known."""
+    """A camera without a calibration."""
     return CameraAffineSource(cell.url, camera_station(cell, known=False))
 
 
 def runout_table(cell: Any, rng: random.Random) -> Any:
-    """A camera that looks at a wobbling tip all round."""
+    """A camera that looks at a tip with runout all round."""
     turns = tuple(30.0 * step for step in range(12))
     furnish(cell, wobble_mm=rng.uniform(0, 0.06), wobble_toward_deg=rng.uniform(0, 360))
     return RunoutTableSource(cell.url, camera_station(cell), AllRoundPlan(turns_deg=turns))
@@ -432,14 +433,14 @@ def board(cell: Any, rng: random.Random) -> Any:
 
 
 def held_board(cell: Any) -> ToolOffset:
-    """Return where the board is."""
+    """Return the place of the board."""
     world = cell.simulator.world
     frame: ToolOffset = world.board.frame(world.tips[TOOL])
     return frame
 
 
 def pivot(_cell: Any, rng: random.Random) -> Any:
-    """A pin touched by a tool that is tilted."""
+    """A pin touched by a tilted tool."""
     count_ = rng.choice((4, 6))
     return PivotSource(informative_tilts(count_, 20.0), sigma_mm=stated(rng, PERSON_SIGMA_MM))
 
@@ -505,12 +506,11 @@ BY_NAME: Final[Mapping[str, Course]] = {course.name: course for course in COURSE
 
 
 def wrong_by(rows: Mapping[str, tuple[float, ...]]) -> Callable[[Any], None]:
-    """Return what makes a cell wrong by so much in each row, in the unit of the row.
+    """Return a function that makes a cell wrong by this much in each row, in the unit of the row.
 
     Args:
-        rows: X and Y of each row that lies in the plane, one number of each other; of ``print_mm``
-            X and Y of each fiducial, one after the other; of ``bend_deg`` how far, and in which
-            direction.
+        rows: X and Y for each row in the plane, one number for each other; for ``print_mm`` X and Y
+            of each fiducial in turn; for ``bend_deg`` the angle and its direction.
     """
 
     def put_in(cell: Any) -> None:
@@ -535,7 +535,7 @@ def _touch(cell: Any, x_mm: float, y_mm: float) -> None:
 
 
 def _place(cell: Any, x_mm: float, y_mm: float) -> None:
-    """Move everything that a method could rely on."""
+    """Shift everything that a method could rely on."""
     world = cell.simulator.world
     moved_mm, toward_deg = _polar(x_mm, y_mm)
     furnish(cell, beams_moved_mm=moved_mm, beams_moved_toward_deg=toward_deg % 360.0)
@@ -595,7 +595,7 @@ _WRONG: Final[Mapping[str, Callable[..., None]]] = {
 
 
 def slips(dx_mm: float, dy_mm: float, dz_mm: float = 0.0) -> Callable[[Any], None]:
-    """Return what lets the nozzle slip in its mount by so much, in the axes of the tool."""
+    """Return a function that makes the nozzle slip in its mount, in the axes of the tool."""
 
     def slip(cell: Any) -> None:
         tips = cell.simulator.world.tips

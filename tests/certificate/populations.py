@@ -1,6 +1,6 @@
-"""Populations of nozzle changes: what is wrong in each, and how it is drawn.
+"""Populations of nozzle changes: the error in each, and its draw.
 
-Each run is decided by its population, its course and its number, so any of them can be run alone.
+Population, course and number decide a run, so any of them can be run alone.
 """
 
 import cmath
@@ -21,8 +21,9 @@ BEYOND: Final = "one to two rows"
 VISIBLE: Final = "visible to the turn test"
 NEAR: Final = "near the limit of the turn test"
 POPULATIONS: Final = (CLEAN, IN_ROW, BEYOND, VISIBLE, NEAR)
-"""The last one has no goal of its own but that nothing is far outside: whatever a turn test lets
-pass has to be small against what is stated."""
+"""The last one has only the goal that nothing is far outside: an error that a turn test lets pass
+must be small against the stated accuracy.
+"""
 
 _PLANE: Final = ("touch_mm", "place_mm", "tip_image_px")
 """Rows of a vector in the plane; each coordinate lies anywhere within the half width."""
@@ -35,17 +36,17 @@ _COSTLY: Final[Mapping[str, float]] = {
     "sphere-touch on PLC": 0.5,
     "six-point on PLC": 0.7,
 }
-"""Share of the runs of the others: these take most of the time."""
+"""Share of the other methods' runs: these take most of the time."""
 
 UNREACHABLE: Final = ("402",)
-"""The arm cannot turn about the pin where it was put up: another cell is drawn."""
+"""The arm cannot turn about the pin at its place: another cell is drawn."""
 
 ANOTHER: Final = 1_000_000
 
 FACTORS: Final[Mapping[str, tuple[float, float]]] = {VISIBLE: (1.5, 6.0), NEAR: (0.4, 1.5)}
-"""A visible fault makes a drift of so many times the limit that the claim sets it for scatter
-alone: at 3.7 standard deviations a limit is passed by half of the drifts that are as large, at 1.5
-times the limit by 97 %."""
+"""A visible fault makes a drift of so many times the claim's limit for scatter alone: at 3.7
+standard deviations half of the drifts of that size exceed the limit, at 1.5 times the limit 97 %.
+"""
 
 
 @dataclass(frozen=True)
@@ -53,11 +54,11 @@ class Run:
     """One change of a population.
 
     Attributes:
-        population: Which one.
-        course: By what, on what.
-        seed: Of everything in it.
-        fault: What is wrong, in words.
-        ended: How it ended.
+        population: Its population.
+        course: Its method and cell.
+        seed: The seed of everything in it.
+        fault: The fault, in words.
+        ended: Its end.
     """
 
     population: str
@@ -68,7 +69,7 @@ class Run:
 
 
 def shares(total: int, population: str) -> Iterator[tuple[Course, int]]:
-    """Yield how many of so many runs each course has in a population."""
+    """Yield the number of runs of each course in a population."""
     courses = [one for one in COURSES if _belongs(one, population)]
     weights = [_COSTLY.get(one.name, 1.0) for one in courses]
     given, due = 0, 0.0
@@ -79,7 +80,7 @@ def shares(total: int, population: str) -> Iterator[tuple[Course, int]]:
 
 
 def _belongs(course: Course, population: str) -> bool:
-    """Return whether a course has what a population needs: a turn test, or a row to be wrong in."""
+    """Return whether a course suits a population: has a turn test, or a row to be wrong in."""
     if population in FACTORS:
         return course.proves
     return population == CLEAN or bool(course.rows)
@@ -119,9 +120,9 @@ def _wrong(rows: Mapping[str, tuple[float, ...]]) -> Callable[[Any], None]:
 
 
 def _drawn(course: Course, rng: random.Random, *, beyond: bool) -> dict[str, tuple[float, ...]]:
-    """Return how wrong a cell is in each row of a course: anywhere within it.
+    """Return a cell's random error in each row of a course, within the row.
 
-    Beyond, one of the rows is exceeded by up to its half width.
+    Beyond: one of the rows is exceeded by up to its half width.
     """
     exceeded = rng.choice(course.rows) if beyond else ""
     found = {}
@@ -146,13 +147,13 @@ def _anywhere(rng: random.Random, half: float, count: int, *, beyond: bool) -> t
 
 
 _MOVES: Final = ("beams", "camera, one look", "one-touch")
-"""Methods that rely on the place of a station, so that one that was moved turns into drift."""
+"""Methods that rely on the place of a station, so that a moved one turns into drift."""
 
 _BUMPS: Final = ("two-pose", "n-angle", "n-angle, contact input")
 
 
 def _moving(population: str, course: Course, seed: int, rng: random.Random) -> Run:
-    """Make a change in which something moves, by what the claim of the same cell lets pass."""
+    """Make a change with a movement, by the amount that the claim of the same cell lets pass."""
     right = change(course, seed)
     proposal, proof = right.proposal, right.proof
     if right.code or proposal is None or proposal.claim is None or proof is None:
@@ -202,21 +203,21 @@ def _nothing(_cell: Any) -> None:
 
 
 def _of_unit(limits: Sequence[float], shown: Sequence[float]) -> float:
-    """Return how large something is that brings the drift that shows it best to its limit."""
+    """Return the size of a fault that brings its most visible drift to its limit."""
     return min(limit / max(share, 1e-3) for limit, share in zip(limits, shown, strict=True))
 
 
 def _shown_of_place(claim: TurnClaim, turned_deg: Sequence[float]) -> list[complex]:
-    """Return what drifts show of a place that all looks were off by."""
+    """Return the visible part of drifts for a place that all looks had wrong."""
     looks = [cmath.exp(1j * math.radians(one)) for one in claim.headings_deg]
     mean = sum(1 / look for look in looks) / len(looks)
     return [1 - cmath.exp(1j * math.radians(one)) * mean for one in turned_deg]
 
 
 def _shown_of_bump(claim: TurnClaim, turned_deg: Sequence[float], after: int) -> list[float]:
-    """Return what drifts show of a pin that is bumped after a touch, for a bump by 1 mm.
+    """Return the visible part of drifts for a pin bumped by 1 mm after a touch.
 
-    The touches before it fit the pin where it was, those after it where it is: f = p - z t.
+    The touches before it fit the pin's old place, those after it the new one: f = p - z t.
     """
     import numpy as np
 

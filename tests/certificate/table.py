@@ -1,7 +1,7 @@
 """``python -m tests.certificate.table``: how often statements hold, by population.
 
-Each population is counted apart, never pooled, so that neither many easy runs nor a wide statement
-hide what misses. Ends with 1 where a goal is missed. ``--write`` puts the tables into
+Populations are counted separately, never pooled, so that neither many easy runs nor a wide
+statement hide misses. Ends with 1 if a goal is missed. ``--write`` puts the tables into
 docs/reference/evidence.md.
 """
 
@@ -42,15 +42,14 @@ LEAST_SEEN: Final = 0.95
 
 @dataclass(frozen=True)
 class Line:
-    """One run, as it is counted.
+    """One counted run.
 
     Attributes:
-        population, course, seed: Which one.
-        fault: What was wrong.
-        code: Why it was refused, empty where it was written.
-        doubts: What was doubted.
-        off_mm, accurate_mm, repeatable_mm: Error and statements, ``None`` where it was refused
-            without.
+        population, course, seed: The run.
+        fault: The fault.
+        code: The reason of a refusal, empty if it was written.
+        doubts: The doubts.
+        off_mm, accurate_mm, repeatable_mm: Error and statements, ``None`` if refused without.
     """
 
     population: str
@@ -65,7 +64,7 @@ class Line:
 
     @property
     def share(self) -> float:
-        """Error as a multiple of the statement; endless without a statement."""
+        """Error as a multiple of the statement; infinite without a statement."""
         if self.off_mm is None or self.accurate_mm is None:
             return float("inf")
         return self.off_mm / self.accurate_mm
@@ -97,32 +96,32 @@ def line_of(job: tuple[str, str, int]) -> Line:
 
 @dataclass(frozen=True)
 class Count:
-    """What came of the runs of a population, or of a part of it."""
+    """The counts of the runs of a population, or of a part of it."""
 
     lines: tuple[Line, ...]
 
     @property
     def runs(self) -> int:
-        """How many there are."""
+        """The number of runs."""
         return len(self.lines)
 
     @property
     def certified(self) -> list[Line]:
-        """Those whose value stands, and nothing is said against it."""
+        """Runs whose value stays without a doubt."""
         return [line for line in self.lines if not line.code and not line.doubts]
 
     @property
     def refused(self) -> list[Line]:
-        """Those after which the old value stands."""
+        """Runs after which the old value is stored."""
         return [line for line in self.lines if line.code]
 
     @property
     def doubted(self) -> list[Line]:
-        """Those whose value stands, with a doubt by name."""
+        """Runs whose value stays with a named doubt."""
         return [line for line in self.lines if line.doubts]
 
     def outside(self, times: float = 1.0) -> list[Line]:
-        """Return the certified ones that are off by more than so many statements."""
+        """Return the certified runs whose error exceeds this many statements."""
         return [line for line in self.certified if line.share > times]
 
     def outside_share(self, times: float = 1.0) -> float:
@@ -131,7 +130,7 @@ class Count:
 
     @property
     def beyond_scatter(self) -> float | None:
-        """Share of the certified ones off by more than they are said to be repeatable to."""
+        """Share of certified runs whose error exceeds the stated repeatability."""
         told = [
             (line.off_mm, line.repeatable_mm)
             for line in self.certified
@@ -141,9 +140,9 @@ class Count:
 
     @property
     def formerly(self) -> tuple[int, int]:
-        """How many the former rule had certified, and how many of these more than 3 r off.
+        """The number that the former rule had certified, and of these those more than 3 r off.
 
-        A turn test was held to the limit of the process alone, and a result had the interval of
+        A turn test was judged by the limit of the process alone, and a result had the interval of
         its scatter, r.
         """
         told = [
@@ -156,17 +155,17 @@ class Count:
 
     @property
     def refused_share(self) -> float:
-        """Share of those that were refused."""
+        """Share of refused runs."""
         return len(self.refused) / max(self.runs, 1)
 
     @property
     def seen_share(self) -> float:
-        """Share of those that were refused or doubted."""
+        """Share of refused or doubted runs."""
         return 1 - len(self.certified) / max(self.runs, 1)
 
     @property
     def median(self) -> float | None:
-        """Median of the statement over the error, of the certified ones."""
+        """Median of statement over error, for the certified runs."""
         found = [1 / max(line.share, 1e-6) for line in self.certified]
         return statistics.median(found) if found else None
 
@@ -201,7 +200,7 @@ HEAD: Final = (
 
 @dataclass(frozen=True)
 class Goal:
-    """What a population is held to."""
+    """The goal of a population."""
 
     name: str
     found: float
@@ -210,7 +209,7 @@ class Goal:
 
     @property
     def met(self) -> bool:
-        """Whether it is kept."""
+        """Whether it is met."""
         return self.found >= self.limit if self.least else self.found <= self.limit
 
     def __str__(self) -> str:
@@ -228,7 +227,7 @@ def counted(lines: Iterable[Line]) -> dict[str, Count]:
 
 
 def goals(counts: dict[str, Count]) -> list[Goal]:
-    """Return the goals of the populations, with what was found."""
+    """Return the goals of the populations, with the results."""
     clean, within, beyond = (counts[name] for name in (CLEAN, IN_ROW, BEYOND))
     return [
         Goal("clean, outside U", clean.outside_share(), MOST_OUTSIDE),
@@ -244,7 +243,7 @@ def goals(counts: dict[str, Count]) -> list[Goal]:
 
 
 def jobs(runs: Mapping[str, int], first_seed: int) -> list[tuple[str, str, int]]:
-    """Return the runs that make up the populations."""
+    """Return the runs of the populations."""
     return [
         (population, course.name, first_seed + number)
         for population, total in runs.items()
@@ -254,7 +253,7 @@ def jobs(runs: Mapping[str, int], first_seed: int) -> list[tuple[str, str, int]]
 
 
 def measured(todo: Sequence[tuple[str, str, int]], processes: int) -> list[Line]:
-    """Make the runs, in their order."""
+    """Make the runs, in order."""
     if processes < 2:
         return [line_of(job) for job in todo]
     with ProcessPoolExecutor(processes) as pool:

@@ -1,7 +1,7 @@
-"""Cells that obey every page and in which the tip is wrong: how each of them has to end.
+"""Cells that obey every page and still have a wrong tip, with the required end of each.
 
-Before the two statements a value was written, tested and called good in all of them although it lay
-more than three times its interval off (docs/reference/evidence.md 21).
+Before there were two statements, all of them wrote, tested and accepted a value more than three
+times its interval off (docs/reference/evidence.md 21).
 """
 
 import math
@@ -50,12 +50,12 @@ def nothing(_toward: Toward) -> Callable[[Any], None]:
 
 
 def moved(mm: float) -> Wrong:
-    """The station was moved since it was learnt."""
+    """Move the station after it was learnt."""
     return lambda toward: wrong_by({"place_mm": (mm * math.cos(toward), mm * math.sin(toward))})
 
 
 def slipped(mm: float) -> Wrong:
-    """The nozzle slips in its mount."""
+    """Let the nozzle slip in its mount."""
     return lambda toward: slips(mm * math.cos(toward), mm * math.sin(toward))
 
 
@@ -64,7 +64,7 @@ def slipped_up(mm: float) -> Wrong:
 
 
 def beside(mm: float) -> Wrong:
-    """The person always stops on the same side of the tool."""
+    """Let the person always stop on the same side of the tool."""
     return lambda toward: wrong_by({"touch_mm": (mm * math.cos(toward), mm * math.sin(toward))})
 
 
@@ -73,7 +73,7 @@ def bent(lean_deg: float) -> Wrong:
 
 
 def with_tip_off(mm: float, wrong: Callable[[Any], None]) -> Wrong:
-    """The new tip is far from the old one, and something else is wrong."""
+    """Put the new tip far from the old one, with another error besides."""
 
     def put_in(toward: Toward, cell: Any) -> None:
         world, stored = cell.simulator.world, held(cell)
@@ -95,7 +95,7 @@ def faults(**parameters: Any) -> Wrong:
 
 
 def bumped(mm: float) -> Wrong:
-    """The pin is bumped between the two touches."""
+    """Bump the pin between the two touches."""
     return lambda toward: partial(
         furnish,
         pin_bumped_after_touch=1,
@@ -109,20 +109,20 @@ def by_sensors(name: str, **more: Any) -> Course:
 
 
 def without_noise(cell: Any, rng: random.Random) -> Any:
-    """Beams of which no edge scatters: nothing but the cycle of the PLC does."""
+    """Beams whose edges do not scatter, except by the cycle of the PLC."""
     source = BY_NAME["beams on PLC"].source(cell, rng)
     cell.mount_beams(cell.beams(radius_mm=0.1))
     return source
 
 
 def with_contact_input(cell: Any, _rng: random.Random) -> Any:
-    """The input shows that the tip is on the pin, wherever on it."""
+    """An input that shows the tip on the pin, at any place on it."""
     furnish(cell, contact_input=9)
     return NAngleSource((90.0, 180.0, 270.0), TouchPlan(contact=InputEdge(9)))
 
 
 def one_touch_by_input(cell: Any, rng: random.Random) -> Any:
-    """The input shows how high the tip is as well."""
+    """The same input, which shows the height of the tip as well."""
     furnish(cell, contact_input=9)
     x_mm, y_mm, z_mm = cell.simulator.world.pin_mm
     pin = Pin(x_mm, y_mm, z_mm, sigma_mm=0.005)
@@ -140,20 +140,20 @@ NO_NOISE = by_sensors("beams on PLC", source=without_noise)
 
 @dataclass(frozen=True)
 class Cell:
-    """A cell in which the tip would be wrong.
+    """A cell with a wrong tip.
 
     Attributes:
-        what: Is wrong.
-        course: What measures, on what.
-        must: How it has to end.
-        codes: By which codes, one of them; of a value that has to be within U, by which codes it
-            may be refused instead.
-        wrong: What is wrong, by a direction.
-        at_write: What happens while the tool is written, likewise.
-        rows: What the cell states.
-        interval_mm: What its process allows.
-        times: Within so many times U at most.
-        each_time: Whether it is tried each time, and not in the soak only.
+        what: The error.
+        course: The method and its cell.
+        must: The required end.
+        codes: The permitted codes; for a value that must be within U, the codes with which it may
+            be refused instead.
+        wrong: Applies the error, in a direction.
+        at_write: The same during the write.
+        rows: The rows that the cell states.
+        interval_mm: The tip error that its process allows.
+        times: The largest error in multiples of U.
+        each_time: Whether it is tried each time, not only in soak.
     """
 
     what: str
@@ -169,12 +169,12 @@ class Cell:
 
     @property
     def of(self) -> Course:
-        """What measures."""
+        """The method and its cell."""
         return BY_NAME[self.course] if isinstance(self.course, str) else self.course
 
     @property
     def name(self) -> str:
-        """What pytest shows."""
+        """The name in pytest."""
         return f"{self.what}: {self.of.name}"
 
 
@@ -186,7 +186,7 @@ CHANGED = ("camera_changed",)
 STILL = ("tip_did_not_move",)
 OVER = ("large_interval",)
 BENT = {0.5: (), 1.0: (), 1.9: ("bent_needle",)}
-"""By how many degrees, and whether the latch of a PLC may make more than 2 degrees of it."""
+"""The tilt in degrees, and its refusals: a PLC's latch may make more than 2 degrees of it."""
 
 CELLS = (
     Cell("moved by 0.05", "beams on EPSON", TAKEN_BACK, CONTRADICTED, moved(0.05)),
@@ -292,14 +292,14 @@ CELLS = (
     *soak(
         Cell("always 0.05 beside", "n-angle on EPSON", WITHIN, (), beside(0.05), times=1.1),
         Cell("always 0.05 beside", "two-pose on PLC", WITHIN, (), beside(0.05), times=1.1),
-        # Nothing in the cell shows it: the default is half of it, and the limit of a recipe
-        # that would need it refuses the default.
+        # Nothing in the cell shows it: the default covers half of it, and a recipe with a limit
+        # that needs it refuses the default.
         Cell("always 0.1 beside", "two-pose on PLC", WITHIN, (), beside(0.1), times=2.0),
         Cell("always 0.1 beside", "n-angle on EPSON", WITHIN, (), beside(0.1), times=2.0),
     ),
     Cell("contact input, nothing wrong", BY_INPUT, WITHIN),
     *soak(
-        # No row of its own; what is usual of a person's scatter holds half of it.
+        # No row of its own; the usual scatter of a person covers half of it.
         Cell("always 0.05 beside, contact input", BY_INPUT, WITHIN, (), beside(0.05), times=2.0),
     ),
     Cell(
@@ -361,8 +361,9 @@ CELLS = (
 
 
 LETS_PASS = {"two-pose": 1.9, "n-angle": 2.1, "plane-touch": 1.9}
-"""So many times U, where scatter is neither stated nor told well by residuals: a drift of 0.14 to
-0.19 mm is not more than it would make."""
+"""The largest error in multiples of U where scatter is neither stated nor well shown by residuals:
+a drift of 0.14 to 0.19 mm is within it.
+"""
 
 
 @pytest.mark.soak
@@ -476,11 +477,11 @@ class AtTerminal:
     """A cell whose station was moved.
 
     Attributes:
-        course: What measures in it.
-        moved: By more than all that is stated explains.
-        little: By more than scatter explains, and less than ``rows`` do.
-        rows: What is stated then.
-        wider_mm: Of the first one: drift and scatter.
+        course: The method and its cell.
+        moved: A shift that exceeds all stated rows.
+        little: A shift that exceeds scatter, and stays within ``rows``.
+        rows: The rows stated then.
+        wider_mm: For the first shift: drift and scatter.
     """
 
     course: str
@@ -506,7 +507,7 @@ AGAIN = "Make one more touch.", "Measure once more with the camera."
 
 
 class Answers:
-    """Chooses one row after the other by its beginning, and keeps what was asked."""
+    """Chooses rows one after another by their beginnings, and keeps the questions."""
 
     def __init__(self, *rows: str):
         self.rows = list(rows)
@@ -612,7 +613,7 @@ def test_and_a_question_with_one(at, yes):
     "course", [pytest.param(one, id=one.name) for one in BY_NAME.values() if one.proves]
 )
 def test_every_method_turns_once_more_from_where_its_turn_test_has_ended(course):
-    """By 0.4 mm each of them is contradicted; the process allows more, or it would refuse first."""
+    """A shift of 0.4 mm contradicts each; the process allows more, or it would refuse first."""
     at = AtTerminal(course.name, lambda _cell: None, lambda _cell: None, {}, 0.0)
     surface = course.method in ("plane-touch", "sphere-touch", "z-touch")
     slip = slips(0.0, 0.0, 0.4) if surface else slips(0.4, -0.1)

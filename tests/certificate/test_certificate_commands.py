@@ -1,4 +1,4 @@
-"""Cells in which the tip is wrong by command and recipe, and a small sample of the populations."""
+"""Cells with a wrong tip by command and recipe, and a small sample of the populations."""
 
 import contextlib
 import io
@@ -22,7 +22,7 @@ from tests.contract.test_proof_after_a_break import Later
 
 pytestmark = [pytest.mark.simulator_only, pytest.mark.timeout(120)]
 
-# The same cells by command, by recipe and after a break: exit codes, and what is stored after.
+# The same cells by command, by recipe and after a break: exit codes, and the stored values.
 
 NEEDLE = Path(__file__).parents[2] / "examples" / "recipes" / "needle-beams.toml"
 CROSSING_MM = (175.0, 488.0, -106.0)
@@ -136,7 +136,7 @@ sigma_mm = 0.01
 @pytest.mark.soak
 @pytest.mark.parametrize("kind", KINDS)
 def test_one_touch_states_a_change_of_a_z_that_nobody_measured(kind, tmp_path, monkeypatch):
-    """The stored Z is some tenths of a millimetre wrong, and so is the new one; nothing is said."""
+    """The stored Z is some tenths of a millimetre wrong, and so is the new one, unnoticed."""
     path = tmp_path / "one-touch.toml"
     path.write_text(ONE_TOUCH)
     with method_cell(kind, tmp_path, monkeypatch) as cell:
@@ -186,7 +186,7 @@ def test_poses_of_a_small_tool_are_asked_about(kind, tool, tmp_path, monkeypatch
 
 
 def taught(tip):
-    """Yield the poses of two touches as a pendant with that tool selected shows them."""
+    """Yield the poses of two touches as a pendant shows them with that tool selected."""
     for u_deg in (10.0, -170.0):
         x, y = rotate_xy(tip.x_mm - SMALL.x_mm, tip.y_mm - SMALL.y_mm, u_deg)
         yield f"{300 - x:.4f},{100 - y:.4f},-60.0,{u_deg}"
@@ -199,7 +199,7 @@ QUICK = ("points on EPSON", "two-pose on EPSON", "camera, one look on EPSON", "o
 
 @pytest.fixture(scope="module")
 def sample():
-    """Four quick courses in the first three populations, one in the one that needs two runs."""
+    """Four quick courses in the first three populations, and the one that needs two runs once."""
     jobs = [(name, course, 7) for name in (CLEAN, IN_ROW, BEYOND) for course in QUICK]
     return [line_of(job) for job in (*jobs, (VISIBLE, QUICK[2], 7), (VISIBLE, QUICK[1], 7))]
 
@@ -217,7 +217,7 @@ def test_a_clean_run_is_certified_and_a_visible_fault_is_not(sample):
 
 
 def test_a_fault_is_what_is_said(sample):
-    """Beyond its row something is, within it nothing."""
+    """A fault exists beyond its row, none within."""
     for line in sample:
         assert bool(line.fault) is (line.population != CLEAN)
     (touch,) = [one for one in sample if (one.population, one.course) == (BEYOND, QUICK[1])]
@@ -262,7 +262,7 @@ def test_a_goal_that_is_missed_is_called_so():
         (lines(VISIBLE, 0.1), "visible, doubted or refused"),
     ):
         assert name in [goal.name for goal in goals(counted([*met, *missed])) if not goal.met]
-    # What stands with a doubt, or was refused, is not certified.
+    # A value with a doubt, or a refused one, is not certified.
     doubted = lines(CLEAN, *[9.0] * 20, doubts=("camera_moved",))
     assert all(goal.met for goal in goals(counted([*met, *doubted])))
 
@@ -277,14 +277,14 @@ def test_the_page_keeps_what_stands_around_the_table():
 @pytest.mark.soak
 @pytest.mark.timeout(1800)
 def test_the_goals_are_met_on_other_seeds():
-    """A tenth of the usual number of runs; which seeds, nobody chose."""
+    """A tenth of the usual number of runs; nobody chose the seeds."""
     assert make_table(["--share", "0.1", "--seed", "40001", "--processes", "1"]) == 0
 
 
 @pytest.mark.soak
 @pytest.mark.timeout(600)
 def test_a_rough_look_by_chance_does_not_blunt_the_turn_test():
-    """Three or four residuals told a limit of 4 to 10 U for these before."""
+    """For these, three or four residuals used to give a limit of 4 to 10 U."""
     for course, seeds in (("camera on EPSON", (60_020,)), ("board on EPSON", (60_037, 60_041))):
         for seed in seeds:
             line = line_of((NEAR, course, seed))

@@ -1,4 +1,4 @@
-"""Two changes of a tool here and one there, as a journal has them."""
+"""Journal entries of two changes of a tool on this controller and one on another."""
 
 from robolink.journal import Journal, open_journal
 from robolink.model import EntryKind, NewEntry, Signature
@@ -17,7 +17,7 @@ def entry(kind: EntryKind, change: str, tool: int, **details: object) -> NewEntr
 
 
 def record_changes() -> Journal:
-    """Record two changes of tool 1 here and one of tool 2 there."""
+    """Record two changes of tool 1 on this controller and one of tool 2 on another."""
     journal = open_journal()
     here, there = journal.log(HERE, signature=ANN), journal.log(THERE)
     here.append(

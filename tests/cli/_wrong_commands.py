@@ -1,8 +1,8 @@
-"""A grammar of wrong command lines, made from the table of commands itself.
+"""A grammar of wrong command lines, built from the table of commands itself.
 
-Each line is one that would be right, with one thing wrong in it. What would be right comes from
-the parameters of the command: which must be given, of which type, between which limits. A new
-command, option or limit is in the grammar as soon as it exists.
+Each line is a correct one with one thing wrong in it. The correct parts come from the command's
+parameters: which are required, of which type, between which limits. A new command, option or limit
+is in the grammar as soon as it exists.
 """
 
 import random
@@ -16,7 +16,7 @@ from robolink_cli.console.usage_errors import EXAMPLES
 from robolink_cli.options.shared import LineType
 
 CELL = "line3"
-"""A cell of the cell file in whose folder the lines are typed; it is simulated."""
+"""A simulated cell of the cell file in the folder where the lines are typed."""
 
 GIVEN: dict[str, str] = {
     **EXAMPLES,
@@ -26,7 +26,7 @@ GIVEN: dict[str, str] = {
     "expert recipe check file": "recipe.toml",
     "folder": "new",
 }
-"""A right value of what must be given, by the name of the parameter, or the command's and its."""
+"""A correct value for each required parameter, by its name, or by the command's and its name."""
 
 CONNECTS: dict[str, list[str]] = {
     "calibrate n-angle": ["--tool", "1", "--points", "901-903", "--yes"],
@@ -57,7 +57,7 @@ CONNECTS: dict[str, list[str]] = {
     "tool select": ["0", "--yes"],
     "tool set": ["1", "--x", "13", "--yes"],
 }
-"""What asks a controller, with what it needs for that."""
+"""The commands that ask a controller, with their required arguments."""
 
 READS: dict[str, str] = {
     "change recipe": "toml",
@@ -83,7 +83,7 @@ READS: dict[str, str] = {
     "tool impact pts": "pts",
     "cell accuracy measure study": "toml",
 }
-"""Parameters that name a file to be read, and what is in it."""
+"""Parameters that name a file to read, and its contents."""
 
 WRITES: dict[str, str] = {
     "calibrate points report": "html",
@@ -96,7 +96,7 @@ WRITES: dict[str, str] = {
     "tool backup file": "json",
     "tool impact report": "html",
 }
-"""Parameters that name what is to be written."""
+"""Parameters that name a file to write."""
 
 TOGETHER: list[list[str]] = [
     ["recover", "--keep", "--choose", "old"],
@@ -124,7 +124,7 @@ TOGETHER: list[list[str]] = [
     ["journal drift", "--page", "drift.html", "--baseline", "10"],
     ["undo", "--to", "1", "abcd"],
 ]
-"""What does not go together, or not alone; no table of commands tells it."""
+"""Options that exclude or require one another; no table of commands has these rules."""
 
 NAMED: list[list[str]] = [
     ["calibrate one-touch", "--tool", "1", "--station", "PIN-99"],
@@ -148,12 +148,12 @@ NAMED: list[list[str]] = [
     ["status", "--lang", "fr"],
     ["calibrate beams", "--tool", "1", "--station", "PIN-07", "--beam", "1;2"],
 ]
-"""Names that nothing has."""
+"""Names that do not exist."""
 
 
 @dataclass(frozen=True)
 class Wrong:
-    """A wrong command line and what is wrong with it."""
+    """A wrong command line and its fault."""
 
     kind: str
     command: str
@@ -169,17 +169,17 @@ class Leaf:
 
     @property
     def own(self) -> list[click.Parameter]:
-        """Its parameters without those that all commands share."""
+        """The parameters other than those that all commands share."""
         shared = {name for one in main.cli.params for name in one.opts}
         return [one for one in self.command.params if not shared.intersection(one.opts)]
 
     def given(self, parameter: click.Parameter) -> str:
-        """A right value of a parameter that must be given."""
+        """A correct value of a required parameter."""
         name = str(parameter.name)
         return GIVEN.get(f"{self.name} {name}", GIVEN.get(name, ""))
 
     def line(self, *, other: dict[str, str] | None = None, left_out: str = "") -> list[str]:
-        """The command with all that it needs, and with these values by the names of parameters."""
+        """The command with all it requires, with the given values by parameter name."""
         other = other or {}
         options, arguments = [], []
         for one in self.command.params:
@@ -197,7 +197,7 @@ class Leaf:
 
 
 def leaves(command: click.Command, path: tuple[str, ...] = ()) -> Iterator[Leaf]:
-    """Yield every command, with those that the first page leaves out."""
+    """Yield every command, including those that the first page leaves out."""
     if not isinstance(command, click.Group):
         yield Leaf(" ".join(path), command)
         return
@@ -210,7 +210,7 @@ def leaves(command: click.Command, path: tuple[str, ...] = ()) -> Iterator[Leaf]
 
 
 def _swapped(word: str, draw: random.Random) -> str:
-    """A word with two neighbouring letters swapped, or one doubled."""
+    """Return a word with two neighbouring letters swapped, or one doubled."""
     places = [n for n in range(1, len(word) - 1) if word[n] != word[n + 1] and word[n] != "-"]
     if not places:
         return f"{word}x"
@@ -384,7 +384,7 @@ CONTROLLERS = {
     "a map that is missing": ["-c", "plc+sim://m?map=missing.toml"],
     "a serial port that is missing": ["-c", "epson+serial:///dev/ttyNONE"],
 }
-"""What may be wrong with the controller of a command."""
+"""Faults of a command's controller."""
 
 
 def _of_a_list(lines: list[list[str]]) -> Maker:
@@ -421,13 +421,13 @@ KINDS: dict[str, tuple[float, Maker]] = {
     "options that do not go together": (6, _of_a_list(TOGETHER)),
     "a name that nothing has": (6, _of_a_list(NAMED)),
 }
-"""What may be wrong with a line, and how readily it is drawn: more where few commands know it."""
+"""Kinds of faults and their weights: larger where few commands can have the fault."""
 
 
 def wrong_commands(seed: int) -> list[Wrong]:
-    """Draw wrong command lines: two of every command, two more where a controller is asked.
+    """Draw wrong command lines: two for every command, two more if it asks a controller.
 
-    Each command is drawn for itself, so that a new option changes the lines of its commands alone.
+    Each command is drawn by itself, so that a new option changes only its own command's lines.
     """
     drawn: list[Wrong] = []
     for leaf in leaves(main.cli):

@@ -1,4 +1,4 @@
-"""A command line of the tests' own, apart from the tester's passwords and settings."""
+"""A command line for the tests, separated from the tester's passwords and settings."""
 
 import os
 from itertools import count
@@ -26,8 +26,8 @@ def plain_environment(monkeypatch, tmp_path):
 
 @pytest.fixture
 def command(monkeypatch):
-    """Put a command of the test's own in place of ``status``, and one for ``sim``."""
-    DOCUMENTS.forgive()  # what the commands of these tests print is made up
+    """Replace ``status`` by a command of the test's own, and add one for ``sim``."""
+    DOCUMENTS.forgive()  # the documents of these tests' commands are made up
     seen = []
 
     def install(act=lambda context: None):
@@ -53,7 +53,7 @@ def command(monkeypatch):
 
 @pytest.fixture
 def state_folder(tmp_path, monkeypatch):
-    """A state folder and a working folder of the test's own; returns the first."""
+    """The test's own state folder and working folder; returns the first."""
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
     monkeypatch.chdir(tmp_path)
     return tmp_path / "state"
@@ -61,10 +61,10 @@ def state_folder(tmp_path, monkeypatch):
 
 @pytest.fixture
 def simulator(state_folder):
-    """A simulated controller of which a record is kept, as of a real one.
+    """A simulated controller that is recorded like a real one.
 
-    No file keeps its tools: what would be written there is not looked at, and costs a command a
-    fifth of its time.
+    No file keeps its tools: no test reads that file, and writing it costs a fifth of a command's
+    time.
     """
     simulator = EpsonSimulator(seed=4, serial="SIM00001")
     simulator.durable = True
@@ -76,7 +76,7 @@ def simulator(state_folder):
 
 @pytest.fixture
 def run(simulator, capsys):
-    """Run a command on the simulator; return the exit code and what was shown."""
+    """Run a command on the simulator; return the exit code and the output."""
 
     def ran(*arguments):
         code = main.run(["-c", simulator.url, *arguments])
@@ -88,6 +88,6 @@ def run(simulator, capsys):
 
 @pytest.fixture
 def golden(run):
-    """The name of a backup of the controller as it is at first."""
+    """The name of a backup of the controller in its initial state."""
     assert run("backup", "golden.json")[0] == 0
     return "golden.json"

@@ -200,7 +200,7 @@ def test_no_write_is_made_when_the_first_backup_cannot_be_stored(
 
 
 CALIBRATIONS = {
-    # Nobody can be asked here, so the first ends before anything moves.
+    # Nobody can be asked here, so the first one ends before anything moves.
     9: ["calibrate", "two-pose", "--tool", "1"],
     0: [
         *("calibrate", "two-pose", "--tool", "1", "--yes"),

@@ -1,4 +1,4 @@
-"""cell accuracy: rows stated, on record and by default; rows measured and used from then on."""
+"""cell accuracy: rows stated, recorded and by default; rows measured and used from then on."""
 
 import json
 from pathlib import Path
@@ -56,7 +56,7 @@ tip_image_px = 1.0
 
 @pytest.fixture
 def run(tmp_path, monkeypatch, capsys):
-    """Run a command in this process; gives exit code, document or text, and messages."""
+    """Run a command in this process; return exit code, document or text, and messages."""
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
     monkeypatch.chdir(tmp_path)
     (tmp_path / "robolink.toml").write_text(CELL)
@@ -101,7 +101,7 @@ def test_what_is_stated_what_is_narrower_and_what_nobody_knows(run):
     assert plate["basis"] == "stated"
     assert plate["half_width"] == pytest.approx(0.01 * 3**0.5)
     camera = rows(document, "CAM-01")
-    # Nothing but calibrating it tells where a camera looks.
+    # Only a calibration shows where a camera looks.
     assert "camera-affine --station CAM-01" in camera["place_mm"]["measure"]
     assert camera["tip_image_px"]["alone_mm"] == pytest.approx(
         1.0 * 0.02 * 2.4477 / 3**0.5, rel=1e-3
@@ -130,7 +130,7 @@ def test_beams_that_were_learnt_five_times_have_the_scatter_of_their_crossing(ru
         file.write('[cells.line3.stations.BEAMS-02]\nkind = "beams"\nz_mm = -100.0\nbeams = [')
         file.write("{input = 3, x_mm = 300.0, y_mm = 90.0, direction_deg = 90.0},")
         file.write("{input = 4, x_mm = 280.0, y_mm = 100.0, direction_deg = 0.0}]\n")
-    # A beam is named by any point on it: where that lies along the beam says nothing.
+    # Any point on a beam defines it: its place along the beam does not matter.
     for along_mm, x_mm in enumerate((300.0, 300.01, 300.0, 300.01, 300.0)):
         crossed = [beam(x_mm, 90.0 + along_mm, 90.0), beam(280.0 - along_mm, 100.0, 0.0)]
         recorded(learnt("BEAMS-02", "beams", z_mm=-100.0, beams=crossed))
@@ -155,7 +155,7 @@ def test_a_station_that_was_learnt_five_times_has_its_place_row_from_the_record(
 
 
 def calibrated(run):
-    """Calibrate on the simulated cell; gives the entry."""
+    """Calibrate on the simulated cell; return the entry."""
     words = ("--tool", "1", "--assist", URL, "--sigma", "0.01", "--yes", "--no-verify")
     told = run("-c", "line3", "--operator", "9", "calibrate", "two-pose", *words, "--json")
     assert told[0] == 0, told
@@ -163,7 +163,7 @@ def calibrated(run):
 
 
 def four_times_more(one):
-    """Put four more calibrations on record that scatter about one."""
+    """Record four more calibrations that scatter about one."""
     log = memory_journal(ADDRESS).log(one.controller, signature=Signature(operator="9"))
     for dx, dy in ((0.01, 0), (-0.01, 0), (0, 0.01), (0, -0.01)):
         tip = [one.details["tip"][0] + dx, one.details["tip"][1] + dy, *one.details["tip"][2:]]
@@ -250,7 +250,7 @@ def test_a_gauge_study_tells_how_persons_differ(run):
     assert found["reproducibility_mm"] < found["reproducibility_upper95_mm"]
 
 
-# Rows that are stated: checked like any key, merged row by row, and used by what measures.
+# Stated rows are checked like any key, merged row by row, and used by measurements.
 
 STATED_URL = "epson+sim://stated-rows"
 STATED_CELL = f"""
@@ -271,7 +271,7 @@ touch_mm = 0.03
 
 @pytest.fixture
 def run_stated(tmp_path, monkeypatch, capsys):
-    """Run a command in this process beside that cell file; gives exit code, output, messages."""
+    """Run a command in this process with that cell file; return exit code, output and messages."""
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
     monkeypatch.chdir(tmp_path)
     Path("robolink.toml").write_text(STATED_CELL)
@@ -345,7 +345,7 @@ def test_a_height_that_was_learnt_is_not_as_sure_as_the_one_that_was_stated():
 
 
 def row(key="touch_mm"):
-    """Return a row of the newest calibration on record."""
+    """Return a row of the newest recorded calibration."""
     one = next(memory_journal(STATED_URL).entries(kinds=(EntryKind.CALIBRATION,)))
     accuracy = one.details["accuracy"]
     assert isinstance(accuracy, dict)

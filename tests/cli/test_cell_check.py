@@ -1,4 +1,4 @@
-"""cell check and cell tools: what they find, what they record, and for which robot."""
+"""cell check and cell tools: their findings, their records, and the robot they apply to."""
 
 import json
 from dataclasses import replace
@@ -17,7 +17,7 @@ from tests.cli.test_journal_statements import entries
 from tests.drift._courses import course
 from tests.faults._requests import changes
 
-# cell check: what it finds, what it records, and that nothing on the controller changes.
+# cell check: its findings, its records, and that nothing on the controller changes.
 
 ROOT = Path(__file__).parents[2]
 PIN = '[cells.line3.stations.PIN-07]\nkind = "pin"\ncheck_every_days = 90\n'
@@ -25,7 +25,9 @@ PIN = '[cells.line3.stations.PIN-07]\nkind = "pin"\ncheck_every_days = 90\n'
 
 @pytest.fixture
 def cells(simulator, tmp_path, monkeypatch, capsys):
-    """Write the cell file; return what runs ``cell check`` and gives code, document and errors."""
+    """Write the cell file; return a runner of ``cell check`` that gives code, document and
+    errors.
+    """
     file = tmp_path / "cells.toml"
     monkeypatch.setenv("ROBOLINK_CONFIG", str(file))
     stated = "remote_timeout_s = 60\nremote_timeout_confirmed_by = 'me'\n"
@@ -162,7 +164,7 @@ def test_a_plc_is_checked_alike(cells):
 
 @pytest.fixture
 def watched(simulator, monkeypatch, tmp_path):
-    """Two beams, a recipe that measures by them, and a person at the terminal who says yes."""
+    """Two beams, a recipe that uses them, and a person at the terminal who confirms."""
     for number, heading_deg in ((3, 2.0), (4, 91.0)):
         beam = LightBeam((175.0, 488.0, -106.0), heading_deg, radius_mm=0.1)
         simulator.world.connect(number, beam, latency_s=0.002, noise_mm=0.003)
@@ -229,7 +231,7 @@ def test_a_recipe_by_which_a_person_touches_measures_nothing(cells, simulator, w
     assert simulator.machine.arm.moves_started == 0
 
 
-# Two robots of one controller, each with a place of a station of the same name.
+# Two robots of one controller, each with a station of the same name.
 
 URL = "epson+tcp://cell-5.plant:5000"
 BOTH = "epson:RC1/T6-1+C8-2"
@@ -320,7 +322,7 @@ stations.BEAMS-02 = {{ kind = "beams", z_mm = -106.0, beams = [
     assert "  off_when_broken = false\n" in shown
 
 
-# One page of all tools of a cell: value, last change, age, what is due.
+# One page of all tools of a cell: value, last change, age, due checks.
 
 RECIPE = Path(__file__).parents[2] / "examples" / "recipes" / "needle-one-touch.toml"
 

@@ -1,4 +1,4 @@
-"""check-contract: what a controller promises, looked at and changed by nothing."""
+"""check-contract: the controller's promises are checked and nothing is changed."""
 
 import json
 import os
@@ -71,7 +71,7 @@ def test_the_controller_may_stand_behind_the_command_and_is_named_once(simulator
 
 
 class Drifting(dict[int, ToolOffset]):
-    """Tools that are others whenever somebody looks."""
+    """Tools whose values differ at every reading."""
 
     looks = count()
 
@@ -137,7 +137,7 @@ def test_told_to_it_writes_and_moves_and_puts_everything_back(
         assert not controller.outcomes.open_markers()
         journal = memory_journal(controller.identity)
         found = [entry for entry in journal.entries() if entry.tool == 2]
-        # The checks' own writes are on no record but that of the whole.
+        # The checks' own writes are recorded only in the whole run's record.
         assert [entry.kind for entry in found] in ([EntryKind.NOT_APPLIED], [EntryKind.ROLLED_BACK])
 
 
@@ -197,7 +197,7 @@ def test_a_driver_in_the_present_folder_is_held_to_it(monkeypatch, tmp_path, cap
     assert json.loads(capsys.readouterr().out)["kept"] is True
     assert main.run([*line, "drv_of_mine:deaf", "--junit", "deaf.xml"]) == 5
     assert "a write is read back: Tool 3 was written" in capsys.readouterr().err
-    # An error that is none of robolink's is the driver's, and no defect of robolink.
+    # An error of another class is the driver's, and no defect of robolink.
     assert main.run([*line[:3], "--driver", "drv_of_mine:crude"]) == 1
     told = [one["broken"] for one in json.loads(capsys.readouterr().out)["checks"]]
     assert any(one and "KeyError at drv_of_mine.py:12 is no RobolinkError" in one for one in told)
@@ -210,7 +210,7 @@ def test_a_driver_in_the_present_folder_is_held_to_it(monkeypatch, tmp_path, cap
 
 
 def checking(cell):
-    """Begin the checks that write in a process of its own, and wait until they have written."""
+    """Begin the writing checks in a separate process, and wait until they have written."""
     arguments = ["-c", cell.url, "expert", "check-contract", "--write", "--tool", "2", "--yes"]
     process = subprocess.Popen(
         [sys.executable, "-m", "robolink_cli", *arguments],
@@ -235,7 +235,7 @@ def test_a_stop_from_another_terminal_ends_the_checks(medium, request, robolink_
     process = checking(cell)
     assert main.run(["-c", cell.url, "stop"]) == 0
     if (ended := process.wait(timeout=60)) == 6:
-        # The stop's own block took the place of a write, so nothing proved how that ended.
+        # The stop's own block replaced a write, so its end is unconfirmed.
         assert medium == "softmotion"
         assert main.run(["-c", cell.url, "robot", "reset", "--yes"]) == 0
         assert main.run(["-c", cell.url, "recover", "--yes"]) == 0
@@ -270,5 +270,5 @@ def test_killed_in_the_middle_recover_gives_the_tool_back(epson_factory, robolin
 
 
 def written(cell):
-    """Return whether the first value of the checks stands there."""
+    """Return whether the checks' first value is stored."""
     return cell.simulator.truth()["stored"]["2"]["x_mm"] == pytest.approx(1.5)

@@ -1,4 +1,4 @@
-"""check-contract, ended in the middle: what was there is back, and it is told how far it came."""
+"""check-contract ended in the middle restores the tool and reports how far it came."""
 
 import json
 import signal
@@ -59,12 +59,12 @@ class Cell:
         return code, shown.out, shown.err
 
     def cases(self):
-        """Name and kind of each case of the file for pipelines."""
+        """Return name and kind of each case in the file for pipelines."""
         suite = ElementTree.fromstring(self.report.read_bytes())
         return [(case.get("name"), case[0].tag if len(case) else "kept") for case in suite]
 
     def end_of_report(self):
-        """The cases that say what was not made: which one ended it, and how many follow."""
+        """Count the incomplete cases: the one that ended the run, and those after it."""
         kinds = [kind for _, kind in self.cases()]
         return kinds.count("error"), kinds.count("skipped")
 
@@ -80,7 +80,7 @@ def epson(epson_sim, robolink_state, tmp_path, capsys):
 
 
 class Signals:
-    """Raises a signal at one of the points that the command passes, and counts them."""
+    """Raises a signal at one of the points that the command passes, and counts the points."""
 
     def __init__(self, number=None, *, at=0):
         self.number, self.at, self.logins = number, at, []
@@ -125,7 +125,7 @@ def test_a_signal_at_any_moment_leaves_all_as_it_was_and_says_so(cell, every):
 def test_what_moved_before_is_not_denied(epson):
     with observed(counting := Signals()):
         assert epson.run("--move", "--yes")[0] == 0
-    # The login of the last check: no connection has moved anything that it knows of.
+    # The login of the last check: no connection has moved anything yet.
     _, _, err = ended(epson, signal.SIGINT, counting.logins[-3], "--move", "--yes")
     assert "\n  Every movement has ended. Nothing was written." in err
 
@@ -180,7 +180,7 @@ def test_a_plc_that_takes_a_lost_check_for_its_owner_is_waited_for(
     softmotion_sim, robolink_state, tmp_path, capsys
 ):
     cell = Cell(softmotion_sim, tmp_path, capsys)
-    # Its first write of the tool is carried out, and the link is gone before that is seen.
+    # Its first write of the tool is carried out, and the link fails before the answer.
     softmotion_sim.do("add_fault", action="disconnect", match="write_command WRITE_TOOL")
     code, _, err = cell.run(*ALL)
     assert (code, cell.open_markers()) == (3, ()), err
@@ -191,7 +191,7 @@ def test_a_plc_that_takes_a_lost_check_for_its_owner_is_waited_for(
 @pytest.mark.parametrize("document", [True, False])
 def test_what_could_not_be_put_back_is_named_and_recover_knows_of_it(epson, document):
     faults = epson.fixture.simulator.faults
-    # The second write, which puts the old value back, is lost, and so are all that follow it.
+    # The second write, which restores the old value, is lost, and so are all that follow it.
     for nth in range(1, 12):
         faults.add(Fault(FaultAction.DISCONNECT_BEFORE, match="TLSet 2, XY", on_exchange=nth))
     code, out, err = epson.run(*ALL, *(["--json"] if document else []))

@@ -1,4 +1,4 @@
-"""How a command fails: exit codes, sentences and documents."""
+"""Errors of a command: exit codes, sentences and documents."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""The frame of the command line: what it loads, and how it merges options."""
+"""The frame of the command line: the modules that it loads, and how it merges options."""
 
 import os
 import subprocess
@@ -158,7 +158,7 @@ def test_a_missing_controller_is_told_with_an_example(command, capsys):
 
 
 class UnfinishedController:
-    """A controller on which two things were left open."""
+    """A controller with two interrupted jobs."""
 
     def __init__(self, *more):
         self.outcomes = self.tools = self

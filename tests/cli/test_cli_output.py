@@ -1,4 +1,4 @@
-"""What a command shows, to people and to machines."""
+"""The output of a command, for people and for programs."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Where a password comes from, and how it stays one."""
+"""The sources of a password, and how it stays secret."""
 
 import sys
 
@@ -74,7 +74,7 @@ def test_the_first_line_of_a_password_file_counts(tmp_path, content):
 
 
 class Ring:
-    """A keyring with one entry, or none that works."""
+    """A keyring with one entry, or one that does not work."""
 
     def __init__(self, failure=None):
         self.failure = failure

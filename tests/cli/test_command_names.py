@@ -1,4 +1,4 @@
-"""The map of commands: groups, what TAB offers, and that every name of before still works."""
+"""The map of commands: groups, TAB completion, and old names that still work."""
 
 import contextlib
 import io
@@ -19,7 +19,7 @@ from robolink_cli.commands.groups import config
 from robolink.journal import open_log
 from robolink.model import EntryKind, NewEntry, Signature
 
-# completion: the scripts, and what TAB offers.
+# completion: the scripts, and the words that TAB offers.
 
 OTHER = "epson+tcp://192.0.2.2:5000"
 URL = "epson+tcp://192.0.2.1:5000"
@@ -130,7 +130,7 @@ def test_a_name_with_blanks_and_signs_is_one_word_in_bash(shell_environment):
 
 @pytest.fixture
 def offered_by_tab(tmp_path, monkeypatch):
-    """What TAB offers in a folder with two cells, a recipe and a journal."""
+    """Return the words that TAB offers in a folder with two cells, a recipe and a journal."""
     (tmp_path / "cells.toml").write_text(
         f'[cells.line3]\nurl = "{URL}"\n[cells.line3.stations.PIN-07]\nkind = "pin"\n'
         f'[cells.a]\nurl = "{OTHER}"\n'
@@ -220,9 +220,8 @@ def _loaded_by_tab(shell_environment, line, word):
     return done.stdout.splitlines()
 
 
-# The map of commands: the first page, the groups, and that every name of before still works.
-#
-# ``commands_of_before.json`` is the tree as it was before there were groups: each command with its
+# The map of commands: the first page, the groups, and the old names, which still work.
+# ``commands_of_before.json`` is the tree before groups were introduced: each command with its
 # options, arguments and their types ("!" is required, "*" may be repeated, "?" is a flag).
 
 BEFORE = json.loads(Path(__file__).with_name("commands_of_before.json").read_text("utf-8"))
@@ -231,7 +230,7 @@ TODAY = {
     **{f"config {old}": new for old, (_, new) in config.renamed.items()},
 }
 OF_ITS_OWN = {"enable", "disable", "resolve"}
-"""Older names that still answer in their own words; each is a command of its own."""
+"""Older names that keep their own output; each is a command of its own."""
 
 
 def command_at(path):
@@ -258,7 +257,7 @@ def _choices(parameters):
 
 
 def run_on_terminal(*arguments):
-    """Run a command line whose stderr is a terminal; return the exit code and what stood there."""
+    """Run a command line whose stderr is a terminal; return the exit code and that output."""
     here, there = os.openpty()
     with (
         open(here, "rb", buffering=0) as screen,
@@ -279,8 +278,8 @@ def test_each_name_of_before_takes_what_it_took(name):
     wanted = BEFORE["commands"][name]
     if wanted[:1] == ["shared"]:
         wanted = BEFORE["shared"] + wanted[1:]
-    # What had to be given may be left out today; nothing more has to be given. That a number has
-    # limits may be told by the option today, where the command told it before.
+    # A once required parameter may be optional today; no new one is required. The option itself may
+    # enforce the limits of a number today, where the command used to.
     given, wanted = ([line.replace(" range", "") for line in lines] for lines in (given, wanted))
     taken = {line.replace("!", "") for line in given}
     assert not [line for line in wanted if line.replace("!", "") not in taken]

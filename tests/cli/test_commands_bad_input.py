@@ -10,7 +10,7 @@ from robolink_cli import main
 from tests.faults._nozzle_cell import MOVE, OLD_TIP, NozzleCell, served_cell
 from tests.faults._requests import changes
 
-# Bad input: each a clear sentence, the right exit code, and nothing sent that was not asked.
+# Bad input: each gives a clear sentence, the right exit code, and sends nothing unasked.
 
 CANARY = "k4nar1envogel"
 WRONG = "n1chtd4spasswort"
@@ -35,7 +35,7 @@ def cell(tmp_path, monkeypatch):
 
 
 def check_refused(shown, code, words):
-    """A sentence that says what happened, and one that says what to do."""
+    """Check for a sentence on what happened, and one on what to do."""
     assert shown.code == code, shown.err
     assert shown.out == ""
     what, *stands, remedy = shown.err.partition("robolink: ")[2].splitlines()
@@ -279,16 +279,16 @@ def test_a_status_is_shown_with_the_e_stop_pressed(cell):
     assert "emergency stop" in shown.out
 
 
-# Cable gone mid-move: a clear sentence, exit code 6, and the move is never sent again.
+# Cable gone during a move: a clear sentence, exit code 6, and the move is never sent again.
 
 TARGET = re.compile(r"XY\(([-\d.]+),")
 
 
 def cut_during_move(cell: NozzleCell, nth: int) -> list[bool]:
-    """Pull the cable at the first look at the status after the ``nth`` move was sent.
+    """Cut the cable at the first status request after the ``nth`` move was sent.
 
-    What is returned tells afterwards whether the arm was moving then: the shortest jogs may
-    have ended, and been answered, by that time.
+    The returned list tells afterwards whether the arm was moving then: the shortest jogs may have
+    ended, and been answered, by that time.
     """
     moving: list[bool] = []
 

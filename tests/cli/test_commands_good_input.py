@@ -1,4 +1,4 @@
-"""Every command once with good input: what it shows, its document, and its dry run."""
+"""Every command once with good input: its output, its document, and its dry run."""
 
 import json
 import os
@@ -72,7 +72,7 @@ REQUESTS = {
         r'\$Execute,"Move XY\(.*\) /R /0"',
     ],
 }
-"""What a dry run must show, and what the command then sends, in this order."""
+"""The requests that a dry run must show and the command then sends, in this order."""
 
 
 def words_of(cell, name):
@@ -101,7 +101,7 @@ def test_a_command_gives_a_machine_one_document_with_units_in_its_keys(cell, nam
 
 
 UNITS = ("_mm", "_deg", "_s", "_percent", "joints", "pulses")
-"""How the name of a number ends; joints are degrees or mm by their kind."""
+"""Endings of the names of numbers; joints are in degrees or mm by their kind."""
 
 WITHOUT = (
     "sigma_gain",
@@ -112,7 +112,7 @@ WITHOUT = (
     "probability",
     "half_width",
 )
-"""A factor, a count and a probability have no unit; that of a row's half width stands beside it."""
+"""A factor, a count and a probability have no unit; the unit of a row's half width is beside it."""
 
 
 def numbers_in(value, key=""):

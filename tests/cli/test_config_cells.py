@@ -1,4 +1,4 @@
-"""-c CELL: what a command takes from the cell file, and what wins over it."""
+"""-c CELL: the settings that a command takes from the cell file, and their precedence."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""cell files, validate, show: what they say about the cell files."""
+"""cell files, validate and show, with their messages about the cell files."""
 
 import json
 import re

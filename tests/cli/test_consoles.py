@@ -1,4 +1,4 @@
-"""Words that a console lacks, and words that mean something to a spreadsheet or a controller."""
+"""Characters that a console lacks, and words with a meaning to a spreadsheet or a controller."""
 
 import csv
 import io
@@ -120,13 +120,13 @@ def test_keys_that_the_console_does_not_know_are_a_slip_and_no_end(tmp_path, enc
         check=False,
     )
     shown = done.stdout.decode(encoding) + done.stderr.decode(encoding)
-    # What lies there before the question is no answer to it, and is shown all the same.
+    # Input typed before the question does not answer it, and is shown all the same.
     assert r"Typed too early and ignored: 'x\\xff+1'" in shown
     assert done.returncode == 9
     assert "Traceback" not in shown
 
 
-# Words that mean something to a spreadsheet, a database, a controller, a file system.
+# Words with a meaning to a spreadsheet, a database, a controller or a file system.
 
 # ---- a spreadsheet
 
@@ -216,7 +216,7 @@ def test_f72_a_name_or_value_says_nothing_else_to_a_controller(run, simulator, t
     asked = [line for _, direction, line in list(simulator.log)[before:] if line.startswith("$")]
     known = ("Login", "Logout", "Execute", "Get")
     sent = "\n".join(asked)
-    if text != "a b":  # a text that may be stored as it is
+    if text != "a b":  # a text that may be stored unchanged
         assert text not in sent
         assert "SetVariable" not in sent
     assert "Motor On" not in sent
@@ -306,7 +306,7 @@ def test_nobody_else_can_read_what_is_kept_even_without_a_umask(state_folder, tm
     kept = [state_folder, *state_folder.rglob("*")]
     assert {path.name for path in kept} >= {"journal.db", "backups"}
     open_to_others = [path for path in kept if stat.S_IMODE(path.stat().st_mode) & 0o077]
-    # What lies in a folder that is its owner's alone is out of reach of others.
+    # Files in a folder that only its owner can open are out of reach of others.
     assert not [path for path in open_to_others if path.is_dir() or path.suffix == ".db"]
 
 

@@ -1,4 +1,4 @@
-"""What a terminal would obey never reaches it raw, wherever the words come from."""
+"""Control sequences never reach the terminal raw, whatever the source of the text."""
 
 import ast
 import json
@@ -31,7 +31,7 @@ OF_CONTROLLERS = {
 
 @pytest.fixture
 def evil(simulator):
-    """A controller whose every text is meant for the terminal."""
+    """A controller whose every text contains control sequences."""
     card = simulator.card
     card.name = card.kind = card.project = card.robot_name = EVIL.replace("\r", "")
     simulator.machine.serial = card.name
@@ -57,7 +57,7 @@ def test_no_word_of_a_controller_is_obeyed(run, evil, command, fault):
 def test_an_answer_that_makes_no_sense_is_shown_as_escapes(run, simulator):
 
     def push(_, request):
-        if "Login" not in request:  # what comes then may hold the password, and is not shown
+        if "Login" not in request:  # later text may hold the password, and is not shown
             simulator.push(b"#GetIO,\x1b[2J\x9b\r\n")
 
     simulator.on_request = push
@@ -118,12 +118,12 @@ def test_lines_and_the_worlds_characters_are_left_alone():
 
 
 def test_there_is_one_door_to_the_console():
-    """Whoever writes past it, writes raw."""
+    """Output that bypasses the function is not cleaned."""
     allowed = {
         "output.py": {"echo"},
         "render.py": {"print"},  # of rich, with cells that went through output.py
         "completion.py": {"echo"},  # a script for the shell, of our own words
-        "unfit_packages.py": {"write"},  # where click cannot be imported; JSON, or visible()
+        "unfit_packages.py": {"write"},  # used where click cannot be imported; JSON, or visible()
     }
     folder = Path(robolink_cli.__file__).parent
     examples = folder / "examples"  # in the wheel: programs to be copied, which print as they like

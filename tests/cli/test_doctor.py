@@ -1,4 +1,4 @@
-"""doctor: each thing that can be in the way is found, and nothing is changed."""
+"""doctor finds each obstacle and changes nothing."""
 
 import json
 import os
@@ -276,7 +276,7 @@ BROKEN = {
     "state": "os.access",
     "cells": "platformdirs.user_config_path",
 }
-"""Subject of a look, and what of the system under it fails."""
+"""The subject of each check, and the system function that fails."""
 
 
 @pytest.mark.parametrize("subject", BROKEN)

@@ -1,8 +1,8 @@
-"""Every document that a command prints is published, and fits what is published.
+"""Every document that a command prints has a published schema and fits it.
 
-What commands print in the other tests of this process is held to the schemas by
-``pytest_runtest_teardown`` in ``tests/conftest.py``, the errors of every command among it
-(``test_refusals_of_every_command``). Here: that nothing is left out, and what no other test prints.
+``pytest_runtest_teardown`` in ``tests/conftest.py`` checks the documents of all other tests in this
+process, including the errors of every command (``test_refusals_of_every_command``). The tests here
+check that none is missing, and the documents that no other test prints.
 """
 
 import json
@@ -27,7 +27,7 @@ READ_NOT_PRINTED = {"sim-cells-1"}
 
 
 def commands():
-    """Return every command that takes --json or --jsonl, also those of before."""
+    """Return every command that takes --json or --jsonl, old names included."""
     names = {*leaves(main.cli), *OF_ITS_OWN, *GROUPS_THAT_SHOW}
     speaking = {"--json", "--jsonl"}
     options = {name: {it for one in command_at(name).params for it in one.opts} for name in names}
@@ -35,7 +35,7 @@ def commands():
 
 
 def schemas_of(described):
-    """Return the schema that each form of a document names."""
+    """Return the schemas that each form of a document names."""
     return {one["properties"]["schema"]["const"] for one in described.get("oneOf", [described])}
 
 
@@ -111,7 +111,7 @@ MORE = {
     "group": ["-c", PLC, "enable", "--yes"],
     "ownership": ["-c", PLC, "robot", "take-ownership", "--yes"],
 }
-"""What no other test of this process prints."""
+"""Documents that no other test of this process prints."""
 
 
 @pytest.mark.parametrize("name", MORE)

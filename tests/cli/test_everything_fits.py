@@ -1,7 +1,7 @@
-"""Tables, screens and pictures fit where they stand: both languages, 60 to 120 columns.
+"""Tables, screens and pictures fit their space: both languages, 60 to 120 columns.
 
-Whatever is drawn in columns passes one of three primitives: ``drawn_table``, a wizard's ``Screen``
-(always 80 columns; the dialogue of lines has what the terminal has), or a drawing as SVG.
+Everything drawn in columns uses one of three primitives: ``drawn_table``, a wizard's ``Screen``
+(always 80 columns; the line dialogue uses the terminal's width), or an SVG drawing.
 """
 
 import io
@@ -113,7 +113,7 @@ TABLES = {
 
 
 def drawn(title, heads, rows, width):
-    """Return the lines of a table as a terminal of so many columns gets them."""
+    """Return the lines of a table on a terminal with this many columns."""
     out = io.StringIO()
     console = Console(file=out, width=width, highlight=False, color_system=None)
     console.print(drawn_table(title, heads, rows, width), crop=False, markup=False)
@@ -130,7 +130,7 @@ def check_fits(lines, heads, rows, width):
         for word in cell.split():
             if word.isascii() and len(word) <= 20:
                 assert word in shown, f"{word} of {cell} is cut at {width}:\n{text}"
-    # Chinese is broken anywhere; no character of it is lost.
+    # Chinese text wraps anywhere; no character is lost.
     wide = [character for cell in cells for character in cell if wcwidth(character) == 2]
     assert sum(map(text.count, set(wide))) >= len(wide)
 
@@ -201,13 +201,13 @@ def test_the_dialogue_of_lines_fits_every_terminal(name, language):
     for width in WIDTHS:
         lines = "\n".join([*told_before(state, width), told_question(state)]).split("\n")
         for line in lines:
-            # What stands in columns would be torn; sentences are broken.
+            # Columns would be torn apart; sentences are wrapped.
             assert wcswidth(line) <= width or "   " not in line.strip(), line
         assert max(wcswidth(row) for row in within("\n".join(lines), width).split("\n")) <= width
 
 
 SIZES = {"tick": 11.0, "axis": 11.0, "scale": 12.0, "name": 10.5, "largest": 12.5, "l": 22.0}
-"""Of the letters of a drawing, in its own units, by class (``robolink/report/style.css``)."""
+"""Letter sizes in a drawing, in its own units, by class (``robolink/report/style.css``)."""
 
 
 def pictures():
@@ -220,7 +220,7 @@ def pictures():
 
 
 def labels(root):
-    """Yield text, left, right and foot of each label of a drawing, shifted as its groups are."""
+    """Yield text, left, right and bottom of each label of a drawing, shifted like its groups."""
 
     def walk(one, dx, dy):
         moved = re.match(r"translate\(([-\d.]+) ([-\d.]+)\)$", one.get("transform") or "")
@@ -229,7 +229,7 @@ def labels(root):
         if one.tag.rpartition("}")[2] == "text":
             text = "".join(one.itertext())
             size = max(SIZES[kind] for kind in one.get("class").split())
-            # Six tenths of its height is what a digit or letter takes on average, and more.
+            # A digit or letter takes six tenths of its height on average; this is more.
             wide = size * sum(1.0 if wcwidth(c) == 2 else 0.6 for c in text)
             back = {"end": wide, "middle": wide / 2}.get(one.get("text-anchor"), 0.0)
             left = float(one.get("x")) + dx - back
@@ -263,7 +263,7 @@ def test_what_six_axes_measured_is_said_of_all_three_lengths():
 
 
 def test_the_touch_turned_by_half_is_one_pin():
-    """Two pins would be another lesson: the needle comes back to the same one."""
+    """The needle comes back to the same pin; two pins would teach something else."""
     root = ElementTree.parse(ROOT / "docs/pictures/turn.svg").getroot()
     pins = [one for one in root.iter() if one.get("class") == "p"]
     assert len(pins) == 1

@@ -1,4 +1,4 @@
-"""How a command ends: the exit codes that are documented, and what is said of each way."""
+"""The end of a command: the documented exit codes and the sentence for each."""
 
 import io
 import json
@@ -23,7 +23,7 @@ from robolink.interrupts import EndedBy, Interrupted, InterruptGate, ended_by, o
 from robolink.model import EntryKind, ToolOffset
 from robolink.transaction import ToolChange, Wanted, change_tools
 
-# The exit codes that are documented are those of the code, and 6 comes first.
+# The documented exit codes are those of the code, and 6 comes first.
 
 _PAGE = Path(__file__).parents[2] / "docs" / "commands.md"
 _NAMED = {
@@ -95,7 +95,7 @@ def test_what_is_not_settled_outranks_whatever_broke_afterwards(error):
     assert exit_codes.exit_code(error) == settled
 
 
-# What a command says that was ended, and with which exit code; the same for every way.
+# The sentence and the exit code of an ended command; the same for every way to end it.
 
 NEW_BY_END = ToolOffset(1.5, 2.5, 3.5)
 

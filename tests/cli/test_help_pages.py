@@ -19,10 +19,10 @@ from robolink import messages
 # Every help page fits into 80 columns, in whole sentences, in each language alike.
 
 COPIED = ["fish", "powershell"]
-"""Lines of ``completion`` that begin so are copied as they stand, and are not broken."""
+"""Lines of ``completion`` that begin so are to be copied, and are not wrapped."""
 
 CODE_WORDS = re.compile(r"^  -.*? (?:INTEGER|FLOAT|TEXT|BOOLEAN|[^ ]*%[YmdHMS]|文件)\b")
-"""What click shows where nobody says what an option takes, with the option before it."""
+"""The words that click shows for an option without a metavar, after the option's name."""
 
 
 def pages(command=main.cli, path=()):

@@ -1,4 +1,4 @@
-"""Every hint that the reader of poses prints is right: typed as it stands, the file is accepted."""
+"""Every hint of the pose reader is right: with the printed options, the file is accepted."""
 
 import json
 import re
@@ -64,7 +64,7 @@ def shown(tmp_path, capsys):
 
 
 def hints_in(remedy):
-    """Return the options that a remedy names, each as it is typed."""
+    """Return the options that a remedy names, as typed."""
     found = []
     columns = re.search(r"--columns(?:, for example|:) (.+?)(?::|;? '-'|\. |\.$)", remedy)
     if columns:
@@ -79,7 +79,7 @@ def hints_in(remedy):
 
 
 def _without(words, option):
-    """Return words without an option and its value: a later answer stands for an earlier one."""
+    """Return the words without an option and its value: a later answer replaces an earlier one."""
     at = words.index(option) if option in words else len(words)
     return (*words[:at], *words[at + 2 :])
 

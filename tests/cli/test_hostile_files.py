@@ -1,4 +1,4 @@
-"""A file that a person names may be anything: it is refused at once, by its name and the reason."""
+"""A named file may contain anything: it is refused at once, with its name and the reason."""
 
 import json
 import os
@@ -15,7 +15,7 @@ from robolink.files.named import MOST_BYTES, append_to_named, holds, read_named
 from robolink.files.toml import MOST_BYTES as HOSTILE_MOST_BYTES
 from robolink.files.toml import MOST_SHOWN
 
-# What is not a regular file, or has no end, is refused at once by every command that reads one.
+# A file that is not regular, or has no end, is refused at once by every command that reads one.
 
 URL = "epson+sim://no-regular-files"
 MAP_URL = "plc+modbus-tcp://127.0.0.1:1?map={file}"
@@ -41,7 +41,7 @@ COMMANDS = {
 
 @pytest.fixture(params=["pipe", "endless", "folder"])
 def no_file(request, tmp_path):
-    """A pipe that nobody writes to, a device that never ends, a folder."""
+    """A pipe without a writer, a device without an end, a folder."""
     if request.param == "endless":
         return Path("/dev/zero")
     path = tmp_path / request.param
@@ -152,12 +152,11 @@ def test_a_file_that_is_too_long_is_refused_and_a_link_is_followed(tmp_path):
         read_named(path)
 
 
-# A file that a person names may hold anything: it is refused at once, by its name and the reason.
-#
-# No regular file, a pipe, a device: test_hostile_files.py.
+# A named file may hold anything: it is refused at once, with its name and the reason.
+# Irregular files, pipes and devices: test_hostile_files.py.
 
 READERS = {name: words for name, words in COMMANDS.items() if name not in ("password", "dialogue")}
-"""A password may be anything, and a dialogue is written."""
+"""A password file may contain anything, and a dialogue file is written."""
 
 CONTENTS = {
     "nothing": b"",
@@ -195,7 +194,7 @@ def refused(words, capsys):
 
 
 def turns():
-    """Yield each content with every fourth reader, beginning with another one each time."""
+    """Yield each content with every fourth reader, each time starting at another one."""
     for number, content in enumerate(CONTENTS):
         for turn in range(TURNS):
             now = turn == number % TURNS and content != "too long"
@@ -209,7 +208,7 @@ def test_whatever_a_file_holds_it_is_refused_by_name(content, turn, tmp_path, ca
     file.write_bytes(CONTENTS[content])
     for name, words in list(READERS.items())[turn::TURNS]:
         what = refused([word.replace("{file}", str(file)) for word in words], capsys)
-        # A case of solve is one document: its places are named, not its file.
+        # A case of solve is one document: errors name its places, not its file.
         assert "hostile" in what or name in ("case", "table"), (name, what)
     monkeypatch.setenv("ROBOLINK_CONFIG", str(file))
     refused(["-c", "a", "status"], capsys)
@@ -240,7 +239,7 @@ def test_of_very_many_problems_the_first_are_told_and_the_rest_counted(tmp_path,
 def test_a_key_of_as_many_parts_as_any_that_we_know_is_no_long_key(tmp_path, capsys):
     file = Path(tmp_path / "dots.toml")
     dots = ".".join(["a"] * 8)
-    # Dots in texts and comments, however many, are none of a key.
+    # Dots in texts and comments, however many, do not belong to a key.
     text = f'# {"a." * 100}\n{dots} = "{"a." * 100}"\nb = ["{"a." * 100}", 1.5, 2.5]\n'
     file.write_text(text)
     what = refused(["-c", "epson+sim://many", "recalibrate", str(file), "--yes"], capsys)

@@ -195,7 +195,7 @@ def test_an_old_entry_names_its_method_as_it_is_named_now(document, run, recorde
     assert "method: beams" in run("journal", "show", "5")[1]
     differing = {field["name"] for field in document("journal", "diff", "5", "6")["fields"]}
     assert "method" not in differing
-    # The hash counts every letter, so an export keeps them.
+    # The hash covers every letter, so an export keeps them.
     kept = [json.loads(line) for line in (tmp_path / "as.jsonl").read_text().splitlines()]
     assert [one["details"].get("method") for one in kept[-2:]] == ["crossed_beams", "beams"]
 

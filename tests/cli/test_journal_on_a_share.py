@@ -1,4 +1,4 @@
-"""A journal on a network share is refused before it is opened; looking and stopping go on."""
+"""A journal on a network share is refused before it is opened; status and stop still work."""
 
 import pytest
 from robolink_cli.commands.computer.checkup import Level, check_journal
@@ -10,7 +10,7 @@ from robolink.journal._connections import close_files
 
 @pytest.fixture
 def share(tmp_path, monkeypatch):
-    """A folder that the table of mounts calls a network share."""
+    """A folder that the mount table lists as a network share."""
     folder = tmp_path / "share"
     folder.mkdir()
     table = tmp_path / "mountinfo"

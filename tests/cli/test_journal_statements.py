@@ -1,4 +1,4 @@
-"""What is read back from a journal: charts of drift, and what a measurement stated."""
+"""Results read back from a journal: charts of drift, and the statement of a measurement."""
 
 import csv
 import itertools
@@ -41,7 +41,7 @@ def run(state_folder, capsys):
 
 
 def entries(change, *, end=EntryKind.DONE, z_from="kept", method="n_angle", stated=None):
-    """Return what a nozzle change puts on record."""
+    """Return the entries of a nozzle change."""
     tip = [change.tip_mm["x"], change.tip_mm["y"], change.tip_mm["z"], 0.0, 0.0, 0.0]
     place = [change.pin_mm["x"], change.pin_mm["y"]]
     told = {
@@ -202,7 +202,7 @@ def test_the_page_has_every_chart_and_escapes_what_people_typed(run, tmp_path):
     assert (code, f"Page: {page}" in out) == (1, True)
     assert text.count("<svg") == 5
     assert text.count('class="largest"') >= 3
-    # Two lines of limits beside each weighted mean, one point a judged value.
+    # Two limit lines beside each weighted mean, one point for each judged value.
     limits = re.findall(r'<polyline[^>]*points="([^"]*)"[^>]*class="mean-limit"', text)
     limits += re.findall(r'<polyline[^>]*class="mean-limit"[^>]*points="([^"]*)"', text)
     assert len(limits) == 2 * text.count('class="mean"') == 10
@@ -213,7 +213,7 @@ def test_the_page_has_every_chart_and_escapes_what_people_typed(run, tmp_path):
     assert run("--page", str(page), "--force")[0] == 1
 
 
-# What a measurement stated is read back from its record: journal show, diff, and the report.
+# A measurement's statement is read back from its record: journal show, diff, and the report.
 
 TOUCHES = Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)
 OLD = ToolOffset(12.0, -4.0, -20.0)
@@ -228,7 +228,7 @@ CLAIM = TurnClaim(
 
 
 def recorded(*, sigma_mm=None, drift_mm=0.06, wider_mm=None, damaged=False, claim=CLAIM):
-    """Put a change on record, and return the number of its first entry."""
+    """Record a change, and return the number of its first entry."""
     found = assessed(solve_two_pose(*TOUCHES, stored=OLD, sigma_mm=sigma_mm), AccuracyFacts())
     proposal = Proposal(1, OLD, found, seating=Seating((0.05, 0.05, 0.05), changes=12))
     shown = VerifyResult((Drift(180.0, drift_mm, 0.0),), 0.2)
@@ -334,7 +334,7 @@ def test_a_report_has_the_statement_that_stands_and_is_no_proof_with_a_doubt(sho
     ):
         assert said in text
     assert "dashed circle, radius 0.1500 mm" in text
-    assert "accurate to, 95 %" not in text  # that of each axis alone no longer stands
+    assert "accurate to, 95 %" not in text  # that of each axis alone is no longer there
     assert "The tool conforms" not in text
 
 

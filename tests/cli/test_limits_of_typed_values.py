@@ -1,4 +1,4 @@
-"""Whatever writes or clears a tool obeys the cell: how far a tip may be taken, and by whom."""
+"""Every command that writes or clears a tool obeys the cell's limits on change and person."""
 
 import json
 
@@ -40,7 +40,7 @@ def tools(simulator):
 
 @pytest.fixture
 def cell(simulator, tools, tmp_path, monkeypatch, capsys):
-    """Run a command on the cell as somebody; return the exit code, the document and stderr."""
+    """Run a command on the cell as a person; return the exit code, the document and stderr."""
 
     def run(who, *words, limits="max_change_mm = 1.5\nmax_change_deg = 5"):
         path = tmp_path / "robolink.toml"
@@ -139,7 +139,7 @@ def test_a_turn_has_a_limit_of_its_own(cell, tools):
 def test_what_the_cell_allows_anybody_writes(cell, tools):
     assert cell("anna", "tool", "set", "1", "--x", "13.4", "--u", "4")[0] == 0
     assert tools.get(1).x_mm == 13.4
-    # 2 mm where the cell says nothing, and a tool that has no value yet may get any.
+    # 2 mm where the cell states nothing; a tool that has no value yet may get any.
     assert cell("anna", "tool", "set", "2", "--x", "13.9", limits="")[0] == 0
     assert cell("anna", "tool", "set", "2", "--x", "16.1", limits="")[0] == 9
     assert cell("anna", "tool", "set", "3", "--x", "100")[0] == 0
@@ -173,7 +173,7 @@ def test_a_measured_change_is_held_to_it_whatever_its_own_limit():
             raise AssertionError
 
     touches = [Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)]
-    plan = ToolPlan(1, source=PointsSource(lambda: touches), verify=False)  # by itself 2 mm
+    plan = ToolPlan(1, source=PointsSource(lambda: touches), verify=False)  # 2 mm by default
     machine = SimpleMachine({1: ToolOffset(12, -3.5, -20)})
     with SimpleController(machine) as controller:
         controller.change_guard.limits = ChangeLimits(length_mm=0.4)
@@ -193,7 +193,7 @@ def test_a_restore_is_asked_about_and_an_undo_is_not(cell, tools, tmp_path):
     assert code == 9
     assert "The tip of tool 1 would move 24.000 mm; this cell allows 1.500 mm." in err
     assert tools.get(1).x_mm == -12.0
-    # What was there before was proved, and the engineer who undoes has it on record.
+    # The earlier value was tested, and the record names the engineer who undoes.
     assert cell("eva", "undo", "--yes")[0] == 0
     assert tools.get(1) == STORED
     assert "accept a jump of tool 1 by 24.000 mm" in cell("eva", "journal", "list")[1]
@@ -273,7 +273,7 @@ def test_an_undo_to_undefined_wants_to_know_too(run, tools):
         (ToolOffset(v_deg=30), ToolOffset(v_deg=-30), 60.0),
         (ToolOffset(w_deg=90), ToolOffset(w_deg=270), 180.0),
         (ToolOffset(u_deg=1e-4), ToolOffset(), 1e-4),
-        # At V = 90 a turn about Z is one about X: the same orientation in other figures.
+        # At V = 90 a turn about Z equals one about X: the same orientation in other numbers.
         (ToolOffset(u_deg=40, v_deg=90), ToolOffset(v_deg=90, w_deg=-40), 0.0),
     ],
 )

@@ -1,4 +1,4 @@
-"""``--log-file``: what stands in it, that it ends nothing, and that no stop waits for it."""
+"""``--log-file``: its contents; a faulty one ends no command, and no stop waits for it."""
 
 import errno
 import logging
@@ -86,7 +86,7 @@ def test_a_log_that_cannot_be_refuses_a_command_before_anything_is_sent(
     assert main.run(["-c", cell, *options, *SET]) == 2
     assert told in " ".join(capsys.readouterr().err.split())
     assert simulator_named("log-file").machine.tools.get(5) is None
-    # A stop goes out all the same, whoever reads its line, and what was wrong is said afterwards.
+    # A stop goes out all the same, and faults are reported afterwards.
     for line in (["-c", cell, *options, "stop"], [f"-c{cell}", *options, "stop"]):
         assert entry.run(line) == 0
         said = " ".join(capsys.readouterr().err.split())
@@ -96,7 +96,7 @@ def test_a_log_that_cannot_be_refuses_a_command_before_anything_is_sent(
 
 @pytest.mark.parametrize("joined", [False, True])
 def test_a_stop_is_logged_once_it_is_over(cell, joined, monkeypatch):
-    """Joined, ``-cURL``, its line is read by click."""
+    """click reads the command line if ``-cURL`` is one word."""
     where = [f"-c{cell}"] if joined else ["-c", cell]
     assert entry.run([*where, "stop", "--log-file", "day.log", "--log-level", "debug"]) == 0
     text = Path("day.log").read_text(encoding="utf-8")
@@ -111,7 +111,7 @@ def test_a_stop_s_line_is_read_with_the_options_of_a_log():
 
 
 class Filling:
-    """A file on a disk that takes ``lines`` lines."""
+    """A file on a disk with room for ``lines`` lines."""
 
     name = "full"
 
@@ -184,7 +184,7 @@ def test_a_file_that_is_moved_away_is_begun_anew(tmp_path):
 
 
 def test_lines_of_two_programs_are_not_mixed(tmp_path):
-    """Each handler has a file of its own, as each process does."""
+    """Each handler has its own file, as each process does."""
     from concurrent.futures import ThreadPoolExecutor
 
     path = tmp_path / "day.log"

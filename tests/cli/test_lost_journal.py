@@ -1,4 +1,4 @@
-"""A journal that was emptied, deleted, replaced or bent is not "nothing is unsettled"."""
+"""An emptied, deleted, replaced or damaged journal does not pass for "nothing is open"."""
 
 import sqlite3
 
@@ -18,7 +18,7 @@ from robolink.model import ANY, EntryKind, NewEntry, ToolOffset
 
 
 def forget_connections():
-    """Begin as a new process does."""
+    """Forget all connections, as a new process does."""
     close_files()
     _opened.clear()
     _closed.clear()
@@ -63,7 +63,7 @@ def test_a_journal_without_history_of_a_known_controller_blocks_until_a_person_l
     assert "No job is left unfinished" not in out + err
     assert "Tool 0 is selected" in out + err
     assert "robolink tool compare" in out + err
-    # It is not said to be settled by having been asked for.
+    # Asking about it does not count as finishing it.
     assert run("recover")[0] == 6
     assert run("resolve", "--yes")[0] == 0
     code, out, err = run("recover")
@@ -96,7 +96,7 @@ def test_a_write_that_changed_nothing_loses_no_record(run, simulator):
 
 
 def bend(path, old, new):
-    """Change bytes of the file, as a disk does; SQLite does not notice."""
+    """Change bytes of the file, as a faulty disk does; SQLite does not notice."""
     content = path.read_bytes()
     assert old in content
     path.write_bytes(content.replace(old, new))
@@ -155,7 +155,7 @@ def test_a_bent_page_of_the_markers_is_noticed(run, changed, simulator):
 
 @pytest.fixture
 def doubted(simulator, state_folder):
-    """A controller that a program wrote to; no answer came, and the first backup was never made."""
+    """A controller with an unanswered write by a program, and no first backup."""
     dropped: list[str] = []
 
     def lose_the_answer(_number, request):
@@ -172,7 +172,7 @@ def doubted(simulator, state_folder):
 
 
 def test_a_program_does_not_write_again_while_an_outcome_is_unknown(doubted, simulator):
-    """Each way of changing something is refused by what all of them pass."""
+    """All ways of changing something pass the one check that refuses them."""
     simulator.machine.tools.set(2, ToolOffset(4, 5, -60))  # at the pendant
     with robolink.connect(simulator.url) as controller:
         assert isinstance(controller, EpsonController)
@@ -212,7 +212,7 @@ def test_a_program_is_refused_too_where_the_record_is_kept_elsewhere_now(
     doubted, simulator, tmp_path, monkeypatch
 ):
     monkeypatch.setenv("ROBOLINK_JOURNAL", str(tmp_path / "elsewhere.db"))
-    for _ in range(2):  # and nothing that the first attempt recorded lets the second one pass
+    for _ in range(2):  # and nothing that the first attempt recorded lets the second one through
         with robolink.connect(simulator.url) as controller:
             with pytest.raises(OutcomeUnknownError):
                 controller.outcomes.append(NewEntry(EntryKind.DECISION, verdict="all is well"))
@@ -249,7 +249,7 @@ PLANTS = {"epson": (EpsonSimulator, epson), "softmotion": (SoftMotionSimulator, 
 def test_each_command_that_writes_or_moves_is_blocked_and_no_other(
     kind, state_folder, tmp_path, capsys
 ):
-    """A program's first write was enough; nobody ever gave a command before."""
+    """A program's first write was enough; no command was ever run before."""
     made, plant = PLANTS[kind]
     simulator = made(seed=4, state_path=tmp_path / "retained.json")
     plant.register("lost", simulator)

@@ -1,4 +1,4 @@
-"""cell new and cell validate: what stands in the cell file, and what methods will refuse of it."""
+"""cell new and cell validate: the cell file written, and the values that methods will refuse."""
 
 import json
 
@@ -9,14 +9,14 @@ from robolink_cli.commands.computer import config
 from robolink.config import find_cell, load_cells
 from tests.contract._method_cell import method_cell
 
-# cell new: what is given or typed stands in the cell file, and nothing else is changed.
+# cell new: given or typed values are written to the cell file, and nothing else is changed.
 
 URL = "epson+tcp://192.0.2.1:5000"
 
 
 @pytest.fixture
 def typing(monkeypatch):
-    """A person at the terminal, who types these answers; returns what was asked."""
+    """A person at the terminal who types these answers; returns the questions."""
 
     def types(*answers):
         left, asked = list(answers), []
@@ -102,7 +102,7 @@ def test_what_is_wrong_is_refused_and_nothing_is_written(
     assert file.read_bytes() == before
 
 
-# ``cell validate`` says what methods will refuse of a cell's limits, in their words.
+# ``cell validate`` reports the cell's limits that methods will refuse, in their words.
 
 ABOVE = "The robot would stop {clearance} mm from contact, but a new tip may be {limit} mm longer."
 
@@ -149,7 +149,7 @@ def test_what_every_calibration_would_refuse_is_said(cell, tmp_path, capsys, lin
     refused = cell.calibrate("two-pose")
     assert refused.code == 2
     assert why in refused.document["error"]["what"]
-    # Everything else works with such a file: a look and a stop most of all.
+    # Everything else works with such a file, above all status and stop.
     assert cell.run("status", "--json").code == 0
 
 
@@ -191,5 +191,5 @@ def test_files_are_looked_at_together_and_the_one_that_says_it_is_named(
     (near / "robolink.toml").write_text("[cells.a]\nmax_change_mm = 3.5\n")
     assert main.run(["config", "check", "--json"]) == 2
     wrong = [bool(entry["problems"]) for entry in json.loads(capsys.readouterr().out)["files"]]
-    # The clearance of the far file is what is too small.
+    # The clearance of the far file is too small.
     assert wrong == [False, True]

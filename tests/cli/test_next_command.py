@@ -1,4 +1,4 @@
-""" "Next" lines and notes: never what was refused just now, right when followed to the letter."""
+"""Notes and "Next" lines never name the refused command, and work when followed exactly."""
 
 import inspect
 import json
@@ -45,7 +45,7 @@ def all_classes(base=errors.RobolinkError):
 
 
 def made(kind, remedy):
-    """Return an error of a class, its required arguments filled in."""
+    """Return an error of a class with its required arguments."""
     more = {}
     for name, one in inspect.signature(kind.__init__).parameters.items():
         if name in ("self", "remedy") or one.default is not inspect.Parameter.empty:
@@ -142,7 +142,7 @@ def test_the_last_screen_of_a_refused_recover_names_what_comes_before_it():
     assert left[-1] == "Next: robolink -c line3 recover"
 
 
-# After an emergency stop or an error: the printed "Next" lines, followed to the letter.
+# After an emergency stop or an error: the printed "Next" lines, followed exactly.
 
 STOPS: dict[str, dict[str, Callable[[Any], object]]] = {
     "epson": {
@@ -170,7 +170,7 @@ CASES = [(kind, stop) for kind, stops in STOPS.items() for stop in stops]
 
 @pytest.fixture(params=CASES, ids=" ".join)
 def stopped(request, tmp_path, state_folder):
-    """A controller that stopped in a procedure with another tool selected; yields what is run."""
+    """A controller stopped in a procedure with another tool selected; yields a command runner."""
     kind, stop = request.param
     name = f"way-back-{kind}-{stop}".replace(" ", "-")
     simulator: Any = SIMULATORS[kind]()
@@ -196,7 +196,7 @@ def stopped(request, tmp_path, state_folder):
 
 
 def next_line_of(said):
-    """Return the commands of the last "Next" lines, in their order, as they would be typed."""
+    """Return the commands of the last "Next" lines, in order, as they would be typed."""
     found = re.findall(r": (robolink -c .*)", said)
     return [shlex.split(part)[1:] for part in found[-1].split(", then ")] if found else []
 
@@ -220,7 +220,7 @@ def test_following_next_ends_settled(stopped, capsys):
     assert typed
 
 
-# A stop that comes while a command calms the controller: told, and noted until it is released.
+# A stop while a command resets the controller is reported, and noted until it is released.
 
 NAME = "stopped-meanwhile"
 NOTED_URL = f"epson+sim://{NAME}"

@@ -1,7 +1,7 @@
-"""Off a terminal no command waits for an answer: it ends with 9 and says why, or does what is told.
+"""Without a terminal no command waits for an answer: it ends with 9 and a reason, or acts.
 
-What that is stands in docs/commands.md, "Without a terminal", for every command that may ask; a
-command that is added and takes ``--yes`` fails here until it has a row.
+docs/commands.md, "Without a terminal", has a row for every command that may ask; a new command that
+takes ``--yes`` fails here until it has one.
 """
 
 import io
@@ -72,7 +72,7 @@ ASKS: dict[str, list[tuple[str, ...]]] = {
     "expert check-contract": [("--write", "--tool", "5"), ("--move",)],
     "expert execute-raw": [("Print 1",)],
 }
-"""What ends with 9 on a robot of four axes, and with which arguments."""
+"""Commands that end with 9 on a four-axis robot, with their arguments."""
 
 SIX_AXES: dict[str, list[tuple[str, ...]]] = {
     "calibrate pivot": [TOOL],
@@ -80,10 +80,10 @@ SIX_AXES: dict[str, list[tuple[str, ...]]] = {
     "calibrate plane-touch": [TOOL],
     "calibrate sphere-touch": [TOOL],
 }
-"""The same on one of six."""
+"""The same on a six-axis robot."""
 
 OF_A_PLC = {"robot take-ownership", "expert plc check-map"}
-"""What asks on PLCs only: below, each by itself."""
+"""Commands that ask only on PLCs: each has its own test below."""
 
 CONSENT: dict[str, tuple[str, ...]] = {
     "tool set": ("1", "--x", "13"),
@@ -98,14 +98,14 @@ CONSENT: dict[str, tuple[str, ...]] = {
     "recover": (),
     "cell accuracy measure": ("touch_mm", "--study", "study.json"),
 }
-"""Where the command itself is the consent, or reading decides; it is done at once."""
+"""Commands that are the consent by themselves, or decide by reading; they act at once."""
 
 HELP = {(): "Every day", ("calibrate",): "two-pose", ("robot", "jog", "--keys"): "steps"}
-"""What ends with 2, and says what can be typed instead."""
+"""Commands that end with 2 and show what can be typed instead."""
 
 
 class NobodyThere(io.StringIO):
-    """A stdin that is no terminal, and of which nothing may be read."""
+    """A stdin that is not a terminal and must not be read."""
 
     def read(self, *_):
         raise AssertionError("an answer was waited for")
@@ -115,7 +115,7 @@ class NobodyThere(io.StringIO):
 
 @pytest.fixture(scope="module")
 def cell(request, tmp_path_factory):
-    """A cell whose commands can be typed; which one, its parameter says."""
+    """A cell for typed commands; the parameter chooses its kind."""
     kind, folder = request.param[0], tmp_path_factory.mktemp("cell")
     with pytest.MonkeyPatch.context() as patch, method_cell(kind, folder, patch) as made:
         patch.chdir(folder)
@@ -229,7 +229,7 @@ def test_a_process_whose_input_is_no_terminal_ends_by_itself(state_folder):
 
 
 def asking():
-    """Yield the commands that take a yes, or measure."""
+    """Yield the commands that take --yes, or measure."""
     for name in leaves(main.cli):
         command: click.Command | None = main.cli
         for word in name.split():

@@ -1,4 +1,4 @@
-"""The next command says that Tool 0 is still selected, and offers the old one."""
+"""The next command reports that Tool 0 is still selected and offers to restore the old tool."""
 
 import pytest
 from robolink_cli import main
@@ -28,7 +28,7 @@ class Person:
 
 @pytest.fixture
 def cell():
-    """A simulator on which a calibration died with Tool 0 selected."""
+    """A simulator on which a calibration was killed with Tool 0 selected."""
     simulator = EpsonSimulator(seed=3)
     url = register("offer-to-restore", simulator)
     with robolink.connect(url) as controller:

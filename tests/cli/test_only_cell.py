@@ -1,4 +1,4 @@
-"""Without -c: the only cell is taken and said; a controller is known by what it says of itself."""
+"""Without -c the only cell is used and named; a controller is identified by its own data."""
 
 import json
 from dataclasses import replace
@@ -16,7 +16,7 @@ from tests.cli.test_command_names import run_on_terminal
 from tests.contract._terminal import Terminal
 from tests.faults._requests import changes
 
-# Without ``-c``: the only cell is taken and said; nothing is guessed, written or moved unasked.
+# Without ``-c`` the only cell is used and named; nothing is guessed, written or moved unasked.
 
 URL = "epson+sim://only-cell"
 
@@ -157,7 +157,7 @@ def test_what_means_something_without_a_controller_stays_so(cells, capsys):
     assert "cell: line3" not in capsys.readouterr().err
 
 
-# The command line knows a controller by what it says of itself, not by its URL.
+# The command line identifies a controller by its own data, not by its URL.
 
 
 @pytest.fixture

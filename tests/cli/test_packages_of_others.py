@@ -1,4 +1,4 @@
-"""Packages of other makers and other versions are named, whatever they make fail."""
+"""Third-party packages and other versions are named, whatever error they cause."""
 
 import json
 import os
@@ -13,7 +13,7 @@ from robolink_cli.console import exit_codes
 from robolink.plug_ins import plug_in_module
 from tests._documents import wrong_in
 
-# What an installed package of another maker lets out is told as its own, not as robolink's.
+# An error of an installed third-party package is reported as its own, not as robolink's.
 
 DRIVER = """
 from robolink.controllers import SimpleController, SimpleMachine
@@ -37,7 +37,7 @@ ENTRY = "[robolink.controllers]\nacme+tcp = acme_robots.driver:opener\n"
 
 @pytest.fixture
 def acme(monkeypatch, tmp_path):
-    """A driver as pip installs it, which calls a library of its maker that fails."""
+    """A driver as pip installs it, which calls a failing library of its maker."""
     for folder, module, content in (
         ("acme_robots", "driver", DRIVER),
         ("acme_vendor", "wire", VENDOR),
@@ -94,10 +94,8 @@ def test_what_robolink_lets_out_below_a_plug_in_is_its_own(acme):
     assert plug_in_module(raised.value) is None
 
 
-# A package of another version than is asked for is named, whatever it makes fail.
-#
-# What is put before the packages of this machine is a package as pip leaves it: its files, and
-# metadata with a version.
+# A package of an unsupported version is named, whatever error it causes.
+# The packages put before this machine's are as pip leaves them: files, and metadata with a version.
 
 BREAKS = "raise ImportError('no such thing in this version')"
 
@@ -107,7 +105,7 @@ CELL = '[cells.a]\nurl = "epson+tcp://192.0.2.1:5000"\n'
 
 @pytest.fixture
 def instead(tmp_path):
-    """Run a command with another version of a package in front."""
+    """Run a command with another version of a package first in the path."""
 
     def run(name, version, content, *command):
         (tmp_path / "robolink.toml").write_text(CELL)

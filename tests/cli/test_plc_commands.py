@@ -1,4 +1,4 @@
-"""What the command line says of a PLC, and for which PLC a map was confirmed."""
+"""The command line's messages about a PLC, and the PLC for which a map was confirmed."""
 
 import json
 from itertools import count
@@ -21,7 +21,7 @@ from robolink.register_maps import RegisterTable, load_map
 from tests.cli.test_plc_map_commands import MAPS as CONFIRMED_MAPS
 from tests.faults._second_address import SecondAddress
 
-# What the command line says of a PLC, and how a person takes its mailbox from another client.
+# The command line's messages about a PLC, and how a person takes its mailbox over.
 
 MAPS = Path("examples/plc-maps").absolute()
 _names = count()
@@ -153,7 +153,7 @@ def another_client(url):
 
 @pytest.fixture
 def held(serve):
-    """Serve a PLC whose mailbox another client holds."""
+    """Serve a PLC whose mailbox another client has locked."""
     url, simulator = serve()
     with another_client(url) as other:
         other.take()
@@ -212,7 +212,7 @@ def test_a_dry_run_sends_no_mailbox_command(shown, held):
     assert len(commands(simulator)) == before
 
 
-# That a person confirmed a map holds for one PLC, however it is named, and for no other one.
+# A person's confirmation of a map counts for one PLC, whatever its URL, and for no other one.
 
 NUMBER_AT = 60
 NUMBER = f"""
@@ -224,7 +224,7 @@ address = {NUMBER_AT}
 
 @pytest.fixture
 def shown_to(state_folder, capsys):
-    """Run a command line; return the exit code and what was shown to a person."""
+    """Run a command line; return the exit code and the output for a person."""
 
     def ran(*arguments):
         code = main.run(arguments)
@@ -235,7 +235,7 @@ def shown_to(state_folder, capsys):
 
 @pytest.fixture
 def machine(state_folder, tmp_path):
-    """A map without a probe that knows where the PLC's own number stands, and such a PLC."""
+    """A map without a probe, with the place of the PLC's own number, and such a PLC."""
     path = tmp_path / "machine.toml"
     text = (CONFIRMED_MAPS / "no-handshake.toml").read_text(encoding="utf-8")
     path.write_text(text + NUMBER, encoding="utf-8")
@@ -260,7 +260,7 @@ def test_another_spelling_of_the_host_keeps_the_confirmation(shown_to, state_fol
     with host, SecondAddress(host.url) as second:
         assert shown_to(*compare(host.url))[0] == 0
         assert shown_to(*write(host.url.replace("127.0.0.1", "localhost")))[0] == 0
-        # Without a number of its own it might be another one.
+        # Without a number of its own it might be another PLC.
         code, err = shown_to(*write(second.url))
         assert (code, "Nobody has compared" in err) == (2, True)
 

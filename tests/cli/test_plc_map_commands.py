@@ -1,4 +1,4 @@
-"""plc check-map and sim plc, and what other commands say to a PLC with a map."""
+"""plc check-map and sim plc, and the messages of other commands about a PLC with a map."""
 
 import json
 import os
@@ -84,7 +84,7 @@ EACH = ("1.x", "1.y", "1.z", "1.u", "2.x")
 
 
 def shows(found, *keys):
-    """Options that say what a screen shows that agrees with the map."""
+    """Return options that state what the screen shows, in agreement with the map."""
     return [it for key in keys for it in ("--shows", f"{key}={found['values'][key]:.3f}")]
 
 
@@ -151,7 +151,7 @@ def test_a_comparison_that_fails_takes_the_confirmation_back(shown, serve):
     write = ["-c", url, "tool", "set", "1", "--x", "2.5", "--dry-run"]
     assert shown(*check, "--shows", "1.x=-5.44", "--operator", "Kim")[0] == 0
     code, _, err = shown(*check, "--shows", "1.x=much")
-    assert (code, "withdrawn" in err) == (2, False)  # a typing mistake says nothing of the map
+    assert (code, "withdrawn" in err) == (2, False)  # a typing mistake shows nothing about the map
     assert shown(*write)[0] == 0
     code, _, err = shown(*check, "--shows", "1.x=9.99")
     assert (code, "The confirmation by Kim" in err, "withdrawn" in err) == (2, True, True)
@@ -164,7 +164,7 @@ def test_a_comparison_that_fails_takes_the_confirmation_back(shown, serve):
 
 
 class Person:
-    """Who stands at the machine: answers a question, after having typed at its own screen."""
+    """A person at the machine who types at its own screen and then answers the question."""
 
     def __init__(self, plc, *answers):
         self.plc, self.answers, self.asked = plc, list(answers), []
@@ -182,7 +182,7 @@ class Person:
 
 @pytest.fixture
 def person(monkeypatch):
-    """Let somebody answer the questions of a terminal."""
+    """Let a person answer the questions of a terminal."""
 
     def sits(plc, *answers):
         person = Person(plc, *answers)
@@ -241,7 +241,7 @@ def test_a_component_that_is_zero_everywhere_is_compared_by_a_test_value(shown, 
 
 
 def test_a_test_value_that_another_component_shows_takes_everything_back(shown, serve, person):
-    """The map has Y and Z exchanged: what is entered for Y appears in Z."""
+    """The map has Y and Z exchanged: a value entered for Y appears in Z."""
     url, plc = serve("level-handshake")
     zero = {**STAND, "y": 0.0, "z": 0.0}
     plc.program.set_tool(1, zero)
@@ -275,7 +275,7 @@ def test_what_a_map_cannot_do_is_refused_in_words(shown, serve, command):
     code, out, err = shown("-c", url, *command)
     assert (code, out) == (5, "")
     said = err.splitlines()
-    if "stop" not in command:  # a stop looks at nothing before it
+    if "stop" not in command:  # a stop checks nothing before it
         assert "reports no serial number" in said.pop(0)
     assert said[0].startswith("robolink: ")
     assert plc.writes == []

@@ -1,4 +1,4 @@
-"""poses show: what was understood of a file, and the questions that a person is asked."""
+"""poses show: its reading of a file, and its questions to a person."""
 
 import json
 

@@ -1,7 +1,7 @@
-"""The main commands in a language that marks every sentence: what is not marked passed by it.
+"""The main commands in a language that marks every sentence: unmarked text is untranslated.
 
-In each sentence 【 and 】 stand about the text, which is two fifths longer: a literal that no
-catalogue knows shows, and so does what the journal keeps.
+Each sentence is put between 【 and 】 and is two fifths longer, so a literal outside the catalogue
+shows, and so does text that the journal keeps.
 """
 
 import gc
@@ -21,7 +21,7 @@ from robolink_simulators.hosting.streams.epson import serve_tcp
 
 MARKS = "\u3010\u3011"
 
-# Names, numbers, units and signs; what a click metavar or a choice is made of.
+# Names, numbers, units and signs; the parts of a click metavar or a choice.
 NOT_SENTENCES = re.compile(r"[A-Za-z]+(?:[,:;]? [a-z]+){2,}")
 
 
@@ -45,7 +45,7 @@ def marked(monkeypatch, tmp_path):
 
 
 def unmarked(text):
-    """Return runs of three words and more that stand outside of the marks; commands are none."""
+    """Return runs of three or more words outside the marks; commands do not count."""
     left = re.sub(r"robolink( -*[a-z-]+)*", "", text)
     while (shorter := re.sub(r"\u3010[^\u3010\u3011]*\u3011", " ", left)) != left:
         left = shorter
@@ -83,16 +83,16 @@ def test_what_a_command_says_comes_from_the_catalogue(marked, arguments, capfd):
 
 @pytest.fixture(scope="module", autouse=True)
 def other_help_options():
-    """A process speaks one language, so click keeps the option ``--help`` of each command."""
+    """A process uses one language, so click caches the option ``--help`` of each command."""
     forget_help_options()
     yield
     forget_help_options()
 
 
 def forget_help_options():
-    gc.unfreeze()  # or what was imported for the collection of the tests is not among them
+    gc.unfreeze()  # otherwise objects imported during collection are missing
     for command in gc.get_objects():
-        if issubclass(type(command), click.Command):  # some objects do not tell their class
+        if issubclass(type(command), click.Command):  # some objects do not reveal their class
             command._help_option = None
     gc.freeze()
 

@@ -1,8 +1,8 @@
-"""Every command times the ways it is refused: an exit code, what happened, what to do.
+"""Every command with every refusal: an exit code, what happened, what to do.
 
-Leaves of the command table are looked up, so a new command without a row fails here. The
-controller is in process; what only a socket shows stands in ``test_commands_bad_input``,
-from which the checks and the states come.
+The leaves of the command table are looked up, so a new command without a row fails here. The
+controller is in process; ``test_commands_bad_input`` has the cases that need a socket, and supplies
+the checks and the states.
 """
 
 import json
@@ -52,7 +52,7 @@ NEEDS_A_CONTROLLER = {
     "calibrate n-angle": ["--tool", "1", *POSES, "--pose", "296.1,87.7,90", "--yes"],
     "tool impact": ["--tool", "1", "--x", "13", "--points", "1-5"],
 }
-"""Command and arguments with which it succeeds on a controller that is ready."""
+"""Each command with arguments that succeed on a controller that is ready."""
 
 ANY_STATE = {
     "status",
@@ -61,10 +61,10 @@ ANY_STATE = {
     "robot io get",
     "robot variable get",
 }
-"""What only reads, and by queries that are legal at any time."""
+"""Commands that only read, by queries that are legal at any time."""
 
 STOPPABLE = set(STATES) - {"controller in Teach", "monitoring only"}
-"""States in which a stop gets through: a stop must not wait for a good state."""
+"""States in which a stop works: a stop must not wait for a good state."""
 
 BAD = {
     "tool get": (["16"], "There is no tool 16"),
@@ -160,11 +160,11 @@ BAD = {
     "expert spel check": (["nowhere.prg"], "There is no file"),
     "expert spel run": (["nowhere.prg"], "There is no file"),
 }
-"""What is a mistake in the command: exit code 2, and at most reads are sent."""
+"""Mistakes in the command: exit code 2, and at most reads are sent."""
 
 
 def leaves(command, path=()):
-    """Yield the full names of ``command``'s commands, with those that the first page leaves out."""
+    """Yield the full names of the commands, including those that the first page leaves out."""
     if not isinstance(command, click.Group):
         yield " ".join(path)
         return
@@ -178,9 +178,9 @@ def leaves(command, path=()):
 
 @pytest.fixture
 def golden(request, name):
-    """A backup of the controller as it is at first, where a row of the command needs it."""
+    """A backup of the controller's initial state, if the command's row needs one."""
     named = (*BAD[name][0], *NEEDS_A_CONTROLLER.get(name, ()))
-    if "golden.json" in named or name == "journal show":  # which looks into the journal
+    if "golden.json" in named or name == "journal show":  # which reads the journal
         assert request.getfixturevalue("run")("backup", "golden.json")[0] == 0
 
 

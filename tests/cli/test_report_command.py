@@ -1,4 +1,4 @@
-"""report: a page about a change from the journal alone, whatever became of the change."""
+"""report: a page about a change from the journal alone, however the change ended."""
 
 import json
 import re
@@ -103,7 +103,7 @@ ENDS = {
 
 @pytest.fixture
 def recorded(simulator):
-    """Put a change on record; returns its id."""
+    """Record a change; return its id."""
 
     def record(*entries, change="c0ffee00" * 4, controller=simulator.url):
         log = open_journal().log(controller, signature=ANN)
@@ -137,7 +137,7 @@ def test_the_page_that_the_wizard_shows_is_that_of_the_command(run, recorded, tm
     assert said == f"Report: {page}"
     made = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d(:\d\d)?")
     assert made.sub("", text_of(page)) == made.sub("", text_of(tmp_path / "page.html"))
-    # What stands there already is not written over, and a change that nobody made has no page.
+    # An existing file is not overwritten, and an unknown change has no page.
     page.write_text("mine")
     beside = page.with_stem(f"{page.stem}-2")
     assert page_of_change(change) == (f"Report: {beside}",)
@@ -155,7 +155,7 @@ def test_the_page_says_who_when_with_what_and_what_came_of_it(run, recorded, sim
     (tool,) = document["tools"]
     assert (tool["tool"], tool["outcome"], tool["method"]) == (1, "verified", "two-pose")
     assert tool["measured"] == ["x_mm", "y_mm"]
-    assert tool["local_time"] is None  # an entry of before does not say it
+    assert tool["local_time"] is None  # an earlier entry lacks it
     text = text_of(tmp_path / "page.html")
     for words in (
         f"controller {simulator.url}",

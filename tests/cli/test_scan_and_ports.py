@@ -1,4 +1,4 @@
-"""scan and ports: what can be reached from this computer."""
+"""scan and ports: the devices and ports within reach of this computer."""
 
 import json
 import os
@@ -178,7 +178,7 @@ SENT = "04 02 53 03 50"
 
 
 def scanned(capsys, *urls):
-    """Ask at lines, with the least patience; return what was found at each."""
+    """Scan lines with the shortest time-out; return the findings for each."""
     lines = [word for url in urls for word in ("--line", url)]
     assert main.run(["scan", *lines, "--timeout", "0.05", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
@@ -200,7 +200,7 @@ def test_a_controller_at_a_serial_line_is_known_by_its_refusal(capsys, eot):
 
 @pytest.fixture
 def far_end():
-    """A cable, and what answers at its far end to each piece that comes."""
+    """A cable, with an answer of its far end to each piece received."""
     cable, over, heard = SerialCable(), threading.Event(), list[bytes]()
     far = os.open(cable.far, os.O_RDWR | os.O_NOCTTY)
     tty.setraw(far)
@@ -242,7 +242,7 @@ def test_what_is_no_controller_gets_five_bytes_and_no_more(capsys, far_end, answ
     url, heard = far_end(answer)
     (line,) = scanned(capsys, url)
     assert line["found"] == found
-    # The far end may still be on its way to what the near end has sent.
+    # The far end may not have received yet what the near end sent.
     deadline = time.monotonic() + 10
     while len(b"".join(heard)) < len(SENT.split()) and time.monotonic() < deadline:
         time.sleep(0.01)

@@ -1,6 +1,4 @@
-"""A second terminal beside one that works, or beside production: what it sees, what it leaves
-alone.
-"""
+"""A second terminal beside a working one, or beside production: its view, and its restraint."""
 
 import json
 import os
@@ -24,7 +22,7 @@ from robolink.model import Marker, MarkerKind, Signature, ToolOffset
 from robolink.stopping import StopListener
 from robolink.timing import NS_PER_S
 
-# A second terminal beside a session that works: who it is and what it does, nothing to recover.
+# A second terminal beside a working session: who it is, what it does, nothing to recover.
 
 DETAILS = {"tool": 1, "now": 0}
 MARKER = Marker("a", MarkerKind.SELECTION, "calibration of tool 1", "then", DETAILS)
@@ -48,14 +46,14 @@ def run_beside(capsys):
 
 
 class LateClock(BootClock):
-    """As it was 20 s ago."""
+    """The time of 20 s ago."""
 
     def now_ns(self):
         return super().now_ns() - 20 * NS_PER_S
 
 
 def session(plc, *, clock=None, **holder):
-    """Return the log of another process that calibrates."""
+    """Return the log of another process that is calibrating."""
     own = this_process()
     other = replace(LeaseHolder("ann", "pc-7", pid=own.pid, boot=own.boot), **holder)
     log = open_journal().log(
@@ -126,12 +124,12 @@ def test_doctor_does_not_send_anybody_to_recover_beside_it(plc, run_beside, caps
     assert "recover" not in shown.out + shown.err
 
 
-# A second person looks while another robolink of this computer has an EPSON controller.
+# A second person watches while another robolink of this computer has the EPSON controller locked.
 
 
 @pytest.fixture
 def held(state_folder):
-    """A served controller that another session has; yields it with its URL."""
+    """A served controller that another session has locked; yields it with its URL."""
     simulator = EpsonSimulator(seed=4)
     with serve_tcp(simulator) as host, robolink.connect(host.url) as controller:
 
@@ -173,7 +171,7 @@ def test_a_holder_that_lets_nobody_look_keeps_nobody_from_asking_the_controller(
     assert json.loads(capsys.readouterr().out)["schema"] == "robolink/status/1"
 
 
-# Looking while production runs, and the companion program that makes tools visible then.
+# Reading during production, and the companion program that makes tools visible then.
 
 
 def test_monitor_only_commands_disturb_no_production(run, simulator, golden):

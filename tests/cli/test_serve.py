@@ -1,4 +1,4 @@
-"""expert serve and orders: who may call, what is killed, and what is delivered again."""
+"""expert serve and orders: permitted callers, killed servers, and repeated deliveries."""
 
 import json
 import os
@@ -32,7 +32,7 @@ from tests._documents import wrong_in
 from tests.contract._permit_machine import PermitMachine
 from tests.faults._callback_cell import CallbackCell
 
-# expert serve: as a process that is killed, and who may call.
+# expert serve: as a process that is killed, and its permitted callers.
 
 SERVED = ("--spel", "127.0.0.1:0", "--sigma-mm", "0.01", "--json")
 
@@ -42,7 +42,7 @@ def conversation(peer):
 
 
 def started(stack):
-    """Start the command as a process; return it, and where it listens."""
+    """Start the command as a process; return it and its address."""
     process = subprocess.Popen(
         [sys.executable, "-m", "robolink_cli", "serve", *SERVED],
         stdout=subprocess.PIPE,
@@ -108,7 +108,7 @@ def test_who_is_not_on_the_list_is_cut_off_unheard():
 
 @pytest.fixture
 def listening():
-    """Start a server; return it, and what it tells."""
+    """Start a server; return it and its output."""
     servers = []
 
     def started(conversation=conversation):
@@ -169,7 +169,7 @@ def test_programs_that_cannot_be_answered_take_no_place_away(listening, error):
 
 
 class Failing:
-    """A listener that cannot accept at first."""
+    """A listener that at first cannot accept connections."""
 
     def __init__(self, listener, errors):
         self._listener, self._errors = listener, errors
@@ -193,7 +193,7 @@ def test_an_error_of_the_system_does_not_end_the_listening(listening, monkeypatc
     with socket.create_connection(server.address, timeout=10) as link:
         assert greeted(link)
     assert waits == [1.0, 1.0, 1.0]
-    # The same trouble is told once.
+    # The same fault is reported once.
     assert told == [
         "No program can connect now: too many files. robolink tries again every second.",
         "No program can connect now: aborted. robolink tries again every second.",
@@ -211,7 +211,7 @@ def test_a_system_without_a_further_thread_does_not_end_the_listening(listening,
         begin(thread)
 
     monkeypatch.setattr(threading.Thread, "start", start)
-    # As often as there are places: each of them is given back.
+    # As often as there are places: each of them becomes free again.
     for _ in range(MOST_PROGRAMS + 1):
         with socket.create_connection(server.address, timeout=10) as link:
             assert link.recv(1) == b""
@@ -281,7 +281,7 @@ def test_what_is_no_question_here_is_cut_off_without_an_answer(sent):
 
 
 class DamagedJournal:
-    """A journal of which nothing can be used."""
+    """A damaged journal that cannot be used."""
 
     def log(self, _controller, **_given):
         """Refuse."""
@@ -289,20 +289,20 @@ class DamagedJournal:
 
 
 class OneProgram:
-    """A server to which one program has called, in a thread of its own, when it begins."""
+    """A server with one calling program, which has its own thread."""
 
     def __init__(self, host, port, conversation, **_given):
         self.address, self._conversation = (host, port), conversation
 
     def start(self):
-        """Let it call, and say who it is."""
+        """Let it call and identify itself."""
         line = CallbackLine(1, CallbackWord.HELLO, ("S", "1", "0", "-", "1", "1", *["0"] * 6))
         calls = threading.Thread(target=lambda: self._conversation("10.0.0.7").answer(line))
         calls.start()
         calls.join(30)
 
     def close(self):
-        """End."""
+        """End the call."""
 
 
 @pytest.mark.parametrize("as_json", [False, True])
@@ -327,13 +327,13 @@ def test_whoever_watches_reads_why_a_program_was_refused_and_what_to_do(monkeypa
         }
 
 
-# expert serve --plc: the program of a PLC calls, and the machine goes on with a proved tool.
+# expert serve --plc: the program of a PLC calls, and the machine goes on with a tested tool.
 
 SERVED_PLC = ("serve", "--plc", "n-angle", "--tool", "1", "--sigma-mm", "0.01", "--json")
 
 
 class MachineClock(ManualClock):
-    """Time in which the machine goes on whenever somebody waits; it produces before each call."""
+    """A clock whose waits advance the machine; it produces before each call."""
 
     parts = 12
 
@@ -397,7 +397,7 @@ def test_a_controller_without_a_mailbox_is_refused():
     assert main.run(["-c", "epson+sim://no-mailbox", *words]) == 2
 
 
-# --order: what is delivered again, and what is refused then.
+# --order: repeated deliveries, and their refusals.
 
 SET = ("tool", "set", "1", "--x", "12.5", "--order", "A-17", "--yes")
 NEW = ToolOffset(12.5, -3.5, -20.0)

@@ -1,4 +1,4 @@
-"""When a served simulator ends by itself."""
+"""The conditions under which a served simulator ends by itself."""
 
 import json
 import os
@@ -20,7 +20,7 @@ from robolink.errors import RobolinkError
 
 
 def waited(life, requests=int):
-    """Return how long a simulator lived."""
+    """Return the life time of a simulator."""
     began = monotonic()
     with Termination(life) as stopped:
         stopped.wait(requests)
@@ -38,7 +38,7 @@ def test_it_ends_when_nobody_has_asked_for_so_long():
         looked.append(min(next(asked), 12))
         return looked[-1]
 
-    # Somebody asks between the first twelve looks, and nobody afterwards.
+    # A client asks between the first twelve looks, and nobody afterwards.
     assert waited(life, requests) >= 0.2 + 11 * 0.2 / 4
     assert looked.count(12) >= 4
 
@@ -59,7 +59,7 @@ def test_a_parent_that_was_killed_has_ended_before_anybody_has_waited_for_it(han
         assert monotonic() - began < 10
     watch.close()
     parent.communicate()
-    assert ParentWatch(parent.pid).ended()  # and whoever comes too late sees it at once
+    assert ParentWatch(parent.pid).ended()  # and a late client sees it at once
 
 
 SPAWNS = """
@@ -92,7 +92,7 @@ def test_it_ends_with_the_process_that_started_it():
             os.kill(simulator, 0)
         except ProcessLookupError:
             return
-        # Its own look comes every half of a second; ours need not be finer.
+        # Its own look comes every half second; ours need not be finer.
         subprocess.run(["sleep", "0.2"], check=True)
     os.kill(simulator, signal.SIGTERM)
     pytest.fail("it lives on")
@@ -121,7 +121,7 @@ assist = true
     ids=["epson", "softmotion", "a file"],
 )
 def test_whatever_is_asked_at_any_of_its_ports_keeps_it_alive(what, tmp_path, monkeypatch, capsys):
-    """Each port is used once, and the count that ``--idle-exit`` looks at goes up."""
+    """A use of each port raises the count that ``--idle-exit`` reads."""
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path))
     if what == ("sim", "run"):
         path = tmp_path / "cells.toml"
@@ -151,7 +151,7 @@ def test_whatever_is_asked_at_any_of_its_ports_keeps_it_alive(what, tmp_path, mo
 def test_one_that_can_keep_its_state_no_longer_says_so_and_ends(
     what, tmp_path, monkeypatch, capsys
 ):
-    """A disk that is full, or a folder that is gone: no traceback, and no test that goes on."""
+    """A full disk or a missing folder: no traceback, and no test that goes on."""
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "records"))
     kept = tmp_path / "kept/state.json"
     arguments = [*what, "--tcp", "127.0.0.1:0", "--state", str(kept)]

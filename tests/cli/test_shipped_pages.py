@@ -1,4 +1,4 @@
-"""docs and recipe: the pages and recipes that come with robolink."""
+"""docs and recipe: the pages and recipes shipped with robolink."""
 
 import json
 import re
@@ -99,7 +99,7 @@ def test_a_copy_of_each_recipe_is_right_and_knows_its_schema(run, tmp_path, name
     assert schema is not None
     assert json.loads(Path(schema[1]).read_text(encoding="utf-8"))["title"]
     model = (ROOT / "examples" / "recipes" / f"{name}.toml").read_text(encoding="utf-8")
-    # Beside what says that the numbers are not yours, it is the recipe to the letter.
+    # Except for the note that the numbers are not yours, it is the recipe to the letter.
     lines = [line.removesuffix("  # SIMULATED") for line in rest.split("\n")]
     own = [line for line in lines if not line.startswith('numbers = "simulated"')]
     assert len(own) == len(lines) - 1
@@ -119,7 +119,7 @@ def test_a_copy_writes_over_nothing(run, tmp_path):
     assert json.loads(run("recipe", "check", "own.toml", "--json")[1])["ok"]
 
 
-# recipe list: what each recipe is for, in the language of the person, no word cut.
+# recipe list: the purpose of each recipe, in the person's language, no word cut.
 
 
 def test_each_recipe_says_what_its_file_says():

@@ -1,4 +1,4 @@
-"""Options of simulators: one set of names, faults, kinematics, and recordings that are replayed."""
+"""Options of simulators: common names, faults, kinematics, and replayed recordings."""
 
 import json
 import os
@@ -89,7 +89,7 @@ def test_an_address_of_either_name_is_refused_by_todays(option, capsys):
     assert error["remedy"] == "Write for example --tcp 127.0.0.1:5000."
 
 
-# sim --faults: what is planned happens to any client, and each time it is told.
+# sim --faults: planned faults apply to any client, and each is reported.
 
 LOST = """
 schema = "robolink/faults/1"
@@ -112,19 +112,19 @@ def plan(tmp_path):
 
 @contextmanager
 def in_this_process(path, capsys):
-    """A simulator with the plan; its URL, and what returns the next line that it told."""
+    """Yield the URL of a simulator with the plan, and a function that returns its next report."""
     simulator = EpsonSimulator()
     simulator.advance(NS_PER_S)
     with click.Context(click.Command("sim")) as context:
         switch_json_on(context)
         plan_faults(simulator, Path(path), {LinkKind.EPSON_TCP})
-    # Its client waits in simulated time: an answer that comes is never late, however busy this is.
+    # Its client waits in simulated time: no answer is late, however busy the computer is.
     yield register("planned-faults", simulator), lambda: capsys.readouterr().out
 
 
 @contextmanager
 def by_command(path, _capsys):
-    """The same of ``robolink sim`` in a process of its own."""
+    """The same with ``robolink sim`` in a separate process."""
     arguments = ["sim", "epson", "--tcp", "127.0.0.1:0", "--faults", path]
     paths = os.pathsep.join(path for path in sys.path if path)
     with subprocess.Popen(
@@ -187,7 +187,7 @@ def test_what_cannot_happen_is_refused_before_anything_is_served(
     assert told in capsys.readouterr().err
 
 
-# sim softmotion --kinematics: what TAB offers, near misses, and a class in the present folder.
+# sim softmotion --kinematics: TAB completion, near misses, and a class in the present folder.
 
 EXAMPLES = Path(__file__).parents[2] / "examples" / "kinematics"
 
@@ -245,7 +245,7 @@ PASSWORD = "hush-4711"
 
 @pytest.fixture
 def cell(tmp_path, monkeypatch):
-    """A simulator with a password and odd habits, named by the environment."""
+    """A cell with a password and unusual options, named by the environment."""
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
     monkeypatch.setenv("ROBOLINK_PASSWORD", PASSWORD)
     options = EpsonOptions(tool_listing="padded", comma_blank="always")
@@ -257,7 +257,7 @@ def cell(tmp_path, monkeypatch):
 
 @contextmanager
 def command(*arguments):
-    """Run ``robolink`` in a process of its own; give its first line, read, and the process."""
+    """Run ``robolink`` in a separate process; return its first line, parsed, and the process."""
     process = subprocess.Popen(
         [sys.executable, "-m", "robolink_cli", *arguments, "--json"],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)},
@@ -324,7 +324,8 @@ def test_a_recording_is_replayed_as_a_test(
     commands = [["status", "--json"], ["tool", "list", "--json"], ["var", "get", "VERSION$"]]
 
     def shown_of(url, arguments, place):
-        # Who never met a controller asks it who it is: so does each of these commands.
+        # A program that never met the controller asks for its identity: so does each of these
+        # commands.
         monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / place / arguments[0]))
         assert main.run(["-c", url, *arguments]) == 0
         return capsys.readouterr().out.replace(url, "URL")

@@ -1,4 +1,4 @@
-"""sim run and demo: what is refused, and that all kinds are served at once."""
+"""sim run and demo: refused files, and all kinds served at once."""
 
 import json
 import os
@@ -25,7 +25,7 @@ from robolink.errors import ConfigError
 from robolink.testing import confirm_whole_map
 from tests._documents import wrong_in
 
-# sim run: what its file may say, what is refused, and that all kinds are served at once.
+# sim run: the keys of its file, refusals, and all kinds served at once.
 
 MAP = Path(__file__).parents[2] / "examples/plc-maps/commit-bit.toml"
 HEAD = 'schema = "robolink/sim-cells/1"\n'
@@ -82,7 +82,7 @@ def test_every_option_of_a_command_is_a_key_of_its_table(kind):
         "help",
         "replay",
     }
-    alone |= {"modbus-tcp", "modbus-rtu"}  # what --tcp and --serial were called
+    alone |= {"modbus-tcp", "modbus-rtu"}  # the old names of --tcp and --serial
     options = {max(it.opts, key=len).lstrip("-") for it in command.params} - alone
     keys = DeclaredKeys(command, Path()).options
     assert set(keys) == {name.replace("-", "_") for name in options}
@@ -245,7 +245,7 @@ def test_a_file_is_checked_without_opening_a_port(file, capsys):
 
 
 def started(path, *arguments, folder):
-    """Run ``sim run`` to its end in a process of its own."""
+    """Run ``sim run`` to its end in a separate process."""
     paths = os.pathsep.join(one for one in sys.path if one)
     return subprocess.run(
         [sys.executable, "-m", "robolink_cli", "sim", "run", str(path), *arguments],
@@ -336,7 +336,7 @@ def test_in_the_background_they_end_with_the_shell_that_started_them(file, tmp_p
     )
     assert shell.stdout is not None
     pid = json.loads(shell.stdout.readline())["pid"]
-    time.sleep(1.2)  # two looks
+    time.sleep(1.2)  # two readings
     os.kill(pid, 0)
     shell.communicate("\n")
     assert ended(pid)

@@ -1,4 +1,4 @@
-"""solve: offline, from a file; every refusal by name, every slip by its path."""
+"""solve: offline, from a file; every refusal is named, every slip has its path."""
 
 import json
 import os

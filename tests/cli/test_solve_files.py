@@ -1,4 +1,4 @@
-"""solve: tables with one pose a line, and whatever else stands in a file."""
+"""solve: tables with one pose a line, and files with any other content."""
 
 import json
 import math
@@ -116,7 +116,7 @@ def test_the_options_of_a_table_need_a_method(solved):
     assert "--method" in answer["error"]["remedy"]
 
 
-# Whatever stands in a file, ``solve`` answers, refuses or names the slip; it never breaks.
+# Whatever a file contains, ``solve`` answers, refuses or names the slip; it never fails.
 
 ODD: st.SearchStrategy[object] = st.sampled_from(
     [0, -1, 1, 2.5, 1e-9, 1e9, 1e11, 1e308, -0.0, True, None, "x", "", [], {}]
@@ -141,7 +141,7 @@ SOUND = st.builds(
     *[st.sampled_from([0, 90, 180, -45])] * 2,
     st.sampled_from([0, 30, 180]),
 )
-"""A pose that a robot could take: lists of them reach the mathematics."""
+"""A pose that a robot could take; lists of them reach the solver."""
 
 VALUES = st.one_of(
     *(NUMBERS, POSES, PLACES),

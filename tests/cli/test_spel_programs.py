@@ -1,4 +1,4 @@
-"""spel check, spel run, and a program in a served controller, as a person types them."""
+"""spel check, spel run, and a program in a served controller, as typed commands."""
 
 import io
 import json
@@ -20,7 +20,7 @@ GOOD = (
 
 @pytest.fixture
 def ended(run):
-    """Return how a command ended: code, out and err."""
+    """Return the exit code, stdout and stderr of a command."""
 
     def ran(*arguments):
         return SimpleNamespace(**dict(zip(("code", "out", "err"), run(*arguments), strict=True)))
@@ -225,7 +225,7 @@ PointFile2 {
 
 @pytest.fixture
 def project(tmp_path, program):
-    """Return a project file; beside it lies a program that it does not list."""
+    """Return a project file with a program beside it that it does not list."""
     program(POINT.replace("LABEL", "tray").replace("NUMBER", "100"), "robot1.pts")
     program(POINT.replace("LABEL", "bin").replace("NUMBER", "-100"), "other.pts")
     program("Function main\n  Nonsense (\nFend\n", "old_main.prg")

@@ -1,4 +1,4 @@
-"""``robolink stop``: nothing keeps it back, and what was wrong is said when the robot stands."""
+"""``robolink stop``: nothing delays it, and faults are reported once the robot has stopped."""
 
 import json
 import os
@@ -38,7 +38,7 @@ CREEPING = MotionProfile(MovePath.STRAIGHT, 5, 1.0)
 
 @pytest.fixture
 def moving(state_folder):
-    """An EPSON robot on the network that creeps for 30 s, left alone by its client."""
+    """An EPSON robot on the network that creeps for 30 s after its client has left."""
     simulator = EpsonSimulator(seed=4)
     with serve_tcp(simulator, clock=ScaledClock(1.0)) as host:
         controller = robolink.connect(host.url)
@@ -47,16 +47,16 @@ def moving(state_folder):
         controller.groups[0].move_to(replace(here, z_mm=here.z_mm + 30), CREEPING, box=WorkBox())
         assert isinstance(controller, EpsonController)
         controller._link.session.close()
-        controller.outcomes.close()  # the lease of the one who died
+        controller.outcomes.close()  # the lease of the dead client
         simulator.url = host.url
         yield simulator
-        controller._link.session.close()  # what it watches for Ctrl-C is given back
+        controller._link.session.close()  # the handler for Ctrl-C is restored
         close_files()
 
 
 @pytest.fixture
 def stop(moving, capsys):
-    """Run ``stop`` and return the exit code and what was shown; the arm must stand."""
+    """Run ``stop`` and return the exit code and the output; the arm must have stopped."""
 
     def ran(*arguments):
         code = entry.run([*(arguments or ("-c", moving.url)), "stop"])
@@ -72,7 +72,7 @@ def test_it_stops_and_says_that_it_stands(moving, stop):
     assert code == 0
     assert out == f"{moving.url}: the robot has stopped (confirmed). State: ready.\n"
     assert "Commands with --yes are blocked until" in err
-    assert "without a clear answer" in err  # the movement of the client that died
+    assert "without a clear answer" in err  # the movement of the dead client
 
 
 def test_its_document(moving, stop):
@@ -139,7 +139,7 @@ def test_what_looks_or_calms_works_with_broken_files_too(
     capsys.readouterr()
     assert main.run(["-c", "a", *command]) == 0
     assert "cannot be read" in capsys.readouterr().err
-    assert main.run(["-c", "a", "motors", "on"]) == 2  # what stirs is kept back
+    assert main.run(["-c", "a", "motors", "on"]) == 2  # a movement is refused
 
 
 def test_a_lease_that_another_holds_is_no_matter(moving, stop):
@@ -228,7 +228,7 @@ def test_a_keyring_that_fails_in_a_way_of_its_own_does_not_keep_it_back(moving, 
 
 
 class Unclear:
-    """A controller in other hands whose stop is not answered."""
+    """A controller locked by another client, whose stop is not answered."""
 
     def stop(self):
         raise OutcomeUnknownError("sent, not answered")
@@ -289,7 +289,7 @@ def test_a_note_holds_the_next_movement_until_somebody_releases_it(moving, stop,
 
 
 class Person:
-    """Somebody at a terminal who answers every question alike."""
+    """A person at a terminal who answers every question alike."""
 
     def __init__(self, answer):
         self.answer, self.questions = answer, []

@@ -1,4 +1,4 @@
-"""What a person is told of the controller's preferences, and when."""
+"""Messages about the controller's preferences, and when they are shown."""
 
 import json
 

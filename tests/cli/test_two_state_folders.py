@@ -1,4 +1,4 @@
-"""Two state folders on one controller: what neither can see, the controller tells."""
+"""Two state folders on one controller: the controller supplies what neither folder records."""
 
 from pathlib import Path
 
@@ -15,12 +15,12 @@ from robolink.journal import close_files, open_journal
 
 
 class Killed(BaseException):
-    """The end of a process, which no handler of an error sees."""
+    """The end of a process, which no error handler sees."""
 
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """Return a function that goes on with another state folder."""
+    """Return a function that switches to another state folder."""
     monkeypatch.chdir(tmp_path)
 
     def use(name):

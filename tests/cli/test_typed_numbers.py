@@ -1,4 +1,4 @@
-"""Numbers that only Python calls numbers are refused wherever a person types one."""
+"""Numbers that only Python accepts are refused wherever a person types one."""
 
 import re
 
@@ -54,7 +54,7 @@ def test_f38_such_a_number_is_refused_as_an_offset_and_nothing_is_written(simula
 
 
 def options(command, path=()):
-    """Yield what a command and those below it take, each with its name."""
+    """Yield the options of a command and of those below it, each with its name."""
     yield from ((" ".join((*path, option.opts[0])), option) for option in command.params)
     if isinstance(command, click.Group):
         context = click.Context(command)
@@ -67,7 +67,7 @@ def options(command, path=()):
 
 @pytest.mark.fault("F38")
 def test_f38_no_option_takes_a_limit_that_nothing_exceeds():
-    """Nothing is greater than nan: as a limit it would let everything pass."""
+    """Nothing is greater than nan: as a limit it would let every value pass."""
     limits = dict(options(main.cli))
     taking = {
         name: option

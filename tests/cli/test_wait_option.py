@@ -1,4 +1,4 @@
-"""``--wait SECONDS``: another program that has the controller is waited for."""
+"""``--wait SECONDS`` waits for another program that has the controller locked."""
 
 import pytest
 from robolink_cli import main
@@ -16,7 +16,7 @@ NEW = ["tool", "set", "2", "--x", "5", "--y", "6", "--z", "-70"]
 
 
 def other_program(url):
-    """Return the controller of a program that works on it, with a journal of its own."""
+    """Return the controller of a second program, which works on it with its own journal."""
     other = robolink.connect(url, outcomes=memory_journal(new_operation()).log(url))
     other.tools.write(3, ToolOffset(1.0, 2.0, -3.0), expected=ANY)
     return other

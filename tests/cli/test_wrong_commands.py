@@ -1,9 +1,9 @@
-"""Wrong commands, drawn from a grammar, are typed; each answer has one form and stands in a table.
+"""Wrong commands, drawn from a grammar, are run; each answer has one form and is in a table.
 
-What happened, what stands, what to do: in this order, three lines of 80 columns at most
-(docs/contributing.md, "Adding a sentence, or a translation"). ``wrong_commands.txt`` is what a
-person reads, and what shows in a review which sentences changed; it is written by
-``python -m tests.cli.test_wrong_commands``.
+The form is: what happened, what stands, what to do, in at most three lines of 80 columns
+(docs/contributing.md, "Adding a sentence, or a translation"). ``wrong_commands.txt`` is for people,
+and shows in a review which sentences changed; ``python -m tests.cli.test_wrong_commands`` writes
+it.
 """
 
 import io
@@ -60,7 +60,7 @@ WRONG_KEY = {
 
 @dataclass(frozen=True)
 class Answer:
-    """How a wrong command ended, and what a terminal of 80 columns shows of it."""
+    """The end of a wrong command, and its output on a terminal of 80 columns."""
 
     wrong: Wrong
     code: int
@@ -74,7 +74,7 @@ class Answer:
 
 
 def furnish(folder: Path) -> None:
-    """Write the files that the lines name, in a folder that becomes the working folder."""
+    """Write the files that the lines name into a folder, which becomes the working folder."""
     (folder / "robolink.toml").write_text(CELLS, encoding="utf-8")
     for ending in ("toml", "json", "csv", "prg", "pts", "log"):
         (folder / f"garbage.{ending}").write_text(GARBAGE, encoding="utf-8")
@@ -85,14 +85,14 @@ def furnish(folder: Path) -> None:
     (folder / "main.prg").write_text("Function main\nFend\n", encoding="utf-8")
     (folder / "file").write_text("", encoding="utf-8")
     (folder / "folder").mkdir()
-    (folder / "circle").symlink_to("circle")  # cannot be read, by root neither
+    (folder / "circle").symlink_to("circle")  # unreadable, even for root
     for name, mode in (("wrong", 0o600), ("open", 0o644)):
         (folder / name).write_text("n1chtd4s\n", encoding="utf-8")
         (folder / name).chmod(mode)
 
 
 def answers(folder: Path, seed: int = SEED) -> list[Answer]:
-    """Type every line in a folder of its own; return the answers."""
+    """Run every line in a folder of its own; return the answers."""
     furnish(folder)
     simulators = {
         "wrong-line3": EpsonSimulator(seed=4, serial="SIM00001"),
@@ -114,7 +114,7 @@ def answers(folder: Path, seed: int = SEED) -> list[Answer]:
 
 
 def typed(wrong: Wrong, port: str, folder: Path) -> Answer:
-    """Type a line; return its answer, without what differs from run to run."""
+    """Run a line; return its answer without the parts that differ between runs."""
     out, err = io.StringIO(), io.StringIO()
     with redirect_stdout(out), redirect_stderr(err):
         code = main.run([word.replace("PORT", port) for word in wrong.words])
@@ -126,7 +126,7 @@ def typed(wrong: Wrong, port: str, folder: Path) -> Answer:
 
 
 def table(found: list[Answer]) -> str:
-    """Return all answers as a person reads them."""
+    """Return all answers as a readable table."""
     parts = []
     for one in found:
         words = " ".join(map(_shown, one.wrong.words))
@@ -145,29 +145,29 @@ VERBS = (
     "Switch|Turn|Type|Use|Wait|Write"
 )
 DOES = re.compile(rf"\b({VERBS})\b|Did you mean|(: |[Nn]ext: )robolink |docs/")
-"""What to do: a verb that asks for it, a command that can be typed, or a page to be read."""
+"""Ways to say what to do: a verb, a command to type, or a page to read."""
 
 UNPLAIN = re.compile(
     r"\b(was|were) not \w+ed\b|\b(who|what|which)ever\b|sure to\b|Traceback|^(Usage|Error):"
     r"|\b(None|True|False)\b|\w+Error\b|: : |%[YmdHM]",
     re.MULTILINE,
 )
-"""What no answer holds: the passive without an actor, words of Python, marks of a broken text."""
+"""No answer contains these: passive without an actor, words of Python, signs of broken text."""
 
 LONGEST_SENTENCE = 24
-"""Words of a sentence, beside what was typed."""
+"""The most words in a sentence, without the typed ones."""
 
 CODES = {2, 3, 5}
 
 
 LISTED = re.compile(r"(?<=:)(\n    .*)+")
-"""What is wrong with a file, a line each, below what happened."""
+"""The faults of a file, a line each, below what happened."""
 
 MOST_LISTED = 11
 
 
 def faults(one: Answer) -> list[str]:
-    """Return what is wrong with the form of an answer."""
+    """Return the faults in the form of an answer."""
     listed = [line[1:] for line in re.findall(r"\n    .*", one.err)]
     told = Answer(one.wrong, one.code, one.out, LISTED.sub("", one.err))
     what, *rest = told.err.rstrip("\n").split("\n  ")

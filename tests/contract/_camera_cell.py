@@ -1,4 +1,4 @@
-"""A simulated cell with an up-looking camera, and what is known about that camera."""
+"""A simulated cell with an up-looking camera, and the true data of that camera."""
 
 import re
 from collections.abc import Callable, Iterator
@@ -20,7 +20,7 @@ KINDS: Final[dict[str, Callable[[int], AbstractContextManager[SensorCell]]]] = {
 
 
 def camera_model(cell: SensorCell) -> CameraModel:
-    """Return the true map of the pixels, for a lens that does not lean."""
+    """Return the true pixel calibration, for a lens that does not lean."""
     camera = cell.simulator.world.camera
     width, height = camera.optics.size_px
     (a, b), (c, d) = camera.optics.mm_per_px
@@ -30,13 +30,13 @@ def camera_model(cell: SensorCell) -> CameraModel:
 
 
 def camera_station(cell: SensorCell, *, known: bool = True) -> CameraStation:
-    """Return where the camera is."""
+    """Return the true station of the camera."""
     x_mm, y_mm, z_mm = cell.simulator.world.camera.middle_mm
     return CameraStation(x_mm, y_mm, z_mm, camera_model(cell) if known else None)
 
 
 def recipe_here(cell: SensorCell, example: Path, folder: Path) -> Path:
-    """Return a recipe written for the simulated EPSON cell, with the numbers of this one."""
+    """Return a recipe written for the simulated EPSON cell, with the numbers of this cell."""
     station, model = camera_station(cell), camera_model(cell)
     flange = cell.simulator.world.robot.flange()
     safe = f"x_mm = {flange.x_mm}, y_mm = {flange.y_mm}, z_mm = {flange.z_mm}, u_deg = {{u}}"
@@ -57,13 +57,13 @@ def recipe_here(cell: SensorCell, example: Path, folder: Path) -> Path:
 
 
 def furnish(cell: SensorCell, **parameters: Any) -> None:
-    """Change what goes wrong in the cell."""
+    """Change the simulated errors of the cell."""
     world = cell.simulator.world
     world.set_up(replace(world.parameters, **parameters))
 
 
 def run_source(cell: SensorCell, source: Any, *, write: bool = True, **gate: Any) -> Any:
-    """Change the nozzle of either kind of controller, and return the report about the tool."""
+    """Change a nozzle on either kind of controller and return the tool's report."""
     with cell.connected() as controller:
         if isinstance(controller, SoftMotionController):
             controller.take()
@@ -71,13 +71,13 @@ def run_source(cell: SensorCell, source: Any, *, write: bool = True, **gate: Any
 
 
 def stored_in(cell: SensorCell) -> ToolOffset | None:
-    """Read what the controller holds."""
+    """Read the offset that the controller stores."""
     with cell.connected() as controller:
         return controller.tools.read(TOOL)
 
 
 @contextmanager
 def cell_of(kind: str, seed: int = 3) -> Iterator[SensorCell]:
-    """Set a cell up around a controller of one kind."""
+    """Set up a cell around a controller of one kind."""
     with KINDS[kind](seed) as cell:
         yield cell

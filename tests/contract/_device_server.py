@@ -1,4 +1,4 @@
-"""A device server as shops have them: a serial port that is reached over TCP."""
+"""A device server as used on site: makes a serial port reachable over TCP."""
 
 import select
 import socket
@@ -11,14 +11,14 @@ from serial.rfc2217 import PortManager
 
 
 class _Port(serial.Serial):  # type: ignore[misc]
-    """A port without modem lines, as a pseudo terminal is; asking it for one is an error."""
+    """A port without modem lines, such as a pseudo terminal; asking for one is an error."""
 
     cts = dsr = ri = cd = property(lambda _: False)
     dtr = rts = property(lambda _: True, lambda _, __: None)
 
 
 class _Client:
-    """What pyserial's port manager writes to."""
+    """The connection to which pyserial's port manager writes."""
 
     def __init__(self, connection: socket.socket) -> None:
         self._connection = connection
@@ -29,11 +29,11 @@ class _Client:
 
 @contextmanager
 def device_server(port_path: str, *, rfc2217: bool) -> Iterator[int]:
-    """Offer a port on a TCP port of loopback, to one client after the other; yield its number.
+    """Serve a serial port on a loopback TCP port, to one client at a time; yield the TCP port.
 
     Args:
         port_path: The serial port.
-        rfc2217: Whether it speaks RFC 2217, with pyserial's own server part, or passes bytes on.
+        rfc2217: Whether to speak RFC 2217, with pyserial's own server part, or to pass raw bytes.
     """
     with (
         socket.create_server(("127.0.0.1", 0)) as listener,
@@ -67,7 +67,7 @@ def _serve(
 def _carry(
     connection: socket.socket, port: serial.Serial, over: socket.socket, *, rfc2217: bool
 ) -> bool:
-    """Pass bytes on until the client leaves; True when the server is to end."""
+    """Pass bytes on until the client disconnects; return True if the server is to end."""
     manager = PortManager(port, _Client(connection)) if rfc2217 else None
     while True:
         ready, _, _ = select.select([connection, port.fd, over], [], [], 0.1)

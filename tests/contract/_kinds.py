@@ -1,4 +1,4 @@
-"""Every kind of controller, and what can be told to each from Python."""
+"""Every kind of controller, and the acts that Python code can ask of each."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -35,14 +35,14 @@ _PROFILE = MotionProfile(Path.STRAIGHT, speed_mm_s=10.0)
 
 @dataclass(frozen=True)
 class Kind:
-    """One controller to be tried.
+    """A kind of controller under test.
 
     Attributes:
-        opened: Connects; with a record of the test's own, where one is given.
+        opened: Connects, with the test's own record if one is given.
         tool: A tool that may be written and cleared.
-        prepare: Brings a fresh connection to where it may move.
-        more: What this kind takes besides.
-        without: Acts that it lacks.
+        prepare: Makes a fresh connection ready to move.
+        more: Additional acts of this kind.
+        without: Acts that this kind lacks.
     """
 
     opened: Callable[[OutcomeLog | None], Controller]
@@ -53,12 +53,12 @@ class Kind:
 
     @property
     def subject(self) -> Subject:
-        """What the contract checks take."""
+        """The subject of the contract checks."""
         return Subject(lambda: self.opened(None), tool=self.tool, prepare=self.prepare)
 
     @property
     def acts(self) -> dict[str, Act]:
-        """All that writes or moves, by name; at the end the tool is not defined."""
+        """All acts that write or move, by name; at the end the tool is undefined."""
         acts: dict[str, Act] = {
             "write": write,
             "blind write": write_blindly,
@@ -73,29 +73,29 @@ class Kind:
 
 
 def write(controller: Controller, tool: int) -> object:
-    """Write another value than the one that is there."""
+    """Write a value other than the stored one."""
     before = controller.tools.read(tool)
     return controller.tools.write(tool, another_offset(before), expected=before)
 
 
 def write_blindly(controller: Controller, tool: int) -> object:
-    """Write without a look at what is there."""
+    """Write without comparing the stored value."""
     there = controller.tools.read(tool)
     return controller.tools.write(tool, another_offset(there), expected=ANY)
 
 
 def clear(controller: Controller, tool: int) -> object:
-    """Take the definition of the tool away."""
+    """Clear the tool."""
     return controller.tools.clear(tool, expected=ANY, then_select=0)
 
 
 def select(controller: Controller, tool: int) -> None:
-    """Put another tool in force."""
+    """Select another tool."""
     controller.tools.select(0 if controller.tools.selected() else tool)
 
 
 def move(controller: Controller, _tool: int) -> object:
-    """Go up a millimetre."""
+    """Move up by 1 mm."""
     group = controller.groups[0]
     start = group.pose()
     box = WorkBox.around(start, xy_mm=5, below_mm=5, above_mm=5)
@@ -146,7 +146,7 @@ def _switch_on(controller: Controller) -> None:
 
 @contextmanager
 def memory() -> Iterator[Kind]:
-    """The controller in memory that ``robolink.testing`` ships."""
+    """The in-memory controller of ``robolink.testing``."""
     machine = SimpleMachine(tools={1: ToolOffset(12.0, -3.5, -20.0)})
     yield Kind(lambda outcomes: SimpleController(machine, outcomes=outcomes))
 
@@ -175,7 +175,7 @@ def softmotion() -> Iterator[Kind]:
 
 @contextmanager
 def plc_map() -> Iterator[Kind]:
-    """A PLC that is reached by a map; nothing moves it."""
+    """A PLC accessed through a map; it does not move."""
     bench = Bench(COMMIT_BIT, identity="plc+modbus-tcp://contract")
 
     def opened(outcomes: OutcomeLog | None) -> Controller:
@@ -189,7 +189,7 @@ def plc_map() -> Iterator[Kind]:
 
 @contextmanager
 def third_kind() -> Iterator[Kind]:
-    """A kind that another package brings."""
+    """A kind that another package supplies."""
     with BenchServer() as server:
         url = parse_url(server.url)
 

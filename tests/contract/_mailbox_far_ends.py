@@ -1,6 +1,6 @@
 """Far ends of a mailbox: real Modbus servers, a serial cable, a CANopen node.
 
-They hold words and know nothing of what the words mean.
+They store words without interpreting them.
 """
 
 import asyncio
@@ -26,7 +26,7 @@ RESPONSE_AT, SLOTS_AT = 0, 112
 
 
 class FarEnd(Protocol):
-    """What the tests ask of any far end."""
+    """The interface that the tests need from any far end."""
 
     url: str
 
@@ -37,17 +37,17 @@ class FarEnd(Protocol):
         """Set a tool slot."""
 
     def put_device(self, low: int, high: int) -> None:
-        """Set the number of the PLC, by its two words."""
+        """Set the PLC's device number, as two words."""
 
     def command(self) -> list[int]:
-        """Return the command block as it was written."""
+        """Return the command block as written."""
 
     def heartbeat(self) -> int:
         """Return the client's heartbeat word."""
 
 
 class ModbusFarEnd:
-    """A pymodbus server in a thread of its own."""
+    """A pymodbus server in its own thread."""
 
     def __init__(self, url: str) -> None:
         self.url = url
@@ -57,7 +57,7 @@ class ModbusFarEnd:
         self._thread = threading.Thread(target=self._loop.run_forever)
 
     def serve(self, make) -> None:
-        """Start the thread and the server that ``make`` returns."""
+        """Start the thread, and in it the server that ``make`` returns."""
         self._thread.start()
         self._run(self._start(make))
 
@@ -66,7 +66,7 @@ class ModbusFarEnd:
         await self._server.serve_forever(background=True)
 
     async def _end(self) -> None:
-        await asyncio.sleep(0.02)  # a connection made just now has to be accepted to be closed
+        await asyncio.sleep(0.02)  # a connection just made must be accepted before it can be closed
         await self._server.shutdown()
         await asyncio.sleep(0.02)
 
@@ -77,7 +77,7 @@ class ModbusFarEnd:
         return port
 
     def note(self, sending, pdu):
-        """Keep function, address and count of each request."""
+        """Record function, address and count of each request."""
         if not sending:
             self.requests.append((pdu.function_code, pdu.address, pdu.count))
         return pdu
@@ -134,7 +134,7 @@ def modbus_tcp() -> Iterator[ModbusFarEnd]:
 
 
 class SerialCable:
-    """Two pseudo terminals joined by a thread; may be cut, and may return what is sent."""
+    """Two pseudo terminals joined by a thread; can be cut, and can echo what is sent."""
 
     def __init__(self) -> None:
         pairs = [os.openpty() for _ in range(2)]
@@ -193,7 +193,7 @@ def modbus_rtu(*, echo: bool = False) -> Iterator[tuple[ModbusFarEnd, SerialCabl
 
 
 class CanopenFarEnd:
-    """A node of canopen's own, which copies the response when it is told to."""
+    """A CANopen node of the ``canopen`` package, which copies the response on request."""
 
     def __init__(self, url: str, interface: str, **bus: Any) -> None:
         self.url = f"{url}?interface={interface}&node={NODE}"
@@ -206,7 +206,7 @@ class CanopenFarEnd:
         self.network.subscribe(0x200 + NODE, self._beaten)
         self._response = bytes(224)
         self._put(0x2101, 0, bytes(224))
-        # A thread of ours, because python-can's own is not waited for when it is stopped.
+        # Our own thread, because stopping python-can's thread does not wait for its end.
         self._ending = threading.Event()
         self._living = threading.Thread(target=self._live)
         self._living.start()

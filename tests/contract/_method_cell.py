@@ -19,7 +19,7 @@ KINDS = ("epson", "plc")
 
 
 def on(kind: str) -> list[Any]:
-    """Return both kinds, of which the other one is left to ``make soak``."""
+    """Return both kinds; the one not named runs only in ``make soak``."""
     return [one if one == kind else pytest.param(one, marks=pytest.mark.soak) for one in KINDS]
 
 
@@ -53,7 +53,7 @@ input = {plate.input}
 
 
 class MethodCell:
-    """A cell, and commands that are run on it."""
+    """A cell with commands to run on it."""
 
     def __init__(self, cell: SensorCell) -> None:
         self.cell = cell
@@ -66,23 +66,23 @@ class MethodCell:
 
     @property
     def truth(self) -> ToolOffset:
-        """Where the tip really is."""
+        """The real place of the tip."""
         return self.cell.truth
 
     @property
     def stored(self) -> ToolOffset:
-        """What the controller holds in tool 1, past the wire."""
+        """The offset stored in tool 1, read by a separate connection."""
         held = self.held(1)
         assert held is not None
         return held
 
     def held(self, tool: int) -> ToolOffset | None:
-        """Return what the controller holds, past the wire."""
+        """Return the stored offset, read by a separate connection."""
         with self.cell.connected() as controller:
             return controller.tools.read(tool)
 
     def mount(self) -> None:
-        """Put the sensors up."""
+        """Mount the sensors."""
         self.cell.mount_beams(self.cell.beams())
         self.cell.mount_plate()
 
@@ -91,12 +91,12 @@ class MethodCell:
         return run_command("-c", "a", *words)
 
     def calibrate(self, method: str, *more: str, tool: int = 1) -> Ended:
-        """Calibrate with the simulated person, who says yes to everything; with the document."""
+        """Calibrate with the simulated person, who confirms everything; prints the document."""
         assist = ("--assist", self.cell.url, "--yes", "--json", "--speed", "100")
         return self.run("calibrate", method, "--tool", str(tool), *assist, *more)
 
     def recorded(self, *kinds: EntryKind) -> list[Recorded]:
-        """Return what is on record, newest first."""
+        """Return the journal entries, newest first."""
         return list(memory_journal(self.cell.url).entries(kinds=kinds))
 
     def bump_pin(self, dx_mm: float, dy_mm: float) -> None:
@@ -105,9 +105,9 @@ class MethodCell:
         self.world.pin_mm = (x_mm + dx_mm, y_mm + dy_mm, z_mm)
 
     def lengthen(self, by_mm: float, dx_mm: float = 0.0, dy_mm: float = 0.0, tool: int = 1) -> None:
-        """Mount another needle."""
+        """Mount a longer needle."""
         tip = self.world.tips[tool]
-        # Where the flange looks out along its Z, a longer needle ends farther along it.
+        # The flange looks along its Z axis, so a longer needle ends farther along Z.
         down_mm = by_mm if tip.z_mm > 0 else -by_mm
         self.world.tips[tool] = replace(
             tip, x_mm=tip.x_mm + dx_mm, y_mm=tip.y_mm + dy_mm, z_mm=tip.z_mm + down_mm
@@ -116,7 +116,7 @@ class MethodCell:
 
 @contextmanager
 def epson_cell(kind: str, seed: int = 3) -> Iterator[SensorCell]:
-    """Set a cell up around the usual EPSON robot, or around another one by its name."""
+    """Set up a cell around the default EPSON robot, or another one by name."""
     robot: dict[str, Any] = {} if kind == "epson" else {"robot": kind}
     with sensor_cell(seed, **robot) as cell:
         cell.simulator.machine.motors_on = True
@@ -127,7 +127,7 @@ def epson_cell(kind: str, seed: int = 3) -> Iterator[SensorCell]:
 def method_cell(
     kind: str, folder: Path, monkeypatch: Any, *, seed: int = 3
 ) -> Iterator[MethodCell]:
-    """Set a cell up with its cell file; ``kind`` is one of :data:`KINDS` or an EPSON robot."""
+    """Set up a cell and its cell file; ``kind`` is one of :data:`KINDS` or an EPSON robot."""
     for name in [name for name in os.environ if name.startswith("ROBOLINK")]:
         monkeypatch.delenv(name)
     with plc_sensor_cell(seed) if kind == "plc" else epson_cell(kind, seed) as cell:

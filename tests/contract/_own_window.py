@@ -1,4 +1,4 @@
-"""``python -m`` this: ``robolink`` in a terminal of its own, so that closing it hangs it up."""
+"""Run with ``python -m``: starts ``robolink`` in its own terminal; closing that hangs it up."""
 
 import fcntl
 import termios

@@ -1,4 +1,4 @@
-"""A machine with a PLC whose own program touches a pin, and gives its permit by the contact."""
+"""A machine whose PLC program touches a pin itself and reports each touch by the contact input."""
 
 import math
 import random
@@ -10,27 +10,27 @@ from robolink.protocols.mailbox import from_frame
 TURNS = (0.0, -120.0, -60.0, -150.0, -90.0)
 PROVING = (-30.0, -135.0)
 OFF_LOOKS, HELD_LOOKS = 5, 6
-"""For so many looks of the client the tip is clear, and held at the pin."""
+"""Number of client polls for which the tip is clear of the pin, and for which it stays on it."""
 
 
 class PermitMachine:
-    """The machine's program, one step at each look of the client.
+    """The machine's program; runs one step each time the client polls.
 
-    It touches, waits for ``xToolChanged``, proves, and waits until the mailbox is given back.
+    It touches, waits for ``xToolChanged``, runs the turn test, and waits until the mailbox is free.
 
     Attributes:
-        state: What it is at: ``touches``, ``waits``, ``proves``, ``blocked``, ``produces`` or
+        state: The current step: ``touches``, ``waits``, ``proves``, ``blocked``, ``produces`` or
             ``gave up``.
-        miss: Numbers of touches, counted from 0, that go beside the pin.
-        leaves: Whether it takes its permit away in the middle of the proof.
-        bump_mm: How far the pin is bumped before the proof.
+        miss: Numbers of the touches, counted from 0, that miss the pin.
+        leaves: Whether the program withdraws its permit during the turn test.
+        bump_mm: How far the pin is bumped before the turn test.
     """
 
     def __init__(self, simulator: SoftMotionSimulator, *, seed=1, noise_mm=0.003):
         self.simulator, self.panel = simulator, simulator.panel
         self.rng, self.noise_mm = random.Random(f"machine {seed}"), noise_mm
         x, y, z = simulator.world.pin_mm
-        simulator.world.pin_mm = (0.8 * x, 0.8 * y, z)  # where all angles of U are reached
+        simulator.world.pin_mm = (0.8 * x, 0.8 * y, z)  # all angles of U can be reached there
         self.start_u = simulator.world.robot.flange().u_deg
         self.miss: set[int] = set()
         self.leaves = False
@@ -47,17 +47,17 @@ class PermitMachine:
 
     @property
     def stored(self):
-        """What slot 1 holds, X and Y in mm."""
+        """The X and Y of slot 1, mm."""
         return from_frame(self.simulator.plc.memory.slot(1).tool, unit_um=1000.0)[:2]
 
     @property
     def error_mm(self):
-        """How far that is from the true tip."""
+        """The distance of the stored value from the true tip."""
         true = self.simulator.world.tips[1]
         return math.dist(self.stored, (true.x_mm, true.y_mm))
 
     def look(self):
-        """Do one step."""
+        """Run one step."""
         self.looks += 1
         owned = self.panel.owned
         self.given_back, self.owned = self.owned and not owned, owned
@@ -86,7 +86,7 @@ class PermitMachine:
                 self.state, self.waited_looks = then, 0
 
     def _bring(self, u_deg):
-        """Bring the tip onto the pin at an angle, as its own search does."""
+        """Move the tip onto the pin at an angle, as the machine's own search does."""
         with self.simulator.lock:
             world = self.simulator.world
             here = world.robot.flange().u_deg
@@ -95,7 +95,7 @@ class PermitMachine:
             world.robot.carry(world.tips[1], (x, y, z))
 
     def _waits(self):
-        """The value is awaited, with the tip at its last touch."""
+        """Wait for ``xToolChanged`` with the tip at its last touch; give up after 40 polls."""
         self.waited_looks += 1
         if self.panel.tool_changed:
             self.state, self.looks = "proves", 0
@@ -106,7 +106,7 @@ class PermitMachine:
             self.state = "gave up"
 
     def restart(self):
-        """Start the PLC, and with it this program, which then has seen nobody own the mailbox."""
+        """Restart the PLC and this program, which then has not yet seen an owner of the mailbox."""
         self.panel.restart()
         self.owned = False
 

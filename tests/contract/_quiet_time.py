@@ -1,4 +1,4 @@
-"""Time in which nobody does anything, stepped by the test: what goes on beside it goes on in it."""
+"""Simulated idle time: the test advances it, and periodic background work runs as it passes."""
 
 from collections.abc import Callable
 from typing import Protocol
@@ -17,12 +17,12 @@ class Steps(Protocol):
 
 
 class QuietTime(SystemRuntime):
-    """Real surroundings, in which what is done regularly is done when the test lets time pass.
+    """A runtime whose periodic work runs when the test advances the time.
 
-    It is the clock of whoever waits, too: so that others go on meanwhile.
+    Waiting threads use the same clock, so that periodic work goes on while they wait.
 
     Args:
-        clock: What is stepped.
+        clock: The clock to advance.
     """
 
     steps_time = True
@@ -34,7 +34,7 @@ class QuietTime(SystemRuntime):
 
     @property
     def going_on(self) -> int:
-        """How many things are done regularly just now."""
+        """The number of periodic jobs at present."""
         return len(self._acts)
 
     def regularly(self, every_s: float, act: Callable[[], None], name: str) -> Callable[[], None]:
@@ -53,7 +53,7 @@ class QuietTime(SystemRuntime):
         return self._clock.now_ns()
 
     def sleep(self, seconds: float) -> None:
-        """Let some seconds pass, and others act once in each."""
+        """Advance the time; each periodic job runs once per second of it."""
         while seconds > 0:
             step_s = min(seconds, _EVERY_S - self._since_s)
             self._clock.advance(step_s)

@@ -36,17 +36,17 @@ PLATE_INPUT = 5
 
 
 class NobodyThere:
-    """An operator who is told things and never has to do any."""
+    """An operator who reads messages and must never be asked."""
 
     def tell(self, text: str) -> None:
-        """Hear a line."""
+        """Accept a message."""
 
     def ask(self, question: str, kind: Question) -> None:
-        """Nobody answers."""
+        """Fail: nobody must be asked."""
         raise AssertionError(f"{kind}: {question}")
 
     def poll(self, wait_s: float) -> str | None:
-        """Nobody types."""
+        """Fail: nobody must be asked."""
         raise AssertionError(f"nobody was asked, for {wait_s} s")
 
 
@@ -74,25 +74,25 @@ class Inverted:
 
 @dataclass(frozen=True)
 class Taken:
-    """A step in which nobody was asked, and the pose after it."""
+    """A step without a question, and the pose after it."""
 
     step: Move | Seek | Look
     pose: Pose
 
     @property
     def edge(self) -> InputEdge | None:
-        """What it sought."""
+        """The edge that the step sought."""
         return self.step.edge if isinstance(self.step, Seek) else None
 
 
 @dataclass
 class Followed(Listener):
-    """A listener that keeps the steps."""
+    """A listener that records the steps."""
 
     steps: list[Taken] = field(default_factory=list)
 
     def step(self, tool: int, done: StepDone) -> None:
-        """Keep a step."""
+        """Record a step."""
         assert tool == TOOL
         assert not isinstance(done.step, Ask)
         if done.pose is None or not isinstance(done.step, (Move, Seek, Look)):
@@ -101,17 +101,17 @@ class Followed(Listener):
 
     @property
     def edges(self) -> list[Taken]:
-        """Those that sought an edge."""
+        """The steps that sought an edge."""
         return [taken for taken in self.steps if taken.edge is not None]
 
 
 @dataclass
 class SensorCell:
-    """What is in the cell, and the truth about it.
+    """A cell with sensors, and its true data.
 
     Attributes:
         place_mm: Where the beams cross.
-        plate: Where the plate is touched.
+        plate: The place where the plate is touched.
     """
 
     simulator: Any
@@ -131,7 +131,7 @@ class SensorCell:
         return BeamStation((first, second), z_mm, BEAM_INPUTS)
 
     def beams(self, **shape: float) -> tuple[LightBeam, LightBeam]:
-        """Return the beams as they really are."""
+        """Return the beams at their real places."""
         first, second = (LightBeam(self.place_mm, heading, **shape) for heading in HEADINGS)
         return first, second
 
@@ -146,24 +146,24 @@ class SensorCell:
 
     @property
     def truth(self) -> ToolOffset:
-        """Where the tip of the mounted nozzle really is."""
+        """The real place of the mounted nozzle's tip."""
         tip: ToolOffset = self.simulator.world.tips[TOOL]
         return tip
 
     @property
     def stored(self) -> ToolOffset | None:
-        """What the controller holds."""
+        """The stored offset."""
         offset: ToolOffset | None = self.simulator.machine.tools.get(TOOL)
         return offset
 
     @property
     def tip_z_mm(self) -> float:
-        """How high the tip is now."""
+        """The present height of the tip."""
         height_mm: float = self.simulator.world.tip_mm()[2]
         return height_mm
 
     def change(self, source: TipSource, listener: Listener | None = None, **plan: Any) -> Any:
-        """Return a change of the nozzle that asks nobody."""
+        """Return a nozzle change that asks nobody."""
         one = ToolPlan(TOOL, source, AcceptanceCriteria(**plan))
         return lambda controller, write=True: (
             NozzleChange(
@@ -177,7 +177,7 @@ class SensorCell:
         )
 
     def foresee(self, controller: Controller, source: TipSource) -> tuple[PlannedStep, ...]:
-        """Return the steps of a measurement as they are foreseen."""
+        """Return the planned steps of a measurement."""
         return preview(controller, ChangePlan((ToolPlan(TOOL, source),)))
 
     @contextmanager
@@ -187,7 +187,7 @@ class SensorCell:
             yield controller
 
     def run(self, source: TipSource, listener: Listener | None = None, **options: Any) -> Any:
-        """Change the nozzle and return the report about the tool."""
+        """Change the nozzle and return the tool's report."""
         write = options.pop("write", True)
         with self.connected() as controller:
             return self.change(source, listener, **options)(controller, write=write)
@@ -195,7 +195,7 @@ class SensorCell:
 
 @contextmanager
 def sensor_cell(seed: int = 3, **habits: Any) -> Iterator[SensorCell]:
-    """Set a cell up around an EPSON controller; ``habits`` are arguments of its simulator."""
+    """Set up a cell around an EPSON controller; ``habits`` are arguments of its simulator."""
     simulator, clock = EpsonSimulator(seed=seed, **habits), ManualClock()
     with served(simulator, clock=clock) as url:
         yield SensorCell(simulator, url, clock)
@@ -203,18 +203,18 @@ def sensor_cell(seed: int = 3, **habits: Any) -> Iterator[SensorCell]:
 
 @contextmanager
 def plc_sensor_cell(seed: int = 3) -> Iterator[SensorCell]:
-    """Set a cell up around a PLC."""
+    """Set up a cell around a PLC."""
     simulator, clock = SoftMotionSimulator(seed=seed), ManualClock()
     with served(simulator, clock=clock) as url:
         yield SensorCell(simulator, url, clock)
 
 
 def miss_mm(found: ToolOffset, true: ToolOffset) -> float:
-    """Return by how much an offset is wrong in the plane."""
+    """Return the error of an offset in X and Y."""
     return math.hypot(found.x_mm - true.x_mm, found.y_mm - true.y_mm)
 
 
 def shifted(beam: LightBeam, dx_mm: float) -> LightBeam:
-    """Return a beam that was moved."""
+    """Return a beam at a shifted place."""
     x_mm, y_mm, z_mm = beam.through_mm
     return replace(beam, through_mm=(x_mm + dx_mm, y_mm, z_mm))

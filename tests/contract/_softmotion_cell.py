@@ -1,4 +1,4 @@
-"""A simulated PLC on each of the ways on which robolink reaches one."""
+"""A simulated PLC on each link by which robolink reaches one."""
 
 import socket
 import time
@@ -24,10 +24,11 @@ BACKENDS: Final = ("sim", "modbus-tcp", "modbus-rtu", "can-virtual", "can-multic
 LINKS: Final = [
     pytest.param(name, marks=pytest.mark.soak if name == "can-virtual" else ()) for name in BACKENDS
 ]
-"""What a test of every link takes: the bus of one process is left to make soak, for the one
-between processes asks more."""
+"""The links that every test of links uses. The bus within one process is left to ``make soak``: the
+bus between processes demands more.
+"""
 OWNER_SILENCE_S: Final = 10.1
-"""After this long without a sign of its owner a mailbox is free.
+"""A mailbox is free after its owner has been silent for this long.
 
 Source: docs/reference/mailbox.md, "Owners".
 """
@@ -38,13 +39,13 @@ SLOW: Final = MotionProfile(Path.STRAIGHT, speed_mm_s=2.0)
 _COMMAND: Final = "write_command "
 _GROUP: Final = "239.74.163.9"
 _ANNOUNCED_S: Final = 0.05
-"""By then a CANopen node has sent its boot-up message."""
+"""A CANopen node has sent its boot-up message after this time."""
 
 _names = count()
 
 
 class SkippingClock:
-    """Real time, in which a test need not wait for what takes long."""
+    """Real time, from which a test can skip long waits."""
 
     def __init__(self) -> None:
         self._base = SystemClock()
@@ -59,18 +60,18 @@ class SkippingClock:
         self._base.sleep(seconds)
 
     def advance(self, seconds: float) -> None:
-        """Skip some time."""
+        """Skip some seconds."""
         self._skipped_ns += round(seconds * NS_PER_S)
 
 
 class PlcCell:
-    """A simulated PLC, and how it is reached.
+    """A simulated PLC and the link to it.
 
     Attributes:
-        url: Where to connect to.
+        url: The address to connect to.
         simulator: The PLC.
-        clock: The simulated time; ``advance`` lets some of it pass at once.
-        journal: The record that all who connect share.
+        clock: The simulated time; ``advance`` skips some of it.
+        journal: The record that all connections share.
     """
 
     def __init__(
@@ -82,7 +83,7 @@ class PlcCell:
         self.journal: Journal = memory_journal(f"{url} {next(_names)}")
 
     def connect(self, **options: Any) -> SoftMotionController:
-        """Connect; what is done is kept in the record of this cell."""
+        """Connect, with the record of this cell."""
         log = self.journal.log(self.url)
         controller = robolink.connect(self.url, outcomes=log, **options)
         assert isinstance(controller, SoftMotionController)
@@ -90,28 +91,28 @@ class PlcCell:
 
     @property
     def commands(self) -> list[str]:
-        """The commands that clients wrote so far, but for those about the ownership."""
+        """The commands that clients wrote so far, except those about ownership."""
         arrived = [text for _, way, text in self.simulator.log if way == ">"]
         named = [text.split()[1] for text in arrived if text.startswith(_COMMAND)]
         return [name for name in named if name != "OWNERSHIP"]
 
     @property
     def movements_started(self) -> int:
-        """How many movements and jogs the axis group began."""
+        """The number of movements and jogs that the axis group began."""
         return self.simulator.plc.group.movements_started
 
     @property
     def owner(self) -> int:
-        """Token of the client that owns the mailbox, 0 for nobody."""
+        """The token of the client that owns the mailbox; 0 if there is none."""
         return self.simulator.plc.program.holder
 
     @property
     def open_requests(self) -> list[str]:
-        """What is unsettled."""
+        """The requests of open markers."""
         return [marker.request for _, marker in self.journal.open_markers()]
 
     def restart(self) -> None:
-        """Start the PLC anew; whoever connects afterwards does not hear of it any more."""
+        """Restart the PLC; clients that connect afterwards do not see the restart."""
         self.simulator.panel.restart()
         time.sleep(_ANNOUNCED_S)
 
@@ -122,7 +123,7 @@ class PlcCell:
 
 @contextmanager
 def served(backend: str, simulator: SoftMotionSimulator | None = None) -> Iterator[PlcCell]:
-    """Offer a PLC, in real time wherever there is a real link."""
+    """Serve a PLC, in real time on every real link."""
     simulator = simulator or SoftMotionSimulator(seed=7)
     clock: ManualClock | SkippingClock = ManualClock() if backend == "sim" else SkippingClock()
     simulated = clock if isinstance(clock, ManualClock) else ScaledClock(base=clock)
@@ -154,5 +155,5 @@ def _free_port() -> int:
 
 
 def above(pose: Pose, by_mm: float) -> Pose:
-    """Return the pose so far above another one."""
+    """Return the pose a given distance above another one."""
     return replace(pose, z_mm=pose.z_mm + by_mm)

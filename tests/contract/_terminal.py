@@ -1,4 +1,4 @@
-"""A pseudo terminal on which a real command runs, and what a person does at it."""
+"""A pseudo terminal on which a real command runs, with the inputs of a person."""
 
 import os
 import re
@@ -16,7 +16,8 @@ class Terminal:
 
     Args:
         words: The command line.
-        controlling: Whether it is the command's own window: closing it hangs the command up.
+        controlling: Whether it is the command's controlling terminal, so that closing it hangs the
+            command up.
     """
 
     def __init__(self, *words, controlling=False):
@@ -37,7 +38,7 @@ class Terminal:
         self.shown = ""
 
     def wait_for(self, pattern):
-        """Read until ``pattern`` has been shown, and forget what was shown up to there."""
+        """Read until ``pattern`` is shown, and drop everything up to it."""
         end_s = time.monotonic() + LONGEST_S
         while not (found := re.search(pattern, self.shown)):
             ready, _, _ = select.select([self.descriptor], [], [], 0.1)

@@ -1,7 +1,7 @@
-"""The places of docs/reference/rules.md, each with what is left of it when its guard is taken out.
+"""The places that docs/reference/rules.md names, each with a stand-in that lacks its guard.
 
-What shows that a check can fail. As a plugin (``-p tests.contract._without_guards``) it takes out
-the place that ROBOLINK_WITHOUT names before the tests are collected.
+They show that a check can fail. As a plugin (``-p tests.contract._without_guards``) this module
+removes the guard that ROBOLINK_WITHOUT names before the tests are collected.
 """
 
 import os
@@ -40,18 +40,18 @@ def found(place: str) -> tuple[Any, str]:
 
 @contextmanager
 def without(place: str) -> Iterator[None]:
-    """Take the guard of a place out for a block, wherever its name was imported to."""
+    """Remove the guard of a place during the block, in every module that imported it."""
     with pytest.MonkeyPatch.context() as patch:
         take_out(place, patch.setattr)
         yield
 
 
 def take_out(place: str, put: Callable[[Any, str, Any], None]) -> None:
-    """Take the guard of a place out.
+    """Remove the guard of a place.
 
     Args:
-        place: As the page names it.
-        put: Puts an attribute in the place of another.
+        place: The name on the page.
+        put: Replaces an attribute.
     """
     for at, stand_in in LEFT[place].items():
         owner, name = found(at)
@@ -59,7 +59,7 @@ def take_out(place: str, put: Callable[[Any, str, Any], None]) -> None:
 
 
 def pytest_configure() -> None:
-    """Take out the place that the environment names."""
+    """Remove the guard that the environment names."""
     place = os.environ.get("ROBOLINK_WITHOUT")
     if place:
         take_out(place, setattr)
@@ -74,7 +74,7 @@ def _open(*_given: object, **_named: object) -> Any:
 
 
 class _Whatever:
-    """Equal to all."""
+    """Equal to every value."""
 
     def __eq__(self, _other: object) -> bool:
         return True
@@ -84,7 +84,7 @@ class _Whatever:
 
 @contextmanager
 def _calmed(latch: Any, _request: str) -> Iterator[None]:
-    """Let a reset out whatever stop came since it was begun."""
+    """Let a reset through, whatever stop came since it began."""
     latch._permits.__dict__["calms"] = _Whatever()
     try:
         yield
@@ -120,7 +120,7 @@ def _begun(
 
 
 def _changed(write: Any, _expected: object) -> ToolReceipt:
-    """Write whatever is there, and believe the answer."""
+    """Write whatever value is stored, and trust the answer."""
     write.before = write.read_back()
     write._link.carry_out(write)
     return ToolReceipt(write.tool, None, write.requested, None)
@@ -148,12 +148,12 @@ def _previewed(table: Any, tool: int, offset: ToolOffset) -> tuple[str, ...]:
 
 
 def _unguarded(controller: Any, text: str) -> str:
-    """Run a statement as it was typed, and tell nobody."""
+    """Run a typed statement without recording it."""
     return str(controller._link.session.exchange("Execute", text).text or "")
 
 
 def _settled_unread(_settler: object, marker: Any) -> Any:
-    """Take whatever was begun for done."""
+    """Treat whatever was begun as finished."""
     from robolink.model import Finding, Verdict
 
     return Finding(marker, Verdict.DONE, "")
@@ -241,4 +241,4 @@ LEFT: Final[Mapping[str, Mapping[str, StandIn]]] = {
     **{place: {place: stand_in} for place, stand_in in _ITSELF.items()},
     **_AS_IMPORTED,
 }
-"""What stands in for each place: itself, or what was imported from it."""
+"""The stand-ins for each place: for itself, and for every import of it."""

@@ -41,7 +41,7 @@ def served(backend: str, simulator: EpsonSimulator) -> Iterator[Cell]:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
-    """Leave out what a serial line has no frame for, and the greater part of the rest to soak."""
+    """Deselect what a serial line has no frame for, and leave most of the rest to soak."""
     impossible = []
     for item in items:
         given = getattr(item, "callspec", None)
@@ -63,7 +63,7 @@ def _own_state_folder(tmp_path, monkeypatch):
 
 @pytest.fixture(params=["sim", "tcp", "pty", "hardware"])
 def cell(request) -> Iterator[Cell]:
-    """A controller with the default habits: simulated, served, or real."""
+    """A controller with the default options: simulated, served, or real."""
     if request.param == "hardware":
         url = os.environ.get("ROBOLINK_EPSON_URL")
         if not url:
@@ -81,19 +81,19 @@ def cell(request) -> Iterator[Cell]:
 
 @pytest.fixture(params=["sim", "tcp", "pty"])
 def serve(request):
-    """A maker of cells around a simulator of the test's own."""
+    """Returns a function that makes a cell around the test's own simulator."""
     return lambda simulator: served(request.param, simulator)
 
 
 @pytest.fixture
 def options():
-    """The class of habits, for tests that vary them."""
+    """The class of simulator options, for tests that vary them."""
     return EpsonOptions
 
 
 @pytest.fixture
 def arm(tmp_path, monkeypatch):
-    """An EPSON cell whose methods are run from commands: for what is the same for all kinds."""
+    """An EPSON cell with commands, for tests of what is the same on all kinds."""
     from tests.contract._method_cell import method_cell
 
     with method_cell("epson", tmp_path, monkeypatch) as cell:

@@ -1,4 +1,4 @@
-"""Who adds a method writes its folder and names it once: command, recipe, schema follow."""
+"""A new method is a folder plus one registration; command, recipe and schema follow from it."""
 
 import importlib
 import sys
@@ -100,7 +100,7 @@ def test_two_methods_of_one_name_are_refused():
 
 def test_a_limit_of_which_it_tells_nothing_is_refused(cell):
     class Silent(PlateTouchSource):
-        """Measures, and says neither how it scatters nor what its errors can be."""
+        """Measures, but reports neither scatter nor possible errors."""
 
         def procedure(self, stored, here):
             told = yield from super().procedure(stored, here)

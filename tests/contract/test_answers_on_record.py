@@ -1,4 +1,4 @@
-"""Every answer on which a written value rests is in the journal: by each face, and how it came."""
+"""The journal holds every answer behind a written value, in each interface, and how it came."""
 
 from contextlib import contextmanager, nullcontext
 from typing import Any
@@ -55,13 +55,13 @@ answer = "text"
 
 
 class Person(_operator.AssistedOperator):
-    """Somebody real: jogs by what they see, says yes, and types a lot."""
+    """A person who jogs by what they see, confirms everything, and types a lot."""
 
     answers_as = AnsweredBy.PERSON
     glance = staticmethod(lambda: None)
 
     def regard(self, subject):
-        """Nothing is drawn."""
+        """Draw nothing."""
 
     @contextmanager
     def following(self, look):
@@ -73,14 +73,14 @@ class Person(_operator.AssistedOperator):
 
     def poll(self, wait_s):
         assert self._clock is not None
-        self._clock.sleep(0.5)  # who answers at once has not read it
+        self._clock.sleep(0.5)  # an immediate answer was given without reading
         said = super().poll(wait_s)
         return "-20" if self.question.startswith(HEIGHT) else said
 
 
 @contextmanager
 def somebody_at(face, arm, monkeypatch):
-    """Let a person sit there: at the wizard's desk, or where lines are typed."""
+    """Put a person at the wizard or at line input."""
     with open_eyes(arm.cell.url) as eyes:
         person: Any = Person.with_eyes(eyes, lambda _text: None, clock=arm.clock)
         monkeypatch.setattr("robolink_cli.prompts.operator._plain_terminal", lambda: person)
@@ -101,7 +101,7 @@ def recipe(folder, z="kept"):
 
 
 def answers(arm):
-    """Return what is on record of the newest change: question, to answer and how."""
+    """Return the recorded answers of the newest change: question, purpose and how it came."""
     change = arm.recorded(EntryKind.CALIBRATION)[0].change
     assert change
     return {
@@ -200,7 +200,7 @@ def test_a_value_that_is_typed_is_on_record_with_the_consent_to_it(
         assert WRITE in str(asked.details["question"])
         assert (asked.details["answer"], asked.details["answered_by"]) == ("yes", how)
         assert asked.change == wrote.change != ""
-        # Undoing it is asked, and on record under the change that it makes.
+        # Undo asks a question too, recorded under the change that it makes.
         more = ("--yes",) if how != "person" else ()
         assert arm.run("undo", *more).code == 0
     undone = arm.recorded(EntryKind.DECISION)

@@ -1,4 +1,4 @@
-"""The habits of a simulated person reach the calibration that they answer for, by --assist."""
+"""The habits of a simulated person affect the calibration run with --assist."""
 
 import json
 import random
@@ -12,8 +12,8 @@ from robolink.runtime import SystemRuntime
 
 
 class SameChance(SystemRuntime):
-    """The places beside the pin are drawn alike in each run: a side is only seen in enough of
-    them, and one run in eight draws others.
+    """Draws the places beside the pin alike in each run: a side shows only in enough of them, and
+    one run in eight draws others.
     """
 
     def __init__(self):
@@ -37,7 +37,7 @@ def named(kind):
 
 @pytest.mark.parametrize("kind", [pytest.param("epson", marks=pytest.mark.soak), "softmotion"])
 def test_a_side_fixed_in_the_tool_is_what_the_offset_is_wrong_by(named, capsys):
-    # A bias that turns with the tool looks like another tool to every touch, so nothing can tell.
+    # A bias that turns with the tool looks like another tool at every touch: undetectable.
     bare, simulator = named
     habits = {
         "eye_sigma_mm": 0,
@@ -57,7 +57,7 @@ def test_a_side_fixed_in_the_tool_is_what_the_offset_is_wrong_by(named, capsys):
 @pytest.mark.parametrize("kind", ["epson", pytest.param("softmotion", marks=pytest.mark.soak)])
 @pytest.mark.parametrize("frame", ["approach", "base"])
 def test_a_side_from_which_the_tip_comes_is_told_with_its_size(named, capsys, frame):
-    # One that is fixed in the base moves the pin that is found, and no tip.
+    # A bias that is fixed in the base shifts the pin that is found, but no tip.
     bare, simulator = named
     habits = {"eye_sigma_mm": 0.005, "person_bias_mm": 0.05, "person_bias_frame": frame}
     url = f"{bare}?seed=5&" + "&".join(f"world.{name}={value}" for name, value in habits.items())

@@ -1,4 +1,4 @@
-"""What an auditor asks of the page about a calibration, on both kinds of controllers."""
+"""The contents that an auditor needs on a calibration's page, on both kinds of controllers."""
 
 import json
 import re
@@ -69,4 +69,4 @@ def test_machine_gauge_people_times_budget_touches_and_rule_stand_on_the_page(ce
         assert words in text
     assert "+-" not in text
     assert "not assessed" not in text
-    assert text.count("undecided") == 1  # in the rule alone
+    assert text.count("undecided") == 1  # only in the rule

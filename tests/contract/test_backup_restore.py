@@ -1,4 +1,4 @@
-"""A backup is whole, and a restore brings it back or says how far it came."""
+"""A backup is complete, and a restore either completes or reports how far it came."""
 
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator
@@ -38,7 +38,7 @@ def simulator():
 
 
 def disorder(simulator):
-    """Change, clear, add and select tools behind robolink's back."""
+    """Change, clear, add and select tools without going through robolink."""
     tools = simulator.machine.tools
     tools.set(1, ToolOffset(99))
     tools.clear(15)

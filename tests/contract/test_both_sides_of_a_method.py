@@ -1,4 +1,4 @@
-"""What only commands or only recipes could say before, from the other side."""
+"""Options and keys once available only in commands or only in recipes, each tried in the other."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""A computer that is too busy to beat: the PLC halts, and a person may let the step be repeated."""
+"""A computer too busy to send heartbeats: the PLC halts, and a person may repeat the step."""
 
 import pytest
 from robolink_cli.prompts.operator import AssistedOperator
@@ -26,28 +26,28 @@ def controller(cell):
 
 
 class Person:
-    """Answers each question in the same way, after a while; keeps what was asked."""
+    """Answers every question alike after a delay; records the questions."""
 
     def __init__(self, answer):
         self.answer = answer
         self.asked = []
 
     def tell(self, text):
-        """Hear something."""
+        """Accept a message."""
 
     def ask(self, question, kind):
-        """Be asked."""
+        """Record a question."""
         self.asked.append(question)
 
     def poll(self, wait_s):
-        """Answer, or be gone."""
+        """Answer, or leave."""
         if self.answer is None:
             raise DeclinedError("The input ended.", remedy="none")
         return self.answer
 
 
 def be_busy(cell, *moves, meanwhile=lambda: None):
-    """Let this computer have something else to do in the middle of these movements, from 1."""
+    """Keep this computer busy in the middle of these movements, counted from 1."""
     begun: list[str] = []
     busy: list[int] = []
 
@@ -129,7 +129,7 @@ def test_nobody_is_asked_when_the_cell_is_not_as_it_was(cell, controller, change
 
 
 def calibrated(cell, controller):
-    """Calibrate slot 1 as a person does who looks at the tip and says yes to everything."""
+    """Calibrate slot 1 as a person does who watches the tip and confirms everything."""
     said: list[str] = []
     limits = Limits(speed_percent=5, speed_mm_s=20.0)
     plan = ChangePlan((ToolPlan(1),), limits)
@@ -163,7 +163,7 @@ def test_a_busy_moment_while_the_new_value_is_proved_takes_it_back(cell, control
 
 
 def be_busy_after_the_write(cell):
-    """Be busy in the movement that follows the first write of a tool."""
+    """Be busy during the movement that follows the first tool write."""
     seen = []
 
     def on_request(_number, text):

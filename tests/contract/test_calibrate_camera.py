@@ -1,4 +1,4 @@
-"""``calibrate camera|camera-affine|board``: what a user types, on both kinds of controllers."""
+"""``calibrate camera|camera-affine|board`` as typed commands, on both kinds of controllers."""
 
 import json
 import math
@@ -19,7 +19,7 @@ from tests.faults._nozzle_cell import OLD_TIP, served_cell
 pytestmark = [pytest.mark.simulator_only, pytest.mark.timeout(120)]
 
 SIM = "SIM"
-"""Stands for the URL of a cell in the arguments below."""
+"""Placeholder for a cell's URL in the arguments below."""
 
 _names = count()
 
@@ -28,11 +28,11 @@ HOSTING = {"epson": in_process, "softmotion": plc_in_process}
 
 
 class Desk:
-    """A simulated cell, and the commands that are typed at it.
+    """A simulated cell and the commands typed for it.
 
     Attributes:
         cell: The cell.
-        at: Where its camera looks, as an option says it.
+        at: The place of its camera, as an option gives it.
     """
 
     def __init__(self, kind, options, capsys):
@@ -47,7 +47,7 @@ class Desk:
         self.at = f"{station.x_mm},{station.y_mm},{station.z_mm}"
 
     def run(self, *arguments):
-        """Run a command in this process; gives its exit code, document and messages."""
+        """Run a command in this process; return its exit code, document and messages."""
         self._capsys.readouterr()
         code = main.run(["-c", self.url, *(self.url if a == SIM else a for a in arguments)])
         shown = self._capsys.readouterr()
@@ -105,7 +105,7 @@ def test_a_spot_that_stands_still_ends_with_7_and_in_the_proof_with_8(desk):
     assert opened.run("calibrate", "camera-affine", "--at", opened.at, *usual)[0] == 0
     stored = opened.cell.stored
     opened.cell.simulator.world.change_nozzle()
-    # Five places of four pictures each are the measurement.
+    # Five places with four pictures each make the measurement.
     for from_picture, exit_code in ((1, 7), (21, 8)):
         furnish(opened.cell, camera_still_share=1.0, camera_still_from_picture=from_picture)
         code, document, messages = opened.run("calibrate", "camera", *usual)
@@ -151,7 +151,7 @@ def test_a_board_is_measured_by_its_fiducials(desk):
     assert document["proposed"]["u_deg"] == pytest.approx(truth.u_deg, abs=0.02)
     assert document["verification"]["passed"]
     assert "Looking at fiducial 4." in messages
-    # What follows is said, in the document, and on record with the value.
+    # The consequences are printed, in the document, and recorded with the value.
     steps = document["next_steps"]
     assert [one["step"] for one in steps] == ["select", "jog", "teach"]
     commands = [one["command"] for one in steps]
@@ -160,7 +160,7 @@ def test_a_board_is_measured_by_its_fiducials(desk):
     assert places == sorted(places)
     kept = memory_journal(opened.url).entries(kinds=(EntryKind.DONE,))
     assert next(iter(kept)).details["next_steps"] == steps
-    # Each of them is a command that works as it stands.
+    # Each of them is a command that works as printed.
     assert opened.run("tool", "select", "1", "--yes")[0] == 0
     assert opened.run("robot", "jog", "x+1", "--yes")[0] == 0
     assert opened.run("robot", "where")[0] == 0

@@ -1,4 +1,4 @@
-"""``calibrate`` and ``impact`` on poses that exist already: nothing moves, ever."""
+"""``calibrate`` and ``impact`` with existing poses: nothing ever moves."""
 
 import json
 import os
@@ -17,13 +17,13 @@ from robolink.model import EntryKind, Hand, Pose, ToolOffset, rotate_xy
 
 REAL = ToolOffset(12.3, -3.9, -20.4)
 STORED = ToolOffset(12.0, -3.5, -20.0)
-"""What a simulator stores for tool 1 at first."""
+"""The initial tool 1 of a simulator."""
 
 PIN = (300.0, 100.0, -60.0)
 
 
 def touching(u_deg, believed=None, **more):
-    """Return the point taught on the pin with a tool that is believed to be there."""
+    """Return a point taught on the pin with a tool that is believed to be there."""
     own = believed or ToolOffset()
     x, y = rotate_xy(REAL.x_mm - own.x_mm, REAL.y_mm - own.y_mm, u_deg)
     return Pose(PIN[0] - x, PIN[1] - y, PIN[2] - REAL.z_mm + own.z_mm, u_deg, **more)
@@ -190,13 +190,13 @@ def test_on_a_terminal_a_no_writes_nothing(command, simulator, monkeypatch):
 
 
 class AtTerminal:
-    """Somebody who answers yes to all but what is said otherwise."""
+    """Confirms everything except the questions with answers of their own."""
 
     def __init__(self, **otherwise):
         self.asked, self._otherwise = [], otherwise
 
     def tell(self, text):
-        """Hear it."""
+        """Accept a message."""
 
     def ask(self, question, kind):
         self.asked.append(question)
@@ -446,7 +446,7 @@ def test_points_at_two_heights_are_refused_and_others_say_that_nobody_saw_them(c
 @pytest.mark.fault("F39")
 @pytest.mark.parametrize("tool", ["1", "5"])
 def test_poses_in_inches_are_refused_by_where_the_robot_is(command, simulator, tmp_path, tool):
-    """Tool 5 has no value that would tell it by its length."""
+    """The length of tool 5 cannot show it: the tool is undefined."""
     path = tmp_path / "poses.csv"
     rows = [f"{p.x_mm / 25.4:.5f},{p.y_mm / 25.4:.5f},{p.u_deg}" for p in POSES]
     path.write_text("\n".join(["x_mm,y_mm,u_deg", *rows]))
@@ -462,7 +462,7 @@ def test_poses_in_inches_are_refused_by_where_the_robot_is(command, simulator, t
 
 @pytest.mark.fault("F39")
 def test_poses_in_inches_are_refused_by_the_length_of_the_stored_tool(serve, simulator):
-    """In a local nothing tells where they are; the points of the controller are in mm anyway."""
+    """In a local system positions cannot show it; the controller's own points are in mm anyway."""
     inches = [replace(p, x_mm=p.x_mm / 25.4, y_mm=p.y_mm / 25.4, local=2) for p in POSES]
     with serve(simulator) as cell, robolink.connect(cell.url) as controller:
         with pytest.raises(CalibrationError) as refused:
@@ -495,11 +495,11 @@ def test_that_nobody_saw_the_touches_is_said_though_yes_was_said_beforehand(comm
 
 
 BUMPED = (*((u, 0.0) for u in (0, 180, 90, -90)), *((u, 0.15) for u in (45, -135, 135, -45)))
-"""The pin was pushed by 0.15 mm between the fourth touch and the fifth."""
+"""The pin was pushed 0.15 mm between the fourth and the fifth touch."""
 
 
 def bumped_file(folder, step_mm):
-    """Write touches with a scatter of some micrometres, and the pin pushed by ``step_mm``."""
+    """Write touches with a scatter of some micrometres and the pin pushed by ``step_mm``."""
     errors = (0.004, -0.003, 0.002, -0.005, 0.003, 0.001, -0.004, 0.002)
     path = folder / "poses.csv"
     lines = ["x_mm,y_mm,z_mm,u_deg"]

@@ -1,4 +1,4 @@
-"""A live calibration that also says what its write will do at taught points."""
+"""A live calibration also shows how its write will shift taught points."""
 
 import json
 

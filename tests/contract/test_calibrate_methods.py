@@ -54,7 +54,7 @@ def one_touch_gives_the_next_needle(cell):
     done = cell.calibrate("one-touch", "--station", "PIN-07")
     assert done.code == 0, done.err
     document = done.document
-    # Z of before was never measured, so only its change can be right, and is stated.
+    # The earlier Z was never measured, so only its change can be right and is stated.
     assert (document["measured"], document["changed"]) == (["x_mm", "y_mm"], ["z_mm"])
     changed = [b - a for a, b in zip(tip.components(), cell.truth.components(), strict=True)]
     proposed = document["proposed"]
@@ -75,7 +75,7 @@ def test_the_chain_asks_for_a_full_calibration_in_time(arm):
         done = arm.calibrate("one-touch", "--station", "PIN-07", "--max-changes", "2")
         assert done.code == 0, done.err
         halves.append(done.document["fit"]["half_width95"]["x_mm"])
-    # Each starts from the touch of the one before, so the touches between cancel.
+    # Each starts from the touch of the one before, so the touches between them cancel.
     assert halves[1] == pytest.approx(halves[0])
     assert done.document["fit"]["chain"]["changes"] == 2
     assert "difference 2 since the last full calibration" in done.err
@@ -97,11 +97,11 @@ def test_one_touch_may_trust_the_place_of_the_pin(arm):
     done = arm.calibrate("one-touch", *one_touch)
     assert done.code == 0, done.err
     assert within(done.document, arm.truth)
-    # Who compares two tools has to know whether they share an error of the pin.
+    # A person who compares two tools must know whether both share an error of the pin.
     learnt, measured = arm.recorded(EntryKind.STATION)[0], arm.recorded(EntryKind.CALIBRATION)[0]
     rests_on = {"station": "PIN-07", "entry": learnt.number, "at": learnt.at}
     assert measured.details["station_record"] == rests_on
-    # The pin counts in full, beside the touch.
+    # The pin counts in full, in addition to the touch.
     halves = done.document["fit"]["half_width95"]
     assert halves["x_mm"] == pytest.approx(1.96 * 0.01 * 2**0.5, rel=1e-3)
     assert arm.run(*learn).code == 0
@@ -143,7 +143,7 @@ def test_a_sensor_measures_at_its_station_and_nobody_is_asked(cell, method, stat
 def test_a_sensor_stops_inside_the_tolerance_and_its_worst_is_offered_for_retaking(
     tmp_path, monkeypatch, kind, words, which
 ):
-    """The simulated person accepts each offer; the answers are on record."""
+    """The simulated person accepts each offer; the answers are recorded."""
     monkeypatch.setattr(
         "robolink_cli.session.check_before_start.agree_to_motion", lambda *_, **__: None
     )

@@ -1,4 +1,4 @@
-"""``calibrate pivot`` live, on a PLC whose flange leaves the vertical; and what cannot tilt."""
+"""``calibrate pivot`` live, on a PLC whose flange tilts; and robots that cannot tilt."""
 
 from dataclasses import replace
 from functools import partial
@@ -35,9 +35,9 @@ QUICK = Limits(speed_percent=100, speed_mm_s=2000.0)
 
 @pytest.fixture
 def plc(serve_simulator, monkeypatch):
-    """A simulated machine of five axes, in process; its URL stands in ``url``.
+    """A simulated five-axis machine, in this process; ``url`` is its URL.
 
-    It moves faster than commands let it, which changes nothing but how long a test takes.
+    It moves faster than commands allow, which only shortens the test.
     """
     monkeypatch.setattr("robolink.calibration_run.Limits", partial(Limits, speed_percent=100))
     simulator = SoftMotionSimulator(FIVE, seed=4)
@@ -46,13 +46,13 @@ def plc(serve_simulator, monkeypatch):
 
 
 def run(url, *words):
-    """Run a command; return its exit code, its document and what it said."""
+    """Run a command; return its exit code, document and messages."""
     ended = run_command("-c", url, *words, "--json")
     return ended.code, ended.document, ended.err
 
 
 def slot(simulator, number=1):
-    """Return the lengths that the PLC holds."""
+    """Return the lengths in the PLC's tool slot."""
     return simulator.plc.memory.slot(number).tool[:3]
 
 
@@ -70,7 +70,7 @@ def change(controller, simulator, *, listener=None, verify=True):
 
 
 def test_a_pivot_finds_the_whole_tip_writes_it_and_proves_it_in_all_directions(plc, tmp_path):
-    """From a start that leans already, with a tool that has angles of its own."""
+    """The start is already tilted, and the tool has angles of its own."""
     group, world, page = plc.plc.group, plc.world, tmp_path / "page.html"
     group.place((*group.values[:4], 12.0))
     tip = world.tip_mm()
@@ -154,7 +154,7 @@ def test_ctrl_c_in_a_tilt_puts_the_tool_back_and_writes_nothing():
         assert controller.tools.selected() == 1
         assert controller.groups[0].pose().tool == 1
         assert abs(simulator.plc.group.values[4]) == pytest.approx(20.0)
-        # The command after it finds the flange of a machine that stands tilted.
+        # The next command finds the flange of a machine that stands tilted.
         flange, seen = simulator.world.robot.flange(), flange_now(controller)
         assert seen.coordinates() == pytest.approx(flange.coordinates(), abs=1e-6)
         assert cell.open_requests == []
@@ -162,7 +162,7 @@ def test_ctrl_c_in_a_tilt_puts_the_tool_back_and_writes_nothing():
 
 
 def test_six_axes_are_sent_v_and_w_but_four_are_refused(tmp_path, monkeypatch):
-    """No six-axis EPSON arm is simulated: the requests alone are looked at."""
+    """There is no six-axis EPSON arm here: only the requests are compared."""
     with method_cell("epson", tmp_path, monkeypatch) as cell:
         robot = "robolink.controllers.epson"
         monkeypatch.setattr(f"{robot}.group.EpsonGroup.axes", lambda _: {"joints": (0.0,) * 6})

@@ -1,4 +1,4 @@
-"""``--report`` of ``impact`` and ``calibrate``: a page whatever the end is."""
+"""``--report`` of ``impact`` and ``calibrate``: the page is written however the run ends."""
 
 import json
 
@@ -86,7 +86,7 @@ def test_a_write_from_poses_is_reported(command, tmp_path):
     assert "Written and read back, not tested" in page
     assert "There was no turn test of the new tip." in page
     assert "typed poses; taught with tool 0" in page
-    # As in the page of the journal.
+    # As on the journal's page.
     for said in ("Entries of the journal", "done by", "Limits and verdicts", "report number"):
         assert said in page
 
@@ -193,7 +193,7 @@ def test_a_failed_verification_is_reported_with_its_drifts(simulator, capsys, tm
     code, document = live(simulator, capsys, "--tolerance", "0.0001")
     page = page_of(tmp_path / "page.html")
     assert (code, document["error"]["kind"]) == (8, "VerifyError")
-    # So small a tolerance lies within what the touches themselves scatter.
+    # So small a tolerance is below the scatter of the touches.
     verdict = "Not decided, which does not pass: "
     for said in ("The turn test failed", "is back.", verdict):
         assert said in page

@@ -1,4 +1,4 @@
-"""A nozzle that wobbles on its spindle, seen all round by a camera, on both kinds."""
+"""A nozzle with spindle runout, measured all round by a camera, on both kinds of controllers."""
 
 import math
 
@@ -31,7 +31,8 @@ def test_a_table_by_angle_is_found_and_the_proof_finds_the_tip_where_it_says(kin
             toward = math.radians(2 * row.u_deg + TOWARD_DEG)
             beside = ToolOffset(WOBBLE_MM * math.cos(toward), WOBBLE_MM * math.sin(toward))
             assert miss_mm(ToolOffset(row.dx_mm, row.dy_mm), beside) < 0.015
-        # Between two rows a seventh of the wobble is left; without the table all of it is.
+        # Interpolation between two rows leaves a seventh of the runout; without the table all of it
+        # stays.
         assert report.verification.max_drift_mm < 0.04
 
 

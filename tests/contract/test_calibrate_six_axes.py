@@ -19,7 +19,7 @@ EXAMPLE = Path(__file__).parents[2] / "examples" / "recipes" / "five-axes-pivot.
 ROBOTS = ("C8-C901S", "C8-C1401CR", "C12-C1401S", "CX4-A601SR", "CX7-A701S")
 SENSOR_SIGMA_MM = 0.004
 SEED, PLATE_SEED = 8, 5
-"""Of the cells. With some thirty intervals of 95 % a seed in which none misses is one in five."""
+"""Seeds of the cells. Of some thirty 95 % intervals none misses with one seed in five."""
 
 PLANAR = ("GX4-C351S-L", "GX8-C652SR", "RS4-C351S", "RS6-C552C")
 
@@ -32,7 +32,7 @@ def at(tmp_path, monkeypatch, request):
 
 
 def each(*names, chosen, seed=SEED):
-    """Run a test on several robots; on those that are not chosen in the long tests only."""
+    """Run a test on several robots; those not chosen run only in the long tests."""
     robots = [
         pytest.param((name, seed), id=name, marks=() if name in chosen else pytest.mark.soak)
         for name in names
@@ -41,17 +41,18 @@ def each(*names, chosen, seed=SEED):
 
 
 def interval_mm(fit, axis):
-    """Return half of the 95 % interval of an axis, as it was told.
+    """Return half of the stated 95 % interval of an axis.
 
-    Two are told: by the scatter, and expanded with what is known of the sensor. The latter is the
-    narrower one where a few touches scatter much: its degrees of freedom are an approximation.
+    Two are stated: one from the scatter, and one expanded with the sensor's known errors. The
+    latter is narrower where a few touches scatter widely, because its degrees of freedom are
+    approximate.
     """
     budget, half = fit["budget"], fit["half_width95"][f"{axis}_mm"]
     return half if budget is None else max(half, budget["expanded_mm"])
 
 
 def wrong_mm(document, truth, axes):
-    """Return by how much each axis is wrong, and the half of its interval."""
+    """Return the error of each axis and half of its interval."""
     found, fit = document["proposed"], document["fit"]
     return [
         (found[f"{axis}_mm"] - getattr(truth, f"{axis}_mm"), interval_mm(fit, axis))
@@ -60,10 +61,10 @@ def wrong_mm(document, truth, axes):
 
 
 def recovered(done, truth, axes="xy"):
-    """Prove that the truth lies where the stated interval leads to expect it.
+    """Check that the errors are within bounds that follow from the stated intervals.
 
-    One in 20 lies outside of a 95 % interval, one in 10,000 outside of twice that. How often it
-    holds over many is counted in the long tests, below.
+    One in 20 lies outside a 95 % interval, one in 10,000 outside twice that. The long tests below
+    count the share over many cells.
     """
     assert done.code == 0, done.err[-1500:] + done.out[-500:]
     for wrong, half in wrong_mm(done.document, truth, axes):
@@ -73,7 +74,7 @@ def recovered(done, truth, axes="xy"):
 
 
 def mount(at):
-    """Put sensors up that switch a few micrometres to and fro, as real ones do."""
+    """Mount sensors whose switching points scatter by a few micrometres, as real ones do."""
     at.cell.mount_beams(at.cell.beams(), noise_mm=SENSOR_SIGMA_MM)
     at.cell.mount_plate(noise_mm=SENSOR_SIGMA_MM)
 
@@ -86,7 +87,7 @@ def test_a_pivot_recovers_the_whole_tip(at):
 
 @each("C8-C901S", "CX4-A601S", chosen={"C8-C901S"})
 def test_a_pivot_near_a_singular_wrist_takes_other_tilts(at):
-    """Joint 5 stands at -25 degrees: leaning by 20 one way would bring it to -5."""
+    """Joint 5 stands at -25 degrees: a tilt of 20 one way would bring it to -5."""
     simulator = at.cell.simulator
     simulator.machine.arm.place(Joints(0.0, -10.0, -55.0, 0.0, -25.0, 0.0), simulator.now_ns)
     x_mm, y_mm, z_mm = at.world.tip_mm()
@@ -123,9 +124,9 @@ def test_angles_and_then_one_touch_recover_two_needles(at):
 
 @each("C8-C901S", "C12-C1401S", "CX4-A601SR", chosen={"CX4-A601SR"})
 def test_two_poses_half_a_turn_apart_give_the_tip_by_the_makers_formula(at):
-    """U at 0 and 180 with Tool 0, as EPSON's page has it: half the difference of X and of Y.
+    """U is 0 and 180 with Tool 0, as on EPSON's page: half the difference of X and of Y.
 
-    The flange of six axes looks down on the pin, so its Y points against the base's.
+    The flange of a six-axis robot looks down on the pin, so its Y axis is opposite to the base's.
     """
     machine, simulator = at.cell.simulator.machine, at.cell.simulator
     *bent, wrist = machine.arm.joints
@@ -195,7 +196,7 @@ def test_what_a_write_does_at_taught_points_is_said_in_space(at):
     entries = document["impact"]["points"]
     assert len(entries) == len(taught)
     for entry, pose in zip(entries, taught.values(), strict=True):
-        # The tip that is on the arm now stands that much beside the point with the old offset.
+        # With the old offset the tip now on the arm is that far from the point.
         moved = rotation_of(pose) @ change
         shown = [entry["dx_mm"], entry["dy_mm"], entry["dz_mm"]]
         assert shown == pytest.approx((-moved).tolist(), abs=2e-3)
@@ -203,7 +204,7 @@ def test_what_a_write_does_at_taught_points_is_said_in_space(at):
 
 @each("C8-C901S", "CX7-A701SR", chosen={"CX7-A701SR"})
 def test_tools_on_one_head_are_measured_one_by_one(at):
-    """A second needle, tilted on the flange: each is found, neither changes the other."""
+    """A second needle, tilted on the flange: both are found, neither changes the other."""
     second = ToolOffset(-15.0, 8.0, 110.0, 0.0, 12.0, 0.0)
     at.world.tips[2] = replace(second, x_mm=second.x_mm + 0.3, z_mm=second.z_mm - 0.4)
     at.cell.simulator.machine.tools.set(2, second)
@@ -262,12 +263,15 @@ def look_with_a_camera(at):
 MEASURES = (touch_at_angles, tilt_over_a_pin, cross_beams, touch_a_plate, look_with_a_camera)
 MANY, MANY_HELD = 40, 32
 FEW, FEW_HELD = 20, 14
-"""Cells and how many of them at least must hold the truth. An interval of 95 % holds 31 or fewer
-of 40 once in 7,700 times, 13 or fewer of 20 once in 29,000 times (binomial distribution)."""
+"""The number of cells, and how many at least must hold the truth. For a 95 % interval, 31 or fewer
+of 40 occurs once in 7,700 counts, 13 or fewer of 20 once in 29,000 (binomial distribution).
+"""
 FALSE_ALARMS, MOST_REFUSED = {"implausible_latency", "proof_contradicts_accuracy"}, 2
-"""What refuses a right result by chance, and in how many cells it may. Each of two latencies is
-refused once in 740 times (docs/reference/evidence.md 13), each turn test once in 1,000 times (20):
-about one cell in 270. More than 2 of 40 are refused once in 2,400 times, of 20 once in 18,000."""
+"""The reasons for which a right result may be refused by chance, and in how many cells. Each of two
+latencies is refused once in 740 times (docs/reference/evidence.md 13), each turn test once in 1,000
+times (20): about one cell in 270. More than 2 of 40 are refused once in 2,400 times, of 20 once in
+18,000.
+"""
 
 UPRIGHT = (
     "GX4-C351S-L",
@@ -280,7 +284,7 @@ UPRIGHT = (
     "G6-651S",
 )
 TILTING = ("C8-C1401CR", "C12-C1401S", "CX4-A601SR", "CX7-A701S", "C4-A601S", "VT6L")
-"""One robot of each family and mounting: docs/reference/touches.md 11 has what was counted."""
+"""One robot of each family and mounting; docs/reference/touches.md 11 has the counts."""
 
 
 def counted(robots, cells, least, measures):
@@ -305,9 +309,9 @@ def counted(robots, cells, least, measures):
 def test_the_interval_of_each_method_holds_the_truth_about_as_often_as_it_says(
     measure, robot, cells, least, tmp_path, monkeypatch, record_property
 ):
-    """Counted over cells with other seeds; each axis for itself: they share their touches.
+    """The count covers cells with other seeds, and each axis separately, as axes share touches.
 
-    A cell that is refused holds nothing.
+    A refused cell counts as one that holds nothing.
     """
     held, refused = dict[str, int](), dict[int, str]()
     for seed in range(200, 200 + cells):

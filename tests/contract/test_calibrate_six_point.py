@@ -1,4 +1,4 @@
-"""``calibrate six-point`` live: all six components, on a PLC whose flange leaves the vertical."""
+"""``calibrate six-point`` live: all six components, on a PLC whose flange tilts."""
 
 from dataclasses import replace
 
@@ -33,7 +33,7 @@ TURNED = WorldParameters(tool_u_deg=14.0, tool_v_deg=7.0, tool_w_deg=356.0)
 
 
 def orientation(offset):
-    """Return how an offset turns the tool."""
+    """Return the rotation of an offset."""
     return rotation_of(Pose(0.0, 0.0, 0.0, *offset.components()[3:]))
 
 
@@ -127,7 +127,7 @@ def test_ctrl_c_on_a_way_puts_the_tool_back_and_writes_nothing():
 def test_over_a_bus_touches_and_ways_go_the_same():
     simulator = turned_simulator(seed=9)
     with served("modbus-tcp", simulator) as cell, cell.connect() as controller:
-        # In real time, so only as far as the write.
+        # It runs in real time, so the test goes only as far as the write.
         (report,) = change(controller, simulator, verify=False).run().tools
         result, truth = report.proposal.result, simulator.world.tips[1]
         for axis, other in zip(orientation(result.offset).T, orientation(truth).T, strict=True):
@@ -153,7 +153,7 @@ def test_what_cannot_be_done_is_refused_before_anything_moves(plc, words, code, 
 
 
 def test_six_axes_of_an_arm_would_do_it_too(tmp_path, monkeypatch):
-    """No six-axis EPSON arm is simulated: the steps and requests alone are looked at."""
+    """There is no six-axis EPSON arm here: only the steps and requests are compared."""
     with method_cell("epson", tmp_path, monkeypatch) as cell:
         robot = "robolink.controllers.epson"
         monkeypatch.setattr(f"{robot}.group.EpsonGroup.axes", lambda _: {"joints": (0.0,) * 6})

@@ -1,4 +1,4 @@
-"""``plane-touch`` and ``sphere-touch`` live, on a PLC whose flange leaves the vertical."""
+"""``plane-touch`` and ``sphere-touch`` live, on a PLC whose flange tilts."""
 
 from dataclasses import replace
 from functools import partial
@@ -23,7 +23,7 @@ LEANING = WorldParameters(person_touches="plane", plane_lean_deg=20.0, plane_lea
 
 @pytest.fixture
 def plc(serve_simulator, monkeypatch):
-    """Opens a simulated machine of five axes, in process; its URL stands in ``url``."""
+    """Opens a simulated five-axis machine in this process; ``url`` is its URL."""
     monkeypatch.setattr("robolink.calibration_run.Limits", partial(Limits, speed_percent=100))
 
     def open_machine(world=LEANING, kinematics="Kin_5Axes"):
@@ -35,7 +35,7 @@ def plc(serve_simulator, monkeypatch):
 
 
 def run(simulator, *words):
-    """Run a command; return its exit code, its document and what it said."""
+    """Run a command; return its exit code, document and messages."""
     ended = run_command("-c", simulator.url, *words, "--json")
     return ended.code, ended.document, ended.err
 
@@ -46,14 +46,14 @@ def calibrate(simulator, method, *more):
 
 
 def slot(simulator):
-    """Return the lengths that the PLC holds."""
+    """Return the lengths in the PLC's tool slot."""
     return simulator.plc.memory.slot(1).tool[:3]
 
 
 def inside(simulator, tool):
-    """Return whether each length that was written is within twice its interval of the truth.
+    """Return whether each written length is within twice its interval of the truth.
 
-    One in 20 lies outside of a 95 % interval; how many do is counted in soak.
+    One in 20 lies outside a 95 % interval; a soak test counts them.
     """
     truth, half = simulator.world.tips[1].components()[:3], tool["fit"]["half_width95"].values()
     found = zip(slot(simulator), truth, half, strict=True)
@@ -61,7 +61,7 @@ def inside(simulator, tool):
 
 
 def recalibrate(simulator, example, folder):
-    """Run an example, at full speed, which changes nothing but how long a test takes."""
+    """Run an example at full speed, which only shortens the test."""
     path, text = folder / example.name, example.read_text(encoding="utf-8")
     fast = text.replace("percent = 30", "percent = 100").replace("mm_s = 40", "mm_s = 100")
     path.write_text(fast, encoding="utf-8")

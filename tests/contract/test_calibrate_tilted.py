@@ -1,4 +1,4 @@
-"""``pivot``, ``six-point`` and ``one-touch`` from poses that a person took; ``station learn``."""
+"""``pivot``, ``six-point`` and ``one-touch`` from taught poses; ``station learn``."""
 
 import csv
 from itertools import product
@@ -25,7 +25,7 @@ def cell(request, tmp_path, monkeypatch):
 
 
 def touching(pose):
-    """Return the flange's coordinates with the tip on the pin, oriented as ``pose``."""
+    """Return the flange's coordinates with the tip on the pin, in the orientation of ``pose``."""
     place = PIN - rotation_of(pose) @ TIP.components()[:3]
     return (*place.tolist(), *pose.coordinates()[3:])
 
@@ -39,7 +39,7 @@ def poses_file(path, rows, columns=COLUMNS):
 
 
 def six_points():
-    """Return pivot poses and the two ways along the tool's own axes."""
+    """Return pivot poses and the two moves along the tool's own axes."""
     rows = [touching(pose) for pose in TILTED]
     last = TILTED[-1]
     axes = rotation_of(last) @ rotation_of(Pose(0, 0, 0, *TIP.components()[3:]))
@@ -112,7 +112,7 @@ def test_one_touch_may_be_taught_too(tmp_path, monkeypatch):
         typed = f"{x + 0.2},{y},{z + 0.3},90"
         done = cell.run("calibrate", "one-touch", "--pose", typed, "--sigma", "0.01", *at)
         assert done.code == 0, done.err
-        # At U 90 the base's X is the flange's -Y; a flange that stands higher has a longer tip.
+        # At U 90 the base's X is the flange's -Y; the higher the flange, the longer the tip.
         change = [b - a for a, b in zip(TIP.components(), cell.stored.components(), strict=True)]
         assert change[:2] == pytest.approx([0.0, 0.2], abs=2e-3)
         three = cell.run("calibrate", "one-touch", "--pose", "1,2,90", *at)
@@ -122,7 +122,7 @@ def test_one_touch_may_be_taught_too(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize(
     ("cell", "name"),
-    # How beams are traced depends on no kind, and is slow on a PLC.
+    # Tracing beams is the same on every kind, and slow on a PLC.
     [
         ("epson", "PIN-07"),
         ("epson", "BEAMS-02"),

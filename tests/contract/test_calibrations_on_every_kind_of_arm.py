@@ -1,4 +1,4 @@
-"""Two poses and many poses find the true tip on arms that share no kinematics."""
+"""Two poses and many poses find the true tip on arms with different kinematics."""
 
 import sys
 from itertools import product
@@ -46,7 +46,7 @@ def cell(serve_simulator, monkeypatch):
     sys.modules.pop("double_scara", None)
 
 
-# The others are left to make soak.
+# The others run only in make soak.
 FIRST = {(OWN, "two-pose"), ("Kin_ArticulatedRobot_6DOF", "n-angle"), ("Kin_5Axes", "n-angle")}
 
 

@@ -1,4 +1,4 @@
-"""A camera that was turned since it was calibrated: what it measured does not stay written."""
+"""A camera turned since its calibration: its results do not stay written."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ pytestmark = [pytest.mark.simulator_only, pytest.mark.timeout(120)]
 
 @pytest.mark.parametrize("what", ["turned", "nearer"])
 def test_what_was_seen_through_it_is_contradicted_by_its_own_turn_test(desk, what):
-    """0.025 and 0.055 mm wrong, in a turn test with a limit of 0.2 mm."""
+    """The results are 0.025 and 0.055 mm wrong, in a turn test with a limit of 0.2 mm."""
     opened = desk()
     usual = ("--tool", "1", "--station", "CAM", "--sensor", SIM, "--yes", "--json")
     code, _, messages = opened.run("calibrate", "camera-affine", "--at", opened.at, *usual)
@@ -29,7 +29,7 @@ def test_what_was_seen_through_it_is_contradicted_by_its_own_turn_test(desk, wha
     }[what]
     world.change_nozzle()
     code, document, messages = opened.run("calibrate", "camera", *usual)
-    # Refused before it was written, or taken back after it.
+    # Refused before the write, or undone after it.
     assert code in (7, 8), messages
     assert document["error"]["code"] in ("proof_contradicts_accuracy", "camera_changed")
     now = machine.tools.get(1)

@@ -1,7 +1,7 @@
-"""The selected tool is never cleared behind anybody's back, on every kind of controller.
+"""The selected tool is never cleared unnoticed, on any kind of controller.
 
-What would stay green while the next program crashes a nozzle: a clear that is accepted, read back
-and on record, and leaves the machine with Tool 0.
+The undetected fault would be a clear that is accepted, read back and recorded, leaves the machine
+with Tool 0, and lets the next program crash a nozzle.
 """
 
 from contextlib import ExitStack
@@ -35,7 +35,7 @@ _names = count()
 
 @dataclass
 class Cell:
-    """A controller with two tools, the first in force, and one that is undefined."""
+    """A controller with two tools, the first one selected, and one undefined tool."""
 
     controller: Controller
     first: int = 1
@@ -135,7 +135,7 @@ def test_a_roll_back_to_undefined_selects_the_earlier_tool_then_clears(cell):
         ToolChange(cell.controller, [Wanted(EMPTY, SECOND, None)], verify=True) as change,
     ):
         change.write()
-        cell.tools.select(EMPTY)  # for its proof
+        cell.tools.select(EMPTY)  # for its turn test
         raise RuntimeError
     assert cell.tools.read(EMPTY) is None
     assert cell.tools.selected() == 1

@@ -1,4 +1,4 @@
-"""``connect(url, kind=...)``: typed as that kind, or refused before anything is connected."""
+"""``connect(url, kind=...)`` is typed as that kind, or refused before anything is connected."""
 
 from typing import assert_type
 
@@ -32,7 +32,7 @@ def test_a_controller_is_of_the_kind_that_was_asked_for():
 
 @pytest.mark.parametrize("kind", [SoftMotionController, PlcMapController, SimpleController])
 def test_a_url_of_another_kind_is_refused_before_anything_is_connected(kind):
-    url = "epson+tcp://192.0.2.1:5000"  # nobody is there, and nobody is asked
+    url = "epson+tcp://192.0.2.1:5000"  # there is no controller, and none is asked
     with pytest.raises(ConfigError, match=f"EpsonController, not {kind.__name__}") as refusal:
         robolink.connect(url, kind=kind)
     assert url in refusal.value.what

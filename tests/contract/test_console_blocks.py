@@ -1,9 +1,9 @@
-"""Every block of commands of README and of the pages is typed as it stands, or it is named why not.
+"""Every command block of README and the pages is run as printed, or listed with a reason.
 
-``test_pages_typed.py`` types the parts of its list. Here is what remains: the other blocks of a
-page from top to bottom against one simulated cell, which stands in for every address, cell and
-served simulator. A command that asks is typed once as it stands, where nobody can answer: it ends
-with 9. Then it is typed with ``--yes``, which is the answer of the person at the cell.
+``test_pages_typed.py`` runs the parts in its own list. This module runs the other blocks of a page
+from top to bottom against one simulated cell, which replaces every address, cell and served
+simulator. A command that asks is first run as printed, with nobody to answer: it ends with 9. Then
+it is run with ``--yes``, in place of the answer of the person at the cell.
 """
 
 import json
@@ -44,7 +44,7 @@ URL = "epson+sim://pages"
 
 
 class Elsewhere(NamedTuple):
-    """Why a block is not run here, which test does it, and what of it stands there."""
+    """The reason why a block is not run here, the test that runs it, and the text that shows it."""
 
     why: str
     test: str
@@ -113,7 +113,7 @@ NOT_RUN = {
         ('"jog", "--keys"',),
     ),
 }
-"""Blocks, and single commands of blocks, that need what is not here."""
+"""Blocks, and single commands of blocks, that need something not available here."""
 
 
 def page_name(page):
@@ -129,7 +129,7 @@ def blocks(page):
 
 
 def commands(page):
-    """Yield of each command its place, such as ``README.md 1, 4``, what is typed, and its end."""
+    """Yield the place of each command, such as ``README.md 1, 4``, its text, and its exit code."""
     for number, shown in enumerate(blocks(page), start=1):
         typed = list(re.finditer(r"^\$ (.*)$", shown, re.M))
         for at, line in enumerate(typed, start=1):
@@ -142,7 +142,7 @@ def commands(page):
 HERE = [page for page in PAGES if blocks(page)]
 
 LONG = dict.fromkeys(("README.zh.md", "recipes.md", "stations.md"), pytest.mark.soak)
-"""Whole changes of a needle, and a search of beams: others in the default suite have them too."""
+"""Whole needle changes and a search for beams; other tests of the default suite cover them."""
 
 CELLS = "".join(
     f"""[cells.{name}]
@@ -191,7 +191,7 @@ def cell(tmp_path, monkeypatch):
 
 @contextmanager
 def served(cell, page):
-    """Yield the addresses of the cell and of its person: on ports where a page names both."""
+    """Yield the addresses of the cell and its person, on fixed ports if a page names them."""
     if "sim assist" in "".join(line for _, line, _ in commands(page)):
         clock = ScaledClock(40.0)
         with serve_tcp(cell, clock=clock) as host, serve_assist(cell, clock=clock) as assist:
@@ -211,7 +211,7 @@ def ended(words, capsys):
 
 
 def agreed(words, person):
-    """Return what is typed where the person of the cell says yes, and brings the tip."""
+    """Return the command with options by which the simulated person confirms and brings the tip."""
     if "--report" in words:  # it is written before the question
         Path(words[words.index("--report") + 1]).unlink()
     live = "change" in words or "two-pose" in words
@@ -220,7 +220,7 @@ def agreed(words, person):
 
 
 def recorded(capsys):
-    """Write tool 1 twice; return the id of the first change and the number of its value."""
+    """Write tool 1 twice; return the id of the first change and the number of its entry."""
     for x in ("12.3", "12.35"):
         assert main.run(["tool", "set", "1", "--x", x, "--y", "-3.7", "--z", "-20"]) == 0
     _, shown = ended(["journal", "list", "--kind", "done", "--json"], capsys)
@@ -229,7 +229,7 @@ def recorded(capsys):
 
 
 def before(place, cell):
-    """Bring the cell to where a page says that it is by then."""
+    """Bring the cell into the state that the page assumes by then."""
     if place == "tutorial.md 5, 1":
         cell.panel.teach()
     if place == "stations.md 1, 3":
@@ -248,7 +248,7 @@ def test_the_blocks_of_a_page_can_be_typed(cell, page, capsys, monkeypatch):
         change, entry = recorded(capsys) if page.name == "records.md" else ("", "")
         for place, line, end in commands(page):
             if not_run(place) or not line.startswith("robolink ") or " sim epson " in line:
-                continue  # what is exported is set, what is served stands here
+                continue  # exported variables are set, served simulators are replaced
             before(place, cell)
             typed = line.partition("  #")[0].replace("9a59", change[:8])
             typed = re.sub(r"(sim assist) (URL|assist\+tcp://\S+)", rf"\1 {person}", typed)
@@ -285,7 +285,7 @@ SCRIPTS = {
 @pytest.mark.soak
 @pytest.mark.parametrize("place", SCRIPTS)
 def test_a_script_runs_in_a_shell(place, tmp_path):
-    """Whatever it leaves in the background ends with it; it gets a port that is free."""
+    """Background jobs of the script end with it; it gets a free port."""
     shutil.copy(ROOT / "examples" / "ci" / "cells.toml", tmp_path)
     (tmp_path / "robolink").symlink_to(Path(sys.executable).with_name("robolink"))
     script = SCRIPTS[place].replace("127.0.0.1:5000", "127.0.0.1:0")

@@ -1,4 +1,4 @@
-"""Nozzle and pin as a switch: an input of the controller, read by the driver as any other."""
+"""Nozzle and pin as a switch: a controller input that the driver reads like any other."""
 
 from contextlib import contextmanager
 from dataclasses import replace
@@ -17,12 +17,12 @@ INPUT = 7
 HOSTS = {"epson": epson, "softmotion": softmotion}
 ANYWHERE = WorkBox()
 LATE_MM = 0.1
-"""Braking on the way to rest, or a cycle of the PLC."""
+"""Braking distance, or one cycle of the PLC."""
 
 
 @contextmanager
 def wired_cell(kind, **world):
-    """Yield a controller and its simulator; nozzle and pin switch an input."""
+    """Yield a controller and its simulator, with nozzle and pin wired to an input."""
     wanted = {"contact_input": INPUT, "eye_sigma_mm": 0.01, **world}
     options = "&".join(f"world.{name}={value}" for name, value in wanted.items())
     name = f"contact-{kind}"
@@ -42,20 +42,20 @@ def cell(request):
 
 
 def carry(simulator, by_mm):
-    """Let the tip be somewhere else."""
+    """Carry the tip to another place."""
     with simulator.lock:
         world = simulator.world
         world.robot.carry(world.tips[1], by_mm)
 
 
 def over_the_pin(simulator, beside_mm=0.0, above_mm=2.0):
-    """Bring the tip over the pin, or beside that."""
+    """Bring the tip above the pin, or beside it."""
     dx, dy, dz = simulator.world.gap_mm()
     carry(simulator, (dx + beside_mm, dy, dz + above_mm))
 
 
 def seek_down(controller, by_mm=3.0):
-    """Go down until the input switches on; return where, if it did."""
+    """Move down until the input switches on; return the pose, or ``None`` if it did not."""
     group = controller.groups[0]
     here = group.pose()
     target = replace(here, z_mm=here.z_mm - by_mm)

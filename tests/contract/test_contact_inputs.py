@@ -1,4 +1,4 @@
-"""A contact input that is not there is known before the robot moves and a person is asked."""
+"""A missing contact input is reported before the robot moves or a person is asked."""
 
 import json
 import math
@@ -33,7 +33,7 @@ def cell(kind, tmp_path, monkeypatch):
 
 @pytest.fixture
 def bench(monkeypatch, tmp_path):
-    """A controller of a kind that has no inputs."""
+    """A controller of a kind without inputs."""
     install(monkeypatch, ("bench", "bench_package.bench_controller:open_bench"))
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
     with BenchServer() as server:
@@ -96,7 +96,7 @@ def test_a_controller_without_inputs_is_refused_with_the_plan(bench, capsys, met
     error = json.loads(capsys.readouterr().out)["error"]
     assert (error["kind"], "no inputs" in error["what"]) == ("ConfigError", True)
     assert bench.machine.tip(robolink.ToolOffset()) == here
-    # Without it the same plan is a plan.
+    # Without the input the same plan is valid.
     assert (
         main.run([*(word for word in words if word not in ("--contact-input", "3")), "--dry-run"])
         == 0

@@ -1,4 +1,4 @@
-"""What each act answers is described in the OpenAPI document, for a client in another language."""
+"""The OpenAPI document describes the answer of each act, for clients in other languages."""
 
 import json
 from contextlib import ExitStack
@@ -45,15 +45,15 @@ GIVEN = {
     "teach_point": {"number": 1, "u_deg": 10},
     "way_along": {"axis": "x", "length_mm": 5},
 }
-"""What acts are given that need something."""
+"""The parameters of acts that need some."""
 
 FIRST = ("snapshot", "teach", "jog_onto_pin", "teach_point", "auto", "move_axis")
-"""What the acts behind them, by name, would bar."""
+"""Acts that come first because earlier acts by name would block them."""
 
 
 @pytest.fixture(params=["epson", "softmotion", "plc"])
 def at(request):
-    """Asks a simulator of each kind by GET and POST, and looks at each answer."""
+    """Runs acts on a simulator of each kind by GET and POST, and checks each answer."""
     simulator: AnySimulator
     if request.param == "epson":
         simulator = EpsonSimulator("T6-602S,C8-C901S", seed=3)
@@ -68,7 +68,7 @@ def at(request):
 
 
 class Asked:
-    """A client in another language, which has read the document."""
+    """A client in another language that follows the document."""
 
     def __init__(self, server, cell):
         self.server, self.cell, self.simulator = server, cell, cell.simulator
@@ -84,7 +84,7 @@ class Asked:
         return int(status), answer
 
     def act(self, name, given=None):
-        """Do an act, by each method that the document has, and return what is told last."""
+        """Run an act by each method in the document, and return the last answer."""
         path = f"/cells/{{cell}}/{name}"
         for method in ("get", "post"):
             if method in DOCUMENT["paths"][path]:
@@ -171,7 +171,7 @@ def test_what_json_has_not_is_no_answer():
 
 
 def test_the_check_of_a_schema_sees_what_is_wrong():
-    """Else every answer would pass."""
+    """Without this every answer would pass."""
     right = {
         "fired": [{"action": "delay"}],
         "times_fired": 1,

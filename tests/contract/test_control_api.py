@@ -1,4 +1,4 @@
-"""The control API: what a client in any language does to a simulated cell."""
+"""The control API: a client in any language operates a simulated cell."""
 
 import http.client
 import json
@@ -56,7 +56,7 @@ def cells():
 
 @pytest.fixture
 def at(cells):
-    """A maker of clients, each cell as at first."""
+    """Makes clients, each of a cell in its initial state."""
     with ExitStack() as stack:
 
         def client(name):
@@ -70,7 +70,7 @@ def at(cells):
 
 
 def raw(cells, method, path, body=b"", headers=()):
-    """Send a request as any client may, and return status and document."""
+    """Send any request; return status and document."""
     parts = urlsplit(cells.url)
     connection = http.client.HTTPConnection(parts.hostname, parts.port, timeout=10)
     try:
@@ -158,7 +158,7 @@ def test_sim_ctl_does_an_act_from_a_shell(cells, at, capsys):
 
 
 def test_sim_ctl_takes_for_a_text_what_is_one(cells, at, capsys):
-    """A snapshot may be called 007, and a request be found by a number in it."""
+    """A snapshot may be called 007, and a number may select a request by its text."""
     control, _ = at("a")
 
     def ctl(*words):
@@ -304,7 +304,7 @@ def test_what_cannot_be_done_now_is_told_apart_from_what_was_asked_wrongly(
 
 
 def test_what_a_controller_cannot_keep_is_refused_and_noted(tmp_path):
-    """Whoever serves it ends it then; until that such an act says why."""
+    """Its host then ends it; until that the act gives the reason."""
     kept = tmp_path / "kept/plc.json"
     simulator = SoftMotionSimulator(state_path=kept)
     cell = ControlledCell(simulator, ManualClock())
@@ -324,7 +324,7 @@ def test_what_a_controller_cannot_keep_is_refused_and_noted(tmp_path):
 
 
 def exchanged(cells, sent, *, then_closes=False):
-    """Send bytes as they are, and return the head and the document of the answer."""
+    """Send raw bytes; return the head and the document of the answer."""
     parts = urlsplit(cells.url)
     with socket.create_connection((parts.hostname, parts.port), 10) as connection:
         connection.sendall(sent)
@@ -407,7 +407,7 @@ def test_each_address_answers_the_methods_of_the_document_and_names_them_to_othe
         allowed = ", ".join(it for it in ("GET", "POST") if it.lower() in operations)
         if method in allowed:
             continue
-        # The method is refused before what is given is looked at.
+        # The method is refused before the body is read.
         sent = (
             f"{method} {base}{address} HTTP/1.1\r\nHost: localhost\r\nContent-Length: 2\r\n\r\n[]"
         )
@@ -541,7 +541,7 @@ def test_silent_clients_are_bounded_and_keep_nobody_out_for_good(cells, monkeypa
                 assert far_too_many.recv(1) == b""
             for connection in too_silent:
                 connection.close()
-    # The server sees that they have left a moment later.
+    # The server notices a moment later that they have left.
     ends = time.monotonic() + 20.0
     while counters_of(cells.url_of("a")) is None:
         assert time.monotonic() < ends
@@ -587,7 +587,7 @@ def test_who_sends_a_byte_now_and_then_is_cut_off_like_who_sends_none(cells, mon
             except TimeoutError:
                 continue  # not yet
             except OSError:
-                pass  # cut off with a byte under way
+                pass  # cut off in the middle of a byte sequence
             break
         else:
             pytest.fail("it has a place for good")
@@ -638,7 +638,7 @@ def test_a_simulator_that_ends_cuts_those_who_ask():
 
 def test_the_openapi_document_of_the_wheel_is_the_one_of_the_acts(cells):
     held = json.loads(files("robolink_simulators.control").joinpath("openapi.json").read_bytes())
-    # Made anew: python -m tools.openapi > .../control/openapi.json
+    # The maker is: python -m tools.openapi > .../control/openapi.json
     assert held == json.loads(json.dumps(openapi()))
     status, served = raw(cells, "GET", f"{urlsplit(cells.url).path}/openapi.json")
     assert (status, served) == (200, held)

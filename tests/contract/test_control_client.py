@@ -1,4 +1,4 @@
-"""The clients of a simulator, where what they talk to is none, is silent or has ended."""
+"""Clients of a simulator whose far end is something else, is silent or has ended."""
 
 import json
 import socket
@@ -45,7 +45,7 @@ CUT = {
 
 @contextmanager
 def answering(answer, *, holds=False):
-    """Serve one connection: read what is asked, answer that, and end it unless it is held."""
+    """Serve one connection: read a request, send this answer, and close it unless it is held."""
     done = threading.Event()
     with socket.create_server(("127.0.0.1", 0)) as listener:
 
@@ -57,7 +57,7 @@ def answering(answer, *, holds=False):
                 if holds:
                     done.wait(20)
                 connection.shutdown(socket.SHUT_WR)
-                while connection.recv(65536):  # to close before all is read would be a reset
+                while connection.recv(65536):  # closing with unread bytes would send a reset
                     pass
 
         thread = threading.Thread(target=serve, daemon=True)
@@ -141,7 +141,7 @@ def test_a_client_that_was_silent_for_long_connects_again(served, monkeypatch):
         first = client._connection.sock
         first.settimeout(10)
         assert first.recv(1, socket.MSG_PEEK) == b""  # the simulator has ended it
-        # Whatever is sent is carried out, and once.
+        # The act is carried out, once.
         assert client.do("counters")["starts"] == 1
         assert client._connection.sock is not first
         assert client._connection.sock.gettimeout() == 10.0

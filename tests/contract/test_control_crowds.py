@@ -1,4 +1,4 @@
-"""Many control clients at once, at simulators that clients of the controllers use meanwhile."""
+"""Many control clients at once, on simulators that other clients use at the same time."""
 
 import os
 import random
@@ -55,7 +55,7 @@ def served(monkeypatch, tmp_path):
 
 
 def together(*works):
-    """Do all of them at once, each in a thread of its own; return what each gave."""
+    """Run all of them at once, each in a thread; return the results."""
     given = [None] * len(works)
 
     def do(number):
@@ -71,7 +71,7 @@ def together(*works):
 
 
 def some(taken, rng):
-    """Return a value that an act takes."""
+    """Return a value that an act accepts."""
     match taken.form:
         case "whole":
             least, most = taken.whole_limits
@@ -93,7 +93,7 @@ def test_every_act_is_answered_whatever_others_do_at_the_same_time(served, each)
     done = threading.Event()
 
     def act(seed):
-        """Do acts, whichever; one that fails as a defect, or is not answered, ends it all."""
+        """Run random acts; a defect or a missing answer ends the thread with an error."""
         rng, refused = random.Random(seed), 0
         for _ in range(each // 20):
             kind = rng.choice(sorted(ACTS))
@@ -109,7 +109,7 @@ def test_every_act_is_answered_whatever_others_do_at_the_same_time(served, each)
         return refused
 
     def use(kind):
-        """Write tools as the real driver does, however often it is cut off."""
+        """Write tools as the real driver does, however often it is disconnected."""
         tries = 0
         while not done.is_set():
             tries += 1
@@ -150,7 +150,7 @@ def test_no_step_of_one_client_is_lost_in_that_of_another(served):
 
 
 def test_what_was_restored_is_whole_whoever_looks(served):
-    """Two tools are written in one go before each snapshot, and are always seen together."""
+    """Each snapshot follows a write of two tools in one step; no client sees only one of them."""
     simulator = served.cells["epson"].simulator
     with ControlClient(served.url_of("epson")) as control:
         for name, x_mm in (("a", 1.0), ("b", 2.0)):

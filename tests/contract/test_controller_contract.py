@@ -1,4 +1,4 @@
-"""Every kind of controller keeps the promises that ``robolink.testing`` looks at."""
+"""Every kind of controller passes the contract checks of ``robolink.testing``."""
 
 import pytest
 

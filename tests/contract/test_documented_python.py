@@ -1,7 +1,7 @@
-"""Every Python block of README and of the pages runs as it stands, against simulators.
+"""Every Python block of README and the pages runs as printed, against simulators.
 
-Only addresses are replaced, by those of simulators; what a block takes as given (a controller, an
-operator, a file) is brought by a maker of this file. A block without a maker fails.
+Only the addresses are replaced, by those of simulators. A maker in this file supplies the names
+that a block assumes (a controller, an operator, a file); a block without a maker fails.
 """
 
 import logging
@@ -89,13 +89,13 @@ def softmotion() -> Iterator[SoftMotionSimulator]:
 
 
 class Agrees:
-    """An operator who says yes."""
+    """An operator who confirms everything."""
 
     def tell(self, text: str) -> None:
-        """Hear a line."""
+        """Accept a message."""
 
     def ask(self, question: str, kind: object) -> None:
-        """Hear a question."""
+        """Accept a question."""
 
     def poll(self, wait_s: float) -> str:
         """Answer."""
@@ -230,7 +230,7 @@ def a_camera_for_a_recipe(stack: ExitStack) -> dict[str, Any]:
     asked, ended = list[int](), list[str]()
 
     class Counted:
-        """The cell's camera, which nobody could have opened by a name."""
+        """The cell's camera, given as an object because no name opens it."""
 
         identity, unit = "acme-camera 00123", inner.unit
         resolution_px, settle_s = inner.resolution_px, inner.settle_s
@@ -267,7 +267,7 @@ def a_panel(stack: ExitStack) -> dict[str, Any]:
 
 
 def an_acme_arm(stack: ExitStack) -> dict[str, Any]:
-    """An arm on which a movement lasts until it was asked for three times."""
+    """An arm whose movement lasts until it was polled three times."""
     inner, left = SimpleMachine(tools={1: ToolOffset(12.0, -3.5, -20.0)}), [0]
     done = list[str]()
 
@@ -285,7 +285,7 @@ def an_acme_arm(stack: ExitStack) -> dict[str, Any]:
         done.append("stop")
 
     def then() -> bool:
-        """Whether it was moved and stopped, its tool is back, and its opener takes the record."""
+        """Whether it moved and stopped, its tool is restored, and its opener uses the record."""
         record = memory_journal("acme").log("acme")
         terms = ConnectionTerms(Signature(), outcomes=record)
         with given["open_acme"](parse_url("acme+usb://17"), terms) as controller:
@@ -324,7 +324,7 @@ def nothing(stack: ExitStack) -> dict[str, Any]:
 
 
 def as_in_a_wheel(stack: ExitStack) -> dict[str, Any]:
-    """Lay the pages where a wheel has them; a checkout has them at its top."""
+    """Put the pages where a wheel has them; in a checkout they are at the top."""
     stack.enter_context(patch("importlib.resources.files", lambda _: ROOT))
     return {}
 
@@ -404,7 +404,7 @@ def test_a_block_runs(name, tmp_path, monkeypatch):
     with ExitStack() as stack:
         given = MAKERS[name](stack)
         then = given.pop("then", lambda: True)
-        exec(compile(BLOCKS[name], name, "exec"), given)  # what it is to do: run what is shown
+        exec(compile(BLOCKS[name], name, "exec"), given)  # its task: run the printed code
         assert then()
 
 

@@ -1,4 +1,4 @@
-"""A closed window and a closed pipe end a command at its question, or in a movement, in order."""
+"""A closed window or pipe ends a command in order, at a question or during a movement."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""A controller whose base is not that of the robot (docs/reference/spel.md 5.4)."""
+"""A controller whose base differs from the robot's (docs/reference/spel.md 5.4)."""
 
 from dataclasses import replace
 

@@ -11,7 +11,7 @@ from robolink.model import ToolOffset
 from tests.contract._device_server import device_server
 
 
-# pyserial 3.5 starts its reader of RFC 2217 in an old way.
+# pyserial 3.5 starts its RFC 2217 reader with a deprecated call.
 @pytest.mark.filterwarnings("ignore:set(Daemon|Name):DeprecationWarning")
 @pytest.mark.parametrize("kind", ["socket", "rfc2217"])
 def test_a_tool_is_written_and_read_back_through_a_device_server(kind):

@@ -1,4 +1,4 @@
-"""What an EPSON controller's errors name: the controller, and what it was asked."""
+"""Errors of an EPSON controller name the controller and the request."""
 
 from dataclasses import replace
 
@@ -47,7 +47,7 @@ def controller(cell):
 
 @pytest.fixture
 def named(cell):
-    """What an act raises: its class, whether it names this controller, and the request."""
+    """The error of an act: its class, whether it names this controller, and the request."""
 
     def names(act, *given, **options):
         with pytest.raises(RobolinkError) as caught:

@@ -1,4 +1,4 @@
-"""Who an EPSON controller is, however it is reached: over real TCP and in the same process."""
+"""The identity of an EPSON controller is the same over TCP and in the same process."""
 
 import pytest
 from robolink_simulators.cell.clock import ManualClock
@@ -21,13 +21,13 @@ def simulator():
 
 
 def spellings(host):
-    """Return two spellings of the URL of a served simulator."""
+    """Return two URLs of one served simulator."""
     port = host.url.rpartition(":")[2]
     return f"epson+tcp://127.0.0.1:{port}", f"epson+tcp://localhost:{port}"
 
 
 def leave_open(url):
-    """End in the middle of a write, as a killed process does."""
+    """Stop in the middle of a write, as a killed process does."""
     controller = robolink.connect(url)
     marker = Marker("op-1", MarkerKind.SET, "TLSet 1, XY(...)", wall_label(), {"tool": 1})
     controller.outcomes.begin(marker)
@@ -120,7 +120,7 @@ def test_a_write_that_ends_after_an_answer_came_bent_is_met_by_the_next_run(
 
 @pytest.mark.fault("F08")
 def test_two_swapped_digits_of_a_serial_number_make_no_other_controller_of_it(simulator):
-    """A checksum by XOR does not notice them (docs/remote-rs232.md)."""
+    """A checksum by XOR does not detect swapped digits (docs/remote-rs232.md)."""
     query = "Print RobotSerial$"
     with serve_serial(simulator) as host:
         simulator.faults = FaultPlan([Fault(FaultAction.SWAP_BYTES, match=query)])
@@ -145,7 +145,7 @@ def test_a_controller_that_is_busy_is_taken_for_whom_it_was_the_last_time(simula
     with served(simulator, clock=clock) as url:
         with robolink.connect(url) as controller:
             name = controller.outcomes.identity
-        # An Execute of a client that has gone keeps the controller from answering.
+        # An Execute of a client that has left keeps the controller from answering.
         link = simulator.connect(clock.now_ns())
         link.receive(b'$Login,\r\n$Execute,"Move Here +X(-20)"\r\n', clock.now_ns())
         link.receive(b"", clock.now_ns())

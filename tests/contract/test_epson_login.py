@@ -1,4 +1,4 @@
-"""Logging in and out, states that forbid a command, and what a link's end means."""
+"""Login and logout, states that forbid a command, and the meaning of a closed link."""
 
 import pytest
 from robolink_simulators.epson.condition import Mode

@@ -1,4 +1,4 @@
-"""Movements: at most once, watched, stoppable, inside limits, and put right afterwards."""
+"""Movements are sent at most once, watched, stoppable and limited; settings are restored after."""
 
 import threading
 from dataclasses import replace
@@ -170,7 +170,7 @@ def test_an_emergency_stop_or_an_open_guard_ends_the_move_and_nothing_is_resent(
         group, target = start(controller, dz_mm=30)
         moved = cell.simulator.machine.arm.moves_started
         motion = group.move_to(target, MotionProfile(Path.STRAIGHT, 1, 5.0), box=EVERYWHERE)
-        controller.status()  # by now the movement has surely been started
+        controller.status()  # by now the movement has started
         getattr(cell.simulator.panel, danger)()
         with pytest.raises(ControllerFaultError):
             motion.wait(timeout_s=60)

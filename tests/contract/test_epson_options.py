@@ -1,4 +1,4 @@
-"""Whatever habit a controller has where the documents are unsure, the driver works."""
+"""The driver works with every option of a controller that the documents leave open."""
 
 from dataclasses import fields, replace
 from typing import Any
@@ -80,12 +80,12 @@ def test_every_option_with_named_values_is_varied_here():
         "login_timeout_s",
         "remote_timeout_s",
         "numbers",
-        # Of the serial line alone: tests/contract/test_epson_serial_line.py.
+        # On the serial line only: tests/contract/test_epson_serial_line.py.
         *(field.name for field in fields(EpsonOptions) if field.name.startswith("rs232_")),
-        # Of the settling of the servo: tests/unit/test_sim_drives.py.
+        # Settling of the servo: tests/unit/test_sim_drives.py.
         "servo_lag_ms",
         "servo_unrest_pulses",
-        # Of programs alone: tests/unit/spel_programs.
+        # Programs only: tests/unit/spel_programs.
         "vision_acquisition_ms",
         "vision_object_ms",
         "vision_not_found",
@@ -112,7 +112,7 @@ ON_THE_WIRE = {
     *("terminator", "requests_end_with_silence", "second_client", "execute_on_disconnect"),
     *("abort_reply_first", "flags_during_execute", "logout_while_running"),
 }
-"""Habits that show in how bytes and connections go; the others are alike on every link."""
+"""Options that affect bytes and connections; the others are alike on every link."""
 
 
 @pytest.fixture(params=HABITS, ids=name_of)
@@ -121,7 +121,7 @@ def habit(request):
 
 
 def links(habit):
-    """Return the links on which a habit is tried, most of them in make soak."""
+    """Return the links on which an option is tried, most of them in make soak."""
     asked = {"sim", "tcp"} if not habit or ON_THE_WIRE & habit.keys() else {"sim"}
     return [
         pytest.param(

@@ -1,4 +1,4 @@
-"""Taught points: read, never changed, and never asked for when they are not there."""
+"""Taught points are read, never changed, and never requested where they do not exist."""
 
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator

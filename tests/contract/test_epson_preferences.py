@@ -1,4 +1,4 @@
-"""What the controller's own preferences mean for tool work, where its firmware tells them."""
+"""Effects of the controller's preferences on tool work, where its firmware reports them."""
 
 from dataclasses import replace
 
@@ -65,7 +65,7 @@ def test_what_an_unreal_cell_would_falsify_is_held_back_before_it_is_sent(habit,
 
 @pytest.mark.parametrize("habit", UNREAL)
 def test_an_old_value_is_put_back_all_the_same(habit):
-    """Left alone, a value that nobody proved would stay in force."""
+    """Otherwise an unconfirmed value would stay stored."""
     simulator = EpsonSimulator(seed=3, options=options_from_text({habit: "yes"}))
     with served("sim", simulator) as cell, cell.connect() as controller:
         unproved, old = controller.tools.read(1), ToolOffset(11.5, -3, -20)

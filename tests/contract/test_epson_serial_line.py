@@ -1,4 +1,4 @@
-"""Remote RS232 where it differs from Remote Ethernet: silence, dialects, letters, lost steps."""
+"""Remote RS232 where it differs from Remote Ethernet: silence, dialects, case, lost steps."""
 
 import os
 import select
@@ -101,7 +101,7 @@ def test_f02_a_late_answer_is_never_the_answer_to_a_later_question():
 
 
 def _read_on_a_new_session(url, number):
-    """An answer that comes while the line is opened may cost a session, never a wrong value."""
+    """An answer that arrives while the line is opened may cost a session, never a wrong value."""
     for _ in range(3):
         with (
             suppress(RemoteProtocolError, LoginUnansweredError),
@@ -113,7 +113,7 @@ def _read_on_a_new_session(url, number):
 
 @pytest.mark.fault("F08")
 def test_f08_a_write_that_arrives_with_two_bytes_swapped_is_found_and_put_back():
-    """The check sum does not see it: 12.500 and 21.500 have the same."""
+    """The checksum does not detect it: 12.500 and 21.500 have the same."""
     cable = SerialCable()
     try:
         with line() as (_, url), _relay(cable, url, b"12.500", b"21.500"):
@@ -130,7 +130,7 @@ def test_f08_a_write_that_arrives_with_two_bytes_swapped_is_found_and_put_back()
 
 @contextmanager
 def _relay(cable, url, find, put):
-    """Carry the bytes between a cable and the port of ``url``, and bend one text on its way."""
+    """Carry the bytes between a cable and the port of ``url``, and alter one text on the way."""
     import tty
 
     port = os.open(url[len("epson+serial://") :].partition("?")[0], os.O_RDWR | os.O_NOCTTY)

@@ -1,4 +1,4 @@
-"""The driver on a six-axis robot: points with flags, the short way round, singular places."""
+"""The driver on a six-axis robot: points with flags, the short way round, singular positions."""
 
 from dataclasses import replace
 
@@ -90,11 +90,11 @@ def test_a_straight_way_to_a_singular_wrist_is_refused_before_it_is_sent(arm):
     with pytest.raises(LimitError, match=r"Joint 5 would be at 4\.0 degrees"):
         go(controller, replace(singular, z_mm=singular.z_mm), STRAIGHT)
     assert machine.arm.moves_started == started
-    go(controller, singular, JOINT)  # from joint to joint it may
+    go(controller, singular, JOINT)  # joint to joint is allowed
 
 
 def test_a_straight_way_past_the_axis_of_joint_1_is_refused_before_it_is_sent(arm):
-    """The wrist 12 mm beside the axis: joint 1 would have to swing round."""
+    """The wrist is 12 mm from the axis: joint 1 would have to swing round."""
     simulator, controller = arm
     machine = simulator.machine
     model = machine.model
@@ -118,7 +118,7 @@ def test_a_straight_way_past_the_axis_of_joint_1_is_refused_before_it_is_sent(ar
 
 
 def wrist_mm(flange, model):
-    """Return where the centre of the wrist is."""
+    """Return the centre of the wrist."""
     axis = transposed(frame_of(flange).rotation)[2]
     at = flange.coordinates()[:3]
     return tuple(p - model.lengths_mm[5] * a for p, a in zip(at, axis, strict=True))

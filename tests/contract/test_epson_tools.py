@@ -1,4 +1,4 @@
-"""The tool table keeps its promises on every backend."""
+"""The tool table keeps its contract on every backend."""
 
 import threading
 
@@ -16,7 +16,7 @@ from robolink.errors import (
 )
 
 SCRATCH = 15
-"""The tool that these tests may write, on hardware too."""
+"""A tool that these tests may write, on hardware too."""
 
 NEW = ToolOffset(11.25, -3.125, -20.5, 0)
 

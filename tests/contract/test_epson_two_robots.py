@@ -1,4 +1,4 @@
-"""Two robots on one controller: a SCARA and six axes, each with its tools, points and world."""
+"""Two robots on one controller, a SCARA and a six-axis arm, each with its tools and points."""
 
 from dataclasses import replace
 
@@ -91,7 +91,7 @@ def test_each_robot_is_undone_by_its_own_record(cell):
     cell.machine.choose(1)
     with robolink.connect(cell.url) as controller:
         undo(controller, plan_undo(controller, tool=4))
-        # A statement that a person typed puts the other robot in force, and its record.
+        # A typed statement selects the other robot, and with it the other record.
         assert isinstance(controller, EpsonController)
         first = controller.outcomes.robot
         controller.execute_raw("Robot 2")
@@ -108,7 +108,7 @@ def test_what_was_begun_on_one_robot_is_not_judged_by_the_tools_of_another(cell)
     marker = Marker("op", MarkerKind.SET, "TLSet 4, XY(...)", wall_label(), details)
     with robolink.connect(cell.url) as controller:
         controller.outcomes.begin(marker)
-    cell.machine.robots[0].tools.set(4, offset)  # it would look done
+    cell.machine.robots[0].tools.set(4, offset)  # it would look finished
     cell.machine.choose(1)
     with robolink.connect(cell.url) as controller:
         with pytest.raises(OutcomeUnknownError):

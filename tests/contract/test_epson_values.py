@@ -1,4 +1,4 @@
-"""Inputs, outputs, memory bits, variables, alarms and facts of a controller."""
+"""Inputs, outputs, memory bits, variables, alarms and data of a controller."""
 
 import pytest
 from robolink_simulators.epson.device import EpsonSimulator

@@ -47,7 +47,7 @@ def cells(tmp_path, monkeypatch):
 
 @pytest.fixture
 def change_and_try(tmp_path, cells, capsys):
-    """Runs it on a cell, with a file of this text; returns exit code and what it printed."""
+    """Runs the program on a cell with a file of this text; returns exit code and output."""
     program = run_path(str(EXAMPLES / "programs/change_and_try.py"))["main"]
 
     def run(cell, text, command):
@@ -119,7 +119,7 @@ def test_a_link_that_is_cut_while_the_part_is_made_leaves_it_to_recover(
 
 @pytest.fixture
 def nightly(monkeypatch, capsys):
-    """Runs it on a mail server and cells; the command that it starts runs in this process."""
+    """Runs the program with a mail server and cells; its command runs in this process."""
     program = run_path(str(EXAMPLES / "programs/nightly_check.py"))["main"]
 
     def robolink_check(command, **_options):
@@ -164,7 +164,7 @@ def test_cells_that_could_not_be_checked_are_not_told_as_in_order(nightly, cells
 def test_a_report_that_cannot_be_mailed_is_printed(nightly, cells):
     with mail_server() as (server, mails):
         ends = [nightly(server, "epson", to=REFUSED)]
-    ends.append(nightly(server, "epson"))  # nobody listens there any more
+    ends.append(nightly(server, "epson"))  # no server listens there any more
     ends.append(nightly("mail.plant:smtp", "epson"))
     assert [code for code, _ in ends] == [69, 69, 69]
     assert all("epson: in order" in shown for _, shown in ends)

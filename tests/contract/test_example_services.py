@@ -1,4 +1,4 @@
-"""The programs of examples/services, each against simulated cells of both kinds."""
+"""The programs of examples/services, each with simulated cells of both kinds."""
 
 import asyncio
 import json
@@ -61,7 +61,7 @@ def test_asyncio_stops_the_controller_when_the_time_is_over():
         assert controller.tools.read(1) == held
 
 
-# FastAPI, without a socket: the service is called as a server would call it.
+# FastAPI without a socket: the service is called as a server would call it.
 
 
 class Caller:
@@ -71,7 +71,7 @@ class Caller:
         self._app = app
 
     async def ask(self, method: str, path: str, body: object = None) -> tuple[int, Any]:
-        """Return status and document."""
+        """Send a request; return status and document."""
         sent = json.dumps(body).encode()
         scope = {
             "type": "http",
@@ -149,7 +149,7 @@ def test_what_a_write_is_refused_for_is_told_and_a_stop_waits_for_no_thread():
             controller.patience.wait_s = PATIENCE_S
             writes = [asyncio.ensure_future(caller.ask("PUT", "/tools/4", new)) for _ in range(4)]
             lock = controller._driver.lock  # type: ignore[attr-defined]
-            while len(lock._waiting) < 2:  # the pool of threads is full of those that wait
+            while len(lock._waiting) < 2:  # waiting requests fill the pool of threads
                 await asyncio.sleep(0.001)
             assert await caller.ask("POST", "/stop") == (200, "stopped")
             for write in writes:

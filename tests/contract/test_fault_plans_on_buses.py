@@ -1,4 +1,4 @@
-"""What a plan does to frames, segments and connections, seen by our links on real buses."""
+"""Effects of fault plans on frames, segments and connections, seen by our links on real buses."""
 
 from contextlib import closing, contextmanager
 from typing import Any
@@ -110,7 +110,7 @@ def test_frames_in_pieces_or_twice_give_no_other_values(bus, action):
             try:
                 read = [link.read_slot(slot) for slot in (1, 2)]
             except TransportError:
-                return  # a line may be given up; a wrong value may not be taken
+                return  # a line may fail; a wrong value must not be accepted
             assert read == usual
             assert len(faults.fired) == 1
 
@@ -119,7 +119,7 @@ def test_frames_in_pieces_or_twice_give_no_other_values(bus, action):
     "segment", [3, *(pytest.param(segment, marks=pytest.mark.soak) for segment in (0, -1))]
 )
 def test_the_segment_that_is_lost_is_the_one_that_the_plan_says(segment, tmp_path):
-    """A slot of 36 words travels in 11 segments; what is lost shows in what was asked after."""
+    """A slot of 36 words takes 11 segments; the next request shows the lost one."""
     asked: list[bytes] = []
     with served("can", tmp_path.name) as (url, faults), canopen.Network() as listener:
         listener.NOTIFIER_CYCLE = 0.02

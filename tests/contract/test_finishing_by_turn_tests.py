@@ -1,4 +1,4 @@
-"""A change of two tools is taken up again for its turn tests, while things are not as they were."""
+"""Recovery finishes a change of two tools by turn tests although conditions have changed."""
 
 import signal
 from dataclasses import replace
@@ -16,12 +16,12 @@ from tests.contract.test_proof_after_a_break import Later
 pytestmark = pytest.mark.simulator_only
 
 FOREIGN = ToolOffset(1.0, 2.0, -30.0)
-"""What somebody else writes."""
+"""A value written by another program."""
 
 
 @pytest.fixture
 def later(tmp_path):
-    """A change of tools 1 and 2, both written, and nothing tested when the link was cut."""
+    """A change of tools 1 and 2, both written, cut off before any turn test."""
     with sensor_cell() as cell:
         yield Later(cell, tmp_path)
 
@@ -34,7 +34,7 @@ def broken_off(later, *sources):
 
 
 def settled(controller):
-    """Settle all but the change itself; return its operation."""
+    """Recover everything but the change itself; return its operation."""
     (operation,) = open_turn_tests(controller)
     recover(controller, confirm=lambda _finding: True, later=[operation])
     return operation
@@ -138,7 +138,7 @@ def test_a_value_that_somebody_else_writes_during_the_test_stays(later):
 
 
 def test_touches_that_were_not_made_end_the_test_as_failed(later):
-    """The first one is; at the standoffs the person answers without a jog."""
+    """The first touch is made; at the standoffs the person answers without a jog."""
     later.cell.simulator.machine.tools.set(2, FOREIGN)
     (old,) = broken_off(later, TwoPoseSource())
     tested = later.person()

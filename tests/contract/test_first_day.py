@@ -1,7 +1,7 @@
-"""A technician's whole first day on a cell, typed as commands.
+"""A technician's whole first day on a cell, as typed commands.
 
-Backup, compare, pendant points, impact, write, verify, compare again, restore, compare equal:
-each with its exit code, in the order in which the day brings them.
+Backup, compare, pendant points, impact, write, verify, compare again, restore, compare equal, in
+the order of the day; each with its exit code.
 """
 
 import json
@@ -48,7 +48,7 @@ def test_the_first_day(backend, tmp_path, capsys):
             shown = capsys.readouterr()
             return code, json.loads(shown.out)
 
-        # Morning: look, and keep what is there.
+        # Morning: look at the cell and make a backup.
         assert run("status")[1]["state"] == "ready"
         assert run("backup", golden)[0] == 0
         assert run("compare", golden)[0] == 0
@@ -61,7 +61,7 @@ def test_the_first_day(backend, tmp_path, capsys):
         simulator.world.operator.teach_point(902, 180.0)
         simulator.panel.auto()
 
-        # What would it mean for the points of the program?
+        # How would it shift the points of the program?
         words = ("calibrate", "two-pose", "--tool", "1", "--points", "901,902")
         code, plan = run(*words, "--impact", "1-5", "--dry-run")
         assert code == 0
@@ -83,7 +83,7 @@ def test_the_first_day(backend, tmp_path, capsys):
         assert live[0] == 0
         assert live[1]["verification"]["passed"]
 
-        # Evening: say what changed, and go back to where the day began.
+        # Evening: show the changes, and restore the state of the morning.
         code, compared = run("compare", golden)
         assert code == 1
         assert {row["tool"] for row in compared["differing"]} == {1}
@@ -97,7 +97,7 @@ def test_the_first_day(backend, tmp_path, capsys):
 
 @contextmanager
 def offered(backend, simulator):
-    """Yield the URL of the cell and that of the operator's eyes."""
+    """Yield the URL of the cell and that of the simulated person's eyes."""
     if backend == "sim":
         url = register("first-day", simulator)
         yield url, url

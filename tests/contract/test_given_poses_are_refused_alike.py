@@ -1,4 +1,4 @@
-"""The same bad poses by every door: 'solve', --poses, --pose, --points and recipes refuse alike."""
+"""Bad poses are refused alike by 'solve', --poses, --pose, --points and recipes."""
 
 import json
 import math
@@ -25,7 +25,7 @@ def touching(u_deg, tip=REAL, off=(0.0, 0.0, 0.0), **more):
 
 
 def six(**off):
-    """Return six touches; ``off`` moves one by its index."""
+    """Return six touches; ``off`` shifts one of them, by its index."""
     return [touching(u, off=off.get(f"p{at}", (0.0, 0.0, 0.0))) for at, u in enumerate(ANGLES)]
 
 
@@ -76,7 +76,7 @@ def simulator():
 
 @pytest.fixture
 def through(simulator, tmp_path, capsys):
-    """Bring poses in by one door; return the exit code and the codes."""
+    """Supply poses by one of the inputs; return the exit code and the codes."""
     on = ["-c", "epson+sim://given-poses"]
 
     def go(door, poses, *more):
@@ -115,20 +115,20 @@ def through(simulator, tmp_path, capsys):
 
 
 def doors_for(name):
-    """Return the doors by which a case can come in at all."""
+    """Return the inputs by which a case can be supplied."""
     for door in DOORS:
-        hand = name == "mixed_hand" and door == "--pose"  # nobody types a hand
-        few = name == "too_few_poses" and door.startswith("recipe of points")  # the recipe is wrong
+        hand = name == "mixed_hand" and door == "--pose"  # a hand cannot be typed
+        few = name == "too_few_poses" and door.startswith("recipe of points")  # a wrong recipe
         if not (hand or few):
             yield door
 
 
 DIFFERED = ("large_residual", "large_rms", "mixed_hand", "touch_heights_differ")
-"""What one door refused and another did not."""
+"""Cases that one input used to refuse and another did not."""
 
 
 def combinations():
-    """Yield each case with each door; what was always alike is left to 'make soak'."""
+    """Yield each case with each input; those that were always alike run only in 'make soak'."""
     for name in CASES:
         for door in doors_for(name):
             marks = [] if name in DIFFERED else [pytest.mark.soak]
@@ -139,6 +139,6 @@ def combinations():
 def test_bad_poses_end_with_the_same_code_by_every_door(through, simulator, name, door):
     code, codes = through(door, CASES[name])
     assert code == 7
-    # 'solve' shows the result with all that it doubts, the others the refusal alone.
+    # 'solve' shows the result with all warnings, the others only the refusal.
     assert name in codes if door == "solve" else codes[0] == name
     assert simulator.machine.tools.defined()[1] == STORED

@@ -1,7 +1,7 @@
-"""How well touches repeat in height is what a cell has on record, however a measurement is run.
+"""A cell's record says how well touch heights repeat, whatever runs the measurement.
 
-At the second touch the person presses the tip 0.15 mm down: nothing by what is usual for two
-touches (0.23 mm), and too much for a person whose touches on record repeat to 0.01 mm.
+At the second touch the person presses the tip 0.15 mm down: within the usual limit for two touches
+(0.23 mm), but too much for a person whose recorded touches repeat to 0.01 mm.
 """
 
 import pytest
@@ -37,7 +37,7 @@ def arm(tmp_path, monkeypatch):
 
 
 def has_touched(arm, by, station=PIN):
-    """Put twelve touches on record, in four runs, that repeat to 0.01 mm in height."""
+    """Record twelve touches in four runs that repeat to 0.01 mm in height."""
     touch = {"station": station, "heights_mm2": 3e-4, "heights_dof": 3, "heights_by": by}
     with arm.cell.connected() as controller:
         for _ in range(4):

@@ -55,7 +55,7 @@ def jog(host):
 
 
 def ready(hand):
-    """Wait until a key counts: the question has stood for a moment."""
+    """Wait until keys count: the question has been shown for a moment."""
     hand.see(r"Tip now +(-?[\d.]+)")
     hand.rest(0.4)
 
@@ -65,7 +65,7 @@ def moves(simulator):
 
 
 def moved(hand, simulator, count):
-    """Wait until so many steps were begun and the last one has ended."""
+    """Wait until this many steps have begun and the last one has ended."""
     hand.see(rf"\D{count} steps?")
     hand.rest(0.1)
     assert moves(simulator) == count

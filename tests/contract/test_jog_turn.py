@@ -24,7 +24,7 @@ def where(cell):
 
 
 def stands(cell, before):
-    """Whether it is where it was; positions that are read scatter by some micrometres."""
+    """Whether the tip is at its old place; read positions scatter by some micrometres."""
     return where(cell).coordinates() == pytest.approx(before.coordinates(), abs=0.02)
 
 
@@ -52,7 +52,7 @@ def went(monkeypatch):
 
 
 def each_once(*rows):
-    """Rows of a kind of controller and what is tried on it; the other pairs are left to soak."""
+    """Return rows of controller kind and case; the other combinations run only in soak."""
     (first, *one), (second, *other) = rows
     others = (pytest.param(first, *other, marks=soak), pytest.param(second, *one, marks=soak))
     return [*rows, *others]
@@ -69,7 +69,7 @@ def test_half_a_turn_is_one_command_that_ends_lifted(cell, went, tool):
     assert after.z_mm - before.z_mm == pytest.approx(12, abs=0.01)
     assert math.dist(before.coordinates()[:2], after.coordinates()[:2]) < 0.02
     assert "It stays lifted by 12 mm" in done.out
-    # Up first, straight; then round in turns so short that chord and arc are the same.
+    # Straight up first; then round in turns so short that chord and arc are the same.
     (up, path), *turns = went
     assert (path, up.u_deg) == (Path.STRAIGHT, before.u_deg)
     assert len(turns) == 12
@@ -93,7 +93,7 @@ def test_a_plain_step_keeps_its_limit_and_names_the_command(cell):
     indirect=["cell"],
 )
 def test_the_way_between_is_checked_of_tip_and_flange(cell, went, tool, named):
-    # The ends of a whole turn are where it began: only what lies between is too far.
+    # A whole turn ends where it began: only the places between are too far.
     offset = ToolOffset(30, 0, -20)
     with cell.cell.connected() as controller:
         controller.tools.write(1, offset, expected=controller.tools.read(1))
@@ -105,7 +105,7 @@ def test_the_way_between_is_checked_of_tip_and_flange(cell, went, tool, named):
     assert "50 mm is allowed. Nothing moved." in refused.err
     assert went == []
     assert stands(cell, before)
-    # Half of it stays inside a box that is wide enough, and outside one that is not.
+    # Half of it fits into a wide box, and not into a narrow one.
     assert cell.run("robot", "jog", "--turn", "180", "--box", "40", "--yes").code == 2
     done = cell.run("robot", "jog", "--turn", "-180", "--box", "61", "--yes", "--speed", "100")
     assert done.code == 0, done.err

@@ -1,4 +1,4 @@
-"""A run that was killed with a PLC's mailbox in its hands: named, and waited out or told."""
+"""A run killed while it owned a PLC's mailbox: the next one names it, waits or is told."""
 
 import signal
 from dataclasses import replace
@@ -37,7 +37,7 @@ class Plc:
         return robolink.connect(self.cell.url, outcomes=log, clock=self.time, tell=self.told.append)
 
     def killed(self, holder, act):
-        """Let somebody do something, and be killed in it."""
+        """Start somebody's action and kill it in the middle."""
         run = self.connect(holder)
         act(run)
         run._mailbox.wire.close()
@@ -66,7 +66,7 @@ def in_process(tmp_path):
 
 @pytest.fixture
 def on_a_port(tmp_path):
-    """Where others act while a client waits."""
+    """A served PLC on which others act while a client waits."""
     with served("modbus-tcp") as cell:
         made = Plc(cell, tmp_path)
         with replaced(made.time):

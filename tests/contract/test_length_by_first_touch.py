@@ -1,4 +1,4 @@
-"""What the first touch alone says of the length: only of a first touch of the pin that is meant."""
+"""The first touch alone shows a length only if it is on the intended pin."""
 
 from dataclasses import replace
 

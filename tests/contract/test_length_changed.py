@@ -1,4 +1,4 @@
-"""A tip of another length is told by the heights of its touches, asked once, never swallowed."""
+"""A tip of another length shows in its touch heights and is asked about once, never ignored."""
 
 import json
 
@@ -13,11 +13,11 @@ AT_PIN = ("--station", "PIN-07")
 THREE = ("--count", "3", *AT_PIN)
 TWO = ("two-pose", *AT_PIN)
 NO_PROOF = "--no-verify"
-"""Where a run only puts touches on record, or is refused: what follows a length is proved."""
+"""For runs that only record touches or are refused. Runs that change a length are verified."""
 
 
 def seen_at_touch_1(err):
-    """Return by how much the needle was said to be longer, mm; said between two touches, once."""
+    """Return how much longer the needle was said to be, mm; said once, between two touches."""
     before, said, after = err.partition("The needle seems ")
     assert said, err
     assert "The needle seems" not in after
@@ -46,13 +46,13 @@ def test_z_follows_the_heights_or_is_kept_where_that_was_decided(arm):
     assert told["written"] == "difference"
     assert "length_changed" in followed.document["warnings"]
     assert seen_at_touch_1(followed.err) == pytest.approx(-0.5, abs=0.2)
-    # Now Z is right for this tip, and there is nothing to say.
+    # Now Z is right for this tip, and there is nothing to report.
     again = arm.calibrate("n-angle", *THREE)
     assert again.code == 0, again.err
     assert not again.document["length"]["changed"]
     assert "seems about as long as the old one: touch 1 shows no" in again.err
     assert again.document["warnings"] == ["few_poses"]
-    # Kept knowingly it stays, and that is on record.
+    # Kept on purpose it stays, and that is recorded.
     before = arm.stored
     arm.lengthen(0.5)
     kept = arm.calibrate("n-angle", *THREE, "--if-length-changed", "keep")
@@ -64,7 +64,7 @@ def test_z_follows_the_heights_or_is_kept_where_that_was_decided(arm):
 
 
 def test_small_changes_do_not_add_up_unseen(arm):
-    """Each is below what touches tell; compared with the last run alone, none would ever show."""
+    """Each change is below the limit; compared with the last run alone, none would ever show."""
     codes: list[int] = []
     while len(codes) < 4 and 7 not in codes:
         codes.append(arm.calibrate("n-angle", *THREE, NO_PROOF).code)
@@ -112,7 +112,7 @@ def test_the_height_of_a_pin_is_never_learnt_from_a_z_that_was_kept(arm):
     with arm.cell.connected() as controller:
         controller.tools.write(2, ToolOffset(12.0, -3.5, -19.0), expected=None)
     arm.world.tips[2] = ToolOffset(12.2, -3.4, -20.3)
-    # Tool 2 has no touch of its own there, and nothing trustworthy says height of the pin is not.
+    # Tool 2 has no touch there, and no trustworthy source gives the height of the pin.
     second = arm.calibrate(*TWO, NO_PROOF, tool=2)
     assert second.code == 0, second.err
     assert second.document["length"] is None
@@ -122,7 +122,7 @@ def test_the_height_of_a_pin_is_never_learnt_from_a_z_that_was_kept(arm):
 def test_a_pin_of_known_height_shows_that_another_tool_s_z_is_wrong(arm):
     learn = ("station", "learn", "PIN-07", "--tool", "1", "--assist", arm.cell.url, "--yes")
     assert arm.calibrate(*TWO, NO_PROOF).code == 0
-    # Nobody ever showed Z of tool 1, so it shows no height either.
+    # Z of tool 1 was never shown, so it shows no height either.
     assert "was never measured" in arm.run(*learn).err
     assert station_z(arm) is None
     stated, held = replace_z(arm.truth, 0.0), arm.stored
@@ -143,7 +143,7 @@ def test_a_pin_of_known_height_shows_that_another_tool_s_z_is_wrong(arm):
     assert followed_z is not None
     assert followed_z.z_mm == pytest.approx(arm.stored.z_mm, abs=0.15)
     assert "shorter than the stored value says" in followed.err
-    # The height of the pin stays what it was: tool 2 followed it.
+    # The height of the pin stays as it was: tool 2 followed it.
     heights = [entry.details["z_mm"] for entry in arm.recorded(EntryKind.STATION)]
     assert heights[0] == heights[1]
 
@@ -215,7 +215,8 @@ def test_a_recipe_refuses_too_and_may_say_it_beforehand(arm, tmp_path):
     now = [arm.held(tool) for tool in (1, 2)]
     assert now[0].z_mm == held[0].z_mm
     assert now[1].z_mm - held[1].z_mm == pytest.approx(-0.6, abs=0.12)
-    # Both by as much: two needles alike, or the pin was pressed down. Nobody is told a length.
+    # Both by the same amount: two equal needles, or the pin was pressed down. No length is
+    # reported.
     arm.lengthen(0.4, tool=1)
     arm.lengthen(0.4, tool=2)
     unsure = run(deciding)

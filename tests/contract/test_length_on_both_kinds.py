@@ -1,6 +1,6 @@
-"""A needle of another length, measured with standoffs: every upright method, both kinds, recipes.
+"""A needle of another length, measured with standoffs: all upright methods, both kinds, recipes.
 
-Beside the method the height of the pin may stand in the cell file only.
+As an alternative to the method, the height of the pin may be in the cell file only.
 """
 
 import os
@@ -32,17 +32,17 @@ def cell(kind, tmp_path, monkeypatch):
 def recalibrate(cell, folder, method, rule=""):
     path = folder / "recipe.toml"
     kind = method + (f'"\nif_length_changed = "{rule}' if rule else "")
-    # Nothing here is about the proof.
+    # These tests leave the turn test out.
     text = RECIPE.format(kind=kind).replace('z = "kept"', 'z = "kept"\nverify = false')
     if method == "n-angle":
-        # Of six touches chance alone says in 1 or 2 of 100 runs that something moved meanwhile.
+        # With six touches, chance alone suggests drift in 1 or 2 of 100 runs.
         text = text.replace("[station]", "count = 4\n[station]")
     path.write_text(text)
     return cell.run("recalibrate", str(path), "--assist", cell.cell.url, "--yes", "--json")
 
 
 def state_pin(cell, *lines):
-    """Write into the cell file what a person knows about the pin."""
+    """Write a person's data about the pin into the cell file."""
     path = Path(os.environ["ROBOLINK_CONFIG"])
     place = 'kind = "pin"\n' + "\n".join(lines)
     path.write_text(path.read_text().replace('kind = "pin"', place, 1))
@@ -50,10 +50,10 @@ def state_pin(cell, *lines):
 
 
 def check_followed(cell, before, told, by_mm):
-    """Z follows the needle to the interval that is stated; the pin's height is not learnt."""
+    """Z follows the needle within the stated interval; the pin's height is not learnt."""
     assert told["changed"]
     assert told["written"] == "difference"
-    # 1.7 times what 95 % lie in: one in a thousand does not.
+    # 1.7 times the 95 % half width: one in a thousand exceeds it.
     half_mm = 1.7 * NORMAL_95 * told["u_mm"]
     assert cell.stored.z_mm - before.z_mm == pytest.approx(by_mm, abs=half_mm)
     assert half_mm < 0.3
@@ -153,7 +153,7 @@ def test_the_height_that_only_the_cell_file_states_tells_it_at_once(cell, tmp_pa
     document = followed.document
     told = document["length"] if run == "command" else document["tools"][0]["length"]
     check_followed(cell, before, told, -0.5)
-    # What is right by the stated height is right, and counts as such.
+    # A value that is right by the stated height counts as right.
     again = measure()
     assert again.code == 0, again.err
 

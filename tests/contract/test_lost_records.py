@@ -1,4 +1,4 @@
-"""A record that was lost blocks all that writes or moves on every kind, and nothing that looks."""
+"""A lost record blocks every write and movement on every kind, but no reading."""
 
 import sqlite3
 from contextlib import suppress
@@ -17,7 +17,7 @@ from tests.contract._kinds import KINDS
 
 @pytest.fixture(autouse=True)
 def state(monkeypatch, tmp_path):
-    """A state folder of the test's own."""
+    """The test's own state folder."""
     monkeypatch.delenv("ROBOLINK_JOURNAL", raising=False)
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path))
     return tmp_path
@@ -47,7 +47,7 @@ def empty(state):
 
 
 def refuses_everything(kind, controller):
-    """Try all that writes or moves; return what was let through."""
+    """Try every write and movement; return those that were let through."""
     passed = []
     before = controller.tools.read_all(), controller.tools.selected()
     for name, act in kind.acts.items():
@@ -71,15 +71,15 @@ FIRST = [
 
 @pytest.mark.parametrize(("name", "first"), FIRST, ids=["-".join(case) for case in FIRST])
 def test_whatever_was_done_first_is_known_to_be_missing(name, first, state):
-    """A program's first act is enough: nobody had to make a backup or begin a procedure."""
+    """A program's first act is enough: no backup and no procedure is needed before it."""
     with KINDS[name]() as kind:
         with opened(kind) as controller:
             kind.prepare(controller)
             kind.acts[first](controller, kind.tool)
-        with opened(kind) as controller:  # in its own journal there is nothing to settle
+        with opened(kind) as controller:  # its own journal has nothing to finish
             assert controller.outcomes.open_markers() == ()
         delete(state)
-        for _ in range(2):  # and nothing that the first attempts recorded lets the second ones pass
+        for _ in range(2):  # nothing that the first attempts recorded helps the second ones
             with opened(kind) as controller:
                 kind.prepare(controller)
                 assert refuses_everything(kind, controller) == []
@@ -103,7 +103,7 @@ def test_looking_and_stopping_meet_nothing_and_recover_settles_it(name, state):
                 controller.reset_fault() if name == "softmotion" else None
             (finding,) = look(controller)
             assert finding.marker.kind is MarkerKind.HISTORY
-            assert recover(controller).left  # asking settles nothing
+            assert recover(controller).left  # asking finishes nothing
             assert refuses_everything(kind, controller) == []
             assert not recover(controller, confirm=lambda _finding: True).left
             kind.prepare(controller)
@@ -115,7 +115,7 @@ def test_looking_and_stopping_meet_nothing_and_recover_settles_it(name, state):
 
 @pytest.mark.parametrize("name", ["epson", "plc_map"])
 def test_a_journal_with_a_history_of_its_own_is_not_the_record(name, state):
-    """What is named again after a week knows nothing of that week, though it is not empty."""
+    """A journal that is used again after a week lacks that week, though it is not empty."""
     other = state / "other.db"
     with KINDS[name]() as kind:
         for journal in (other, None):
@@ -141,13 +141,13 @@ def test_a_journal_that_was_moved_with_all_that_is_in_it_is_the_record(state):
             with opened(kind, state / "moved.db") as controller:
                 assert controller.outcomes.open_markers() == ()
                 kind.acts["write"](controller, kind.tool)
-        # From here on what stands at the old place is not the record.
+        # From now on the journal at the old place is not the record.
         with opened(kind) as controller:
             assert refuses_everything(kind, controller) == []
 
 
 def test_a_program_that_calls_is_refused_with_an_answer(state):
-    """Without one it would wait, with a nozzle that it knows to be wrong."""
+    """Without an answer it would wait, with a nozzle that it knows to be wrong."""
     limits, value = CallbackLimits(tolerance_mm=0.1), ("1", *("0",) * 6)
     log = open_journal().log("epson:SIM00001")
     marker = Marker("a", MarkerKind.CHANGE, "a change", "2026-01-01T00:00:00+00:00")
@@ -166,7 +166,7 @@ def test_a_program_that_calls_is_refused_with_an_answer(state):
 
 
 def test_a_record_begun_anew_that_cannot_be_noted_is_said(state, monkeypatch):
-    """Else a person would be asked again and again, and never told why."""
+    """Otherwise a person would be asked again and again without a reason."""
     with KINDS["epson"]() as kind:
         with opened(kind) as controller:
             kind.acts["write"](controller, kind.tool)

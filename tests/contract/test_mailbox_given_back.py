@@ -1,4 +1,4 @@
-"""A client that is ended while it takes or gives back the mailbox of a PLC leaves it to others."""
+"""A client that ends while it takes or releases a PLC's mailbox leaves it to others."""
 
 import signal
 

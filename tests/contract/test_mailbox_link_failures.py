@@ -1,4 +1,4 @@
-"""What a mailbox link does when its far end, or what leads there, fails."""
+"""Failures of a mailbox link when its far end or the connection to it fails."""
 
 import socket
 import threading

@@ -71,7 +71,7 @@ def test_all_that_passes_is_told_to_a_trace(far_end):
         link.read_response()
         sent = b"".join(data for direction, data in told if direction == "sent")
         received = b"".join(data for direction, data in told if direction == "received")
-        # A word of CANopen goes low byte first, and seven bytes are in a frame.
+        # CANopen sends a word low byte first, and a frame holds seven bytes.
         low_first = isinstance(far_end, CanopenFarEnd)
         assert (b"\xe8\x03\xe9" if low_first else b"\x03\xe8\x03") in sent
         assert (b"\x64\x00\x65" if low_first else b"\x00\x64\x00") in received

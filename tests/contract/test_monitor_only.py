@@ -1,4 +1,4 @@
-"""Nothing that robolink does while production runs stops or disturbs it."""
+"""Nothing that robolink does during production stops or disturbs it."""
 
 import time
 from contextlib import contextmanager
@@ -39,7 +39,7 @@ READS |= {"GetContSettings"}
 
 
 def in_production(options, **habit):
-    """Return a controller that another device started, with a task that runs."""
+    """Return a controller that another device started, with a running task."""
     simulator = EpsonSimulator(seed=5, options=options(**habit))
     simulator.panel.set_monitoring_only(True)
     simulator.panel.start_production()
@@ -52,7 +52,7 @@ def requests(simulator):
 
 
 class SkippingClock(SystemClock):
-    """Real time, of which a test can leave out a part."""
+    """Real time, from which a test can skip a part."""
 
     skipped_ns = 0
 
@@ -61,7 +61,7 @@ class SkippingClock(SystemClock):
 
 
 class Cell:
-    """A served simulator whose time can pass at once."""
+    """A served simulator whose time can be advanced at once."""
 
     def __init__(self, url, simulator, skip):
         self.url = url
@@ -72,7 +72,7 @@ class Cell:
         return robolink.connect(self.url)
 
     def await_hang_up(self):
-        """Wait until the controller has seen that its client is gone."""
+        """Wait until the controller has noticed that its client is gone."""
         deadline = Deadline.after(SystemClock(), 5.0)
         while self._simulator._slot.client is not None:
             assert not deadline.expired
@@ -81,12 +81,12 @@ class Cell:
     def pass_time(self, seconds):
         self._skip(seconds)
         with self._simulator.acting():
-            pass  # which makes the device look at its clock
+            pass  # which makes the device read its clock
 
 
 @pytest.fixture(params=["sim", "tcp"])
 def serve(request):
-    """A maker of such cells."""
+    """Makes such cells."""
 
     @contextmanager
     def offered(simulator):
@@ -197,7 +197,7 @@ def test_a_project_that_has_not_published_yet_publishes_nothing(serve, options):
 
 
 def publishing(simulator, times):
-    """Let the program change the table at each of the next readings of it."""
+    """Let the program change the table at each of its next readings."""
     left = count(times, -1)
 
     def change(number, text):

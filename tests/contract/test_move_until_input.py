@@ -1,4 +1,4 @@
-"""A movement until an input switches, on every kind of controller that can."""
+"""A movement until an input switches, on every kind of controller that supports it."""
 
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -32,7 +32,7 @@ SPEED_MM_S = 5.0
 DOWN_MM = 6.0
 PLATE_BELOW_MM = 4.0
 LATE_MM = 0.1
-"""Braking on the way to rest, or a cycle of the PLC."""
+"""Braking distance, or one cycle of the PLC."""
 
 
 @dataclass
@@ -53,7 +53,7 @@ class Bench:
         return self.group.move_until_input(target, edge, speed_mm_s=SPEED_MM_S, box=box)
 
     def moved(self):
-        """Whether the robot has left where it stood."""
+        """Whether the robot has left its start."""
         return self.group.pose().z_mm < self.touch_mm + PLATE_BELOW_MM - 0.5
 
 

@@ -1,4 +1,4 @@
-"""A driver or a method whose author knows none of the rules: refused by the bases, or found out."""
+"""Drivers and methods whose authors ignore the rules: the base classes or the checks stop them."""
 
 from contextlib import contextmanager
 from dataclasses import replace
@@ -34,11 +34,11 @@ TOOL = 2
 
 
 class Careless(SimpleController):
-    """A driver of somebody else: its machine is an object of this process.
+    """A third-party driver whose machine is an object of this process.
 
     Args:
         machine: The machine.
-        tools: Its table of tools; ``None`` for the usual one.
+        tools: Its tool table; ``None`` for the usual one.
         group: Its arm.
     """
 
@@ -51,7 +51,7 @@ class Careless(SimpleController):
 
 
 class WritesByItself(_MemoryTools):
-    """A table that does as it is told: nothing is compared, marked, locked or read back."""
+    """A table that writes at once: nothing is compared, marked, locked or read back."""
 
     def __init__(self, link: SimpleLink, machine: SimpleMachine) -> None:
         super().__init__(link)
@@ -81,7 +81,7 @@ class WritesByItself(_MemoryTools):
 
 
 class Done:
-    """A movement that has ended when it has begun."""
+    """A movement that has ended as soon as it begins."""
 
     settled = True
 
@@ -93,7 +93,7 @@ class Done:
 
 
 class MovesByItself(_MemoryGroup):
-    """An arm that goes wherever it is told to, whatever is in force."""
+    """An arm that moves to any target, whatever tool is selected."""
 
     def __init__(self, link: SimpleLink, tools: _MemoryTools, machine: SimpleMachine) -> None:
         super().__init__(link, tools)
@@ -105,7 +105,7 @@ class MovesByItself(_MemoryGroup):
 
 
 class SendsPastItsWrite(_MemoryTools):
-    """Builds on the bases, and sends in place of handing a write to them."""
+    """Uses the base classes, but sends by itself instead of handing them a write."""
 
     def __init__(self, link: SimpleLink, machine: SimpleMachine) -> None:
         super().__init__(link)
@@ -118,7 +118,7 @@ class SendsPastItsWrite(_MemoryTools):
 
 
 class AsksNoLatch(SimpleLink):
-    """A link whose exchange forgets the latch: the one thing that the bases leave to it."""
+    """A link whose exchange ignores the latch, the one check that the bases leave to it."""
 
     @contextmanager
     def exchange(self, request, kind=CommandClass.LOOK):
@@ -127,7 +127,7 @@ class AsksNoLatch(SimpleLink):
 
 
 def broken(connect):
-    """Return what the checks find, by the name of the promise."""
+    """Return the findings of the checks, by promise."""
     with pytest.raises(ContractBrokenError) as found:
         check_controller(Subject(connect, tool=TOOL))
     return dict(line.split(": ", 1) for line in str(found.value).splitlines())
@@ -168,7 +168,7 @@ def test_a_driver_that_sends_past_the_bases_is_found_out():
 
 
 def test_a_driver_that_forgets_all_but_its_wire_is_refused_by_the_bases(monkeypatch):
-    """It takes no lock, stores no marker and asks no latch; two promises are left to its link."""
+    """It takes no lock, stores no marker and checks no latch; two promises are left to its link."""
     monkeypatch.setattr("robolink.controllers.simple_controller.SimpleLink", AsksNoLatch)
     machine = SimpleMachine(tools={1: ToolOffset(12.0, -3.5, -20.0)}, selected=1)
     told = broken(lambda: Careless(machine))
@@ -180,13 +180,13 @@ def test_a_driver_that_forgets_all_but_its_wire_is_refused_by_the_bases(monkeypa
 
 
 class Nobody:
-    """Is told, and never asked."""
+    """Reads messages and is never asked."""
 
     def tell(self, text: str) -> None: ...
 
 
 def measuring(controller: Controller, procedure):
-    """Run a procedure of a method as every source does."""
+    """Run a method's procedure as every source does."""
     start = controller.groups[0].pose()
     settings = Limits(speed_mm_s=10).settings
     nobody = cast(Operator, Nobody())
@@ -195,7 +195,7 @@ def measuring(controller: Controller, procedure):
 
 
 def far_away(here: Pose):
-    """Go where no box reaches."""
+    """Move to a place outside every box."""
     yield Move(replace(here, z_mm=here.z_mm + 5000), Path.STRAIGHT, "far away")
 
 

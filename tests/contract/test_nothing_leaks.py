@@ -1,4 +1,4 @@
-"""Of a served simulator nothing is left for the next one, seen from outside."""
+"""A served simulator leaves nothing behind for the next one, seen from outside."""
 
 import json
 import os
@@ -43,13 +43,13 @@ def served(*arguments):
 
 
 def compare_the_map(controller):
-    """Put on record that a map was compared: before that nothing is written by it."""
+    """Record that a map was compared: nothing is written through it before."""
     if isinstance(controller, PlcMapController):
         confirm_whole_map(controller)
 
 
 def lose_an_answer(document):
-    """Write a tool whose answer is lost, and return who was written to."""
+    """Write a tool whose answer is lost; return the controller's identity."""
     with robolink.connect(document["url"], timeout_s=3.0) as controller:
         compare_the_map(controller)
         with pytest.raises(OutcomeUnknownError):
@@ -94,7 +94,7 @@ def test_the_next_simulator_on_the_port_starts_clean(kind, link, match, at, tmp_
 
 @pytest.mark.soak
 def test_a_machine_without_a_number_is_told_apart_by_the_folder(tmp_path, monkeypatch):
-    """A PLC with a map is known by its address: the folder of each run keeps them apart."""
+    """A PLC with a map is known by its address: the folder of each run keeps runs apart."""
     own = tmp_path / "own"
     own.mkdir()
     (own / "journal.db").write_bytes(b"precious")

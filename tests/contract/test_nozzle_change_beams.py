@@ -1,4 +1,4 @@
-"""A nozzle change on two crossed beams, from the mounted needle to the proved offset."""
+"""A nozzle change on two crossed beams, from the mounted needle to the tested offset."""
 
 import math
 import sys
@@ -26,10 +26,10 @@ from tests.contract._sensor_cell import (
 )
 
 POSITION_NOISE_MM = 0.002
-"""Of a position as the simulated controller prints it."""
+"""Scatter of a position that the simulated controller prints."""
 
 BARELY_MM = 0.012
-"""What that noise alone may do to an offset."""
+"""The largest offset error that this scatter alone causes."""
 
 
 @pytest.fixture
@@ -65,7 +65,7 @@ def test_play_in_the_joints_cancels_between_the_two_directions(cell):
 
 
 def test_a_needle_change_takes_less_than_20_s_of_the_robots_time(cell, capsys):
-    # Counted by the simulated clock, which only movements move on here: 19.39 s, the same in each
+    # Counted by the simulated clock, which only movements advance here: 19.39 s, the same in each
     # run and on each machine.
     cell.mount_beams(cell.beams(radius_mm=0.1), latency_s=0.002, noise_mm=0.003)
     with cell.connected() as controller:
@@ -139,7 +139,7 @@ def test_inputs_may_go_off_while_a_beam_is_broken(cell):
 
 
 def refused(cell, code, station=None, listener=None):
-    """Run into a refusal: nothing written, the tip above the beams, the tool put back."""
+    """Check a refusal: nothing written, the tip above the beams, the tool restored."""
     before = cell.stored
     with pytest.raises(CalibrationError) as refusal:
         cell.run(BeamsSource(station or cell.station), listener)

@@ -1,4 +1,4 @@
-"""Nozzles and held boards before an up-looking camera, on both kinds of controllers."""
+"""Nozzles and held boards over an up-looking camera, on both kinds of controllers."""
 
 import math
 import sys
@@ -38,7 +38,7 @@ def any_cell(request):
 
 
 def moved_station(cell, dx_mm, dy_mm):
-    """Return the camera where it is not."""
+    """Return the camera's station at a wrong place."""
     model = camera_model(cell)
     x_mm, y_mm = model.origin_mm
     model = replace(model, origin_mm=(x_mm + dx_mm, y_mm + dy_mm))
@@ -50,7 +50,7 @@ def seconds_of(cell, began_ns):
 
 
 def inside(result, truth):
-    """Tell by how many of its own half widths a result misses the truth at most."""
+    """Return the largest error of a result in units of its half widths."""
     pairs = zip(result.measured, result.half_width95, strict=True)
     return max(abs(getattr(result.offset, n) - getattr(truth, n)) / half for n, half in pairs)
 
@@ -154,7 +154,7 @@ def test_play_in_the_joints_does_no_harm_because_places_are_met_from_one_side(ce
 
 
 def refused(cell, code, source):
-    """Run into a refusal: nothing written, the tip lifted, the tool put back."""
+    """Check that the change is refused: nothing written, the tip lifted, the tool restored."""
     before = cell.stored
     with pytest.raises(CalibrationError) as refusal:
         run_source(cell, source)

@@ -1,4 +1,4 @@
-"""A nozzle change on a touch plate, from the mounted nozzle to the proved length."""
+"""A nozzle change on a touch plate, from the mounted nozzle to the tested length."""
 
 from dataclasses import replace
 
@@ -15,12 +15,12 @@ SLOWEST_MM_S, FASTEST_MM_S = min(SPEEDS_MM_S), max(SPEEDS_MM_S)
 DECEL_MM_S2 = 200.0
 BRAKING_MM = FASTEST_MM_S**2 / (2 * DECEL_MM_S2)
 
-# One reading is printed to 0.001 mm, so half of that; two speeds 1 mm/s apart stretch it.
+# A reading is printed to 0.001 mm, so half of that; two speeds 1 mm/s apart amplify it.
 PRINTED_MM = 0.003
 PRINTED_S = 0.003
 
 BARELY_MM = 0.02
-"""More than what braking adds, and four times the 3.2 um that 2 um a reading make of a length."""
+"""More than braking adds, and four times the 3.2 um that 2 um a reading cause in a length."""
 
 
 @pytest.fixture

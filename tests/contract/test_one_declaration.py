@@ -1,4 +1,4 @@
-"""A method declares its parameters once: commands and recipes take and refuse the same values."""
+"""A method declares its parameters once: commands and recipes accept and refuse the same values."""
 
 import json
 import subprocess
@@ -20,7 +20,7 @@ from robolink.recipe._loading import _checked
 from robolink.stations import Station
 
 NOBODY = "epson+tcp://127.0.0.1:9"
-"""Refused before anything is sent, nothing is asked for there."""
+"""No controller is needed: the value is refused before anything is sent."""
 
 
 def beyond(field):
@@ -63,7 +63,7 @@ def method_of(name):
 
 
 def typed(method, values):
-    """Return the options of a command that say the same as keys of a recipe."""
+    """Return the options of a command that correspond to keys of a recipe."""
     flags = {field.name: field.flag for field in fields_of(method.parameters)}
     for name, value in values.items():
         if value is True:
@@ -74,7 +74,7 @@ def typed(method, values):
 
 
 def in_recipe(method, values, *tables):
-    """Return what a recipe of that method is told."""
+    """Return the error for a recipe of that method."""
     z = "measured" if method.only_z else "kept"
     lines = [
         'schema = "robolink/recipe/1"',
@@ -94,7 +94,7 @@ def in_recipe(method, values, *tables):
 
 
 def refused(method, values, capsys, *more):
-    """Return what a command of that method says."""
+    """Return the error for a command of that method."""
     station = ("--station", "S") if method.needs.named else ()
     where = station if method.needs.motion else ("--points", "901,902")
     words = ("calibrate", method.name, "--tool", "1", *where, *typed(method, values), *more)
@@ -126,7 +126,7 @@ def test_what_does_not_go_together_is_refused_in_the_same_words(name, values, wh
 
 HALVES = {"board": {"spacing_mm": 40.0, "turns_deg": (0.0,)}, "camera": {"turns_deg": (0.0,)}}
 HALVES |= {"z-touch": {"speeds_mm_s": (2.0, 1.0)}, "beams": {"repeats": 1, "turn_deg": 0.0}}
-"""With these a measurement leaves no residual; two-pose, points and one-touch never do."""
+"""A measurement with these leaves no residual; two-pose, points and one-touch never do."""
 
 NO_RESIDUAL = ("two-pose", "one-touch", "points", *HALVES)
 TYPED = {"rms_mm": "--max-rms", "max_mm": "--max-residual", "interval_mm": "--max-interval"}
@@ -134,7 +134,7 @@ UNKNOWN_SIGMA = "is missing: the measurement cannot check itself"
 
 
 def of_the_library(method, values, **more):
-    """Return what a script is told that asks for the source of measurements."""
+    """Return the error for a script that asks for the source of measurements."""
     station = Station(id="S", kind=method.needs.station)
     site = Site(controller=cast(Controller, None), tool=1, station=station)
     with pytest.raises(ConfigError) as caught:
@@ -170,7 +170,7 @@ def test_an_interval_that_is_never_met_is_refused_in_the_same_words(capsys):
 
 
 def test_what_a_cell_allows_every_method_is_no_reason_to_refuse_one(tmp_path, monkeypatch, capsys):
-    """A cell's limits stand for methods that can be judged by them; nobody typed them here."""
+    """A cell's limits apply to methods that can be judged by them; they were not typed here."""
     (tmp_path / "robolink.toml").write_text(
         f'[cells.a]\nurl = "{NOBODY}"\nrms_tolerance_mm = 0.1\n', encoding="utf-8"
     )

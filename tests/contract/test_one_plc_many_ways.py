@@ -1,4 +1,4 @@
-"""One simulated PLC on five ways at once: what was left open on one shows on each."""
+"""One simulated PLC on five links at once: a job left open on one shows on all."""
 
 from contextlib import ExitStack
 
@@ -15,12 +15,12 @@ from robolink.transport import parse_url
 
 
 class Killed(BaseException):
-    """The end of a process, which no handler of an error sees."""
+    """The end of a process, which no error handler sees."""
 
 
 @pytest.fixture
 def ways():
-    """The URLs of one PLC, by how it is reached."""
+    """The URLs of one PLC, by link."""
     simulator = SoftMotionSimulator(seed=5)
     with ExitStack() as stack:
         tcp = stack.enter_context(serve_modbus_tcp(simulator)).url
@@ -31,16 +31,16 @@ def ways():
 
 
 def connect(url):
-    # What is reached over a bus inside this process has a journal that ends with it, else.
+    # Otherwise the journal of an in-process bus would end with it.
     return robolink.connect(url, outcomes=open_journal().log(url))
 
 
 def kill_a_calibration(url):
-    """Leave tool 0 selected and its marker open, as a process does that is killed at a touch."""
+    """Leave tool 0 selected and the marker open, as a process does that is killed at a touch."""
     controller = connect(url)
     with pytest.raises(Killed), controller.preserved("calibration of tool 1"):
         controller.tools.select(0)
-        # The link dies with the process, so that nothing can be put back.
+        # The link dies with the process, so that nothing can be restored.
         controller._mailbox.wire.close()
         raise Killed
     controller.close()

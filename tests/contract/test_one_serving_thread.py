@@ -1,4 +1,4 @@
-"""All simulated controllers of a process are served by one thread, and do not feel each other."""
+"""All simulated controllers of a process share one serving thread without affecting each other."""
 
 import contextlib
 import select
@@ -31,7 +31,7 @@ class Asking:
 
 @pytest.fixture
 def asking():
-    """Connect raw clients that are closed at the end."""
+    """Connects raw clients that are closed at the end."""
     clients = []
 
     def connected(url):
@@ -106,7 +106,7 @@ def test_a_host_may_be_closed_by_what_its_own_controller_does(asking):
 
 @pytest.fixture
 def asked_at_once(asking):
-    """Ask some controllers while another holds all of them up; tell what each saw when served."""
+    """Query controllers while another one blocks all of them; return what each saw when served."""
 
     def asked(hosts):
         holding, let_go, all_looked = (threading.Event() for _ in range(3))
@@ -142,14 +142,14 @@ def asked_at_once(asking):
 
 
 def test_those_who_asked_at_once_are_all_heard_before_one_is_answered(hosts, asked_at_once):
-    """A client that asks many is woken once for all of them, not once for each."""
+    """A client that queries many is woken once for all of them, not once for each."""
     assert asked_at_once(hosts[:6]) == [0] * 5
 
 
 def test_of_many_who_ask_at_once_a_few_are_answered_before_the_rest_is_heard(
     monkeypatch, asked_at_once
 ):
-    """Also where the system tells of all of them at once."""
+    """The same if the system reports all of them at once."""
     monkeypatch.setattr(serving_loop, "make_readiness", SelectedReadiness)
     with contextlib.ExitStack() as stack:
         hosts = [stack.enter_context(serve_tcp(EpsonSimulator())) for _ in range(40)]
@@ -174,7 +174,7 @@ def test_one_that_cannot_answer_is_served_no_more_and_the_others_are(hosts, aski
 
 
 def test_one_whose_end_fails_too_is_closed_all_the_same(hosts, asking, monkeypatch):
-    """What has failed mostly fails again when it is told that its client has gone."""
+    """A client that has failed usually fails again when its controller is told that it has left."""
     told = []
     monkeypatch.setattr(threading, "excepthook", lambda args: told.append(str(args.exc_value)))
     broken, sound = asking(hosts[0].url), asking(hosts[1].url)
@@ -186,7 +186,7 @@ def test_one_whose_end_fails_too_is_closed_all_the_same(hosts, asking, monkeypat
     with monkeypatch.context() as failing:
         failing.setattr(EpsonServerLink, "receive", fail)
         assert broken.ask(b"$GetStatus") == b""
-        hosts[0].close()  # returns when the thread is done with it
+        hosts[0].close()  # returns when the thread has finished with it
     assert told == ["of a test"] * 2
     with pytest.raises(ConnectionRefusedError):
         asking(hosts[0].url)

@@ -1,7 +1,7 @@
-"""Parts of pages, typed as they stand from top to bottom, against one simulated cell.
+"""Parts of pages, run as printed from top to bottom, against one simulated cell.
 
-Every ``$ robolink`` line of a part runs in this process; a line ``(exit code N)`` below it says how
-it ends. The cells of its own TOML are written to ``robolink.toml``, with the simulator in
+Every ``$ robolink`` line of a part runs in this process; a line ``(exit code N)`` below it gives
+its exit code. The part's own TOML cells are written to ``robolink.toml``, with the simulator in
 place of every address.
 """
 
@@ -24,10 +24,10 @@ CELL = '[cells.line3]\nurl = "epson+tcp://192.168.0.1:5000"\n'
 CI = "testing#In a CI machine without hardware"
 LINE_COMPUTER = "commands#A line computer runs the change"
 RECIPES = {CI: "needle-beams"}
-"""The recipe that a part calls needle.toml without saying where it is from."""
+"""The recipe that a part calls needle.toml without giving its source."""
 
 NEW_NOZZLE = {LINE_COMPUTER, CI}
-"""The parts that begin when another nozzle was mounted and the motors are on."""
+"""The parts that begin with another nozzle mounted and the motors on."""
 
 TYPED: dict[str, tuple[pytest.MarkDecorator, ...]] = {
     "tutorial#Ten minutes with a simulated robot": (),
@@ -39,7 +39,7 @@ TYPED: dict[str, tuple[pytest.MarkDecorator, ...]] = {
     LINE_COMPUTER: (pytest.mark.soak,),
     CI: (),
 }
-"""The parts of pages that are typed here, each by its page and heading, with their marks."""
+"""The parts of pages that run here, each by page and heading, with their marks."""
 
 
 @pytest.fixture
@@ -56,7 +56,7 @@ def cell(tmp_path, monkeypatch):
 
 
 def typed(page):
-    """Return the commands of a page, with the exit code that it says for each."""
+    """Return the commands of a page, with the exit code that it gives for each."""
     lines = [line for block in CONSOLE.findall(page) for line in block.splitlines()]
     ends = [re.fullmatch(r"\(exit code (\d+)\)", line) for line in (*lines[1:], "")]
     return [
@@ -67,7 +67,7 @@ def typed(page):
 
 
 def part(name):
-    """Return what stands on a page below one of its headings, down to the next one."""
+    """Return the text of a page below one of its headings, up to the next one."""
     file, _, heading = name.partition("#")
     page = (ROOT / "docs" / f"{file}.md").read_text(encoding="utf-8")
     _, found, below = page.partition(f"\n## {heading}\n")
@@ -76,7 +76,7 @@ def part(name):
 
 
 def without_typed_parts(page):
-    """Return the text of a page but for the parts that are typed here."""
+    """Return the text of a page without the parts that run here."""
     text = page.read_text(encoding="utf-8")
     for name in TYPED:
         if name.partition("#")[0] == page.stem:

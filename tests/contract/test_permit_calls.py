@@ -1,4 +1,4 @@
-"""A PLC's program calls back through the profile tools: permit in, xToolChanged out."""
+"""A PLC program starts a calibration through the profile tools: permit in, xToolChanged out."""
 
 import pytest
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
@@ -30,7 +30,7 @@ def call(cell, machine):
 
 
 def answered(controller, machine):
-    """Answer the call, with the machine at work at each look."""
+    """Answer the call; the machine runs a step at each poll."""
 
     def ended():
         machine.look()
@@ -50,7 +50,7 @@ def kinds(cell):
 
 
 def refused(cell, machine, code):
-    """The old value stays, or is back, and the machine is let go on."""
+    """Check that the old value is stored and the machine may go on."""
     old = machine.stored
     with pytest.raises(CalibrationError) as caught:
         call(cell, machine)
@@ -83,7 +83,7 @@ def test_a_needle_is_measured_written_proved_and_the_machine_goes_on(backend):
         assert machine.error_mm < 0.02
         assert machine.state == "produces"
         assert cell.open_requests == []
-        # Beside the ownership the slot was written, once, and the tool in force was read.
+        # Besides the ownership commands: one write of the slot, and a reading of the selected tool.
         assert cell.commands == ["WRITE_TOOL", "READ_TOOL"]
         assert cell.movements_started == 0
         (done,) = cell.journal.entries(kinds=(EntryKind.DONE,))
@@ -95,7 +95,7 @@ def test_a_needle_is_measured_written_proved_and_the_machine_goes_on(backend):
 
 @pytest.mark.soak
 def test_a_touch_that_the_contact_did_not_see_never_comes(cell):
-    """Nobody counts it for another one: the machine gives up, and so does robolink."""
+    """Another touch is not counted in its place: the machine gives up, and so does robolink."""
     machine = PermitMachine(cell.simulator)
     machine.miss = {2}
     refused(cell, machine, "no_touch")
@@ -120,7 +120,7 @@ def test_a_pin_that_was_bumped_before_the_proof_puts_the_old_value_back(cell):
 
 
 def test_a_permit_that_was_there_before_is_no_touch(cell):
-    """A machine in its service state calls nobody."""
+    """A machine in its service state starts no calibration."""
     looks = 0
 
     def ended():
@@ -135,7 +135,7 @@ def test_a_permit_that_was_there_before_is_no_touch(cell):
 
 
 def test_without_the_permit_to_put_it_back_the_machine_stays_blocked_until_recover(cell):
-    """The permit goes in the proof and stays away: the slot holds what nobody proved."""
+    """The permit ends during the turn test for good: the slot holds an untested value."""
     machine = PermitMachine(cell.simulator)
     old = machine.stored
     machine.leaves = True
@@ -159,12 +159,12 @@ def test_without_the_permit_to_put_it_back_the_machine_stays_blocked_until_recov
 
 
 class Gone(BaseException):
-    """The PC is switched off now."""
+    """The PC is switched off at this moment."""
 
 
 @pytest.mark.parametrize("step", [5, pytest.param(1, marks=pytest.mark.soak)])
 def test_the_pc_goes_at_any_commit_and_the_machine_waits_for_a_settled_tool(step):
-    """Old or proved, whenever the machine goes on; else it is blocked, and recover settles."""
+    """The value is old or tested when the machine goes on; else it is blocked until recover."""
     ends = set()
     for commit in range(0, 40, step):
         with served("sim", tools_only()) as cell:

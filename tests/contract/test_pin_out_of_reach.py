@@ -1,4 +1,4 @@
-"""A pin below the box: whoever answers, a person or a stand-in, the calibration comes to an end."""
+"""A pin below the box: the calibration ends, whether a person or a stand-in answers."""
 
 import pytest
 

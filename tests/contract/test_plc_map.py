@@ -1,4 +1,4 @@
-"""The tool table of a PLC with a map keeps the promises of every tool table, on each wire."""
+"""The tool table of a PLC with a map keeps the contract of every tool table, on each link."""
 
 import socket
 from pathlib import Path
@@ -30,7 +30,7 @@ from robolink.testing import confirm_whole_map
 from robolink.transaction import recover
 
 MAPS = Path("examples/plc-maps")
-# The first map has coils, discrete inputs and both kinds of registers, so it is on both wires.
+# The first map has coils, discrete inputs and both kinds of registers, so it runs on both links.
 CELLS = (
     ("commit-bit", "modbus-tcp"),
     ("level-handshake", "modbus-tcp"),
@@ -41,7 +41,7 @@ NEW = ToolOffset(11.25, -3.125)
 
 
 class Served:
-    """A simulated PLC on a wire; its time passes ten times as fast as ours."""
+    """A simulated PLC on a link; its time passes ten times as fast as real time."""
 
     def __init__(self, name, wire="modbus-tcp"):
         self.path = MAPS / f"{name}.toml"
@@ -49,7 +49,7 @@ class Served:
         self.plc = PlcSimulator(self.map, seed=7)
         on_line = wire == "modbus-rtu"
         self.serve = serve_plc_line if on_line else serve_plc
-        self.patience_s = 0.8 if on_line else 0.3  # a line has to fall silent first
+        self.patience_s = 0.8 if on_line else 0.3  # a line must be silent first
 
     def __enter__(self):
         self.host = self.serve(self.plc, self.path, clock=ScaledClock(10.0))

@@ -1,4 +1,4 @@
-"""The fixtures of the pytest plugin keep out of the tester's own journal."""
+"""The fixtures of the pytest plugin do not touch the tester's own journal."""
 
 import pytest
 
@@ -71,14 +71,14 @@ def test_a_write_that_is_cut_leaves_nothing_in_the_tester_s_own_folder(
     monkeypatch.setenv("ROBOLINK_JOURNAL", str(own_folder / "journal.db"))
     before = contents(own_folder)
     pytester.makepyfile(THEIRS)
-    # A process of its own: what was named when the plugin was loaded is the tester's.
+    # It runs in its own process: the environment when the plugin was loaded is the tester's.
     result = pytester.runpytest_subprocess("-p", "no:cacheprovider")
     result.assert_outcomes(passed=3)
     assert contents(own_folder) == before
 
 
 def test_without_the_fixtures_it_would_be_there(own_folder):
-    """What the test above looks for is where it looks."""
+    """Shows that the test above looks in the right place."""
     from robolink_simulators.epson.device import EpsonSimulator
     from robolink_simulators.hosting.streams.epson import serve_tcp
 

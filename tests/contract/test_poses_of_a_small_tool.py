@@ -1,4 +1,4 @@
-"""Poses of a tool near the flange: what nothing in them tells is asked, never guessed."""
+"""Poses of a tool near the flange: robolink asks what they cannot show, and never guesses."""
 
 import json
 
@@ -14,13 +14,13 @@ from robolink.methods import PointsSource
 from robolink.model import EntryKind, Pose, ToolOffset, rotate_xy
 
 SMALL = ToolOffset(0.7, -0.55, -20.0)
-"""0.9 mm beside the axis, as a coaxial nozzle."""
+"""0.9 mm from the axis, as a coaxial nozzle."""
 REAL = ToolOffset(0.78, -0.5, -20.0)
 PIN = (300.0, 100.0)
 
 
 def touching(u_deg, believed=None):
-    """Return the pose on the pin, of the flange or of the tip of a tool that is believed there."""
+    """Return a pose on the pin, of the flange or of the tip of a tool that is believed there."""
     own = believed or ToolOffset()
     x, y = rotate_xy(REAL.x_mm - own.x_mm, REAL.y_mm - own.y_mm, u_deg)
     return Pose(PIN[0] - x, PIN[1] - y, -40.0 - REAL.z_mm + own.z_mm, u_deg)
@@ -57,7 +57,7 @@ def stored(simulator):
 
 
 def sources(tmp_path, poses, points):
-    """Return the options by which the same poses come in."""
+    """Return the options by which the same poses can be given."""
     table = tmp_path / "touches.csv"
     rows = [f"{p.x_mm},{p.y_mm},{p.z_mm},{p.u_deg}" for p in poses]
     table.write_text("\n".join(["x,y,z,u", *rows]) + "\n", encoding="utf-8")

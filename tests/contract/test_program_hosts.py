@@ -1,4 +1,4 @@
-"""A program in Structured Text behind the same hosts as the modelled one."""
+"""A Structured Text program behind the same hosts as the modelled one."""
 
 from contextlib import closing
 

@@ -1,4 +1,4 @@
-"""The prompt that can be polled: while a person is asked, the controller is looked after."""
+"""The prompt polls the controller while it waits for a person."""
 
 from itertools import pairwise
 
@@ -17,7 +17,7 @@ NAME = "prompt-watch"
 
 
 class SlowOperator:
-    """A person who takes ``thinks_s`` to answer; ``meanwhile`` happens after ``happens_at_s``."""
+    """A person who answers after ``thinks_s``; ``meanwhile`` runs after ``happens_at_s``."""
 
     def __init__(self, clock, thinks_s, *, meanwhile=None, happens_at_s=0.0):
         self._clock = clock
@@ -44,7 +44,7 @@ class SlowOperator:
 
 
 class DeafOperator(SlowOperator):
-    """A prompt that cannot be left, as ``input()`` would be."""
+    """A prompt that cannot be interrupted, such as ``input()``."""
 
     def poll(self, wait_s):
         return super().poll(self._thinks_s)

@@ -1,7 +1,7 @@
-"""Each method that proves a new value can prove it after a break, and says no where it slipped.
+"""Each method with a turn test can run it after a break, and fails it if the tip slipped.
 
-The link is cut when the value is written and nothing proved it. Whoever comes next finds the change
-open, with its proof in the durable record, and makes that one.
+The link is cut after the write and before the turn test. The next run finds the change open, with
+the test in the durable record, and carries it out.
 """
 
 from collections.abc import Callable
@@ -130,7 +130,7 @@ def board(cell):
 
 @dataclass(frozen=True)
 class Case:
-    """A cell, and what measures in it; ``slip`` is by how much the tip moves after the write."""
+    """A cell and its measurement; ``slip`` is the axis along which the tip moves after it."""
 
     cell: Callable[[], Any]
     source: Callable[[Any], Any]
@@ -166,7 +166,7 @@ EACH_TIME = ("one-touch", "camera", "z-touch")
 
 
 class Cuts(Listener):
-    """Ends all when the last value is written: nothing goes out, nothing is recorded."""
+    """Ends everything when the last value is written: nothing is sent, nothing is recorded."""
 
     gone = False
 
@@ -180,7 +180,7 @@ class Cuts(Listener):
 
 
 class Later:
-    """One cell, its record, and who works on it."""
+    """One cell, its record, and its users."""
 
     def __init__(self, cell, folder):
         self.cell = cell
@@ -205,7 +205,7 @@ class Later:
         return Person.with_eyes(eyes, lambda _text: None, way_mm=12.0, clock=self.cell.clock)
 
     def broken_off(self, *sources, approach=None, verify=True):
-        """Measure and write, one source a tool; the link is cut then."""
+        """Measure and write, with one source for each tool; then the link is cut."""
         tools = tuple(
             ToolPlan(tool, source, approach=approach, verify=verify)
             for tool, source in enumerate(sources, start=TOOL)
@@ -223,7 +223,7 @@ class Later:
         self.cell.clock.sleep(60.0)
 
     def finished(self, controller):
-        """Make the proof that is open; return who was asked what in it."""
+        """Run the open turn test; return the person with the questions asked."""
         (operation,) = open_turn_tests(controller)
         recover(controller, keep=True, confirm=lambda _finding: True, later=[operation])
         finish_by_turn_test(controller, operation, self.person())

@@ -1,4 +1,4 @@
-"""A turn test after a break that contradicts its measurement asks as the change itself does."""
+"""A contradicted turn test after a break asks the same question as during the change."""
 
 from contextlib import contextmanager
 from dataclasses import replace
@@ -136,7 +136,7 @@ def test_looking_once_more_after_a_break_counts_all_looks(broken):
 
 
 def test_ending_the_process_at_the_question_is_no_way_to_a_fresh_test(broken):
-    """What was seen before the power went counts, although the beams are put right meanwhile."""
+    """The looks before the power failure count, although the beams are corrected meanwhile."""
     with pytest.raises(RobolinkError):
         broken.asked_to_finish(POWER_GOES)
     assert broken.now()[1], "the change is open"

@@ -1,4 +1,4 @@
-"""A value that reads back other than it was written is read again before it counts."""
+"""A value that reads back wrong is read again before it counts."""
 
 import pytest
 
@@ -11,7 +11,7 @@ DAMAGED = ToolOffset(4.971, -0.516, -1.0008)
 
 
 class Misread(SimpleMachine):
-    """Reports what it is told after a write, then what it holds."""
+    """Reports the given answers after a write, then the stored value."""
 
     def __init__(self, *answers: ToolOffset) -> None:
         super().__init__()

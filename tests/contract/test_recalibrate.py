@@ -1,4 +1,4 @@
-"""``recalibrate``: the example recipes and what a recipe asks for, on a served simulator."""
+"""``recalibrate``: the example recipes and their settings, on a served simulator."""
 
 import json
 import signal
@@ -148,19 +148,19 @@ def test_pendant_points_only_and_nothing_moves(cell):
     teach(cell, ToolOffset(12.5, -3.5, -20))
     second = cell.run("recalibrate", path, "--yes", "--json")
     assert second.code == 0, second.err
-    # What was wrong with the stored offset stays: only the difference is written.
+    # The error of the stored offset stays: only the difference is written.
     expected = ToolOffset(OLD_TIP.x_mm + 0.2, OLD_TIP.y_mm - 0.1, OLD_TIP.z_mm)
     assert cell.tool_1.components() == pytest.approx(expected.components(), abs=2e-3)
     (tool,) = json.loads(second.out)["tools"]
     assert abs(tool["tip"]["x_mm"] - 12.5) <= tool["fit"]["half_width95"]["x_mm"] < 0.05
     assert cell.simulator.machine.arm.moves_started == 0
     assert not [text for text in changes(cell.requests) if "TLSet 1" not in text]
-    # Nothing was verified; what was kept is the reference of the next change all the same.
+    # Nothing was verified; the kept value is the reference of the next change all the same.
     teach(cell, ToolOffset(12.4, -3.5, -20))
     third = cell.run("recalibrate", path, "--yes", "--json")
     assert third.code == 0, third.err
     assert cell.tool_1.x_mm == pytest.approx(OLD_TIP.x_mm + 0.1, abs=2e-3)
-    # What was measured is charted, not what was written.
+    # The chart shows the measured values, not the written ones.
     (charted,) = json.loads(cell.run("journal", "drift", "--json").out)["controllers"]
     assert json.loads(third.out)["simulated"] is charted["simulated"] is True
     tips = {c["axis"]: c["points"] for c in charted["charts"] if c["quantity"] == "tip"}
@@ -182,7 +182,7 @@ def test_two_nozzles_on_one_head(cell):
     assert len(measured) == len(written) == 2
     assert max(measured) < min(written)
     assert "$SetIO,8,0" not in requests[first_write:]
-    # The backup before the first write of all belongs to no change.
+    # The backup before the very first write belongs to no change.
     changes_known = {e.change for e in journal(cell) if e.kind is not EntryKind.BACKUP}
     assert len(changes_known) == 1
     assert [tool["write"]["skipped"] for tool in json.loads(done.out)["tools"]] == [False, False]
@@ -266,7 +266,7 @@ def test_z_is_typed_for_each_tool(cell, recipe):
 
 
 def test_a_typed_z_beyond_the_cell_takes_an_engineer(cell, recipe, tmp_path, monkeypatch):
-    """What a person types is not judged by the recipe, and held back by the write all the same."""
+    """The recipe does not judge a typed value, but the write refuses it all the same."""
     file, before = tmp_path / "robolink.toml", cell.tool_1
     people = '[cells.a.people]\nanna = "engineer"\nben = "operator"\n'
     file.write_text(
@@ -354,7 +354,7 @@ def test_corrections_that_grow_on_one_nozzle_are_refused(cell, recipe):
         assert done.code == code, (step, done.err)
     assert "The correction grew" in done.err
     assert cell.tool_1 == before
-    # Another nozzle may sit further off.
+    # Another nozzle may be farther off.
     assert assisted(cell, recipe(TOUCH), "--nozzle", "N-2").code == 0
 
 
@@ -472,7 +472,7 @@ def test_a_raw_statement_is_for_engineers_and_on_record(cell, tmp_path, monkeypa
     (entry,) = journal(cell, EntryKind.RAW)
     assert (entry.signature.operator, entry.signature.role) == ("anna", "engineer")
     assert entry.details["request"] == "Print TLDef(1)"
-    # A statement that put the controller in error: nobody knows what it did before.
+    # A statement that caused a controller error: how far it got is unknown.
     failed = cell.run("execute-raw", "Tool 9", "--yes", "-c", "a", "--operator", "anna", "--json")
     error = json.loads(failed.out)["error"]
     assert (failed.code, error["kind"]) == (6, "ControllerFaultError")

@@ -26,7 +26,7 @@ GANTRY = str(EXAMPLES / "gantry-touch-probe.toml")
 
 @pytest.fixture
 def run(tmp_path, monkeypatch, capsys):
-    """Run a command in this process; gives its exit code, document and messages."""
+    """Run a command in this process; return its exit code, document and messages."""
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
 
     def run(*arguments):
@@ -101,7 +101,7 @@ def test_a_served_cell_lends_its_camera_through_the_assist_port(tmp_path, monkey
         (measured,) = open_journal().log(cell.url).recorded(kinds=[EntryKind.CALIBRATION])
         token, _, place = cell.assist_url.removeprefix("assist+tcp://").partition("@")
         assert f"assist+tcp://{place}" in str(measured.details["source"])
-        # Who let the camera in is nobody's business but the simulator's.
+        # Only the simulator needs to know how the camera was added.
         assert token not in json.dumps(measured.details)
         assert token not in done.out + done.err
         assert measured.details["method"] == "camera"
@@ -136,7 +136,7 @@ def test_the_same_recipe_serves_a_plc(run, plc, tmp_path, capsys):
 def test_the_next_nozzle_is_a_difference_that_a_moved_camera_does_not_shift(run, epson, tmp_path):
     text = Path(CAMERA).read_text().replace('basis = "absolute"', 'basis = "difference"')
     recipe = tmp_path / "difference.toml"
-    # Looked at from one angle, so that the camera's error stays in both.
+    # Seen from one angle, so that the camera's error stays in both.
     recipe.write_text(
         text.replace("[157.63,", "[157.93,")
         .replace("[0, 60, 120, 180]", "[0]")

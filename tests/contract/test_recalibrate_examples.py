@@ -1,7 +1,7 @@
-"""The shipped recipes as a whole: how long the robot takes, and how sure the result is.
+"""The shipped recipes as a whole: the robot's time, and the accuracy of the result.
 
-Those with a camera or a probe and those for another robot stand with their sensors, in the other
-tests of ``recalibrate``.
+Recipes with a camera or a probe, and those for another robot, are in the other tests of
+``recalibrate``, with their sensors.
 """
 
 import json
@@ -20,8 +20,9 @@ pytestmark = pytest.mark.simulator_only
 EXAMPLES = Path(__file__).parents[2] / "examples" / "recipes"
 BEAMS_MM = (175.0, 488.0, -106.0)
 MOST_S = {"needle-beams": 20.0}
-"""What the product promises. It is counted by the simulated clock, which only movements move on
-here, so it is the same in each run and on each machine: 19.69 s."""
+"""The promised time. It is counted by the simulated clock, which only movements advance here, so it
+is the same in each run and on each machine: 19.69 s.
+"""
 
 
 @pytest.fixture
@@ -54,8 +55,8 @@ def test_the_error_to_the_truth_is_what_the_interval_leads_to_expect(cell, examp
         true = cell.simulator.world.tips[number]
         assert set(halves) == {"x_mm", "y_mm"}
         for name, half in halves.items():
-            # One draw: one in 20 lies outside of a 95 % interval, one in 10,000 outside of twice
-            # that; how many do is counted in soak. The controller keeps three decimals.
+            # One draw: one in 20 lies outside a 95 % interval, one in 10,000 outside twice that; a
+            # soak test counts them. The controller stores three decimals.
             assert abs(getattr(found, name) - getattr(true, name)) <= 2 * half + 0.0005
             assert half <= 0.05
         assert tool["verification"]["passed"]

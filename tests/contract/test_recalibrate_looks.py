@@ -1,4 +1,4 @@
-"""``recalibrate`` with a camera of unknown pose and with a held board, on both controller kinds."""
+"""``recalibrate`` with an uncalibrated camera and with a held board, on both controller kinds."""
 
 import cmath
 import json
@@ -26,7 +26,7 @@ BOARD = EXAMPLES / "held-board.toml"
 
 @pytest.fixture
 def here(tmp_path, monkeypatch, capsys):
-    """Opens a cell; gives it, and a way to run a recipe there."""
+    """Opens a cell; returns it and a function that runs a recipe there."""
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "state"))
     opened = []
 
@@ -75,7 +75,7 @@ def test_the_example_recalibrates_inside_the_stated_interval(here, kind, example
     assert found is not None
     assert set(halves) == {"x_mm", "y_mm", *(["u_deg"] if board else [])}
     for name, half in halves.items():
-        # The controller keeps three decimals.
+        # The controller stores three decimals.
         assert abs(getattr(found, name) - getattr(truth, name)) <= half + 0.0005
         assert half < 0.02
     assert found.z_mm == -20.0
@@ -96,7 +96,7 @@ def test_a_camera_that_changed_since_the_last_run_ends_the_recipe_with_the_old_v
 
 
 def test_a_difference_carries_the_stored_value_along_with_a_board_that_turned(here, tmp_path):
-    """What was wrong with the stored value when the points were taught stays as wrong as it was."""
+    """The error that the stored value had when the points were taught stays the same."""
     cell, run = here("epson", board_held=True)
     path = tmp_path / "difference.toml"
     path.write_text(BOARD.read_text().replace('basis = "absolute"', 'basis = "difference"'))

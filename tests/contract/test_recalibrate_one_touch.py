@@ -1,4 +1,4 @@
-"""``recalibrate`` at named stations: one touch with Z, a bumped pin, beams on record, a retake."""
+"""``recalibrate`` at named stations: one touch with Z, a bumped pin, recorded beams, a retake."""
 
 import json
 import sys
@@ -149,7 +149,7 @@ def test_a_recipe_names_beams_and_a_surface_by_their_stations_and_may_end_early(
             true = getattr(arm.truth, f"{axis}_mm")
             assert tool["proposed"][f"{axis}_mm"] == pytest.approx(true, abs=0.02)
         assert "That is enough" in done.err
-    # With --yes nobody is asked about the worst, and what nobody was asked nobody declined.
+    # With --yes nobody is asked about the worst touch, so nobody declined to repeat it.
     said = [entry.details for entry in arm.recorded(EntryKind.DECISION)]
     assert not any("Repeat it" in str(one["question"]) for one in said)
     assert {one["answered_by"] for one in said} == {"--yes"}
@@ -204,7 +204,7 @@ def test_a_recipe_offers_the_worst_pose_again_and_the_answer_is_on_record(
 
 
 def test_a_z_that_nobody_measured_is_changed_and_never_stated(arm, tmp_path):
-    """The stored Z is 0.36 off; one touch said +-0.025 of it."""
+    """The stored Z is 0.36 off; one touch stated it to +-0.025."""
     assert arm.calibrate("n-angle", "--station", "PIN-07", "--count", "4").code == 0
     off_mm = arm.stored.z_mm - arm.truth.z_mm
     assert abs(off_mm) > 0.3
@@ -217,7 +217,7 @@ def test_a_z_that_nobody_measured_is_changed_and_never_stated(arm, tmp_path):
     assert tool["changed"] == ["z_mm"]
     assert set(tool["fit"]["half_width95"]) == {"x_mm", "y_mm"}
     assert tool["stored_z"] == {"value_mm": stored, "half95_mm": None, "entry": None}
-    # What is stated is the change, and it is right.
+    # The change is stated, and it is right.
     assert tool["change_z_mm"] == pytest.approx(tool["proposed"]["z_mm"] - stored, abs=2e-3)
     assert abs(tool["change_z_mm"] + 0.2) <= tool["change_z_half95_mm"]
     assert abs(arm.stored.z_mm - arm.truth.z_mm) > 3 * tool["change_z_half95_mm"]
@@ -240,7 +240,7 @@ def test_a_z_that_nobody_measured_is_changed_and_never_stated(arm, tmp_path):
 
 
 def test_a_z_that_was_measured_has_its_interval_after_one_touch(arm, tmp_path):
-    """Z by the height of a surface, X and Y of the same needle on the pin, then the next needle."""
+    """Z comes from the height of a surface, X and Y from the pin; then the needle is changed."""
     arm.mount()
     arm.lengthen(-0.3)
     assert arm.calibrate("z-touch", "--station", "PLATE", "--nozzle", "N-0").code == 0
@@ -258,7 +258,7 @@ def test_a_z_that_was_measured_has_its_interval_after_one_touch(arm, tmp_path):
         assert abs(arm.stored.z_mm - arm.truth.z_mm) <= half
         assert half > tool["change_z_half95_mm"]
         assert f"the stored Z was measured: journal entry {measured.number}" in done.err
-    # Typed, it is a number that nobody measured.
+    # A typed number was not measured by anybody.
     assert arm.run("tool", "set", "1", "--z", str(arm.stored.z_mm + 0.01), "--yes").code == 0
     assert arm.calibrate(*full).code == 0
     arm.lengthen(0.1)

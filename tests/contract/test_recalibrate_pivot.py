@@ -1,4 +1,4 @@
-"""``recalibrate`` with tilted touches, on a PLC whose flange leaves the vertical."""
+"""``recalibrate`` with tilted touches, on a PLC whose flange tilts."""
 
 import sys
 from pathlib import Path
@@ -18,7 +18,7 @@ STORED = (12.0, -3.5, -20.0)
 
 @pytest.fixture
 def machine(serve_simulator):
-    """Opens a simulated machine in virtual time; its URL stands in ``url``."""
+    """Opens a simulated machine in virtual time; ``url`` is its URL."""
 
     def open_machine(kinematics="Kin_5Axes"):
         simulator = SoftMotionSimulator(kinematics, seed=1)
@@ -36,7 +36,7 @@ def recalibrate(simulator, path, *more):
 
 
 def slot(simulator):
-    """Return the lengths that the PLC holds."""
+    """Return the lengths in the PLC's tool slot."""
     return simulator.plc.memory.slot(1).tool[:3]
 
 
@@ -52,7 +52,7 @@ def test_the_example_finds_the_whole_tip_as_the_interval_leads_to_expect(machine
     halves = tool["fit"]["half_width95"]
     assert list(halves) == ["x_mm", "y_mm", "z_mm"]
     for found, true, half in zip(slot(simulator), truth(simulator), halves.values(), strict=True):
-        # Standoffs are drawn anew each time: one in 20 lies outside of a 95 % interval.
+        # Standoffs are drawn anew each time: one in 20 lies outside a 95 % interval.
         assert abs(found - true) <= 2 * half < 0.1
     assert tool["verification"]["passed"]
     with capsys.disabled():

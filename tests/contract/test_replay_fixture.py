@@ -1,4 +1,4 @@
-"""The fixture ``epson_replay``, as the tests of somebody else use it."""
+"""The fixture ``epson_replay``, as used in third-party tests."""
 
 import pytest
 
@@ -33,7 +33,7 @@ def test_nothing(epson_replay):
 
 @pytest.fixture
 def recorded(pytester, monkeypatch):
-    """A recording of one status in the folder of the inner test."""
+    """A recording of one status request in the folder of the inner test."""
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(pytester.path / "state"))
     log = DialogueLog("a simulator", wall_label())
     with robolink.connect("epson+sim://replay-fixture", trace=log) as controller:
@@ -44,7 +44,7 @@ def recorded(pytester, monkeypatch):
 
 def test_a_replay_fails_the_test_that_asks_otherwise(recorded):
     recorded.makepyfile(TESTS)
-    # In one run: another interpreter for each would cost more than all of them.
+    # All in one run: an interpreter for each would cost more than all of them.
     result = recorded.runpytest_subprocess("-p", "no:cacheprovider")
     result.assert_outcomes(passed=4, errors=3)
     *_, shown = result.stdout.str().partition("= ERRORS =")

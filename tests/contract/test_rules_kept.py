@@ -33,7 +33,7 @@ MOVING = {check.__name__ for check in (*MOVING_CHECKS, *WRITING_WHILE_MOVING_CHE
 
 
 def table():
-    """Yield each row: its rule, its promise, its places and what tries them."""
+    """Yield each row: its rule, its promise, its places and its checks."""
     listed = PAGE.partition("## Where each is kept")[2]
     for line in re.findall(r"^\| \d+ \|.*$", listed, re.MULTILINE):
         rule, promise, places, tries = (cell.strip() for cell in line.strip("|").split("|"))
@@ -50,10 +50,10 @@ EACH = [
 
 PLUGIN = "tests.contract._without_guards"
 UNTRIED = {"robolink.files.durable.sync_folder"}
-"""What a platform lacks cannot be taken out: the test takes it away from all of robolink."""
+"""A place that a platform lacks cannot be removed; its own test hides it from all of robolink."""
 
 OWN = {"robolink.controllers.ToolTableCore.same": "epson"}
-"""Kinds that keep a place by themselves; the others are tried on the controller in memory."""
+"""Kinds that implement a place themselves; others are tried on the in-memory controller."""
 
 
 def test_every_rule_stands_in_the_table():
@@ -70,7 +70,7 @@ def test_each_place_and_what_tries_it_are_there(promise, place, tried):
         path, _, name = tried.partition("::")
         assert re.search(rf"^def {name}\(", Path(path).read_text("utf-8"), re.MULTILINE), tried
         return
-    # What is not in the tuples that the kinds run is a promise that nobody looks at.
+    # A promise missing from the tuples that the kinds run would never be checked.
     run_on = {kind for kind, check in test_controller_contract.CASES if check.__name__ == tried}
     assert run_on == set(KINDS) - (set(IMMOBILE) if tried in MOVING else set()), tried
 
@@ -114,7 +114,7 @@ BY_TESTS = [
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize(("place", "tried"), BY_TESTS)
 def test_a_test_fails_where_its_guard_is_taken_out(place, tried):
-    """In a process of its own, before anything has imported the guard."""
+    """The test runs in a process of its own, before anything has imported the guard."""
     line = [sys.executable, "-m", "pytest", "-n", "0", "-q", "-x", "-p", PLUGIN, tried]
     environment = {**os.environ, "ROBOLINK_WITHOUT": place}
     done = subprocess.run(line, env=environment, capture_output=True, text=True, check=False)

@@ -1,7 +1,7 @@
-"""An open block lives although it is quiet: who else comes is told, and takes nothing from it.
+"""An idle open block stays alive: another client is told and cannot take its lock.
 
-Two computers share a journal or share only the PLC (docs/decisions/0067). Nobody waits here: the
-test lets the time pass, on every link.
+Two computers share a journal, or only the PLC (docs/decisions/0067). No real time passes: the test
+advances it, on every link.
 """
 
 from dataclasses import replace
@@ -35,7 +35,7 @@ DISPOSSESSED = {106, 107}
 
 
 class Plc:
-    """A PLC, two computers that command it, and the time of all."""
+    """A PLC, two computers that command it, and their common time."""
 
     def __init__(self, cell, folder):
         self.cell = cell
@@ -54,7 +54,7 @@ class Plc:
 
     @property
     def held(self):
-        """The z of what the slot holds, past the wire."""
+        """The Z in the slot, read by a separate connection."""
         return self.cell.simulator.plc.memory.slot(1).tool[2]
 
     @property
@@ -80,7 +80,7 @@ def in_process(tmp_path):
 
 
 def dispossessed(error):
-    """Whether an act was refused because somebody else took over."""
+    """Whether an act was refused because another client took over."""
     if isinstance(error, RejectedError):
         return error.code in DISPOSSESSED
     return isinstance(error, LeaseLostError)
@@ -159,7 +159,7 @@ def test_its_recover_of_what_it_left_itself_is_refused_too(in_process, tmp_path,
         change.write()
         plc.time.sleep(QUIET_S)
         with at(BOB) as second, pytest.raises(RobolinkError) as told:
-            # Who waits for a silent owner lets the others go on meanwhile.
+            # A client that waits for a silent owner lets the others go on meanwhile.
             clock = type(second._mailbox.wire.clock)
             monkeypatch.setattr(clock, "sleep", lambda _clock, s: plc.time.sleep(s))
             recover(second, confirm=lambda _: True)
@@ -185,7 +185,7 @@ def test_a_person_insists_and_the_old_holder_is_refused_from_then_on(plc):
             owner = f"{plc.cell.owner:08X}"
             with plc.connect(BOB) as second:
                 second.take_over("ann went home")
-                assert plc.epoch == before + 2  # she took it, then he did
+                assert plc.epoch == before + 2  # she took it over, then he did
                 assert recover(second, confirm=lambda _: True).left == ()
             assert plc.held == OLD.z_mm
             change.keep("parts were good")

@@ -1,4 +1,4 @@
-"""The assist port: a person, as JSON lines."""
+"""The assist port: a simulated person, controlled by JSON lines."""
 
 import json
 import math
@@ -65,7 +65,7 @@ def test_the_assist_port_shows_the_axes_of_the_true_tool(assisted):
     _, assist, simulator = assisted
     assist.do("set_world", tool_v_deg=90, eye_sigma_mm=0)
     u_deg = math.radians(simulator.machine.arm.flange().u_deg)
-    # Turned about Y by a quarter of a turn, +Z points to where +X was.
+    # A quarter turn about Y brings +Z to the old direction of +X.
     aside = [50 * math.cos(u_deg), 50 * math.sin(u_deg), 0]
     assert assist.way_along("z", 50.0, 1) == pytest.approx(aside, abs=1e-9)
     assert assist.way_along("x", 50.0, 1) == pytest.approx([0, 0, -50], abs=1e-9)
@@ -138,13 +138,13 @@ def test_no_value_of_any_act_stops_the_assist_port(simulated):
 
 
 def door(assist):
-    """Open a bare connection to the port that a client talks to."""
+    """Open a bare connection to the assist port."""
     link = parse_url(assist._url)
     return socket.create_connection((link.host, link.port), timeout=5)
 
 
 def end_of(connection):
-    """Return what still comes; the end of a connection may be a reset, when it held bytes."""
+    """Read to the end of a connection, which with unread bytes may be a reset."""
     heard = b""
     try:
         while piece := connection.recv(65536):
@@ -238,7 +238,7 @@ def test_a_full_assist_port_sends_the_newcomer_away(assisted):
         with pytest.raises(TransportBrokenError):
             AssistClient(url)
         assert assist.do("counters")["exchanges"] == 0
-    # Places are free again as soon as the port has seen them go, which it does before the next.
+    # Places are free again once the port has noticed the departures, before the next client.
     assert assist.do("counters")["exchanges"] == 0
     with AssistClient(url) as again:
         assert again.do("counters")["exchanges"] == 0

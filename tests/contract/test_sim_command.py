@@ -1,4 +1,4 @@
-"""``robolink sim epson`` as a process of its own."""
+"""``robolink sim epson`` in a process of its own."""
 
 import json
 import os

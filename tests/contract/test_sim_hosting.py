@@ -1,4 +1,4 @@
-"""The served simulator against a client that is not ours: a raw socket."""
+"""The served simulator against a foreign client: a raw socket."""
 
 import random
 import re
@@ -23,7 +23,7 @@ ANSWER = re.compile(rb'(#\w+,"[^"]*"|[#!][^\r"]*)\r\n')
 
 
 class RawClient:
-    """A socket and nothing else; hands out one answer at a time."""
+    """A bare socket that returns one answer at a time."""
 
     def __init__(self, url):
         link = parse_url(url)
@@ -62,7 +62,7 @@ def served(simulator=None, *, factor=1.0):
         yield host
 
 
-# ---- the exchanges of docs/reference/epson.md 6, against the simulator
+# ---- the exchanges of docs/reference/epson.md 6, on the simulator
 
 
 def test_a_login_with_and_without_a_password():
@@ -135,7 +135,7 @@ def test_a_second_execute_is_refused_while_the_first_one_runs():
 
 
 def test_every_transcribed_request_is_understood():
-    """None of the requests of the transcripts is unknown or malformed here."""
+    """The simulator knows every request of the transcripts."""
     path = Path(__file__).parents[1] / "transcripts" / "epson_text.toml"
     exchanges = tomllib.loads(path.read_text())["exchange"]
     requests = [
@@ -242,7 +242,7 @@ def test_a_taken_port_is_named():
 
 @pytest.mark.parametrize("serve", [serve_tcp, serve_serial])
 def test_no_client_waits_until_statements_can_be_read(serve, monkeypatch):
-    """That takes a third of a second, and several of them on a busy machine."""
+    """Loading the parser takes a third of a second, and seconds on a busy machine."""
     made = []
     monkeypatch.setattr(parser, "_parser", lambda: made.append("the parser"))
     with serve(EpsonSimulator()):

@@ -1,4 +1,4 @@
-"""Simulators inside this process: shared by name, and as nasty as TCP."""
+"""Simulators inside this process: shared by name, with the same faults as over TCP."""
 
 import threading
 from contextlib import closing

@@ -1,4 +1,4 @@
-"""Every simulated controller is made anew, and goes back to a moment, while it is served."""
+"""Every simulated controller can be reset, and returned to a snapshot, while it is served."""
 
 import json
 import socket
@@ -85,7 +85,7 @@ def test_it_is_made_anew_as_another_controller(served):
 
 
 def test_who_asked_before_it_was_made_anew_is_not_answered_by_the_new_one(served):
-    """A request is under way while the controller is replaced: its connection has ended."""
+    """A request is under way during the reset: its connection is closed."""
     host, _, port = served.url.partition("://")[2].partition("?")[0].rpartition(":")
     asked = b"$Login,\r\n" if served.kind == "epson" else bytes.fromhex("000100000006010400140002")
     with socket.create_connection((host, int(port)), 10) as client:
@@ -93,7 +93,7 @@ def test_who_asked_before_it_was_made_anew_is_not_answered_by_the_new_one(served
         assert client.recv(100)
         with served.simulator.lock:
             client.sendall(asked)
-            time.sleep(0.05)  # it waits for the controller by then, else it is cut off all the same
+            time.sleep(0.05)  # it waits for the controller by then, or it is cut off all the same
             served.simulator.reset()
         with suppress(ConnectionResetError):
             assert client.recv(100) == b""
@@ -123,7 +123,7 @@ def test_it_goes_back_to_a_moment_as_the_same_controller(served):
         there = served.simulator.world.robot.flange()
         assert there.coordinates() == pytest.approx(place.coordinates(), abs=1e-9)
     assert write(served, -31.0) == who
-    # What came later has not crept into what was kept.
+    # Later changes have not entered the snapshot.
     served.simulator.go_back(moment)
     assert served.simulator.truth() == then
 
@@ -145,7 +145,7 @@ def test_writes_and_starts_are_counted_alike(served):
     write(served, -31.0)
     if served.kind != "plc":
         with robolink.connect(served.url) as controller:
-            controller.tools.clear(2, expected=robolink.ANY)  # a write too
+            controller.tools.clear(2, expected=robolink.ANY)  # including a write
     served.simulator.restart()
     counted = served.simulator.counters()
     writes = 1 if served.kind == "plc" else 2
@@ -156,7 +156,7 @@ def test_writes_and_starts_are_counted_alike(served):
 
 
 def test_what_is_counted_goes_on_when_it_goes_back(served):
-    """Whoever looks at two counts sees what there was between them, whatever else was done."""
+    """The difference of two counts covers everything between them, whatever else was done."""
     write(served, -31.0)
     moment = served.simulator.kept_moment()
     write(served, -32.0)

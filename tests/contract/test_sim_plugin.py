@@ -1,4 +1,4 @@
-"""The pytest plugin in the run of somebody else's tests."""
+"""The pytest plugin in third-party tests."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""The behaviours of docs/reference/softmotion.md 5, seen through the wire."""
+"""The behaviours of docs/reference/softmotion.md 5, seen through the mailbox."""
 
 import math
 import re
@@ -71,7 +71,7 @@ def client(machine):
 
 
 def put(client, tool, slot=2):
-    """Write a slot and select it: the way in which a client sets a tool."""
+    """Write a slot and select it, as a client sets a tool."""
     client.done(Opcode.WRITE_TOOL, slot, pose=tool, name="probe")
     return client.tell(Opcode.SELECT_TOOL, slot)
 
@@ -143,7 +143,7 @@ NAMED = [
     "Kin_5Axes",
     "Kin_Bipod_Rotary",
 ]
-"""What the behaviour names; behind them the other rows of the table that take all tools."""
+"""The kinematics that the behaviour names; the test adds the other rows that accept all tools."""
 
 
 @pytest.mark.parametrize(
@@ -181,7 +181,7 @@ def test_8_setting_the_kinematics_takes_the_tool_off_even_the_same_kinematics(ki
 
 
 class Rail:
-    """A kinematics of one's own, of one axis, that does not implement the interface."""
+    """A user-defined kinematics of one axis that does not implement the interface."""
 
     kinds = (AxisKind.LINEAR,)
 
@@ -193,7 +193,7 @@ class Rail:
 
 
 class RailWithImage(Rail):
-    """The same with it."""
+    """The same kinematics with the interface."""
 
     def get_flange_orientation_image(self, r_flange):
         return OrientationSpace.known(NO_TURN)
@@ -271,13 +271,13 @@ def test_14_an_axis_moved_by_itself_breaks_a_movement_and_nothing_else():
 
 @dataclass(frozen=True, slots=True)
 class Turn:
-    """A machine that can turn its TCP about one axis of MCS, from where the two are parallel.
+    """A machine that can turn its TCP about one axis of MCS, starting with the two parallel.
 
     Attributes:
         button: Which of A, B and C is jogged.
-        axis: What that turns about.
+        axis: The axis that it turns about.
         wrist: The turn and the inclination of a Kin_5Axes at the start.
-        tool: ZYZ angles that make up for them.
+        tool: ZYZ angles that compensate for them.
     """
 
     button: int
@@ -286,7 +286,7 @@ class Turn:
     tool: tuple[float, float, float]
 
 
-# An inclination leans about the Y axis of the wrist, which the turn brings to the X axis of MCS.
+# An inclination tilts about the Y axis of the wrist, which the turn brings to the X axis of MCS.
 TURNS = {
     "A": Turn(3, (1.0, 0.0, 0.0), (90.0, 0.0), (-90.0, 0.0, 0.0)),
     "B": Turn(4, (0.0, 1.0, 0.0), (0.0, 0.0), (0.0, 0.0, 0.0)),
@@ -302,7 +302,7 @@ def turn(request):
 
 @pytest.fixture
 def parallel(machine, turn):
-    """A client of a machine with a long tool, whose TCP stands parallel to MCS."""
+    """A client of a machine with a long tool, whose TCP is parallel to MCS."""
     client = machine("Kin_5Axes")
     axes = (*client.now().axes[:3], *turn.wrist, 0.0)
     now = client.tell(Opcode.MOVE_DIRECT, 0, 0, ACS, 0, pose=axes, dynamics=FACTORS)
@@ -312,7 +312,7 @@ def parallel(machine, turn):
 
 
 def jog(client, forward, backward):
-    """Press buttons for a tenth of a second and wait until everything rests."""
+    """Press buttons for a tenth of a second and wait until everything stops."""
     client.tell(Opcode.JOG, forward, backward, MCS, dynamics=FACTORS)
     client.wait(0.1)
     jogging = bool(client.now().bits & Bits.JOGGING)
@@ -331,7 +331,7 @@ def test_15_jogging_a_turn_goes_about_an_axis_of_mcs_and_keeps_the_tcp(parallel,
     axis, angle_deg = axis_and_angle(zyz(*after.tcp[3:]))
     assert axis == pytest.approx(turn.axis, abs=1e-6)
     assert 5 < angle_deg < 60
-    # The flange goes round the tip of the long tool.
+    # The flange moves round the tip of the long tool.
     assert math.dist(after.axes[:3], before.axes[:3]) > 1
 
 

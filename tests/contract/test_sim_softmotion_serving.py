@@ -1,4 +1,4 @@
-"""Simulated PLCs by name, with a person beside them, and as a process of their own."""
+"""Simulated PLCs by name, with a simulated person, and in a process of their own."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""Stations of six-axis arms that stand near a singular place: found before anything moves."""
+"""Stations of six-axis arms near a singular position are found before anything moves."""
 
 import json
 import os
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.simulator_only
 EXAMPLES = Path(__file__).parents[2] / "examples" / "recipes"
 TABLE, CEILING = "C8-C901S", "CX4-A601SR"
 LEANING = ToolOffset(30.0, 0.0, 120.0)
-"""A tip that stands 30 mm beside the axis of the flange."""
+"""A tip 30 mm from the axis of the flange."""
 PLACES = {
     "wrist": (
         TABLE,
@@ -31,8 +31,9 @@ PLACES = {
     "wrist under a ceiling": (CEILING, (0.0, -25.0, -57.0, 0.0, -8.0, 0.0), "Joint 5 would be"),
     "elbow under a ceiling": (CEILING, (0.0, -75.2, 77.6, 0.0, 87.6, 0.0), "cannot reach"),
 }
-"""The tool points down in each: joint 5 nearly at 0; the arm nearly stretched; the wrist 26 mm
-before the axis of joint 1, so that it would have to pass behind it."""
+"""The tool points down in each: joint 5 nearly at 0; the arm nearly stretched; the wrist 26 mm in
+front of the axis of joint 1, so that it would have to pass behind it.
+"""
 
 
 @pytest.fixture
@@ -46,7 +47,7 @@ def cell_file():
 
 
 def stand(at, joints, tip=None):
-    """Put the arm somewhere, with all stations of the cell about its tip."""
+    """Put the arm at a place, with all stations of the cell at its tip."""
     simulator, cell = at.cell.simulator, at.cell
     simulator.machine.arm.place(Joints(*joints), simulator.now_ns)
     if tip is not None:
@@ -62,7 +63,7 @@ def stand(at, joints, tip=None):
 
 
 def refused(at, done):
-    """Prove that nothing moved, and return why."""
+    """Check that nothing moved, and return the reason."""
     assert done.code == 2, done.out + done.err
     assert at.cell.simulator.machine.arm.moves_started == 0
     return json.loads(done.out)["error"]["what"]
@@ -99,7 +100,7 @@ def looking_at(at, method, *more):
 
 
 def a_recipe(at):
-    """A recipe whose measuring place is there."""
+    """A recipe that measures there."""
     x, y, z, u, v, w = at.world.robot.flange().coordinates()
     place = f"{{ x_mm = {x}, y_mm = {y}, z_mm = {z}, u_deg = {u}, v_deg = {v}, w_deg = {w} }}"
     safe = place.replace(f"z_mm = {z}", f"z_mm = {z + 20}")
@@ -114,13 +115,13 @@ def a_recipe(at):
 
 MEASURES = (crossing, touching, looking, a_board, a_recipe)
 ADAPTS = {("shoulder", touching), ("shoulder", a_recipe), ("elbow under a ceiling", a_recipe)}
-"""Straight up and down, and with other tilts, the arm can measure there."""
+"""With vertical moves and other tilts the arm can measure there."""
 
 QUICK = {("wrist", looking), ("elbow", touching), ("shoulder", crossing), ("wrist", a_recipe)}
 
 
 def cases():
-    """Return each way of measuring at each place; all but a few in the long tests."""
+    """Return each measurement at each place; all but a few only in the long tests."""
     return [
         pytest.param(
             robot,
@@ -143,8 +144,9 @@ def test_a_station_near_a_singular_place_is_refused_before_anything_moves(at, me
 
 
 FAR_OUT = (0.0, -68.483, 43.963, 0.0, -65.48, 0.0)
-"""Tool down, 52 mm before the end of the reach: with a tip that stands 30 mm beyond the flange
-three eighths of a turn about it are in reach, half a turn is not."""
+"""Tool down, 52 mm from the limit of reach: with a tip 30 mm beyond the flange, three eighths of a
+turn about it are within reach, half a turn is not.
+"""
 
 
 @pytest.mark.parametrize("at", [TABLE], indirect=True)

@@ -1,4 +1,4 @@
-"""A jog on a simulated PLC: whatever happens meanwhile, the robot stands afterwards, and stays."""
+"""A jog on a simulated PLC always ends with the robot stopped, whatever happens meanwhile."""
 
 import math
 import threading
@@ -40,13 +40,13 @@ def box_around(pose, half_mm):
 
 
 def distance_mm(controller, since):
-    """Return how far the tip has come since it was there."""
+    """Return the distance of the tip from an earlier place."""
     here = controller.groups[0].pose().coordinates()
     return math.dist(here[:3], since.coordinates()[:3])
 
 
 def look_for(cell, controller, seconds):
-    """Look at the state again and again for so long."""
+    """Poll the state for this long."""
     for _ in range(round(seconds / 0.1)):
         controller.status()
         cell.clock.advance(0.1)
@@ -70,7 +70,7 @@ def test_a_permit_that_is_withdrawn_ends_the_jog_and_no_status_moves_it_on(cell,
 
 
 def taken_over(cell, controller, command):
-    """Let a second program insist on the mailbox a while after a command was written."""
+    """Let a second program take over the mailbox shortly after a command was written."""
     cell.simulator.faults.add(
         PlcFault(PlcFaultAction.TAKE_OWNERSHIP, match=f"write_command {command}", seconds=0.4)
     )

@@ -1,4 +1,4 @@
-"""Movements of an axis group on every link: at most once, watched, stoppable, inside limits."""
+"""Movements of an axis group on every link: at most once, watched, stoppable, in limits."""
 
 import threading
 from dataclasses import replace
@@ -63,7 +63,7 @@ def test_a_joint_move_turns_the_tool(group):
 def test_four_movements_may_be_under_way_and_a_fifth_has_to_wait(cell, group):
     start = group.pose()
     ways = [above(start, by_mm) for by_mm in (2.0, 3.0, 1.0, 0.0)]
-    # The first lasts long enough for a busy computer to send the others meanwhile.
+    # The first takes long enough for a busy computer to send the others meanwhile.
     motions = [group.move_to(ways[0], SLOW, box=ANYWHERE)]
     motions += [group.move_to(way, QUICK, box=ANYWHERE) for way in ways[1:]]
     with pytest.raises(BusyError, match="four movements"):
@@ -215,7 +215,7 @@ def test_a_movement_on_which_nobody_waits_is_halted_on_purpose(cell, group):
 
 
 def test_a_program_that_another_task_calls_is_told_what_to_change():
-    """ErrorID 12108: the PLC has no class for it, but what it means is known."""
+    """ErrorID 12108 has no class on the PLC, but its meaning is known."""
     options = PlcOptions(GroupOptions(program_task="other"))
     with served("sim", SoftMotionSimulator(options=options)) as cell, cell.connect() as controller:
         group = controller.groups[0]

@@ -1,4 +1,4 @@
-"""What is done with a PLC as a whole, on every link: look, back up, calibrate, recover, undo."""
+"""Whole procedures on a PLC, on every link: read, back up, calibrate, recover, undo."""
 
 import pytest
 from robolink_cli.prompts.operator import AssistedOperator

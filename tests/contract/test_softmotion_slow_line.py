@@ -1,6 +1,6 @@
-"""A movement on a serial line, and how much stands between two of the beats that keep it going.
+"""A movement on a serial line, and the exchanges between its heartbeats.
 
-Line and PLC run at half their pace here, so that a busy machine does not decide the outcome.
+Line and PLC run at half speed here, so that a busy machine does not decide the outcome.
 """
 
 import threading
@@ -20,28 +20,28 @@ from tests.contract._softmotion_cell import above
 
 PACE = 0.5
 LONG = ("read_response", "read_slot")
-"""Exchanges that take a good part of the half second which the PLC waits for a beat."""
+"""Exchanges that take a large part of the half second for which the PLC waits for a heartbeat."""
 
 
 @contextmanager
 def line_at(baud, *, carried=True):
-    """Serve a PLC on a line; what is not carried as slowly is slow for the driver alone."""
+    """Serve a PLC on a line; a link that is not slowed down is slow only for the driver."""
     with ExitStack() as stack:
         simulator = SoftMotionSimulator(seed=7)
         rate, pace = (round(PACE * baud), PACE) if carried else (0, 1.0)
         host = serve_modbus_rtu(simulator, baud=rate, clock=ScaledClock(pace))
         stack.enter_context(host)
-        # The driver goes by the rate in the URL: that of the line at its full pace.
+        # The driver uses the rate in the URL: that of the line at full speed.
         url = host.url.replace(f"baud={rate or 115200}", f"baud={baud}")
         log = memory_journal("slow line").log(url)
         yield simulator, stack.enter_context(robolink.connect(url, outcomes=log))
 
 
 class Watch:
-    """What stands between each two beats while a movement or a jog is unfinished.
+    """The exchanges between heartbeats during a movement or a jog.
 
     Attributes:
-        gaps: The exchanges between one beat and the next; the last gap is that of the end.
+        gaps: The exchanges between one heartbeat and the next; the last gap is at the end.
     """
 
     def __init__(self, simulator):
@@ -62,7 +62,7 @@ class Watch:
             self.gaps[-1].append(kind)
 
     def require_beats_around_long_ones(self):
-        """Each whole look and each slot comes just after a beat, and no two without one."""
+        """Check that each long exchange comes just after a heartbeat, and no two without one."""
         assert len(self.gaps) > 5
         for gap in self.gaps:
             assert not [kind for kind in gap[1:] if kind in LONG], gap
@@ -80,7 +80,7 @@ def test_one_whole_look_at_the_beginning_then_the_head_alone(baud):
         motion = group.move_to(above(group.pose(), 2.0), profile, box=WorkBox())
         assert motion.wait(timeout_s=20) is MotionOutcome.ARRIVED
     watch.require_beats_around_long_ones()
-    # That which shows the acceptance; in more than ten times its own time there is another.
+    # One shows the acceptance; another comes only after more than ten times its own time.
     assert 1 <= len(watch.long_ones) <= 3
 
 

@@ -1,4 +1,4 @@
-"""The tool slots of a PLC keep their promises on every link."""
+"""The tool slots of a PLC keep their contract on every link."""
 
 import pytest
 from robolink_simulators.softmotion.kinematics.kinematics import CoordRef
@@ -24,7 +24,7 @@ from tests.contract._softmotion_cell import LINKS, QUICK, above, served
 SCRATCH = 15
 NEW = ToolOffset(11.25, -3.125, -20.5, 12.0, 30.0, -40.0)
 ZYZ_OF_NEW = (71.21026697116785, 48.43923742984067, -48.06989481005915)
-"""Its angles with R = Rz(A) Ry(B) Rz(C), computed apart from robolink."""
+"""Its angles with R = Rz(A) Ry(B) Rz(C), computed independently of robolink."""
 
 OTHER = ToolOffset(9.0, 9.0, 9.0)
 ANYWHERE = WorkBox()
@@ -48,7 +48,7 @@ def controller(cell):
 
 
 def put_into_scratch(cell, x_mm):
-    """Let somebody at the PLC itself put another value there."""
+    """Let somebody at the PLC itself store another value there."""
     with cell.simulator.acting():
         cell.simulator.plc.memory.define(SCRATCH, (x_mm, 9.0, 9.0, 0.0, 0.0, 0.0), "panel")
 

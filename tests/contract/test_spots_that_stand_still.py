@@ -1,8 +1,8 @@
-"""A camera checks itself: a spot that stands still, a camera that changed, another spot.
+"""A camera checks itself: a spot that stands still, a camera that changed, a wrong spot.
 
-Each failure is built into the simulated cell. Before the looks beside each place, `camera` wrote
-0.38 mm (EPSON) and 0.63 mm (PLC) wrong with "+-0.002", `runout-table` and `board` as much, and the
-turn test was 0.004: the believed tip is brought back to the middle at every angle.
+Each failure is built into the simulated cell. Before looks beside each place were added, `camera`
+wrote values 0.38 mm (EPSON) and 0.63 mm (PLC) wrong with "+-0.002", `runout-table` and `board` as
+much, and the turn test showed 0.004: it brings the believed tip back to the middle at every angle.
 """
 
 from dataclasses import replace
@@ -52,13 +52,13 @@ CALIBRATED = [name for name in METHODS if name != "camera-affine"]
 
 
 def soaked(*each_time, among=tuple(METHODS)):
-    """Return methods as parameters; those that are not tried each time are left to soak."""
+    """Return methods as parameters; those not tried each time run only in soak."""
     marks = {name: () if name in each_time else pytest.mark.soak for name in among}
     return [pytest.param(name, marks=marks[name]) for name in among]
 
 
 class AfterTheWrite(Listener):
-    """Changes the world when the value is written, so that only the proof sees it."""
+    """Changes the world when the value is written, so that only the turn test sees it."""
 
     def __init__(self, cell, faults):
         self._cell, self._faults = cell, faults
@@ -69,7 +69,7 @@ class AfterTheWrite(Listener):
 
 
 def refusal(cell, source, *, error=CalibrationError, listener=None):
-    """Run into a refusal: the old value stands, the tip is lifted."""
+    """Check a refusal: the old value is stored, the tip is lifted."""
     before = stored_in(cell)
     with pytest.raises(error) as raised:
         if listener is None:
@@ -142,7 +142,7 @@ def test_a_spot_that_is_found_now_and_then_costs_a_closer_look_and_no_truth():
 
 
 def test_a_fleck_that_is_found_where_the_tip_is_out_of_sight_is_no_tip():
-    """A nozzle broken off above the depth of focus."""
+    """The nozzle broke off above the depth of focus."""
     with cell_of("epson") as cell:
         tip = cell.truth
         cell.simulator.world.tips[TOOL] = replace(tip, z_mm=tip.z_mm + 4.0)
@@ -152,12 +152,12 @@ def test_a_fleck_that_is_found_where_the_tip_is_out_of_sight_is_no_tip():
 
 
 def at_the_edge(cell, margin_px):
-    """Return a station whose place is so near to the edge of the image."""
+    """Return a station very near the edge of the image."""
     station, world = camera_station(cell), cell.simulator.world
     (a, b), (c, d) = world.camera.optics.mm_per_px
     x_mm, y_mm, _ = world.camera.middle_mm
     width, _ = world.camera.optics.size_px
-    # Pixels from which the way beside the place, (-1, -1) mm, leads out of the image.
+    # Pixels from which the step beside the place, (-1, -1) mm, leads out of the image.
     area = a * d - b * c
     step = ((-d + b) / area, (-a + c) / area)
     px = margin_px if step[0] < 0 else width - margin_px
@@ -167,14 +167,14 @@ def at_the_edge(cell, margin_px):
 
 @pytest.mark.parametrize("fleck", [False, True])
 def test_a_spot_that_leaves_the_picture_beside_its_place_is_looked_for_nearer(fleck):
-    """And a fleck that is found there in its place does not stand for it."""
+    """A fleck that is found there instead does not pass for the spot."""
     with cell_of("epson") as cell:
         station = at_the_edge(cell, margin_px=40.0)
         truth = cell.truth
         with cell.connected() as controller:
             stored = controller.tools.read(TOOL)
             assert stored is not None
-            # A tip that sits where it is believed stays where the station is.
+            # A tip at its believed place stays where the station is.
             cell.simulator.world.tips[TOOL] = replace(truth, x_mm=stored.x_mm, y_mm=stored.y_mm)
         if fleck:
             furnish(cell, camera_still_unseen=True, **ALWAYS)
@@ -213,7 +213,7 @@ def test_a_camera_that_changes_after_the_write_proves_nothing():
 
 
 def test_an_image_mirrored_about_the_way_of_the_approach_shows_in_the_first_step_to_the_middle():
-    """The approach goes along (1, 1): mirrored about that, it looks as it should."""
+    """The approach runs along (1, 1): an image mirrored about that line shows it correctly."""
     with cell_of("epson") as cell:
         furnish(cell, camera_turn_deg=45.0)
         source = CameraSource(cell.url, camera_station(cell))
@@ -298,7 +298,7 @@ def test_an_approach_that_begins_at_its_place_shows_nothing_and_is_refused():
 
 
 def no_false_alarms(kind, seeds, **parameters):
-    """Measure and prove in clean cells; returns how many pairs of pictures were compared."""
+    """Measure and verify in clean cells; return the number of compared pairs of pictures."""
     pairs = 0
     for seed in seeds:
         with cell_of(kind, seed) as cell:
@@ -328,7 +328,7 @@ def test_what_cells_are_like_gives_no_false_alarm(parameters):
 
 
 def test_play_that_exceeds_the_limit_of_a_way_is_no_false_alarm_where_pixels_are_unknown():
-    """0.4 mm at this reach: the way by which all others are judged is met from one side."""
+    """Play of 0.4 mm at this reach: the move that judges all others starts from one side."""
     with cell_of("epson") as cell:
         furnish(cell, backlash_deg=0.05)
         report = run_source(cell, METHODS["camera-affine"](cell, camera_station(cell)))

@@ -1,4 +1,4 @@
-"""A station is used in the base that it was learnt in (docs/reference/spel.md 5.4)."""
+"""A station is used in the base in which it was learnt (docs/reference/spel.md 5.4)."""
 
 from dataclasses import replace
 
@@ -42,7 +42,7 @@ number = 1
 
 @pytest.fixture
 def learnt(arm):
-    """Return a cell whose pin is on record in the robot's own base."""
+    """Return a cell whose pin is recorded in the robot's own base."""
     x_mm, y_mm, z_mm = arm.world.pin_mm
     place = {"x_mm": x_mm, "y_mm": y_mm, "z_mm": z_mm}
     found = Found(id="PIN-07", kind=StationKind.PIN, sigma_mm=0.01, **place)
@@ -134,5 +134,5 @@ def test_what_is_a_station_of_another_base(learnt):
         with pytest.raises(NotReadyError) as told:
             require_base_of(controller, station)
         assert told.value.reason is NotReadyReason.OTHER_BASE
-        # What is not known is not held against anybody.
+        # An unknown base is no reason to refuse.
         require_base_of(controller, station.at(1, 2, 3))

@@ -1,4 +1,4 @@
-"""What a station is unsure of is kept when it is learnt, and is in the results that use it."""
+"""A learnt station keeps its uncertainty, and results that use the station include it."""
 
 import pytest
 
@@ -66,7 +66,7 @@ def test_cameras_and_beams_of_before_are_read():
     assert camera_station(old).require_model().sigma_at_mm(0.0, 0.0) == 0.01
     known = {**seen, "centre_mm": [10.0, 20.0], "place_sigma_mm": 0.003, "scale_sigma": 0.001}
     new = Station(id="C", kind=StationKind.CAMERA, details=known).at(*here, sigma_mm=0.01)
-    # 4 mm from the centre, the scale counts 0.004 mm.
+    # 4 mm from the centre, the scale error counts 0.004 mm.
     assert camera_station(new).require_model().sigma_at_mm(14.0, 20.0) == pytest.approx(0.005)
 
 
@@ -91,7 +91,7 @@ def test_the_limit_of_a_process_is_compared_with_the_region():
 
 
 def kept(number, x_mm, z_mm, z_from, nozzle):
-    """Return what is kept of a value at a pin."""
+    """Return the journal entry of a kept value at a pin."""
     details = {
         "tip": plain_offset(ToolOffset(x_mm, -3.5, z_mm)),
         "touch": {"station": "PIN-07"},
@@ -106,13 +106,13 @@ def test_how_nozzles_sit_is_pooled_from_eight_changes_on_record(arm):
     with arm.cell.connected() as controller:
         for number, x_mm in enumerate(places):
             controller.outcomes.append(kept(1, x_mm, -20.0, "kept", f"N-{number}"))
-        # Seven changes, and one that is none: the same nozzle again, which says nothing.
+        # Seven changes, and the same nozzle mounted again, which shows nothing.
         controller.outcomes.append(kept(1, 0.0, -20.0, "kept", "N-7"))
         assert seating_of(controller) == Seating()
         controller.outcomes.append(kept(1, 0.3, -20.0, "kept", "N-8"))
         found = seating_of(controller)
     assert found.changes == 8
-    # X moved by 0.3 in each, Y by nothing; a Z that was kept is no Z that sits alike.
+    # X moved by 0.3 in each, Y by nothing; a kept Z does not show that Z seats alike.
     assert found.sigma_mm == pytest.approx((0.3 / 2**0.5, 0.3 / 2**0.5, 0.05))
 
 

@@ -1,4 +1,4 @@
-"""After a stop nothing that acts leaves this process, on any controller, until it is released."""
+"""After a stop no movement or write leaves this process until release, on any controller."""
 
 import threading
 from collections.abc import Iterator
@@ -28,7 +28,7 @@ NEW_IN_PLANE = ToolOffset(11.25, -3.125)
 
 @dataclass
 class Bench:
-    """A controller, and what came in at its far end."""
+    """A controller, and the requests received at its far end."""
 
     controller: Any
     requests: Any
@@ -40,7 +40,7 @@ class Bench:
 
 @contextmanager
 def bench(backend: str) -> Iterator[Bench]:
-    """A controller that stands ready, and a look past the wire at what it is told."""
+    """A controller ready to work, and its requests as received at the far end."""
     if backend.startswith("epson"):
         simulator = EpsonSimulator(seed=7)
         with served(backend.removeprefix("epson-"), simulator) as cell:
@@ -53,7 +53,7 @@ def bench(backend: str) -> Iterator[Bench]:
 
 
 def told(log, *looks: str) -> list[str]:
-    """Return what a controller was told, without what only looks."""
+    """Return the requests to a controller, except readings."""
     sent = [text for _, direction, text in log if direction == ">"]
     return [text for text in sent if not text.startswith(looks)]
 
@@ -70,7 +70,7 @@ def stopped(request):
 
 
 def acts(on: Bench):
-    """Return everything that may not leave any more, by name."""
+    """Return every act that a stop forbids, by name."""
     here = on.group.pose()
     up = replace(here, z_mm=here.z_mm + 5)
     tools = on.controller.tools
@@ -138,7 +138,7 @@ def test_a_reset_that_another_stop_overtakes_releases_nothing(stopped):
 
 
 class Person:
-    """Is asked, and is stopped while the answer is on its way."""
+    """A person who is asked, with a stop before the answer arrives."""
 
     def __init__(self, controller, answer):
         self._controller, self._answer = controller, answer
@@ -160,7 +160,7 @@ class Person:
 def test_a_stop_while_a_person_is_asked_about_a_reset_is_not_released_by_the_yes(stopped):
     controller, before = stopped.controller, stopped.requests()
     with pytest.raises(StoppedError), controller.latch.calming("the question and the reset"):
-        controller.stop()  # another one, from the next terminal
+        controller.stop()  # another stop, from the next terminal
         asked = stopped.requests()
         controller.reset_fault()
     assert stopped.requests() == asked != before
@@ -197,7 +197,7 @@ def test_a_map_is_written_by_nobody_after_a_stop_wherever_it_falls(name, points)
 
 
 def run_of_a_map(name: str, at: Placement | None) -> list[Placement]:
-    """Write a tool of a mapped PLC, with a stop at a point; return the points there are."""
+    """Write a tool of a mapped PLC, with a stop at a point; return all possible points."""
     with ServedMap(name) as cell, cell.connect() as controller:
         old = controller.tools.read(1)
         placements = Placements(at)

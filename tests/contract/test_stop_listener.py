@@ -1,4 +1,4 @@
-"""A process that has a controller stops it for its own user, and for nobody else."""
+"""A process that has locked a controller stops it for its own user, and for nobody else."""
 
 import json
 import os
@@ -20,7 +20,7 @@ from robolink.transport import far_end_of
 
 @pytest.fixture(params=["path", "loopback"])
 def controller(request, monkeypatch, tmp_path):
-    """An open controller; ``loopback`` is for paths, and systems, without local sockets."""
+    """An open controller; ``loopback`` is for paths and systems without local sockets."""
     if request.param == "loopback":
         monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / ("long" * 30)))
     with serve_tcp(EpsonSimulator(seed=3)) as host, robolink.connect(host.url) as controller:
@@ -96,7 +96,7 @@ def test_another_address_is_not_this_controller(controller):
 
 
 class Refusing:
-    """A controller that cannot be stopped."""
+    """A controller that refuses to stop."""
 
     def __init__(self, error):
         self._error = error

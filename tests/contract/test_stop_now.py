@@ -1,4 +1,4 @@
-"""A stop from outside brings any controller to rest, whoever moves it."""
+"""A stop from outside stops any controller, whatever is moving it."""
 
 import socket
 from dataclasses import replace
@@ -36,7 +36,7 @@ HABITS: tuple[dict[str, Any], ...] = (
 
 
 def left_moving(cell, **options):
-    """Begin a slow movement of 30 mm and let its client vanish, as a killed process does."""
+    """Begin a slow movement of 30 mm and drop its client, like a killed process."""
     controller = cell.connect(**options)
     controller.motors(True)
     group = controller.groups[0]
@@ -54,7 +54,7 @@ def test_a_movement_whose_client_died_is_brought_to_rest(serve, habits):
         begun = simulator.machine.arm.flange().z_mm
         assert stop_now(cell.url).state is ControllerState.READY
         assert not simulator.machine.arm.moving
-        # It was under way, and far from the end when it was stopped.
+        # It was under way, and far from its end, when it was stopped.
         assert simulator.machine.arm.flange().z_mm < begun + 15
         with cell.connect() as controller:  # nobody is left logged in
             assert controller.status().state is ControllerState.READY
@@ -84,7 +84,7 @@ def test_the_late_end_of_an_execute_does_not_disturb_a_stop(serve):
 
 
 def asked_of(simulator):
-    """Return the names of the requests that came in, in their order."""
+    """Return the names of the received requests, in order."""
     return [text.split(",")[0].strip() for _, way, text in simulator.log if way == ">"]
 
 
@@ -164,7 +164,7 @@ def test_a_map_has_no_stop():
 
 
 ONE_CLIENT_EACH = ("modbus-rtu", "can-virtual", "can-multicast")
-"""A serial line is opened once; a CANopen node answers one SDO client at a time."""
+"""A serial line can be opened once; a CANopen node answers one SDO client at a time."""
 
 
 @pytest.fixture(params=LINKS)

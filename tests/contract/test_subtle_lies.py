@@ -1,4 +1,4 @@
-"""Machines that lie in a subtle way: the contract of a controller finds each, and names it."""
+"""Machines with subtly false answers: the contract checks find and name each fault."""
 
 import re
 import threading
@@ -81,7 +81,7 @@ class ArrivesTurned(SimpleMachine):
 
 
 class GoesOnAfterAStop(SimpleMachine):
-    """Says that it rests as soon as it is told to, and ends the movement all the same."""
+    """Reports a stop at once, and completes the movement all the same."""
 
     target, ends_s, told = None, 0.0, False
 
@@ -108,7 +108,7 @@ class NeverRests(SimpleMachine):
 
 
 def test_a_machine_that_does_not_rest_was_not_stopped():
-    """It takes the stop; five seconds later nobody knows what it does."""
+    """It accepts the stop; five seconds later its state is unknown."""
     machine, clock = NeverRests(), ManualClock()
     with SimpleController(machine, identity="memory+object://restless", clock=clock) as controller:
         with pytest.raises(OutcomeUnknownError, match="did not confirm within") as unconfirmed:
@@ -122,7 +122,7 @@ EVERY = (*READING_CHECKS, *WRITING_CHECKS, *MOVING_CHECKS)
 
 
 def found(connect, *names):
-    """Return what was found instead of some promises, or of all; empty where they are kept."""
+    """Return the findings for some promises, or for all; empty if they are kept."""
     checks = [check for check in EVERY if not names or check.__name__ in names]
     return {one.name: one.broken for one in outcomes(Subject(connect, tool=SPARE), checks)}
 
@@ -174,7 +174,7 @@ def test_a_driver_that_takes_all_values_for_the_same_is_found():
 
 
 class Patient(ProcedureLock):
-    """Lets a second procedure wait for the first in place of telling it."""
+    """Makes a second procedure wait for the first instead of refusing it."""
 
     def __init__(self, *given):
         super().__init__(*given)

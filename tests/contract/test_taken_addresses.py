@@ -1,4 +1,4 @@
-"""What a simulator says that cannot listen: the same at each kind of port, and why."""
+"""The error of a simulator that cannot listen gives the reason, alike at each kind of port."""
 
 import errno
 import os

@@ -1,4 +1,4 @@
-"""What the fixtures of the pytest plugin bring, as an integrator's tests use it."""
+"""The fixtures of the pytest plugin, as an integrator's tests use them."""
 
 import os
 import subprocess
@@ -85,7 +85,7 @@ def test_a_plc_with_a_map_is_served_in_the_process_and_on_both_buses(plc_sim):
 @pytest.mark.robolink(seed=5, world={"eye_sigma_mm": 0.25})
 def test_the_marker_says_how_the_cell_is(epson_sim, epson_factory):
     simulator = epson_sim.simulator
-    # The marker that stands nearest to the test wins.
+    # The marker nearest to the test wins.
     assert (simulator.machine.model.name, simulator.seed) == ("C8-C901S", 5)
     assert simulator.options.status_flags == 10
     assert simulator.world.parameters.eye_sigma_mm == 0.25
@@ -114,7 +114,7 @@ def test_a_password_is_needed_and_shown_nowhere(epson_sim):
 
 @pytest.fixture
 def program(tmp_path, request):
-    """A folder with a program as it was exported for an arm, or for any."""
+    """A folder with an exported program, for one arm or for any."""
     kinematics = getattr(request, "param", "Kin_Gantry3")
     for name, text in program_texts(kinematics=kinematics).items():
         (tmp_path / name).write_text(text)
@@ -123,7 +123,7 @@ def program(tmp_path, request):
 
 def test_a_program_is_executed_behind_the_mailbox_and_is_not_put_back(program, softmotion_factory):
     cell = softmotion_factory(kinematics="Kin_Gantry3", program=program)
-    assert cell.simulator.plc.memory.slot(1).name == "nozzle"  # of the program's own variables
+    assert cell.simulator.plc.memory.slot(1).name == "nozzle"  # from the program's own variables
     assert cell.simulator.executes_program
     cell.snapshot("now")
     for back in (cell.put_back, lambda: cell.restore("now"), lambda: cell.do("reset")):
@@ -208,7 +208,7 @@ def test_a_long_wire_is_counted_whole(epson_sim):
     epson_sim.wire.assert_sent("TLSet 2, XY", times=1)
     with pytest.raises(AssertionError, match="was sent 1 times"):
         epson_sim.wire.assert_not_sent("TLSet 2, XY")
-    # One that has lost a line says nothing of how often something was sent.
+    # A log that has lost a line cannot show how often something was sent.
     epson_sim.simulator.log = short = WireRecord(2)
     for text in ("$Reset", "$GetStatus", "$GetStatus"):
         short.add(0, ">", text)
@@ -245,13 +245,13 @@ def test_a_person_does_what_the_script_says_when_the_wire_gives_the_cue(epson_si
     with robolink.connect(epson_sim.url) as controller:
         controller.status()
     assert [act for act, _ in epson_sim.operator.failed] == ["restore"]
-    epson_sim.operator.forget()  # or the test fails for it
+    epson_sim.operator.forget()  # or the test fails because of it
     assert epson_sim.operator.unplayed() == []
 
 
 @pytest.mark.parametrize("softmotion_sim", ["sim", "can"], indirect=True)
 def test_no_command_is_run_on_a_cell_that_it_would_not_reach(epson_sim, softmotion_sim):
-    """A simulator of that name would be made in its own process, and be written to instead."""
+    """The command's process would create a simulator of that name and write to that one instead."""
     for cell in (epson_sim, softmotion_sim):
         with pytest.raises(ConfigError, match=r"lives in the process of the test.*epson_cell"):
             cell.run("status")
@@ -302,7 +302,7 @@ def test_a_cell_is_put_back_between_two_looks(epson_sim, softmotion_sim, fault_p
 
 
 def test_the_journal_of_the_test_tells_what_was_done(epson_factory, robolink_journal):
-    """On a port: what happens in the process is kept in the process."""
+    """On a port; an in-process journal stays in the process."""
     cell = epson_factory(medium="tcp")
     with robolink.connect(cell.url) as controller:
         change_tools(controller, [Wanted(2, WANTED, robolink.ANY)])
@@ -452,7 +452,7 @@ def test_a_test_that_fails_shows_wire_seed_and_state(tmp_path, shared):
     assert "robolink state: softmotion Kin_Scara3_Z, seed 7" in shown
     assert "> $GetStatus" in shown
     assert '"pin_mm"' in shown
-    # The cell of the first try is not shown again with the second.
+    # The second try does not show the cell of the first.
     assert shown.count("robolink wire: epson") == 5
     assert "has no parameter 'colour'" in shown
     assert "(nothing moved)" in shown
@@ -472,7 +472,7 @@ def test_a_test_that_fails_shows_wire_seed_and_state(tmp_path, shared):
 
 
 def properties(path, test):
-    """Return what a file for a pipeline holds of a test, by name."""
+    """Return a test's properties in the file for a pipeline, by name."""
     found = ElementTree.parse(path).getroot().iterfind(f".//testcase[@name='{test}']//property")
     return {one.get("name"): one.get("value") for one in found}
 
@@ -483,7 +483,7 @@ def properties(path, test):
 def test_what_was_recorded_of_a_cell_in_the_process_goes_with_it(
     make, medium, tmp_path, robolink_state
 ):
-    """Ten thousand tests would hold ten thousand records."""
+    """Otherwise ten thousand tests would keep ten thousand records."""
     with ExitStack() as stack:
         cell = make(OwnFolder(stack, tmp_path, 1, []), CellRequest(), medium, None)
         with robolink.connect(cell.url) as controller:

@@ -1,4 +1,4 @@
-"""A controller of a kind that this package does not bring, from its URL to a calibrated tool."""
+"""A third-party controller kind, from its URL to a calibrated tool."""
 
 from importlib import metadata
 from importlib.metadata import EntryPoint, EntryPoints
@@ -21,7 +21,7 @@ from robolink.timing import FASTEST_ANSWER_S
 from tests.contract.third_kind import BenchServer, open_bench
 
 TRUE = ToolOffset(12.4, -3.2, -20.0)
-"""Where the tip of the new nozzle is; the old one stood where the server says."""
+"""The tip of the new nozzle; the old one was at the server's value."""
 
 PIN_MM = (312.0, -3.5, 80.0)
 
@@ -58,7 +58,7 @@ def server():
 
 
 class Fitter:
-    """Reads the question, brings the tip to the pin, and says yes."""
+    """Reads the question, brings the tip to the pin, and confirms."""
 
     def __init__(self, machine, clock):
         self.machine, self.clock = machine, clock
@@ -104,7 +104,7 @@ def test_what_nobody_brings_or_cannot_be_loaded_is_said(server, monkeypatch):
     install(monkeypatch, ("bench", "gone:opener"))
     with pytest.raises(ConfigError, match="no module named 'gone'"):
         robolink.connect(server.url)
-    # Whatever it raises is told as its own, and not as a defect of robolink.
+    # Its errors are reported as its own, not as a defect of robolink.
     install(monkeypatch, ("bench", "crude:module"))
     with pytest.raises(ConfigError, match="cannot be loaded: RuntimeError: no dongle"):
         robolink.connect(server.url)
@@ -145,7 +145,7 @@ def test_a_tool_of_it_is_calibrated_at_two_poses(server, monkeypatch):
 
 def test_a_controller_that_writes_what_it_likes_does_not_keep_its_promises():
     class Careless(SimpleMachine):
-        """Stores every tool a little off."""
+        """Stores every tool with a small error."""
 
     machine = Careless(tools={1: ToolOffset(1.0)})
     store = dict.__setitem__

@@ -1,4 +1,4 @@
-"""A person goes back from the new values of a tilted measurement, on a simulated machine."""
+"""A person goes back from the result of a tilted measurement, on a simulated machine."""
 
 import math
 from types import SimpleNamespace
@@ -30,8 +30,8 @@ pytestmark = pytest.mark.simulator_only
 
 ON_A_SURFACE = TouchPlan(lift_mm=15.0)
 TILTS = informative_tilts(4, 20.0)
-# Of nine touches of a plane the ninth alone tells so much that the fit follows it: a slip there
-# leaves no residual, and another one seems to fit worst (docs/reference/touches.md).
+# Among nine touches of a plane the ninth alone carries so much information that the fit follows it:
+# a slip there leaves no residual, and another touch seems to fit worst (docs/reference/touches.md).
 SOURCES: dict[str, tuple[Any, WorldParameters, int]] = {
     "plane-touch": (PlaneTouchSource(ON_A_SURFACE, PlaneSurvey(9), axes=5), LEANING, 8),
     "sphere-touch": (

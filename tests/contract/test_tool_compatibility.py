@@ -1,4 +1,4 @@
-"""A tool that the kinematics cannot carry is refused before it is written, part by part."""
+"""A tool that the kinematics cannot support is refused before the write, component by component."""
 
 import sys
 from pathlib import Path
@@ -53,7 +53,7 @@ def written(simulator):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_driver_and_the_simulator_say_the_same_of_every_kinematics(name):
-    """Each has its own images; one of the two alone would be believed."""
+    """Each has its own table; a fault in either would go unnoticed."""
     position, _, orientation = name.partition("+")
     space = OrientationImages().space(
         find_kinematics(position) or 0, (find_kinematics(orientation) or 0) if orientation else 0
@@ -188,7 +188,7 @@ def test_a_command_says_it_and_sends_nothing(machine, tmp_path, monkeypatch, cap
 
 @pytest.fixture
 def run(machine, tmp_path, monkeypatch, capsys):
-    """Run a command on a PLC whose flange turns with its arms; gives code and messages."""
+    """Run a command on a PLC whose flange turns with its arms; return code and messages."""
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path))
     simulator, plc = machine("Kin_Scara2_Z")
     plc.close()

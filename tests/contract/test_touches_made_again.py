@@ -1,6 +1,6 @@
-"""A person goes back to a touch, adds one, and goes back from the new values, on a simulated robot.
+"""A person goes back to a touch, adds one, and goes back from the result, on a simulated robot.
 
-A touch that slipped is what they go back to, so that what is made again has to mend it.
+They go back to a touch that slipped, so that repeating it must correct the result.
 """
 
 import math
@@ -29,14 +29,14 @@ from tests.contract._method_cell import method_cell
 pytestmark = pytest.mark.simulator_only
 
 SLIP = ["x+0.1", "x+0.1", ""]
-"""How a touch ends that slipped off: its last step is as fine as it has to be."""
+"""The end of a touch that slipped: its last step is as fine as required."""
 
 
 class Undecided(AssistedOperator):
-    """Answers touches and offers by a script first, then as the simulated person does.
+    """Answers touches and offers by a script first, then like the simulated person.
 
-    ``touches`` maps the number of a question for a touch to what is typed in place of "done";
-    ``offers`` is what is answered to offers, ``writes`` to questions before a write.
+    ``touches`` maps the number of a touch question to the word typed in place of "done"; ``offers``
+    holds the answers to offers, ``writes`` those to the questions before a write.
     """
 
     asked = 0
@@ -85,7 +85,7 @@ def cell(tmp_path, monkeypatch):
 
 
 def change(cell, source, *, verify=False, **script):
-    """Carry it out; return the person, and how many touches the measurement rests on."""
+    """Carry out the change; return the person and the measurement's result."""
     with robolink.connect(cell.cell.url) as controller:
         person = Undecided.at(cell, controller, **script)
         plan = ChangePlan((ToolPlan(1, source, verify=verify),))
@@ -103,7 +103,7 @@ def decisions(cell):
 
 
 def test_a_touch_that_slipped_is_made_again_alone_and_the_measurement_goes_on(cell):
-    # The second touch slips; at the third one it is gone back to, and the third one is made then.
+    # The second touch slips; at the third the person goes back to it, and the third follows.
     source = NAngleSource((180.0, 90.0, -90.0), sampling=SamplingPolicy(retake=False))
     person, result = change(cell, source, touches={2: SLIP, 3: ["again"]})
     assert person.asked == 1 + 1 + 1 + 1 + 1 + 1
@@ -159,7 +159,7 @@ def test_who_goes_back_without_end_has_to_answer_in_the_end(cell):
 
 
 def test_a_touch_made_again_is_judged_as_any_other(cell):
-    # It is left at its standoff, with a jog beside the pin: the heights tell.
+    # The tip is left at its standoff, with a jog beside the pin: the heights show it.
     with pytest.raises(CalibrationError) as refused:
         change(
             cell,
@@ -172,7 +172,7 @@ def test_a_touch_made_again_is_judged_as_any_other(cell):
 
 def test_a_change_that_is_implausible_once_a_touch_was_made_again_is_refused(cell):
     before = cell.stored
-    aside = ["x+5", "x+0.1", ""]  # half of it is what the tip would move
+    aside = ["x+5", "x+0.1", ""]  # half of it is the shift of the tip
     with pytest.raises(CalibrationError) as refused:
         change(cell, TwoPoseSource(), touches={3: aside}, writes=["back"])
     assert refused.value.code == "implausible_change"
@@ -180,7 +180,7 @@ def test_a_change_that_is_implausible_once_a_touch_was_made_again_is_refused(cel
 
 
 def changed_on_the_pin(cell, source, *, writes=(), length="keep"):
-    """Change the nozzle on a pin by name; ``source`` may need the controller."""
+    """Change the nozzle on a named pin; ``source`` may need the controller."""
     with robolink.connect(cell.cell.url) as controller:
         person = Undecided.at(cell, controller, writes=writes)
         tool = ToolPlan(1, source(controller), verify=False, pin="PIN-07", length=length)
@@ -196,7 +196,7 @@ def test_a_length_that_changed_is_followed_also_where_a_touch_was_made_again(cel
 
 
 def test_one_touch_that_is_made_again_starts_from_what_is_stored(cell):
-    """From what the first one proposed it would add the same difference once more."""
+    """Starting from its first proposal, it would add the same difference again."""
 
     def compared(controller):
         last = partial(difference_from_last, controller, 1, "PIN-07", sigma_mm=0.03)

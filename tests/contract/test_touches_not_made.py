@@ -1,7 +1,7 @@
-"""Touches that were only answered: every way to touch a pin, on both kinds of controllers.
+"""Touches that were answered but not made: every way to touch a pin, on both controller kinds.
 
-The nozzle was changed by some tenths of a millimetre before. What a person does who does not do it
-stands in the simulated world, so that nothing but the procedures can tell.
+The nozzle was changed by some tenths of a millimetre before. What the person really does is hidden
+in the simulated world, so only the procedures can find out.
 """
 
 import math
@@ -57,12 +57,12 @@ def arm(arm):
 
 
 def has_habit(cell, **habits):
-    """Let the person at the cell be another one."""
+    """Give the person at the cell another habit."""
     perform(cell.cell.simulator, {"do": "set_world", **habits})
 
 
 def check_refused(cell, done, code, *, exit_code=7):
-    """The command was refused, nothing was written, and the record says why."""
+    """Check that the command was refused, nothing was written, and the record gives the reason."""
     assert (done.code, done.document["error"]["code"]) == (exit_code, code), done.err
     assert (cell.stored.x_mm, cell.stored.y_mm) == (12.0, -3.5)
     assert cell.recorded(EntryKind.REFUSED)[0].details["code"] == code
@@ -125,7 +125,7 @@ def test_enter_alone_teaches_no_station(cell):
 
 
 def test_a_station_that_was_touched_once_only_is_not_taught(arm):
-    """The first answer came from beside the pin, the second one from on it."""
+    """The first answer was given beside the pin, the second on it."""
     has_habit(arm, person_stays_share=1)
     answers = iter((1.0, 0.0))
     ask = arm.world.operator.begin_touch
@@ -186,7 +186,7 @@ def test_a_pin_that_is_bumped_between_two_touches_shows_in_the_proof(arm):
 
 
 class SameJog(AssistedOperator):
-    """A person who brings the tip to the pin once, and types one and the same jog ever after."""
+    """Brings the tip to the pin once, and types the same jog ever after."""
 
     jog = "z-2"
     asked = 0
@@ -207,12 +207,12 @@ class SameJog(AssistedOperator):
         if self.asked == 1 or word is None:
             return word
         if self.words is None:
-            # They end in a fine step, as is asked of them, and are where they were.
+            # The jogs end in a fine step, as required, where they began.
             self.words = [self.later(), "z+0.1", "z-0.1", ""]
         return self.words.pop(0) if self.words else ""
 
     def later(self):
-        """Return what is typed at each touch but the first."""
+        """Return the words typed at each touch but the first."""
         return self.jog
 
 
@@ -235,15 +235,15 @@ def test_the_same_jog_each_time_is_refused_from_the_python_api(cell, source, jog
         plan = ChangePlan((ToolPlan(1, source),), ask_before_write=False)
         with pytest.raises((CalibrationError, VerifyError)) as refused:
             NozzleChange(controller, plan, operator=person).run()
-        # The one height drawn for a second touch may be the one that was jogged: then the proof
-        # tells.
+        # The one height drawn for a second touch may equal the jogged one: then the turn test shows
+        # it.
         assert "touch_heights_differ" in vars(refused.value).values()
         assert isinstance(refused.value, CalibrationError) or isinstance(source, TwoPoseSource)
     assert (cell.stored.x_mm, cell.stored.y_mm) == (12.0, -3.5)
 
 
 class DownOnly(SameJog):
-    """Goes down to the height of the pin each time, beside it."""
+    """Moves down to the height of the pin each time, but beside it."""
 
     def later(self):
         _, _, dz_mm = self._look()
@@ -257,7 +257,7 @@ class DownOnly(SameJog):
         (
             NAngleSource((180.0, 90.0, -90.0)),
             CalibrationError,
-            # The first touch was on the pin, and so may be what does not fit.
+            # The first touch was on the pin, so it may be the one that does not fit.
             {"touch_not_proven", "large_residual"},
         ),
     ],
@@ -281,7 +281,7 @@ def test_a_touch_at_a_perfect_stored_offset_is_taken_as_it_is(cell):
     (entry,) = cell.recorded(EntryKind.CALIBRATION)
     first, *others = entry.details["touches"]
     assert (first["arrival"], first["jog_mm"]) == (None, None)
-    # A perfect offset leaves the standoff alone to jog; what is missed is a few hundredths.
+    # With a perfect offset only the standoff is left to jog; the error is a few hundredths.
     assert all(
         touch["jog_mm"] == pytest.approx(math.hypot(*touch["standoff_mm"]), abs=0.3)
         for touch in others

@@ -1,4 +1,4 @@
-"""Every transport keeps the same contract; the checks live with the simulators."""
+"""Every transport passes the same contract checks, which are kept with the simulators."""
 
 import socket
 from collections.abc import Callable, Iterator
@@ -11,7 +11,7 @@ from robolink.transport import TracingTransport, Transport, open_transport
 
 
 class SocketFarEnd:
-    """The accepted side of a loopback connection."""
+    """The accepting side of a loopback connection."""
 
     def __init__(self, connection: socket.socket) -> None:
         self._connection = connection

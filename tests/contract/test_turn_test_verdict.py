@@ -1,4 +1,4 @@
-"""A turn test that contradicts its measurement: who may let it pass, and what is on record then."""
+"""A contradicted turn test: who may accept it, and what is then recorded."""
 
 from dataclasses import replace
 from itertools import count
@@ -20,14 +20,14 @@ BEAMS = TurnClaim(
     repeatable_mm=0.007,
     accurate_mm=0.028,
 )
-"""Limits of a turn by 180 degrees: 0.016 by scatter, 0.087 with the place of the beams."""
+"""Limits for a turn by 180 degrees: 0.016 from scatter, 0.087 with the place of the beams."""
 
 
 _numbers = count()
 
 
 def controller_of_its_own():
-    """A controller with a record of its own."""
+    """A controller with its own record."""
     return SimpleController(identity=f"turn-test-verdict-{next(_numbers)}")
 
 
@@ -48,7 +48,7 @@ RELEARN = ("cell station learn BEAMS-02 --tool 15",)
 
 
 class Person:
-    """Chooses the row that begins with a text, one after the other; keeps what was offered."""
+    """Chooses rows by their first words, one after another; records the offered rows."""
 
     def __init__(self, *answers, again=(), relearning=RELEARN):
         self.answers, self.tests = list(answers), list(again)

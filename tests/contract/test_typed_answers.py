@@ -1,4 +1,4 @@
-"""Questions on a real terminal: what was typed before one was shown never answers it."""
+"""Questions on a real terminal: input typed before a question is shown never answers it."""
 
 import time
 
@@ -50,7 +50,7 @@ def test_what_was_typed_before_a_question_or_during_a_jog_answers_nothing(start,
     terminal.press(b"y\r\n\r\n")
     terminal.wait_for("Typed too early and ignored: 'y'")
     terminal.wait_for(YES_NO)
-    # A scanner: neither a yes nor a no, and its LF is not the answer to the next question.
+    # A scanner: neither a yes nor a no, and its LF does not answer the next question.
     terminal.press(b"4006381333931\r\n")
     terminal.wait_for("neither yes nor no")
     terminal.wait_for(YES_NO)

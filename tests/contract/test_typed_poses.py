@@ -1,4 +1,4 @@
-"""A pose that a person types: what it may be used for, and that it proves nothing by itself."""
+"""A pose that a person types: its permitted uses, and why it proves nothing by itself."""
 
 from typing import Any
 
@@ -23,7 +23,7 @@ def cell(tmp_path, monkeypatch):
 
 
 class Types(Undecided):
-    """Types ``pose`` with the numbers of the controller, changed by what follows it."""
+    """Types ``pose`` with the controller's numbers, plus the given differences."""
 
     group: Any
 
@@ -93,7 +93,7 @@ def test_the_turn_test_takes_no_typed_pose(cell):
 
 
 class InTheAir(Types):
-    """Never jogs at the second touch, and types where the robot stopped."""
+    """Never jogs at the second touch, and types the pose where the robot stopped."""
 
     def poll(self, wait_s):
         word = super().poll(wait_s)

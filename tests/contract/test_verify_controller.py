@@ -1,4 +1,4 @@
-"""verify-controller names the habits that are in force, and leaves no trace."""
+"""verify-controller names the device options in effect and leaves no trace."""
 
 import json
 
@@ -81,7 +81,7 @@ PREFERENCES = {
 
 @pytest.fixture
 def cell(serve_simulator):
-    """A maker of simulators in this process."""
+    """Makes simulators in this process."""
     return lambda simulator: serve_simulator(simulator).url
 
 
@@ -91,7 +91,7 @@ def test_the_profile_names_exactly_the_option_values_in_force(cell, habit):
     found = verify_epson(cell(EpsonSimulator(seed=3, options=options))).options
     in_force = {name: getattr(options, name) for name in found}
     if options.rc_plus == 5:
-        in_force["extended_queries"] = False  # RC+ 5 has none, whatever the option says
+        in_force["extended_queries"] = False  # RC+ 5 has none, whatever the option is
     assert found == in_force
     assert set(found) >= ALWAYS_SETTLED
     told = {"rc_plus", *PREFERENCES} if options.extended_queries else set()
@@ -124,7 +124,7 @@ def test_every_fact_has_a_finding_and_names_an_option_that_exists(cell):
     others = {name for name in option_names() if "." not in name} - set(named)
     serial = {name for name in others if name.startswith("rs232_")}
     assert others - serial == ours | of_programs | of_robots
-    assert serial  # asked for on a serial line alone
+    assert serial  # asked only on a serial line
 
 
 @pytest.mark.parametrize("letters", ["documented", "guessed"])

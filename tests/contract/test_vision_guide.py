@@ -1,4 +1,4 @@
-"""The camera ``vision-guide``: the companion program looks, the driver starts it and reads."""
+"""The camera ``vision-guide``: the driver starts the companion program and reads its look."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -50,21 +50,21 @@ def cell(tmp_path, monkeypatch):
 
 
 def wrong_mm(cell):
-    """Return by how much the tool in the controller is wrong."""
+    """Return the error of the stored tool."""
     stored = stored_in(cell)
     assert stored is not None
     return miss_mm(stored, cell.truth)
 
 
 def look_at(cell, controller):
-    """Bring the tip before the camera, without any procedure, and take a look."""
+    """Bring the tip to the camera, outside any procedure, and take a look."""
     with open_sensor("vision-guide") as camera:
         assert isinstance(camera, ControllerSensor)
         return seen_once(camera.beside(controller), TIP, pictures=1)
 
 
 def lead_tip_to_camera(cell):
-    """Put the arm where the tip is before the lens."""
+    """Move the arm so that the tip is in front of the lens."""
     world = cell.simulator.world
     tip, there = world.tip_mm(), world.camera.middle_mm
     by_mm = tuple(b - a for a, b in zip(tip, there, strict=True))

@@ -1,4 +1,4 @@
-"""Whoever asks to wait gets his turn; a stop, Ctrl-C or the end of his time ends the wait."""
+"""A client that waits gets its turn; a stop, Ctrl-C or the end of its time ends the wait."""
 
 import _thread
 import threading
@@ -48,7 +48,7 @@ def threads():
 
 
 def come_to_wait(controller: SimpleController, number: int) -> None:
-    """Return once so many threads wait for their turn."""
+    """Return as soon as this many threads wait for their turn."""
     deadline = time.monotonic() + PATIENCE_S
     while len(controller._driver.lock._waiting) != number:
         assert time.monotonic() < deadline
@@ -70,7 +70,7 @@ def test_those_that_wait_get_their_turn_in_the_order_in_which_they_came(controll
         for number in range(5):
             ends.append(threads.submit(write, number))
             come_to_wait(controller, number + 1)
-        with pytest.raises(BusyError, match="must wait"):  # whoever does not wait is told
+        with pytest.raises(BusyError, match="must wait"):  # a client that does not wait is told
             threads.submit(controller.tools.write, 2, value(9), expected=ANY).result(PATIENCE_S)
         assert came == []
     for end in ends:
@@ -241,7 +241,7 @@ def test_a_change_that_cannot_begin_leaves_nothing_held(controller, threads):
 
 @contextmanager
 def two_programs():
-    """Two controllers on one machine, each with a log of its own in one journal."""
+    """Two controllers on one machine, each with its own log in one journal."""
     journal = memory_journal(new_operation())
     machine = SimpleMachine(tools={1: value(0)}, selected=1)
     holders = [replace(this_process(), operator=name) for name in ("Anna", "Bert")]

@@ -1,4 +1,4 @@
-"""What a measurement with beams claims, in cells where the tip would be wrong otherwise."""
+"""The stated accuracy of a beam measurement in cells that would otherwise give a wrong tip."""
 
 import math
 from dataclasses import replace
@@ -19,7 +19,7 @@ soak = pytest.mark.soak
 
 
 def measured(make, seed, plan=None, *, wiring=NOISE, write=True, **world):
-    """Change a needle in a cell that is so; return the report, and how far off the tip is."""
+    """Change a needle in such a cell; return the report and the error of the tip."""
     with make(seed) as cell:
         cell.mount_beams(cell.beams(radius_mm=0.1), **wiring)
         cell.simulator.world.set_up(WorldParameters(**world))
@@ -54,14 +54,14 @@ def test_a_needle_that_leans_is_corrected_for_it(lean_deg, turn_deg, seed):
         sensor_cell, seed, plan, lean_deg=lean_deg, lean_toward_deg=70.0 * seed
     )
     result = report.proposal.result
-    # Without it, it was off by the lean at 1.5 mm, several times what was stated.
+    # Without it, the error was the lean at 1.5 mm, several times the stated value.
     seen_mm = math.hypot(*result.lean.corrected_mm)
     assert seen_mm > 0.4 * 1.5 * math.tan(math.radians(lean_deg))
     assert within(report, off_mm) < 1.2
     assert result.lean.angle_deg == pytest.approx(lean_deg, abs=0.15)
     assert "needle_leans" in result.notes
     assert result.details()["needle"]["corrected_mm"] == list(result.lean.corrected_mm)
-    # The beams see its shaft in the turn test, too.
+    # The beams see the needle's shaft in the turn test, too.
     assert report.verification.max_drift_mm < 0.012
 
 
@@ -86,7 +86,7 @@ def test_a_needle_that_leans_under_a_flange_upside_down_is_corrected_too(turn_de
 
 @soak
 def test_a_needle_bent_below_the_beams_is_beyond_them():
-    """What is bent only below where the beams see it looks upright, and its tip is elsewhere."""
+    """A needle bent only below the beams looks upright to them."""
     bent = {"lean_deg": 1.0, "lean_up_to_mm": 1.0}
     report, off_mm = measured(sensor_cell, 4, **bent)
     assert "needle_leans" not in report.proposal.result.notes
@@ -109,7 +109,7 @@ def test_beams_found_at_two_angles_are_tested_at_a_third(turn_deg):
     assert within(report, off_mm) < 1.2
     shift = [0.1 * math.cos(math.radians(40.0 - heading - 90.0)) for heading in (3.0, 88.0)]
     assert result.moved_mm == pytest.approx(shift, abs=0.006)
-    # About the places that were found: nothing is presumed of where they were.
+    # About the places that were found: their earlier places are not assumed.
     assert report.verification.max_drift_mm < 0.012
     (drift,) = report.verification.drifts
     measured_deg = {round(pose.u_deg, 3) for pose in result.inputs}
@@ -162,7 +162,7 @@ def test_crossings_that_scatter_by_nothing_are_not_sure_to_nothing(make, speed_m
     ("search_mm", "remedy"),
     [
         (1.5, "Search by 1.8 mm or more, or cross at 10 mm/s or less."),
-        (1.0, "Search by 1.8 mm or more."),  # so near no speed would do
+        (1.0, "Search by 1.8 mm or more."),  # so near that no speed would do
     ],
 )
 def test_a_run_up_that_is_too_short_is_refused_before_anything_moves(search_mm, remedy):

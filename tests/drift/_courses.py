@@ -1,4 +1,4 @@
-"""Courses of a cell's tools as a real cell might have them, drawn from a seed."""
+"""Histories of a cell's tools as a real cell might have them, drawn from a seed."""
 
 import random
 from collections.abc import Callable
@@ -28,13 +28,13 @@ def course(
     """Return changes of a cell.
 
     Args:
-        seed: What the scatter is drawn from.
+        seed: The seed of the scatter.
         count: Changes of each tool.
         tools: Number of tools.
-        shift: By how much the tip of a tool is elsewhere at a change, mm.
-        pin: The same of X of the pin.
+        shift: The shift of a tool's tip at a change, mm.
+        pin: The same for X of the pin.
         each_nozzle: How often a nozzle is measured before the next is mounted.
-        wear_mm: By how much it is shorter each time.
+        wear_mm: The loss of length each time.
         ids: Whether somebody gives the nozzles ids.
     """
     rng, made, seat = random.Random(seed), list[MeasuredChange](), dict[int, list[float]]()
@@ -70,7 +70,7 @@ def course(
 
 
 def found(changes: list[MeasuredChange]) -> set[str]:
-    """Return the codes of what stands out after the last change."""
+    """Return the codes of the findings after the last change."""
     from robolink.drift import charts_of, findings_in
 
     return {str(finding.code) for finding in findings_in(charts_of(changes), changes)}

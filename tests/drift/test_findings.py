@@ -1,4 +1,4 @@
-"""What stands out in the course of a cell's tools, how soon, and how rarely for nothing."""
+"""Findings in the history of a cell's tools, how soon they appear, and how rarely without cause."""
 
 from collections import Counter
 from dataclasses import replace
@@ -14,13 +14,13 @@ from robolink.errors import ConfigError
 from robolink.model import EntryKind, Recorded, Signature, ToolOffset, plain_offset
 from tests.drift._courses import course, found, steady
 
-# What stands out in the course of a cell's tools, and what does not.
+# Findings in the history of a cell's tools, and what is none.
 
 SEEDS = range(8)
 
 
 def most(seed_codes):
-    """Return the codes that most courses show."""
+    """Return the codes that most histories show."""
     counted = Counter(code for codes in seed_codes for code in codes)
     return {code for code, count in counted.items() if count > 4}
 
@@ -99,7 +99,7 @@ def test_fewer_than_twenty_changes_draw_no_limits():
 
 @pytest.mark.parametrize("seed", range(40))
 def test_a_large_shift_is_said_after_four_changes_whatever_was_before(seed):
-    """Values that happened to lie on the same side before it are no part of it."""
+    """Earlier values that happened to lie on the same side do not belong to it."""
     slipped = course(seed, 29, shift=lambda index, _: (0.2 * (index >= 25), 0, 0))
     (said,) = (one for one in said_of(slipped) if one.code == DriftCode.MOUNT_SHIFTED)
     assert said.shift_mm["x"] == pytest.approx(0.2, abs=0.05)
@@ -222,7 +222,7 @@ def test_the_course_of_one_tool_is_of_that_tool_alone():
 
 
 def test_a_slope_is_told_from_the_level_on_that_was_chosen_on_both_sides():
-    """Just below the limit nothing is told: each look is one more chance of a false alarm."""
+    """Just below the limit nothing is reported: each check is one more chance of a false alarm."""
     limit = student_t(1 - LEVEL / 2, 4)
     for share, told in ((0.97, None), (1.03, {"z"})):
         low, high = 0.0, 1.0
@@ -245,7 +245,7 @@ RUNS, BEFORE, UNTIL = 300, 25, 55
 
 
 def first_seen(name, **kwargs):
-    """Return in how many courses a code came up, and after how many changes at the median."""
+    """Return the number of histories with a code, and the median of changes before it."""
     tools = kwargs.get("tools", 1)
     seen, delays = Counter[str](), dict[str, list[int]]()
     for run in range(RUNS):

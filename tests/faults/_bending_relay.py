@@ -1,4 +1,4 @@
-"""A relay on loopback between clients and one server, which bends, holds back and adds bytes."""
+"""A relay on loopback between clients and one server that alters, delays and adds bytes."""
 
 import select
 import socket
@@ -9,26 +9,26 @@ from typing import Final, Self
 
 _CHUNK_BYTES: Final = 4096
 _LOOK_S: Final = 0.02
-"""After this long what was held back goes on, once it may."""
+"""The interval at which held bytes are checked for release."""
 
 Bend = Callable[[bytes], bytes]
 
 
 class BendingRelay:
-    """Carries TCP connections one after the other; a context manager.
+    """Carries TCP connections, one at a time; a context manager.
 
     Attributes:
-        port: Where clients connect to.
-        connections: How many clients came.
-        holding: While it is set, what clients send is kept back, in order.
+        port: The port for clients.
+        connections: The number of clients so far.
+        holding: While it is set, the clients' bytes are held back, in order.
 
     Args:
-        server_port: Where the server listens, on loopback.
-        greeting: What each client hears before anything else.
-        to_server: What becomes of each piece that a client sends.
-        to_client: What becomes of each piece that the server sends.
-        hold_at: With the first piece of a client that contains this, ``holding`` is set.
-        bytewise: Whether clients hear each byte in a piece of its own.
+        server_port: The server's port on loopback.
+        greeting: Sent to each client first.
+        to_server: Alters each piece from a client.
+        to_client: Alters each piece from the server.
+        hold_at: ``holding`` is set at a client's first piece that contains this.
+        bytewise: Whether clients get each byte in a separate piece.
     """
 
     def __init__(
@@ -78,7 +78,7 @@ class BendingRelay:
             self.connections += 1
             server = socket.create_connection(("127.0.0.1", self._server_port))
             for end in (client, server):
-                # Else the kernel joins again what was sent in pieces.
+                # Otherwise the kernel joins the pieces again.
                 end.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
                 self._ends.append(end)
             thread = threading.Thread(target=self._carry, args=(client, server), daemon=True)

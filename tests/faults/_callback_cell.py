@@ -1,7 +1,7 @@
-"""A cell whose running program calls back: simulated controller, real server on a real socket.
+"""A cell whose running program calls back: a simulated controller and a real server on a socket.
 
-What the program asks is passed on, and simulated time goes on only when it is answered. So no wall
-clock decides anything. Of a run that forks, the questions are answered in its own process.
+Each question is passed on, and simulated time goes on only after its answer, so no wall clock
+decides anything. In a run that forks, the same process answers the questions.
 """
 
 import math
@@ -73,12 +73,12 @@ Fend
 
 
 def main_of(method, measure, prove, functions):
-    """Return a program that calibrates by a method, with functions that measure and prove."""
+    """Return a program that calibrates by a method, with its functions to measure and test."""
     return _MAIN.format(method=method, measure=measure, prove=prove) + functions
 
 
 def touching(method="n-angle", measured=MEASURED, proved=PROVED):
-    """Return a program that touches a pin in so many orientations."""
+    """Return a program that touches a pin in this many orientations."""
     ends = f"TouchAll(11, {10 + len(measured)})", f"TouchAll(21, {20 + len(proved)})"
     return main_of(method, *ends, _TOUCHING)
 
@@ -88,19 +88,19 @@ NOMINAL = ToolOffset(12, -3.5, -20)
 
 
 class PowerCut(BaseException):
-    """The controller loses its power now."""
+    """The controller loses its power at this moment."""
 
 
 class CallbackCell:
-    """Controller, program, server and journal, and what passes between program and server.
+    """Controller, program, server and journal, and the traffic between program and server.
 
     Args:
-        folder: Where the program is written.
-        seed: Of the world.
-        journal: Of the server, one of its own by default.
-        limits: Of the server.
-        main: The program; of the class by default.
-        controllers: Names on record that the server was given.
+        folder: The folder for the program.
+        seed: The seed of the world.
+        journal: The server's journal, its own by default.
+        limits: The server's limits.
+        main: The program; that of the class by default.
+        controllers: Recorded names given to the server.
         in_process: Whether a server without a thread answers.
     """
 
@@ -134,7 +134,7 @@ class CallbackCell:
         self.furnish()
 
     def furnish(self):
-        """Put into the cell what the program measures with besides the pin."""
+        """Add the program's means of measurement other than the pin to the cell."""
 
     def _far_end(self):
         if self.address is None:
@@ -142,7 +142,7 @@ class CallbackCell:
         return AnsweredAt(self.address)
 
     def conversation(self, peer):
-        """Return who answers one program."""
+        """Return a conversation with one program."""
         return CallbackConversation(
             self.journal, self.limits, peer=peer, controllers=self.controllers
         )
@@ -153,7 +153,7 @@ class CallbackCell:
         return server
 
     def restart_server(self):
-        """End the server, and start another on another port, with the same journal."""
+        """Stop the server, and start another on another port with the same journal."""
         assert self.server is not None
         self.server.close()
         self.server = self._serve()
@@ -165,12 +165,12 @@ class CallbackCell:
 
     @property
     def error_mm(self):
-        """How far the stored tip lies from the true one, in the plane."""
+        """The distance of the stored tip from the true one, in the plane."""
         true = self.simulator.world.tips[1]
         return math.hypot(true.x_mm - self.tool.x_mm, true.y_mm - self.tool.y_mm)
 
     def teach(self, first, angles, *, off_mm=0.0, noise_mm=0.003):
-        """Put points where the true tip is on the pin, as the program's own search finds them."""
+        """Teach points with the true tip on the pin, as the program's own search finds them."""
         true, pin = self.simulator.world.tips[1], self.simulator.world.pin_mm
         for number, u_deg in enumerate(angles, start=first):
             u_deg += self.rng.uniform(-2, 2)
@@ -188,17 +188,17 @@ class CallbackCell:
             self.simulator.machine.points.store(number, Point.at(pose))
 
     def change_needle(self):
-        """Put another needle on: its tip is some tenths of a mm from the nominal one."""
+        """Mount another needle, whose tip is some tenths of a mm from the nominal one."""
         self.simulator.world.tips[1] = exchanged(NOMINAL, self.rng)
         self.bring()
 
     def bring(self):
-        """Put the points of the program where the needle that is mounted needs them."""
+        """Move the program's points to where the mounted needle needs them."""
         self.teach(11, MEASURED)
         self.teach(21, PROVED)
 
     def run(self, most_s=600.0):
-        """Start production, let it go on until the program ends; return what it printed."""
+        """Start production and run the program to its end; return its output."""
         self.start()
         return self.go_on(most_s)
 
@@ -208,7 +208,7 @@ class CallbackCell:
         self.simulator.panel.start_production()
 
     def go_on(self, most_s=600.0):
-        """Let the program go on to its end; return what it printed."""
+        """Run the program to its end; return its output."""
         end_ns = self.simulator.now_ns + round(most_s * NS)
         while self.runner.tasks:
             change = self.simulator.next_change()
@@ -228,7 +228,7 @@ class CallbackCell:
         """Start production and cut the power before a statement, by its number from 0.
 
         Returns:
-            The statement, ``None`` where the program ended before.
+            The statement, ``None`` if the program ended before.
         """
         at, reached = 0, None
 
@@ -248,7 +248,7 @@ class CallbackCell:
         return reached
 
     def statements(self):
-        """Run the program once; return its statements in their order."""
+        """Run the program once; return its statements in order."""
         found = []
         self.runner.on_statement = lambda _t, file, line, text: found.append((file, line, text))
         self.run()
@@ -256,17 +256,17 @@ class CallbackCell:
         return found
 
     def restore(self):
-        """Start the program that puts the old value back, and nothing else."""
+        """Run the program that restores the old value, and nothing else."""
         self.runner.start("main2", self.simulator.now_ns)
         self.go_on()
 
     def entries(self, kind=None, *, limit=None):
-        """Return what is on record, newest first."""
+        """Return the journal entries, newest first."""
         kinds = () if kind is None else (kind,)
         return list(self.journal.entries(controller=IDENTITY, kinds=kinds, limit=limit))
 
     def require_whole(self, old):
-        """Make sure that the tool is as it was, or one that was proved and is right; tell which."""
+        """Check that the tool is unchanged, or tested and right; return which."""
         if self.tool.rounded(3) == old.rounded(3):
             return False
         (newest,) = self.entries(EntryKind.VERIFY, limit=1)

@@ -11,13 +11,13 @@ from robolink.calibration import rotation_of, uvw_deg
 from tests.faults._callback_cell import CONTACT, CallbackCell, touching
 
 TILTS = ((0, 0), (18, 0), (18, 90), (18, 180), (18, -90), (9, 45))
-"""Of the measurement: by how much, and toward which direction of the base."""
+"""The tilts of the measurement: angle, and direction in the base."""
 
 PROVING_TILTS = ((22, 135), (22, -45), (22, 20))
 
 
 def two_programs():
-    """Return ``main`` for robot 1 and ``main3`` for robot 2; each has a contact of its own."""
+    """Return ``main`` for robot 1 and ``main3`` for robot 2, each with its own contact."""
     first = touching("n-angle").replace("Function main\n", "Function main\n  Robot 1\n")
     second = touching("pivot", TILTS, PROVING_TILTS)
     begin, end = second.index("Function main\n"), second.index("Function main2")
@@ -27,7 +27,7 @@ def two_programs():
 
 
 class TwoRobotCell(CallbackCell):
-    """Robot 1 and robot 2, by whichever was put in force last."""
+    """Robot 1 and robot 2; properties refer to the robot selected last."""
 
     robot = "GX4-C351S,C8-C901SR"
     main = two_programs()
@@ -39,11 +39,11 @@ class TwoRobotCell(CallbackCell):
                 world.set_up(replace(world.parameters, contact_input=wired))
 
     def choose(self, number):
-        """Put a robot in force, as whose the cell is looked at."""
+        """Select the robot that the properties refer to."""
         self.simulator.machine.choose(number)
 
     def change_needle_of(self, number):
-        """Put another needle on a robot."""
+        """Mount another needle on a robot."""
         self.choose(number)
         if number == 1:
             self.change_needle()
@@ -53,7 +53,7 @@ class TwoRobotCell(CallbackCell):
         self.tilt(21, PROVING_TILTS)
 
     def tilt(self, first, tilts):
-        """Put points where the true tip is on the pin, with the tool tilted."""
+        """Teach points with the true tip on the pin and the tool tilted."""
         world, machine = self.simulator.world, self.simulator.machine
         tip, flange = world.tips[1], machine.arm.flange()
         for number, (tilt_deg, toward_deg) in enumerate(tilts, start=first):
@@ -67,7 +67,7 @@ class TwoRobotCell(CallbackCell):
             machine.points.store(number, Point.at(pose))
 
     def calibrate(self, number):
-        """Let the program of a robot run; return what it printed."""
+        """Run the program of a robot; return its output."""
         self.runner.console.clear()
         self.runner.start("main" if number == 1 else "main3", self.simulator.now_ns)
         printed = self.go_on()
@@ -76,7 +76,7 @@ class TwoRobotCell(CallbackCell):
 
 
 def leaning(tilt_deg, toward_deg):
-    """Return the rotation about a level axis that leans a tool toward a direction."""
+    """Return the rotation about a level axis that tilts a tool toward a direction."""
     tilt, toward = np.radians(tilt_deg), np.radians(toward_deg)
     x, y = -np.sin(toward), np.cos(toward)
     across = np.array([[0, 0, y], [0, 0, -x], [-y, x, 0]])

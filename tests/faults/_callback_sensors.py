@@ -1,4 +1,4 @@
-"""Cells whose program calls back with edges of two beams, or with what its camera saw."""
+"""Cells whose program calls back with edges of two beams, or with sightings of its camera."""
 
 import math
 from dataclasses import replace
@@ -22,7 +22,7 @@ MEASURED_U, PROVED_U = 20.0, 160.0
 SHAFT_MM = 3.0
 FIRST, PROOF = 100, 200
 CROSSED, PROVED_BY = 12, 4
-"""Each beam both ways twice and deeper once; and once for the proof."""
+"""Each beam is crossed both ways twice and deeper once; once more in the turn test."""
 
 _CROSSING = f"""
 Function CrossAll(first As Integer, count As Integer) As Boolean
@@ -91,10 +91,10 @@ Fend
 
 
 class BeamCell(CallbackCell):
-    """Two crossed beams, which stand on record as they were learnt.
+    """Two crossed beams, recorded as they were learnt.
 
     Attributes:
-        place_mm: Where they really cross.
+        place_mm: The place where they really cross.
         station: The record.
     """
 
@@ -139,7 +139,7 @@ class BeamCell(CallbackCell):
         self.store(PROOF, self.scans(PROVED_U)[:4])
 
     def scans(self, u_deg, *, deeper_mm=0.0):
-        """Return two rounds of ways through the beams, for the nominal tip."""
+        """Return two rounds of crossings of the beams, for the nominal tip."""
         flange = self.simulator.machine.arm.flange()
         frame = Pose(0, 0, flange.z_mm, u_deg, hand=flange.hand)
         plan = BeamsParameters(search_mm=1.2)
@@ -147,7 +147,7 @@ class BeamCell(CallbackCell):
         return [*drive.round(), *drive.round(1)]
 
     def store(self, first, scans):
-        """Put their ends into points, and which beam it is 40 points on."""
+        """Store their ends as points, and the number of the beam 40 points on."""
         points = self.simulator.machine.points
         for number, scan in enumerate(scans):
             at = first + 2 * number
@@ -157,7 +157,7 @@ class BeamCell(CallbackCell):
 
 
 class CameraCell(CallbackCell):
-    """An up-looking camera that the controller's own vision knows."""
+    """An up-looking camera that the controller's own vision system uses."""
 
     main = main_of(
         "camera",
@@ -172,7 +172,7 @@ class CameraCell(CallbackCell):
         self.see(VisionCalibration.of_camera(world.camera))
 
     def see(self, calibration):
-        """Give the controller's vision a calibration of the camera."""
+        """Give the controller's vision system a calibration of the camera."""
         tip = VisionObject("tip", TIP, {"NumberToFind": 0})
         project = VisionProject.of(
             [VisionSequence("findTip", [tip], {"Calibration": "up"})], up=calibration
@@ -185,7 +185,7 @@ class CameraCell(CallbackCell):
         self.look_from(21, PROVING_LOOKS, ToolOffset())
 
     def look_from(self, first, angles, tip, *, beside_mm=0.0):
-        """Put points where a tip stands before the camera, seen from the tool that is used."""
+        """Teach points with a tip in front of the camera, in the coordinates of the used tool."""
         place = self.simulator.world.camera.middle_mm
         hand = self.simulator.machine.arm.flange().hand
         for number, u_deg in enumerate(angles, start=first):

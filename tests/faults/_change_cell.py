@@ -1,6 +1,6 @@
-"""A cell with two tools, programs that are killed while they change them, recovery.
+"""A cell with two tools, programs that are killed while they change them, and recovery.
 
-It is served, for programs that are processes of their own, or lives in this process.
+It is served for programs in processes of their own, or lives in this process.
 """
 
 import re
@@ -39,7 +39,7 @@ _WRITE = re.compile(r'\$Execute,"TL(?:Set (\d+), XY|Clr (\d+))')
 
 @dataclass(frozen=True)
 class WireStep:
-    """One instant of a program: an exchange by its running number, and a moment of it."""
+    """One instant of a program: the number of an exchange, and a moment of it."""
 
     number: int
     moment: Moment
@@ -56,8 +56,8 @@ class ChangeCell(ABC):
     """A controller that holds ``OLD`` in tools 1 and 2, of which 1 is selected.
 
     Attributes:
-        matters: What requests begin with that take ownership, select or write.
-        skip: Lets some seconds pass at once, where the clock can do that.
+        matters: The beginnings of requests that take ownership, select or write.
+        skip: Skips some seconds, if the clock can.
     """
 
     matters: ClassVar[re.Pattern[str]]
@@ -82,12 +82,12 @@ class ChangeCell(ABC):
     @property
     @abstractmethod
     def tools(self) -> dict[int, ToolOffset | None]:
-        """What is stored in both, past the wire."""
+        """The stored values of both tools, past the wire."""
 
     @property
     @abstractmethod
     def selected(self) -> int:
-        """Which tool is selected, past the wire."""
+        """The selected tool, past the wire."""
 
     @abstractmethod
     def writes(self) -> list[int]:
@@ -95,15 +95,15 @@ class ChangeCell(ABC):
 
     @abstractmethod
     def values_written(self, tool: int = 1) -> list[ToolOffset]:
-        """Return what a tool was written as so far, in order."""
+        """Return the values written to a tool so far, in order."""
 
     @abstractmethod
     def act(self) -> None:
-        """Let the controller act on what came in."""
+        """Let the controller carry out what it has received."""
 
     @property
     def requests(self) -> list[str]:
-        """What came in so far."""
+        """The requests so far."""
         return [text for _, direction, text in self.simulator.log if direction == ">"]
 
     def steps_of(self, program: str) -> list[Step]:
@@ -127,7 +127,7 @@ class ChangeCell(ABC):
         return [*wire, *durable]
 
     def run(self, program: str, instants: Instants) -> None:
-        """Run a program in this process, with all its instants seen."""
+        """Run a program in this process and record all its instants."""
         with exchanges_and_commits(self.simulator, instants):
             # Its time stands still: no sign of life comes between the transactions.
             log = self.journal.log(self.url, clock=ManualClock())
@@ -148,11 +148,11 @@ class ChangeCell(ABC):
         assert client.exit_code() == -9, f"it was not killed at {step}"
 
     def recover(self) -> str:
-        """Run ``robolink recover`` and return what it said; nothing may be left."""
+        """Run ``robolink recover`` and return its output; nothing may be left open."""
         return self.command("recover")
 
     def command(self, *words: str) -> str:
-        """Run a command that ends well, and return what it said."""
+        """Run a command that must succeed, and return its output."""
         with pytest.MonkeyPatch.context() as environment:
             environment.setenv("ROBOLINK_JOURNAL", str(self.folder / "journal.db"))
             environment.setenv("ROBOLINK_STATE_DIR", str(self.folder))
@@ -161,26 +161,26 @@ class ChangeCell(ABC):
         return ended.out + ended.err
 
     def check_what_was_acknowledged_is_there(self) -> None:
-        """Every entry that a process was told is durable is in the journal, which is whole."""
+        """Every entry acknowledged as durable is in the journal, which is whole."""
         assert self.journal.verify().problems == ()
         for number, last_hash in acknowledged(self.folder):
             entry = self.journal.entry(number) if number else None
             assert number == 0 or (entry is not None and entry.hash == last_hash), number
 
     def check_the_selected_tool_is_right_or_named(self) -> None:
-        """Whoever looks is told which tool the cell's own one is."""
+        """Status reports which tool is the cell's own."""
         if self.selected != 1:
             markers = [marker for _, marker in self.journal.open_markers()]
             (named,) = [marker for marker in markers if marker.kind is MarkerKind.SELECTION]
             assert named.details["tool"] == 1
 
     def meet(self) -> None:
-        """Let the journal know who the controller is: not each of many programs stores it."""
+        """Store the controller's identity in the journal once, for all programs."""
         with robolink.connect(self.url, outcomes=self.journal.log(self.url)) as controller:
             assert controller.outcomes.open_markers() == ()
 
     def check_all_is_settled(self) -> None:
-        """Nothing is open, the record says what is true, and the cell's own tool is selected."""
+        """Nothing is open, the record is true, and the cell's own tool is selected."""
         assert self.journal.open_markers() == ()
         assert self.selected == 1
         self.check_what_was_acknowledged_is_there()
@@ -191,7 +191,7 @@ class ChangeCell(ABC):
                 assert changed_since(controller, tool, held) is None, tool
 
     def verified(self) -> bool:
-        """Whether it is on record that a verified change stays."""
+        """Whether it is recorded that a verified change stays."""
         done = self.journal.entries(kinds=(EntryKind.DONE,))
         return any(entry.verdict == "verified" for entry in done)
 
@@ -225,7 +225,7 @@ class EpsonChangeCell(ChangeCell):
     """An EPSON controller.
 
     Attributes:
-        epson: It.
+        epson: The controller.
     """
 
     matters = re.compile(r'\$(Log|Execute,"(Tool \d|TL(Set|Clr) ))')
@@ -237,12 +237,12 @@ class EpsonChangeCell(ChangeCell):
 
     @property
     def tools(self) -> dict[int, ToolOffset | None]:
-        """What is stored in both, past the wire."""
+        """The stored values of both tools, past the wire."""
         return {tool: self._machine.tools.get(tool) for tool in OLD}
 
     @property
     def selected(self) -> int:
-        """Which tool is selected, past the wire."""
+        """The selected tool, past the wire."""
         return self._machine.tools.selected
 
     def writes(self) -> list[int]:
@@ -252,13 +252,13 @@ class EpsonChangeCell(ChangeCell):
         return [int(tool) for tool in found]
 
     def values_written(self, tool: int = 1) -> list[ToolOffset]:
-        """Return what a tool was written as so far, in order."""
+        """Return the values written to a tool so far, in order."""
         sent = [text for text in self.requests if text.startswith(f'$Execute,"TLSet {tool}, XY')]
         texts = [text.partition("XY(")[2].partition(")")[0] for text in sent]
         return [ToolOffset(*map(float, text.split(","))) for text in texts]
 
     def act(self) -> None:
-        """Let the controller act on what came in: it has done so at once."""
+        """Do nothing: the controller acts on requests at once."""
 
 
 @contextmanager
@@ -269,7 +269,7 @@ def change_cell(
     wire: EpsonWire = "tcp",
     **habits: Any,
 ) -> Iterator[EpsonChangeCell]:
-    """Have a cell with a journal of its own, served over TCP or on a pseudo terminal, or not."""
+    """Open a cell with its own journal, over TCP, on a pseudo terminal, or in this process."""
     folder.mkdir(parents=True)
     options = EpsonOptions(**{"remote_timeout_s": 0, "login_timeout_s": 0, **habits})
     simulator = kind(seed=1, options=options)
@@ -288,7 +288,7 @@ def change_cell(
 
 @contextmanager
 def kept(cell: Cell) -> Iterator[Cell]:
-    """Have the journal of a cell, which knows the controller already."""
+    """Open the journal of a cell, which already has the controller's identity."""
     cell.meet()
     try:
         yield cell

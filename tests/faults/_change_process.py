@@ -1,8 +1,7 @@
-"""Tool changes and recoveries as processes of their own, to be killed or held at a commit.
+"""Tool changes and recoveries in processes of their own, to be killed or held at a commit.
 
-Every durable transaction of the journal is counted in the process; when it has ended, number
-and hash of the newest entry are written down, so that what was acknowledged can be looked for
-afterwards.
+The process counts every durable transaction of the journal; after each one it writes down number
+and hash of the newest entry, so that acknowledged entries can be looked for afterwards.
 """
 
 import os
@@ -35,7 +34,7 @@ CommitMoment = Literal["before it is durable", "once it is durable"]
 
 @dataclass(frozen=True)
 class CommitStep:
-    """One instant of a program: a durable transaction by its running number, and a moment."""
+    """One instant of a program: the number of a durable transaction, and a moment of it."""
 
     number: int
     moment: CommitMoment
@@ -58,14 +57,14 @@ def _write_verified(controller: Controller) -> None:
 
 
 def _deliver(controller: Controller, *tools: int) -> None:
-    """Carry an order out, unless it was carried out before."""
+    """Carry an order out, unless that was done before."""
     with carrying_out(controller, ORDER, {"tools": list(tools)}) as order:
         if order.done is None:
             change_tools(controller, _wanted(*tools), order=order)
 
 
 def _restore(controller: Controller) -> None:
-    """Bring a backup back that selects tool 2, whose value is new, and knows no tool 1."""
+    """Restore a backup that has tool 2 selected with a new value, and tool 1 undefined."""
     now = take_backup(controller)
     wanted = replace(now.state, selected=2, tools={**now.state.tools, 1: None, 2: NEW[2]})
     restore(controller.tools, plan_restore(replace(now, state=wanted), now.state, selected=True))
@@ -94,8 +93,8 @@ class ProgramProcess:
     Args:
         program: Its name.
         url: The controller.
-        folder: Where its journal is, and where it writes down what was acknowledged.
-        kill_at: Where it ends itself with SIGKILL.
+        folder: The folder of its journal and of its notes on acknowledged entries.
+        kill_at: The instant at which it kills itself with SIGKILL.
     """
 
     def __init__(
@@ -107,7 +106,7 @@ class ProgramProcess:
         self._process.start()
 
     def kill(self) -> None:
-        """Send SIGKILL and return when the process, and with it its socket, is gone."""
+        """Send SIGKILL; return when the process and its socket are gone."""
         assert self._process.pid is not None
         os.kill(self._process.pid, signal.SIGKILL)
         assert wait([self._process.sentinel], PATIENCE_S), "it outlived SIGKILL"
@@ -123,10 +122,10 @@ class ProgramProcess:
 
 
 def acknowledged(folder: Path) -> list[tuple[int, str]]:
-    """Return number and hash of the newest entry after each transaction that was acknowledged."""
+    """Return number and hash of the newest entry after each acknowledged transaction."""
     noted = folder / "acknowledged"
     lines = noted.read_text().splitlines() if noted.exists() else []
-    # Before the first entry there is no hash: who the controller is was stored, and no more.
+    # There is no hash before the first entry: only the controller's identity was stored.
     pairs = [line.partition(" ") for line in lines]
     return [(int(number), last_hash) for number, _, last_hash in pairs]
 

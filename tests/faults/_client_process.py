@@ -1,7 +1,7 @@
 """The real command line in a process of its own, to be killed or interrupted.
 
-Each process is forked from one small single-threaded server that has the command line loaded
-already: a new interpreter for every kill point would cost more than all the rest.
+Each process is forked from a small single-threaded server that has loaded the command line: a new
+interpreter for every kill point would cost more than everything else.
 """
 
 import multiprocessing
@@ -18,7 +18,7 @@ _FORKS = multiprocessing.get_context("forkserver")
 _FORKS.set_forkserver_preload(
     [
         "tests.faults._loaded_first",
-        # What else is started from here. It imports this module, which is whole by then.
+        # Other processes started from here. They import this module, which is complete by then.
         "tests.faults._change_process",
         "tests.faults._operator_process",
     ]
@@ -26,12 +26,12 @@ _FORKS.set_forkserver_preload(
 
 
 class ClientProcess:
-    """``robolink ARGUMENTS`` as a process; what it printed stands in two files.
+    """``robolink ARGUMENTS`` as a process, with its output in two files.
 
     Args:
         arguments: The command line.
         environment: Added to this process's environment.
-        folder: Where its output goes.
+        folder: The folder of its output.
     """
 
     def __init__(
@@ -50,7 +50,7 @@ class ClientProcess:
         os.kill(self._process.pid, number)
 
     def kill(self) -> None:
-        """Send SIGKILL and return when the process, and with it its socket, is gone."""
+        """Send SIGKILL; return when the process and its socket are gone."""
         self.signal(signal.SIGKILL)
         assert wait([self._process.sentinel], PATIENCE_S), "it outlived SIGKILL"
 
@@ -65,12 +65,12 @@ class ClientProcess:
 
     @property
     def out(self) -> str:
-        """What it wrote to stdout."""
+        """Its stdout."""
         return self._out.read_text()
 
     @property
     def err(self) -> str:
-        """What it wrote to stderr."""
+        """Its stderr."""
         return self._err.read_text()
 
 

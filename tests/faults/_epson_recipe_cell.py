@@ -51,12 +51,12 @@ class EpsonRecipeCell(RecipeCell):
         epson.unregister(self.name)
 
     def tools(self) -> dict[int, ToolOffset | None]:
-        """Return what is stored in the tools of the recipe, past the wire."""
+        """Return the stored values of the recipe's tools, past the wire."""
         return {tool: self._machine.tools.get(tool) for tool in self.before}
 
     @property
     def selected(self) -> int:
-        """Which tool is in force, past the wire."""
+        """The selected tool, past the wire."""
         return self._machine.tools.selected
 
     def settings(self) -> object:
@@ -74,32 +74,32 @@ class EpsonRecipeCell(RecipeCell):
         return self.simulator.status_flags().running
 
     def where(self) -> object:
-        """Return where the flange is, past the wire."""
+        """Return the flange pose, past the wire."""
         return self._machine.arm.joints
 
     def writes(self) -> list[int]:
-        """Return the tools that were written so far, in order, as the controller counts them."""
+        """Return the tools written so far, in order, as the controller counts them."""
         return list(self._written)
 
     def moves_asked(self) -> int:
-        """Return how many movements were asked for so far."""
+        """Return the number of movements requested so far."""
         return sum(_MOVE.match(text) is not None for text in self.requests())
 
     @property
     def moves_begun(self) -> int:
-        """How many movements the robot began so far, past the wire."""
+        """The number of movements begun so far, past the wire."""
         return self._machine.arm.moves_started
 
     def strange(self) -> list[str]:
-        """Return what came in that no run of a recipe may ask for."""
+        """Return requests that no run of a recipe may send."""
         return [text for text in changes(self.requests()) if not _CHANGES.fullmatch(text)]
 
     def stops_asked(self) -> int:
-        """Return how many stops were asked for so far."""
+        """Return the number of stops requested so far."""
         return self.requests().count("$Abort")
 
     def sent_as(self, number: int, on: bool) -> str:
-        """Return what switches an output, as a person reads it."""
+        """Return the request that switches an output, as a person reads it."""
         return f"SetIO,{number},{on:d}"
 
     def disturb(self, how: str) -> None:
@@ -112,7 +112,7 @@ class EpsonRecipeCell(RecipeCell):
         acts[how]()
 
     def make_ready(self, how: str) -> None:
-        """Undo it, and reset."""
+        """Undo the disturbance, and reset."""
         panel = self.simulator.panel
         panel.release_estop() if how == "e-stop" else panel.close_guard()
         assert (done := self.run("reset")).code == 0, done.err

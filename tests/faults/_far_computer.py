@@ -1,7 +1,7 @@
-"""A controller on a computer of its own, whose power can be cut: a network namespace.
+"""A controller on a separate computer whose power can be cut: a network namespace.
 
-Needs root and ``ip`` of iproute2. What is cut is the address: nothing answers any more, and nothing
-says so either, as when a controller or a switch loses its power (docs/reference/faults.md F11).
+Needs root and ``ip`` of iproute2. The address is removed: nothing answers any more, and nothing
+reports it, as when a controller or a switch loses its power (docs/reference/faults.md F11).
 """
 
 import json
@@ -21,10 +21,10 @@ _numbers = count(os.getpid() % 200)
 
 
 class FarComputer:
-    """One that serves a simulator.
+    """A computer that serves a simulator.
 
     Attributes:
-        url: Of the simulator.
+        url: The simulator's URL.
     """
 
     def __init__(self, space: str, device: str, address: str) -> None:
@@ -32,16 +32,16 @@ class FarComputer:
         self._space, self._device, self._address = space, device, address
 
     def lose_power(self) -> None:
-        """Let nothing answer any more."""
+        """Make the computer silent."""
         given = f"{self._address}/{_MASK}"
         _ip("-n", self._space, "addr", "del", given, "dev", self._device)
 
 
 @contextmanager
 def far_computer(*served: str) -> Iterator[FarComputer]:
-    """Serve ``robolink sim`` with these words; ``{address}`` among them becomes its address.
+    """Serve ``robolink sim`` with these words, in which ``{address}`` stands for its address.
 
-    Skips the test where this computer lets nobody make a network namespace.
+    Skips the test on a computer that allows no network namespace.
     """
     if not shutil.which("ip"):
         pytest.skip("needs the command ip (iproute2)")

@@ -1,4 +1,4 @@
-"""A firewall on the way to a port, which forgets connections and says so with a reset."""
+"""A firewall before a port that drops connections with a reset."""
 
 import select
 import socket
@@ -10,14 +10,14 @@ from robolink.transport import parse_url
 
 
 class Firewall:
-    """Forwards a port, and resets its clients when it is told to, or at a request.
+    """Forwards a port, and resets its clients on demand or at a request.
 
     Attributes:
-        port: Where it listens.
-        opened: How often somebody connected.
-        is_cut: Whether nobody gets through.
-        requests: What clients sent, piece by piece.
-        reset_at: Whether what is forwarded is the last thing before a reset.
+        port: Its port.
+        opened: The number of connections so far.
+        is_cut: Whether everybody is refused.
+        requests: The pieces that clients sent.
+        reset_at: Whether a forwarded piece is the last before a reset.
     """
 
     def __init__(self, port: int) -> None:
@@ -40,16 +40,16 @@ class Firewall:
         assert self._tell.recv(8) == b"done"
 
     def cut(self) -> None:
-        """Reset all clients, and everybody who comes from now on."""
+        """Reset all clients, and all later ones."""
         self.is_cut = True
         self.reset()
 
     def mend(self) -> None:
-        """Let everybody through again."""
+        """Let all clients through again."""
         self.is_cut = False
 
     def close(self) -> None:
-        """End."""
+        """Stop."""
         self._tell.send(b"close")
         self._thread.join(5)
         self._tell.close()
@@ -67,7 +67,7 @@ class Firewall:
                     self._carry(one)
 
     def _obeyed(self, word: bytes) -> bool:
-        """Do what is told; return whether that was the end."""
+        """Carry out a command; return whether that was the end."""
         self._reset()
         if word == b"close":
             self._listener.close()
@@ -111,7 +111,7 @@ class Firewall:
     def _reset(self) -> None:
         ends, self._others = list(self._others), {}
         for end in ends:
-            if end in self._near:  # what reached the controller stays there
+            if end in self._near:  # the controller keeps what it has received
                 end.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\1\0\0\0\0\0\0\0")
             end.close()
         self._near.clear()

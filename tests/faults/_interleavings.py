@@ -1,8 +1,8 @@
-"""Every order of the steps of two processes that makes a difference, each once.
+"""Every significantly different order of the steps of two processes, each once.
 
-Two steps of different processes that do not touch the same thing may be swapped without
-anybody noticing; sleep sets (Godefroid, 1996) leave such orders out. Which steps there are
-shows only on the way: a process that is refused takes fewer.
+Two steps of different processes that touch different things may be swapped without any effect;
+sleep sets (Godefroid, 1996) leave such orders out. The steps are known only during a run: a refused
+process takes fewer.
 """
 
 import random
@@ -12,32 +12,32 @@ from typing import Protocol
 from tests.faults._operator_steps import Waiting
 
 Plan = tuple[tuple[int, ...], frozenset[int]]
-"""Who does the first steps, and who need not go next: it was tried before."""
+"""The processes of the first steps, and those that need not go next: already tried."""
 
 
 class Run(Protocol):
     """Two processes on one cell, each before its next step."""
 
     def waiting(self) -> Mapping[int, Waiting]:
-        """Return who stands before which step; who has ended is left out."""
+        """Return the next step of each process that has not ended."""
 
     def step(self, who: int) -> None:
-        """Let one do his step."""
+        """Let one process do its step."""
 
     def abandon(self) -> None:
-        """End what is not worth finishing."""
+        """End a run that is not worth finishing."""
 
 
 class Interleavings:
     """Plans runs, one after another, until every order has been seen.
 
     Args:
-        alike: Whether the two do the same, so that it makes no difference who goes first.
-        most: After so many orders it is enough; ``None`` for all of them. Then the runs are
-            drawn from all over the orders, the same ones each time.
+        alike: Whether both processes do the same, so that either may go first.
+        most: The largest number of orders; ``None`` for all of them. With a limit the runs
+            are drawn from all over the orders, the same ones each time.
 
     Attributes:
-        seen: Orders that were followed to their end.
+        seen: Orders that were followed to the end.
     """
 
     def __init__(self, *, alike: bool = True, most: int | None = None) -> None:
@@ -52,10 +52,10 @@ class Interleavings:
             yield self._todo.pop(self._draw.randint(0, last) if self._draw else last)
 
     def follow(self, run: Run, beginning: Sequence[int], asleep: frozenset[int]) -> bool:
-        """Drive a run to its end along one order, and plan those that branch off.
+        """Drive a run to its end along one order, and plan the orders that branch off.
 
         Returns:
-            Whether it was an order of its own.
+            Whether the order was a new one.
         """
         path: tuple[int, ...] = ()
         for who in beginning:
@@ -79,6 +79,6 @@ class Interleavings:
 
 
 def apart(one: Waiting, other: Waiting) -> bool:
-    """Whether two steps may be swapped without anybody noticing."""
+    """Whether two steps may be swapped without any effect."""
     here, there = one.touches(), other.touches()
     return not any(here[what] or there[what] for what in here.keys() & there.keys())

@@ -1,7 +1,7 @@
-"""A whole ``robolink calibrate two-pose`` that was killed on its way.
+"""A whole ``robolink calibrate two-pose`` that is killed on its way.
 
-Nothing is written that was not asked, the next command says that Tool 0 is still selected and names
-the old tool, and ``recover`` puts it back.
+Nothing is written that was not asked for, the next command says that Tool 0 is still selected and
+names the old tool, and ``recover`` restores it.
 """
 
 import re
@@ -14,28 +14,28 @@ from tests.faults._recipe_instants import EVERYTHING, Instant
 from tests.faults._requests import changes
 
 _EVERY: Final = 48
-"""Of all other exchanges, every 48th makes the sample."""
+"""Every 48th of all other exchanges is in the sample."""
 
 _MATTERS: Final = re.compile(r'\$(Log|Execute,"Tool \d)')
-"""Logs in or out, or selects."""
+"""Requests that log in or out, or select."""
 
 _MOVES: Final = re.compile(r'\$Execute,"(Move |Go )')
 _EVERY_MOVE: Final = 7
-"""Of the moments of movements, most of which are the jogs of one touch, every seventh."""
+"""Every seventh moment of movements, most of which are the jogs of one touch."""
 
 _WRITES: Final = re.compile(r'\$Execute,"TLSet \d')
 
 
 class Dealt:
-    """Chooses the instants of a share: all of them, or without the switch a fixed sample.
+    """Chooses the instants of a share: all of them, or, without the switch, a fixed sample.
 
-    The sample has both moments of a write, and of other exchanges one.
+    The sample has both moments of a write, and one of each other exchange.
 
     Args:
-        share: Which one, from 0.
-        shares: Into how many they are dealt.
-        every_commit: Of the durable transactions of the journal, before and after which something
-            may come, one in so many belongs to the sample; 0 for none.
+        share: Its number, from 0.
+        shares: The number of shares.
+        every_commit: One in so many durable transactions of the journal is in the sample, with the
+            instants before and after it; 0 for none.
     """
 
     def __init__(self, share: int, shares: int, *, every_commit: int = 0) -> None:
@@ -45,7 +45,7 @@ class Dealt:
         self._chosen = 0
 
     def __call__(self, at: Instant) -> bool:
-        """Whether something comes in between there."""
+        """Whether the program is disturbed there."""
         if at.kind not in ("request", "answer", "commit") or not self._in_sample(at):
             return False
         self._chosen += 1
@@ -69,13 +69,13 @@ def words(cell: EpsonRecipeCell) -> tuple[str, ...]:
 
 
 def meet(cell: EpsonRecipeCell) -> None:
-    """Load what the commands of a check need, once for all of them."""
+    """Load the modules that the commands of a check need, once for all of them."""
     for command in (("status",), ("recover", "--yes")):
         assert (done := cell.run(*command)).code == 0, done.err
 
 
 def check_killed(cell: EpsonRecipeCell) -> None:
-    """Look at what it left, recover, and go on."""
+    """Check the leftovers, recover, and go on."""
     cell.come_to_rest()
     moves_begun = cell.moves_begun
     check_nothing_else_was_written(cell)
@@ -88,7 +88,7 @@ def check_killed(cell: EpsonRecipeCell) -> None:
 
 
 def check_nothing_else_was_written(cell: EpsonRecipeCell) -> None:
-    """Tool 1 holds the old or the measured value, written once at most; the rest stands."""
+    """Tool 1 holds the old or the measured value, written once at most; the rest is unchanged."""
     asked = changes(cell.requests())
     strange = [text for text in asked if not OF_A_CALIBRATION.fullmatch(text)]
     assert not strange, strange
@@ -100,7 +100,7 @@ def check_nothing_else_was_written(cell: EpsonRecipeCell) -> None:
 
 
 def check_the_next_command_says_what_is_selected(cell: EpsonRecipeCell) -> None:
-    """What is in force is named beside what it was, and how it is restored."""
+    """The selected tool is named beside the earlier one, with the way to restore it."""
     markers = cell.open_markers()
     shown = cell.run("status")
     assert shown.code == 0, shown.err
@@ -112,7 +112,7 @@ def check_the_next_command_says_what_is_selected(cell: EpsonRecipeCell) -> None:
 
 
 def check_recover_puts_the_cell_s_own_tool_back(cell: EpsonRecipeCell) -> None:
-    """Tool, power and speed are those of before, and what nobody verified is taken back."""
+    """Tool, power and speed are the earlier ones, and an unverified value is undone."""
     recovered = cell.run("recover", "--yes")
     assert recovered.code == 0, recovered.err
     assert (cell.selected, cell.settings()) == (1, cell.settings_before)

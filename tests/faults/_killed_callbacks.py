@@ -1,8 +1,8 @@
-"""A change that the controller's own program makes, and what is gone in the middle of it.
+"""A change by the controller's own program, with the controller or the PC lost in the middle.
 
-The controller loses its power at a statement of the companion, or the PC that answers is gone
-before or after it stores something. After RobolinkRestore the tool is the old one, or one that was
-proved; no later start touches it; and the next calibration settles what was open.
+The controller loses its power at a statement of the companion, or the answering PC dies before or
+after it stores something. After RobolinkRestore the tool is the old one, or a tested one; no later
+start touches it; and the next calibration finishes or undoes open changes.
 """
 
 from collections.abc import Callable
@@ -26,7 +26,7 @@ class PcGone(BaseException):
 
 
 class _MortalPc(AnsweredHere):
-    """Answers until it is gone; then nothing of it cleans up."""
+    """Answers until its process ends; then nothing cleans up."""
 
     def ask(self, question):
         with suppress(PcGone):
@@ -36,12 +36,12 @@ class _MortalPc(AnsweredHere):
 
 
 class MortalCell:
-    """A cell of some kind, of which something is gone once.
+    """A cell of some kind, of which controller or PC is lost once.
 
     Args:
         kind: Measures with a pin, with beams, or with a camera.
-        folder: For the program, and for how it ended in each world.
-        refused: Whether a touch of the proof is beside the pin.
+        folder: For the program, and for its end in each world.
+        refused: Whether a touch of the turn test misses the pin.
     """
 
     def __init__(self, kind: type[CallbackCell], folder: Path, *, refused: bool = False) -> None:
@@ -56,7 +56,7 @@ class MortalCell:
         self._dead = pytest.MonkeyPatch()
 
     def lose(self, gone: str, *, any_statement: bool) -> set[str]:
-        """Let it be gone at its instants; return how the changes ended."""
+        """Lose it at its instants; return how the changes ended."""
         power = gone == "power"
         worlds = Worlds(
             Statements(any_statement) if power else lambda at: at.kind == "commit",
@@ -99,7 +99,7 @@ class MortalCell:
         cell = self.cell
         self._dead.undo()
         if printed is not None:
-            # A process that is gone holds no lease; in this world its process goes on.
+            # A dead process holds no lease; in this world its process goes on.
             log = cell.journal.log(IDENTITY)
             log.take_over("the PC was switched off")
             log.close()
@@ -120,7 +120,7 @@ class MortalCell:
 
 
 class Statements:
-    """Chooses those of the companion that matter, or all, the first time that each is reached."""
+    """Chooses the significant statements of the companion, or all, each when first reached."""
 
     def __init__(self, any_statement: bool) -> None:
         self._chosen: Callable[[str], bool] = (
@@ -129,7 +129,7 @@ class Statements:
         self._seen = set[str]()
 
     def __call__(self, at: Instant) -> bool:
-        """Whether the power goes there."""
+        """Whether the power fails there."""
         place, _, text = at.what.partition(" ")
         if at.kind != "statement" or not place.startswith(_COMPANION) or place in self._seen:
             return False

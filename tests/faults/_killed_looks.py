@@ -1,7 +1,7 @@
-"""A look through the controller's own camera (``vision-guide``) that was killed.
+"""A look through the controller's own camera (``vision-guide``) that is killed.
 
-No tool was touched, nothing moved, a look in doubt blocks the next one until a person has settled
-it, and the next look tells what is before the camera then, never what the killed one has seen.
+No tool is touched, nothing moves, an unconfirmed look blocks the next one until a person recovers,
+and the next look shows the present picture, never the killed one's.
 """
 
 from pathlib import Path
@@ -32,11 +32,11 @@ exact = true
 """
 BESIDE_MM = 1.5
 _PROGRAM_S = 10.0
-"""By then the program on the controller has ended, whoever started it."""
+"""The program on the controller has ended after this time, whoever started it."""
 
 
 def furnish(cell: EpsonChangeCell) -> None:
-    """Give the controller its vision system, and bring the tip before the camera."""
+    """Give the controller its vision system, and bring the tip to the camera."""
     cell.epson.load([PROGRAM])
     path = cell.folder / "vision.toml"
     path.write_text(VISION)
@@ -45,7 +45,7 @@ def furnish(cell: EpsonChangeCell) -> None:
 
 
 def lead_tip(cell: EpsonChangeCell, beside_mm: float) -> None:
-    """Bring the tip before the camera, or beside its middle."""
+    """Bring the tip to the camera, or beside its middle."""
     world = cell.epson.world
     tip, there = world.tip_mm(), world.camera.middle_mm
     by_mm = (there[0] + beside_mm - tip[0], there[1] - tip[1], there[2] - tip[2])
@@ -53,7 +53,7 @@ def lead_tip(cell: EpsonChangeCell, beside_mm: float) -> None:
 
 
 def look(cell: EpsonChangeCell) -> tuple[float, float]:
-    """Look for the tip and return where it is, in mm."""
+    """Look for the tip and return its place, in mm."""
     with robolink.connect(cell.url, outcomes=cell.journal.log(cell.url)) as controller:
         assert isinstance(controller, LookingController)
         (spot,) = controller.look(TIP, program=7)
@@ -61,7 +61,7 @@ def look(cell: EpsonChangeCell) -> tuple[float, float]:
 
 
 def check_killed_look(cell: EpsonChangeCell) -> None:
-    """Look at what a killed look left, settle it as a person does, and look again."""
+    """Check the leftovers of a killed look, recover as a person does, and look again."""
     cell.skip(_PROGRAM_S)
     cell.check_what_was_acknowledged_is_there()
     assert (cell.tools, cell.selected, cell.writes()) == (OLD, 1, [])

@@ -1,4 +1,4 @@
-"""An order that was killed on its way, and is delivered again until it is carried out."""
+"""An order that is killed on its way, and delivered again until it is carried out."""
 
 import json
 from pathlib import Path
@@ -40,7 +40,7 @@ def check_killed_order(cell: ChangeCell, program: str) -> None:
     cell.deliver(program)
     assert cell.tools == {tool: NEW[tool] if tool in tools else OLD[tool] for tool in OLD}
     for tool in tools:
-        # Each time that it was made, but the last, it had been taken back.
+        # Each time it was made, except the last, it had been undone.
         made = cell.values_written(tool)
         assert made[0::2] == [NEW[tool]] * len(made[0::2])
         assert made[1::2] == [OLD[tool]] * len(made[1::2])
@@ -61,7 +61,7 @@ def words(cell: EpsonRecipeCell, folder: Path) -> list[str]:
 
 
 def check_delivered_again(cell: EpsonRecipeCell, words: list[str]) -> None:
-    """The order of a change that was killed is carried out once, however often it is delivered."""
+    """The order of a killed change is carried out once, however often it is delivered."""
     cell.come_to_rest()
     if cell.open_markers():
         moves, writes = cell.moves_begun, cell.writes()

@@ -1,7 +1,7 @@
-"""A restore from a backup that was killed on its way: written, selected, cleared, in this order.
+"""A restore from a backup that is killed on its way: writes, selects, clears, in this order.
 
-What was done by then stays, and nothing else is done until somebody runs it again, which ends it:
-each tool is written or cleared once.
+The steps done by then stay, and nothing else is done until somebody runs the restore again, which
+completes it: each tool is written or cleared once.
 """
 
 from typing import Final
@@ -19,19 +19,19 @@ STAGES: Final[tuple[Stage, ...]] = (
     ({**OLD, 2: NEW[2]}, 2),
     ({1: None, 2: NEW[2]}, 2),
 )
-"""What the tools hold and which is selected, from step to step."""
+"""The tools' values and the selected tool, step by step."""
 
 _FORGOTTEN_S: Final = 11.0
-"""By then a PLC no longer takes the program that was killed for the owner of its mailbox."""
+"""After this time a PLC no longer counts the killed program as owner of its mailbox."""
 
 
 def stage(cell: ChangeCell) -> Stage:
-    """Return what stands, past the wire."""
+    """Return the present state, past the wire."""
     return cell.tools, cell.selected
 
 
 def check_killed_restore(cell: ChangeCell) -> None:
-    """Look at what a killed restore left, recover, and run it again, twice."""
+    """Check the leftovers of a killed restore, recover, and run it again, twice."""
     cell.act()
     stands = stage(cell)
     assert stands in STAGES

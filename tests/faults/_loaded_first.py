@@ -1,6 +1,6 @@
-"""What the server loads from which processes are forked, so that none of them loads it anew.
+"""The modules that the fork server loads, so that no forked process loads them anew.
 
-Packages of the library load their parts when these are asked for, so each part is named or found.
+Packages of the library load their parts on demand, so each part is named or found.
 """
 # ruff: noqa: F401 - loading them is all that is wanted
 

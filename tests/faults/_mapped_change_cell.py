@@ -1,4 +1,4 @@
-"""A PLC with a register map and two tools, to be changed by programs that are killed."""
+"""A PLC with a register map and two tools, for programs that are killed while changing them."""
 
 import re
 from collections.abc import Iterator
@@ -20,14 +20,14 @@ from tests.faults._change_process import OLD
 
 MAP: Final = Path("examples/plc-maps/commit-bit.toml").absolute()
 _FIRST_ADDRESS: Final = {"fc16 100": 1, "fc16 110": 2}
-"""What writes the registers of a tool."""
+"""The request that writes the registers of a tool."""
 
 _TAKEN_OVER_S: Final = 0.5
-"""In this time the PLC takes over what it was asked to."""
+"""The PLC applies a request within this time."""
 
 
 class MappedChangeCell(ChangeCell):
-    """A PLC whose registers hold the tools; they count once the PLC has taken them over."""
+    """A PLC whose registers hold the tools; they take effect once the PLC has applied them."""
 
     matters = re.compile("fc16 |fc5 ")
 
@@ -37,12 +37,12 @@ class MappedChangeCell(ChangeCell):
 
     @property
     def tools(self) -> dict[int, ToolOffset | None]:
-        """What the machine works with, past the wire."""
+        """The values in use, past the wire."""
         return {tool: _offset(self._program.in_force[tool]) for tool in OLD}
 
     @property
     def selected(self) -> int:
-        """Which tool the machine has selected: the first, and robolink selects none."""
+        """The machine's selected tool: the first one; robolink selects none."""
         return 1
 
     def writes(self) -> list[int]:
@@ -50,11 +50,11 @@ class MappedChangeCell(ChangeCell):
         return [_FIRST_ADDRESS[text] for text in self.requests if text in _FIRST_ADDRESS]
 
     def values_written(self, tool: int = 1) -> list[ToolOffset]:
-        """Fail: a write is known by its address alone here, so no check may rest on its values."""
+        """Fail: writes are known by address only here, so no check may rest on their values."""
         pytest.fail(f"the values written to tool {tool} are not kept for a map: look at `tools`")
 
     def act(self) -> None:
-        """Let the PLC take over what it was asked to."""
+        """Let the PLC apply the request."""
         self.skip(_TAKEN_OVER_S)
         with self.simulator.acting():
             pass
@@ -62,7 +62,7 @@ class MappedChangeCell(ChangeCell):
 
 @contextmanager
 def mapped_change_cell(folder: Path, *, wire: str = "sim") -> Iterator[MappedChangeCell]:
-    """Have a PLC that holds ``OLD``, with a journal of its own, in this process or over TCP."""
+    """Open a PLC that holds ``OLD``, with its own journal, in this process or over TCP."""
     folder.mkdir(parents=True)
     simulator = PlcSimulator(load_map(MAP), seed=1)
     for tool, offset in OLD.items():

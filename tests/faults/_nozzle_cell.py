@@ -1,4 +1,4 @@
-"""A served cell whose nozzle was changed, and what may be found in it after a mishap."""
+"""A served cell with a changed nozzle, and the checks after a mishap."""
 
 import re
 import time
@@ -24,17 +24,17 @@ SPEED = 200.0
 """Simulated seconds per real second. The remote time-out is off: it would be 0.3 s."""
 
 FAST = (30, 40, 50)
-"""Speed of the cell's own program, which a calibration must leave as it found it."""
+"""The speed of the cell's own program, which a calibration must restore."""
 
 OLD_TIP = STORED
-"""What tool 1 holds before the nozzle change."""
+"""The value of tool 1 before the nozzle change."""
 
 MOVE = re.compile(r'\$Execute,"(Move|Go) ')
 OF_A_CALIBRATION = re.compile(
     r'\$Execute,"(Tool [01]|TLSet 1, XY\(.*\)|Power (Low|High)|SpeedS? [\d., ]+'
     r'|(Move|Go) XY\(.*\).*)"|\$Abort'
 )
-"""All that a calibration of tool 1 may ask of a controller besides reading."""
+"""All requests other than readings that a calibration of tool 1 may send."""
 
 
 class NozzleCell:
@@ -58,7 +58,7 @@ class NozzleCell:
         return ["calibrate", "two-pose", "--tool", "1", "--yes", *assist]
 
     def calibrate(self) -> ClientProcess:
-        """Start the whole nozzle change in a process of its own."""
+        """Start the whole nozzle change in a separate process."""
         return ClientProcess(
             ["-c", self.url, *self.calibration, "--json"],
             environment={"ROBOLINK_STATE_DIR": str(self.state_folder)},
@@ -70,7 +70,7 @@ class NozzleCell:
         return run_command("-c", self.url, *arguments)
 
     def wait_at_rest(self) -> None:
-        """Wait until a movement that goes on without its client has ended."""
+        """Wait until a movement without a client has ended."""
         while self.simulator.status_flags().running:
             time.sleep(0.002)
 
@@ -81,25 +81,27 @@ class NozzleCell:
 
     @property
     def tool_1(self) -> ToolOffset | None:
-        """What is stored, past the wire."""
+        """The stored value, past the wire."""
         return self.simulator.machine.tools.get(1)
 
     @property
     def requests(self) -> list[str]:
-        """What came in so far."""
+        """The requests so far."""
         return [text for _, direction, text in self.simulator.log if direction == ">"]
 
     @property
     def moves_requested(self) -> int:
-        """How many moves were asked for so far."""
+        """The number of moves requested so far."""
         return sum(MOVE.match(text) is not None for text in self.requests)
 
     def open_markers(self) -> tuple[Marker, ...]:
-        """Return what the command line holds for unsettled."""
+        """Return the markers that the command line counts as open."""
         return open_journal().log(self.url).open_markers()
 
     def check_nothing_else_was_written(self) -> None:
-        """Tool 1 holds the old or the measured value, written once at most; the rest stands."""
+        """Tool 1 holds the old or the measured value, written once at most; the rest is as
+        before.
+        """
         machine = self.simulator.machine
         asked = changes(self.requests)
         strange = [text for text in asked if not OF_A_CALIBRATION.fullmatch(text)]
@@ -111,7 +113,7 @@ class NozzleCell:
         assert machine.arm.moves_started <= self.moves_requested
 
     def check_settings_are_those_of_before(self) -> None:
-        """Tool, power and speed are as the cell's own program left them."""
+        """Tool, power and speed are as the cell's own program set them."""
         assert self.selected_tool == 1
         assert self._settings_now() == self._settings
 

@@ -1,4 +1,4 @@
-"""An operator in a process of its own, who waits at each step until he is let on."""
+"""An operator in a separate process, who waits before each step for permission."""
 
 import os
 import signal
@@ -22,22 +22,22 @@ from tests.faults._operator_steps import StepKind, Waiting, wait_at_each_step
 
 @dataclass(frozen=True)
 class Ended:
-    """How it ended: ``done``, or the kind of error and its sentences."""
+    """How the operator ended: ``done``, or the kind of error and its sentences."""
 
     how: str
     said: str = ""
 
 
 class OperatorProcess:
-    """Reads tools, then changes them if they still hold what was read.
+    """Reads tools, then changes them if they still hold the values read.
 
     Args:
         url: The controller.
-        folder: Where the journal is.
-        name: Of the operator.
-        wanted: What the tools are to hold.
-        stepwise: Whether he waits at each step.
-        later_s: By how much his clock is ahead.
+        folder: The folder of the journal.
+        name: The operator's name.
+        wanted: The intended values of the tools.
+        stepwise: Whether to wait before each step.
+        later_s: How much the operator's clock is ahead.
     """
 
     def __init__(
@@ -61,12 +61,12 @@ class OperatorProcess:
             self._listen()
 
     def step(self) -> None:
-        """Let him do his next step and come to the one after it, or to his end."""
+        """Permit the next step; return at the one after it, or at the end."""
         self._line.send(None)
         self._listen()
 
     def advance_to(self, kind: StepKind, *, count: int = 1) -> None:
-        """Let him on until he stands before the ``count``-th step of a kind."""
+        """Permit steps up to the ``count``-th step of a kind."""
         while True:
             assert isinstance(self.state, Waiting), f"he did not come to a {kind}: {self.state}"
             if self.state.kind == kind:
@@ -76,7 +76,7 @@ class OperatorProcess:
             self.step()
 
     def end(self) -> Ended:
-        """Let him on to the end."""
+        """Permit all steps to the end."""
         while not isinstance(self.state, Ended):
             if isinstance(self.state, Waiting):
                 self._line.send(None)
@@ -93,7 +93,7 @@ class OperatorProcess:
         self._signal(signal.SIGCONT)
 
     def close(self) -> None:
-        """End the process, wherever it is."""
+        """End the process, whatever its state."""
         self._process.kill()
         self._process.join()
         self._process.close()
@@ -114,7 +114,7 @@ def _operate(
     url, folder, name, wanted, later_s = task
     clock = ManualClock(round(later_s * NS_PER_S))
     signature = Signature(operator=name)
-    os.environ["ROBOLINK_STATE_DIR"] = folder  # a PC of his own, where the folder is
+    os.environ["ROBOLINK_STATE_DIR"] = folder  # a PC of its own, in the place of the folder
     outcomes = open_journal(f"{folder}/journal.db").log(url, signature=signature, clock=clock)
     try:
         with robolink.connect(url, outcomes=outcomes, timeout_s=1.0) as controller:

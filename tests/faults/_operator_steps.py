@@ -1,8 +1,8 @@
-"""The steps of an operator, and how he is made to wait before each.
+"""The steps of an operator, and the wait before each.
 
-A step is what two operators share: a read or a write of a tool, a read or a durable transaction
-of the journal; on a PLC each command in the mailbox, a write of a tool among them, and the look
-at what the PLC answers. What lies between two of them cannot be seen by the other.
+A step is an act that the other operator can notice: a read or a write of a tool, a read or a
+durable transaction of the journal; on a PLC each command in the mailbox, tool writes included, and
+the reading of the PLC's answer.
 """
 
 import re
@@ -29,23 +29,23 @@ StepKind = Literal[
     "mailbox answer",
 ]
 Wait = Callable[..., None]
-"""Waits before a step: its kind, and the tool where it is about one."""
+"""Waits before a step of a kind, with the tool if it is about one."""
 
 ALL_TOOLS: Final = -1
-"""They are listed at once."""
+"""The tools are listed at once."""
 
 _TOOL: Final = re.compile(r"(Print )?TLSet\(?\s*(\d+)")
 
 
 @dataclass(frozen=True)
 class Waiting:
-    """Before which step he stands.
+    """The next step.
 
     Attributes:
-        kind: Of the step.
-        epoch: Under which he has the lease; 0 without it.
-        tool: Which tool is read or written, or :data:`ALL_TOOLS`; 0 for a step of another kind.
-        by_mailbox: Whether a tool is written by a command in a PLC's mailbox.
+        kind: The kind of step.
+        epoch: The epoch of the operator's lease; 0 without one.
+        tool: The tool that is read or written, or :data:`ALL_TOOLS`; 0 for a step of another kind.
+        by_mailbox: Whether a command in a PLC's mailbox writes the tool.
     """
 
     kind: StepKind
@@ -54,7 +54,7 @@ class Waiting:
     by_mailbox: bool = False
 
     def touches(self) -> dict[str, bool]:
-        """Return what the step reads or changes that the other may see, and whether it changes."""
+        """Return what the step touches that the other may see, and whether it changes it."""
         where, _, what = self.kind.partition(" ")
         tools = range(1, 16) if self.tool == ALL_TOOLS else [self.tool]
         touched = {f"{where} {tool}": what in ("write", "command") for tool in tools}
@@ -64,7 +64,7 @@ class Waiting:
 
 
 def wait_at_each_step(line: Connection, outcomes: JournalOutcomeLog) -> None:
-    """Make this process tell before which step it stands, and wait until it is let on."""
+    """Make this process report its next step, and wait for permission."""
 
     def wait(kind: StepKind, tool: int = 0, *, by_mailbox: bool = False) -> None:
         line.send(Waiting(kind, outcomes._lease._epoch, tool, by_mailbox))

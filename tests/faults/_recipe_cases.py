@@ -1,4 +1,4 @@
-"""The runs that are disturbed: recipes, each on a kind of controller."""
+"""The disturbed runs: recipes, each on a kind of controller."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -19,10 +19,10 @@ class Case:
     """A recipe on a kind of controller.
 
     Attributes:
-        kind: Of the controller.
+        kind: The kind of controller.
         recipe: The recipe.
-        tools: Those that it changes.
-        answers: Given with the command; without any, a person at a terminal is asked.
+        tools: The tools that it changes.
+        answers: Options with answers; without any, a person at a terminal is asked.
     """
 
     kind: type[EpsonRecipeCell] | type[PlcRecipeCell]
@@ -32,7 +32,7 @@ class Case:
 
     @contextmanager
     def cell(self) -> Iterator[RecipeCell]:
-        """Serve a cell on which it may run."""
+        """Serve a cell for the recipe."""
         cell = self.kind(self.tools)
         try:
             yield cell
@@ -43,9 +43,9 @@ class Case:
         """Run it.
 
         Args:
-            cell: Where.
-            folder: Where the recipe is written.
-            instants: Sees every instant of it.
+            cell: The cell.
+            folder: The folder for the recipe.
+            instants: Sees every instant of the run.
         """
         path = folder / "recipe.toml"
         path.write_text(self.recipe)

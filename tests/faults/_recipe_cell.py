@@ -1,4 +1,4 @@
-"""A cell in this process on which whole recipes run, and what may be found in it after a mishap."""
+"""A cell in this process on which whole recipes run, and the checks after a mishap."""
 
 import io
 import re
@@ -35,10 +35,10 @@ class RecipeCell(ABC):
     """A controller of some kind with its nozzles changed, tool 1 selected.
 
     Attributes:
-        disturbances: What may come in between besides Ctrl-C.
-        before: What the tools held.
+        disturbances: The possible disturbances besides Ctrl-C.
+        before: The tools' earlier values.
         shows_its_tool: Whether it shows which tool is selected in every state.
-        clock: On which everything passes.
+        clock: The clock of all parts.
         recipe_tools: The tools that the recipe changes.
     """
 
@@ -65,25 +65,25 @@ class RecipeCell(ABC):
 
     @abstractmethod
     def _unregister(self) -> None:
-        """Serve it no more."""
+        """Stop serving it."""
 
     def close(self) -> None:
-        """Serve it no more, and forget its journal."""
+        """Stop serving it, and drop its journal."""
         self._unregister()
         self.journal.close()
 
     @abstractmethod
     def tools(self) -> dict[int, ToolOffset | None]:
-        """Return what is stored in the tools of the recipe, past the wire."""
+        """Return the stored values of the recipe's tools, past the wire."""
 
     @property
     @abstractmethod
     def selected(self) -> int:
-        """Which tool is in force, past the wire."""
+        """The selected tool, past the wire."""
 
     @abstractmethod
     def settings(self) -> object:
-        """Return what else a procedure must leave as it was."""
+        """Return the other settings that a procedure must restore."""
 
     @abstractmethod
     def outputs(self) -> Mapping[int, bool]:
@@ -91,7 +91,7 @@ class RecipeCell(ABC):
 
     @abstractmethod
     def sent_as(self, number: int, on: bool) -> str:
-        """Return what switches an output, as a person reads it."""
+        """Return the request that switches an output, as a person reads it."""
 
     @property
     @abstractmethod
@@ -100,43 +100,43 @@ class RecipeCell(ABC):
 
     @abstractmethod
     def where(self) -> object:
-        """Return where the flange is, past the wire."""
+        """Return the flange pose, past the wire."""
 
     @abstractmethod
     def writes(self) -> list[int]:
-        """Return the tools that were written so far, in order, as the controller counts them."""
+        """Return the tools written so far, in order, as the controller counts them."""
 
     @abstractmethod
     def moves_asked(self) -> int:
-        """Return how many movements were asked for so far."""
+        """Return the number of movements requested so far."""
 
     @property
     @abstractmethod
     def moves_begun(self) -> int:
-        """How many movements the robot began so far, past the wire."""
+        """The number of movements begun so far, past the wire."""
 
     @abstractmethod
     def strange(self) -> list[str]:
-        """Return what came in that no run of a recipe may ask for."""
+        """Return requests that no run of a recipe may send."""
 
     @abstractmethod
     def stops_asked(self) -> int:
-        """Return how many stops were asked for so far."""
+        """Return the number of stops requested so far."""
 
     @abstractmethod
     def disturb(self, how: str) -> None:
-        """Let something come in between."""
+        """Disturb the run."""
 
     @abstractmethod
     def make_ready(self, how: str) -> None:
-        """Undo it, and do at the command line what a person does then."""
+        """Undo the disturbance, and do at the command line what a person does then."""
 
     def changed(self) -> set[int]:
-        """Return which tools do not hold what they held before."""
+        """Return the tools whose values have changed."""
         return {tool for tool, held in self.tools().items() if held != self.before[tool]}
 
     def names_output(self, number: int, on: bool, said: str) -> bool:
-        """Whether somebody who reads ``said`` learns how an output is."""
+        """Whether the text ``said`` gives the state of an output."""
         if "The emergency stop may have switched outputs off" in said and not on:
             return True
         left = re.search(r"Outputs stay as the recipe switched them: ([^.]*)\.", said)
@@ -144,24 +144,24 @@ class RecipeCell(ABC):
         return f"{number} {'on' if on else 'off'}" in states or self.sent_as(number, on) in said
 
     def check_motion_is_allowed(self) -> None:
-        """A movement starts again, once it is asked for."""
+        """A movement starts again when it is requested."""
         asked = self.moves_asked()
         for words in (("motors", "on", "--yes"), ("jog", "z+0.5", "--yes")):
             assert (done := self.run(*words)).code == 0, done.err
         assert self.moves_asked() == asked + 1
 
     def come_to_rest(self) -> None:
-        """Let a movement end that goes on without its client."""
+        """Let a movement without a client end."""
         while self.moving:
             self.clock.sleep(0.1)
             self._hosted.advance(self.clock.now_ns())
 
     def requests(self) -> list[str]:
-        """Return what came in so far."""
+        """Return the requests so far."""
         return [text for _, direction, text in self._hosted.log if direction == ">"]
 
     def open_markers(self) -> tuple[Marker, ...]:
-        """Return what is held for unsettled."""
+        """Return the open markers."""
         return tuple(marker for _, marker in self.journal.open_markers())
 
     def run(self, *words: str, instants: Instants | None = None, asks: bool = False) -> Ended:
@@ -170,7 +170,7 @@ class RecipeCell(ABC):
         Args:
             words: The command.
             instants: Sees every instant of it.
-            asks: Whether a person sits at a terminal, and says yes to everything.
+            asks: Whether a person sits at a terminal and confirms everything.
         """
         seen = Instants() if instants is None else instants
         simulator = self._hosted
@@ -180,7 +180,7 @@ class RecipeCell(ABC):
             pytest.MonkeyPatch.context() as patch,
         ):
             patch.setattr(sys, "stdin", (_Terminal if asks else io.StringIO)())
-            # A run is taken again, up to each of its instants: the same one.
+            # A run is repeated up to each of its instants: the same one.
             patch.setattr("robolink.procedures.witnessed_touches.fresh_seed", lambda: 7)
             patch.setattr(self.clock, "on_wait", lambda: seen.pass_by("wait"))
             err = _Terminal() if asks else None

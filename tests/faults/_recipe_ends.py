@@ -1,4 +1,4 @@
-"""What must be true when a run of a recipe was ended from outside, and after it was put right."""
+"""Conditions after a recipe's run was ended from outside, and after its recovery."""
 
 import re
 from collections import Counter
@@ -12,10 +12,10 @@ from tests.faults._recipe_cell import RecipeCell
 
 @dataclass
 class Disturbance:
-    """One thing that comes in between, once.
+    """One disturbance, once.
 
     Attributes:
-        asked: How many movements had been asked for by then; -1 while it has not come.
+        asked: The number of movements requested before it; -1 while it has not occurred.
     """
 
     cell: RecipeCell
@@ -24,17 +24,17 @@ class Disturbance:
 
     @property
     def came(self) -> bool:
-        """Whether it has come."""
+        """Whether it has occurred."""
         return self.asked >= 0
 
     def __call__(self) -> None:
-        """Let it come."""
+        """Cause the disturbance."""
         self.asked = self.cell.moves_asked()
         self.cell.disturb(self.how)
 
 
 def check_interrupted(cell: RecipeCell, ended: Ended, disturbance: Disturbance) -> None:
-    """Ctrl-C ends a run with everything put back, or with all that was proved kept."""
+    """Ctrl-C ends a run with everything restored, or with all tested values kept."""
     assert ended.code == 130, (ended.code, ended.err)
     check_nothing_was_repeated(cell, disturbance)
     assert cell.stops_asked() <= 1
@@ -55,7 +55,7 @@ def check_interrupted(cell: RecipeCell, ended: Ended, disturbance: Disturbance) 
 
 
 def check_stopped(cell: RecipeCell, ended: Ended, disturbance: Disturbance) -> None:
-    """A controller that can be commanded no more is left as it is, and everything is named."""
+    """A controller that can no longer be commanded is left as it is, and everything is named."""
     check_nothing_was_repeated(cell, disturbance)
     assert cell.stops_asked() <= 1
     check_writes(cell)
@@ -75,7 +75,7 @@ def check_stopped(cell: RecipeCell, ended: Ended, disturbance: Disturbance) -> N
 
 
 def check_put_right(cell: RecipeCell, disturbance: Disturbance, *, offered: bool) -> None:
-    """After the reset one command settles what reading can, and with --yes the rest."""
+    """After the reset one command recovers what reading can, and with --yes the rest."""
     found = {marker.kind for marker in cell.open_markers()}
     cell.make_ready(disturbance.how)
     if offered:
@@ -100,16 +100,16 @@ def check_put_right(cell: RecipeCell, disturbance: Disturbance, *, offered: bool
 
 
 def check_nothing_was_repeated(cell: RecipeCell, disturbance: Disturbance) -> None:
-    """The robot stands, and began no movement that was asked for after what came in between."""
+    """The robot has stopped, and began no movement requested after the disturbance."""
     assert not cell.moving, "the robot still moves"
     assert cell.strange() == []
     assert cell.moves_begun <= disturbance.asked, "a movement after it"
-    # Whoever has looked before he asks may be overtaken once; the controller refuses then.
+    # A client that reads before it asks may be overtaken once; the controller refuses then.
     assert cell.moves_asked() <= disturbance.asked + 1
 
 
 def check_all_or_none(cell: RecipeCell) -> bool:
-    """All tools hold new values and that is on record, or none does and nothing is."""
+    """All tools hold new values and that is recorded, or none does and nothing is."""
     whole = kept(cell)
     if whole:
         assert cell.changed() == set(cell.recipe_tools)
@@ -123,7 +123,7 @@ def check_writes(cell: RecipeCell) -> None:
 
 
 def kept(cell: RecipeCell) -> bool:
-    """Whether it is on record that every tool keeps what was proved."""
+    """Whether it is recorded that every tool keeps its tested value."""
     done = list(cell.journal.entries(kinds=(EntryKind.DONE,)))
     proved = {entry.tool for entry in done if entry.verdict == "verified"}
     assert proved in (set(), set(cell.recipe_tools)), proved
@@ -132,7 +132,7 @@ def kept(cell: RecipeCell) -> bool:
 
 
 def check_the_selected_tool_is_named(cell: RecipeCell, ended: Ended) -> None:
-    """Where the cell's own tool is not in force, or may not be, marker and message say so."""
+    """If the cell's own tool is not selected, or may not be, marker and message say so."""
     markers = [m for m in cell.open_markers() if m.kind is MarkerKind.SELECTION]
     if not markers:
         assert cell.selected == 1, ended.err
@@ -140,7 +140,7 @@ def check_the_selected_tool_is_named(cell: RecipeCell, ended: Ended) -> None:
     (marker,) = markers
     assert marker.details["tool"] == 1
     now = marker.details["now"]
-    # A selection that was on its way: both are named.
+    # A selection under way: both tools are named.
     asked = {m.details.get("select", now) for m in cell.open_markers()} - {now}
     assert cell.selected in {now, *asked}, "the markers name another tool"
     known = [cell.selected] if cell.shows_its_tool else [*asked, now]
@@ -154,14 +154,14 @@ def check_the_selected_tool_is_named(cell: RecipeCell, ended: Ended) -> None:
 
 
 def check_markers_are_named(markers: Sequence[Marker], ended: Ended) -> None:
-    """Of whatever is left open the end of the run says what it is."""
+    """The end of the run names everything that is left open."""
     for marker in markers:
         named = (marker.request, begun_in_words(marker))
         assert any(words in ended.err for words in named), (marker, ended.err)
 
 
 def check_outputs_are_named(cell: RecipeCell, ended: Ended) -> None:
-    """Outputs stay as they were switched, and the end of the run says how they are."""
+    """Outputs stay as they were switched, and the end of the run names their states."""
     for number, on in cell.outputs().items():
         if on is not cell.outputs_before[number]:
             assert cell.names_output(number, on, ended.err), (number, on, ended.err)

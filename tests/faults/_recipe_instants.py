@@ -1,10 +1,10 @@
-"""Every instant of a run at which something can come in between, and how it is brought in.
+"""Every instant of a run at which a disturbance can occur, and its injection.
 
-A run is one process on one clock that stands still until somebody waits, so that its instants
-are the same each time: each exchange (before it is carried out, and before its answer leaves),
-the middle of each wait of the driver (a movement is waited on in such waits), each question to
-the person, and each durable transaction of the journal (before it, and once it counts). Questions
-and transactions lie between exchanges, where Ctrl-C is not held back.
+A run is one process on one clock that advances only during waits, so its instants are the same each
+time: each exchange (before it is carried out, and before its answer leaves), the middle of each
+wait of the driver (movements are waited for like that), each question to the person, and each
+durable transaction of the journal (before it, and once it counts). Questions and transactions lie
+between exchanges, where Ctrl-C is not held back.
 """
 
 import os
@@ -25,7 +25,7 @@ from robolink.journal.store.store import Store, Tables
 from robolink.runner import Question
 
 EVERYTHING: Final = os.environ.get("ROBOLINK_ALL_KILL_POINTS") == "1"
-"""Whether something comes in at all instants, not at a sample of them."""
+"""Whether all instants are disturbed, not only a sample."""
 
 Kind = Literal["request", "answer", "wait", "question", "commit", "statement"]
 _EVERY: Final = 97
@@ -36,10 +36,10 @@ _TURNS: Final = 12
 
 @dataclass(frozen=True)
 class Instant:
-    """One of them: the ``number``-th of its kind, and what went on.
+    """One instant: the ``number``-th of its kind, and its subject.
 
-    Of an answer that is its request, of a commit whether it counts already, of a statement its
-    place in the program and its text.
+    The subject of an answer is its request, of a commit whether it already counts, of a statement
+    its place in the program and its text.
     """
 
     kind: Kind
@@ -54,11 +54,11 @@ class Instants:
     """Counts the instants of a run, and acts at one of them.
 
     Attributes:
-        passed: Those that went by.
+        passed: The instants so far.
 
     Args:
-        at: When to act; ``None`` for never.
-        act: What is done then, once.
+        at: The instant to act at; ``None`` for never.
+        act: Called then, once.
     """
 
     def __init__(self, at: Instant | None = None, act: Callable[[], None] = lambda: None) -> None:
@@ -68,7 +68,7 @@ class Instants:
         self._counts = Counter[Kind]()
 
     def pass_by(self, kind: Kind, what: str = "") -> None:
-        """Let one go by."""
+        """Pass one instant."""
         self._counts[kind] += 1
         self.passed.append(Instant(kind, self._counts[kind], what))
         at = self._at
@@ -77,37 +77,37 @@ class Instants:
 
 
 class WatchedClock(ManualClock):
-    """A clock that tells when half of a wait is over."""
+    """A clock that reports when half of a wait is over."""
 
     def __init__(self) -> None:
         super().__init__()
         self.on_wait: Callable[[], None] = lambda: None
 
     def sleep(self, seconds: float) -> None:
-        """Let ``seconds`` pass, with a look after half of them."""
+        """Let ``seconds`` pass, with a report after half of them."""
         super().sleep(seconds / 2)
         self.on_wait()
         super().sleep(seconds / 2)
 
     def advance_to(self, now_ns: int) -> None:
-        """Move the time forward to ``now_ns``, with a look halfway."""
+        """Move the time forward to ``now_ns``, with a report halfway."""
         super().advance_to((self.now_ns() + now_ns) // 2)
         self.on_wait()
         super().advance_to(now_ns)
 
 
 class Person:
-    """Agrees to everything that a command asks on its terminal."""
+    """Confirms everything that a command asks on its terminal."""
 
     def __init__(self, instants: Instants) -> None:
         self.asked: list[str] = []
         self._instants = instants
 
     def tell(self, text: str) -> None:
-        """Hear something."""
+        """Accept a message."""
 
     def ask(self, question: str, kind: Question) -> None:
-        """Be asked."""
+        """Accept a question."""
         self.asked.append(question)
 
     def poll(self, wait_s: float) -> str:
@@ -118,7 +118,7 @@ class Person:
 
 @contextmanager
 def questions(instants: Instants) -> Iterator[Person]:
-    """Let ``instants`` see the questions; yields who sits at the terminal."""
+    """Let ``instants`` see the questions; yields the person at the terminal."""
     person = Person(instants)
     poll = _operator.AssistedOperator.poll
 
@@ -134,7 +134,7 @@ def questions(instants: Instants) -> Iterator[Person]:
 
 @contextmanager
 def exchanges_and_commits(simulator: HostedDevice, instants: Instants) -> Iterator[None]:
-    """Let ``instants`` see what goes to a simulator and what is stored in a journal."""
+    """Let ``instants`` see the requests to a simulator and the transactions of a journal."""
     write = Store.write
     asked: dict[int, str] = {}
 
@@ -162,12 +162,12 @@ def exchanges_and_commits(simulator: HostedDevice, instants: Instants) -> Iterat
 
 
 def chosen(instants: Sequence[Instant], matters: re.Pattern[str], turn: int) -> list[Instant]:
-    """Return the instants to act at: all, or without the switch a sample.
+    """Return the instants to act at: all, or, without the switch, a sample.
 
     Args:
         instants: All of one run.
-        matters: What is worth more than one instant in so many.
-        turn: Which of several samples that complement each other.
+        matters: Instants of greater weight in the sample.
+        turn: The number of the sample, of several that complement each other.
     """
     if EVERYTHING:
         return list(instants)
@@ -176,9 +176,9 @@ def chosen(instants: Sequence[Instant], matters: re.Pattern[str], turn: int) -> 
 
 
 def without_inner_polls(instants: Sequence[Instant], polls: re.Pattern[str]) -> list[Instant]:
-    """Return the instants with the first, the middle and the last of each row of polls only.
+    """Return the instants with only the first, the middle and the last of each row of polls.
 
-    While nothing but a movement goes on, polls differ from each other in the time alone.
+    During a movement alone, polls differ only in the time.
     """
     kept: list[Instant] = []
     for polling, group in groupby(instants, lambda i: bool(polls.match(f"{i.kind} {i.what}"))):

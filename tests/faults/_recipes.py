@@ -88,7 +88,7 @@ at = "end"
 output = 8
 on = true
 """
-"""The example of two nozzles with two touches a tip, near the pin, and with more to switch."""
+"""The two-nozzle example with two touches a tip, near the pin, and with more outputs to switch."""
 
 ON_THE_PLC: Final = """
 schema = "robolink/recipe/1"
@@ -112,7 +112,7 @@ number = 1
 percent = 100
 mm_s = 100
 """
-"""One tool, measured from where the machine is."""
+"""One tool, measured from the machine's present position."""
 
 TWO_ON_THE_PLC: Final = (
     ON_THE_PLC

@@ -1,4 +1,4 @@
-"""Telling requests that only read from those that change something."""
+"""Separates requests that only read from those that change something."""
 
 import re
 from collections.abc import Iterable
@@ -7,5 +7,5 @@ _READ = re.compile(r'\$(Get\w+(,.*)?|Login,.*|Logout|Execute,"(Print .*|TLSet|Wh
 
 
 def changes(requests: Iterable[str]) -> list[str]:
-    """Return those of ``requests``, as the simulator's log shows them, that do not just read."""
+    """Return those of ``requests``, as the simulator's log has them, that do more than read."""
     return [request for request in requests if not _READ.fullmatch(request)]

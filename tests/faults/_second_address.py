@@ -1,4 +1,4 @@
-"""A second address of what is served on loopback, as a host with two network cards has."""
+"""A second address for a server on loopback, as on a host with two network cards."""
 
 import socket
 import threading
@@ -10,7 +10,7 @@ _CHUNK_BYTES = 4096
 
 
 class SecondAddress:
-    """Carries connections to ``127.0.0.2`` on to a port of ``127.0.0.1``; a context manager.
+    """Forwards connections from ``127.0.0.2`` to a port of ``127.0.0.1``; a context manager.
 
     Attributes:
         url: The URL of the far end at the second address.

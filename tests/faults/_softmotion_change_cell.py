@@ -1,4 +1,4 @@
-"""A PLC with two tools, to be changed by programs that are killed."""
+"""A PLC with two tools, for programs that are killed while changing them."""
 
 import re
 from collections.abc import Iterator
@@ -19,14 +19,14 @@ from tests.faults._change_process import OLD
 _UNIT_UM: Final = 1000.0
 _WRITE: Final = re.compile("write_command (WRITE|CLEAR)_TOOL")
 _CYCLES_S: Final = 0.05
-"""In this time the mailbox program has looked, and what it was told is done."""
+"""The mailbox program has read and carried out a command after this time."""
 
 _SPEED: Final = 2000.0
-"""Simulated seconds in a second: a mailbox whose owner was killed is free after 5 ms."""
+"""Simulated seconds per second: the mailbox of a killed owner is free after 5 ms."""
 
 
 class _HastenedSilence(ScaledClock):
-    """Simulated time in which the silence of a client passes as fast as all the rest."""
+    """Simulated time in which a client's silence passes as fast as everything else."""
 
     def wire_at(self, now_ns: int) -> int:
         return now_ns
@@ -36,10 +36,10 @@ class _HastenedSilence(ScaledClock):
 
 
 class PlcChangeCell(ChangeCell):
-    """A SoftMotion PLC; counts what its slots really became, past the wire.
+    """A SoftMotion PLC; counts the changes of its slots, past the wire.
 
     Attributes:
-        executed: Slot and tool of each write that the PLC carried out; of a clear, no tool.
+        executed: Slot and tool of each write that the PLC carried out; for a clear, no tool.
     """
 
     matters = re.compile("write_command ")
@@ -65,18 +65,18 @@ class PlcChangeCell(ChangeCell):
 
     @property
     def tools(self) -> dict[int, ToolOffset | None]:
-        """What is stored in both, past the wire."""
+        """The stored values of both slots, past the wire."""
         defined = self._now().memory.defined()
         return {tool: _offset(defined[tool].tool) if tool in defined else None for tool in OLD}
 
     @property
     def selected(self) -> int:
-        """Which slot is selected, past the wire."""
+        """The selected slot, past the wire."""
         return self._now().tools.selected
 
     @property
     def owner(self) -> int:
-        """Token of the client that owns the mailbox, 0 for nobody."""
+        """The token of the client that owns the mailbox; 0 if there is none."""
         return self._now().program.holder
 
     def writes(self) -> list[int]:
@@ -87,17 +87,17 @@ class PlcChangeCell(ChangeCell):
         return [slot for slot, _ in self.executed]
 
     def values_written(self, tool: int = 1) -> list[ToolOffset]:
-        """Return what a slot was written as so far, in order."""
+        """Return the values written to a slot so far, in order."""
         self._now()
         return [_offset(value) for slot, value in self.executed if slot == tool and value]
 
     def act(self) -> None:
-        """Let the mailbox program come to the cycle in which it looks at what was written."""
+        """Run the mailbox program up to the cycle in which it reads the command."""
         self.skip(_CYCLES_S)
         self._now()
 
     def _now(self) -> Plc:
-        """Return the PLC when it has looked at all that was written."""
+        """Return the PLC after it has read everything written."""
         with self._acting():
             return self._plc
 
@@ -106,12 +106,12 @@ class PlcChangeCell(ChangeCell):
 def plc_change_cell(
     folder: Path, clock: ScaledClock | None = None, *, wire: str = "modbus-tcp"
 ) -> Iterator[PlcChangeCell]:
-    """Have a PLC that holds ``OLD``, with a journal of its own.
+    """Open a PLC that holds ``OLD``, with its own journal.
 
     Args:
-        folder: Where the journal is kept.
+        folder: The folder of the journal.
         clock: The simulated time; by default so fast that nobody owns the mailbox for long.
-        wire: On which of the links of ``BACKENDS``.
+        wire: One of the links of ``BACKENDS``.
     """
     folder.mkdir(parents=True)
     simulator = SoftMotionSimulator(seed=1)

@@ -17,11 +17,11 @@ _MAY: Final = frozenset(
     {"OWNERSHIP", "SELECT_TOOL", "READ_TOOL", "WRITE_TOOL", "WRITE_OUTPUT"}
     | {"MOVE_LINEAR", "MOVE_DIRECT", "HALT"}
 )
-"""All that a run of a recipe may tell the PLC."""
+"""All commands that a run of a recipe may send to the PLC."""
 
 
 class PlcRecipeCell(RecipeCell):
-    """A SoftMotion PLC. Each command carries its own speed, so no settings are left to restore."""
+    """A SoftMotion PLC. Each command carries its own speed, so there are no settings to restore."""
 
     disturbances = ("e-stop", "drive fault", "permit")
     shows_its_tool = True
@@ -51,7 +51,7 @@ class PlcRecipeCell(RecipeCell):
         softmotion.unregister(self.name)
 
     def tools(self) -> dict[int, ToolOffset | None]:
-        """Return what is stored in the tools of the recipe, past the wire."""
+        """Return the stored values of the recipe's tools, past the wire."""
         defined = self._plc.memory.defined()
         return {
             tool: ToolOffset(*from_frame(defined[tool].tool, unit_um=_UNIT_UM))
@@ -60,11 +60,11 @@ class PlcRecipeCell(RecipeCell):
 
     @property
     def selected(self) -> int:
-        """Which tool is in force, past the wire."""
+        """The selected tool, past the wire."""
         return self._plc.tools.selected
 
     def settings(self) -> object:
-        """Return nothing: there is nothing else to restore."""
+        """Return nothing: there are no other settings."""
         return None
 
     def outputs(self) -> Mapping[int, bool]:
@@ -77,32 +77,32 @@ class PlcRecipeCell(RecipeCell):
         return not self._plc.group.motion.resting
 
     def where(self) -> object:
-        """Return where the axes are, past the wire."""
+        """Return the axis positions, past the wire."""
         return self._plc.group.motion.values
 
     def writes(self) -> list[int]:
-        """Return the slots that were written so far, in order, as the PLC counts them."""
+        """Return the slots written so far, in order, as the PLC counts them."""
         return list(self._written)
 
     def moves_asked(self) -> int:
-        """Return how many movements were asked for so far."""
+        """Return the number of movements requested so far."""
         return sum(name.startswith("MOVE") for name in self._commands())
 
     @property
     def moves_begun(self) -> int:
-        """How many movements the group began so far, past the wire."""
+        """The number of movements the group began so far, past the wire."""
         return self._plc.group.movements_started
 
     def strange(self) -> list[str]:
-        """Return what came in that no run of a recipe may ask for."""
+        """Return requests that no run of a recipe may send."""
         return [name for name in self._commands() if name not in _MAY]
 
     def stops_asked(self) -> int:
-        """Return how many stops were asked for so far."""
+        """Return the number of stops requested so far."""
         return self._commands().count("HALT")
 
     def sent_as(self, number: int, on: bool) -> str:
-        """Return what switches an output, as a person reads it."""
+        """Return the request that switches an output, as a person reads it."""
         return f"WRITE_OUTPUT {number} 1" if on else f"WRITE_OUTPUT {number}."
 
     def disturb(self, how: str) -> None:
@@ -117,7 +117,7 @@ class PlcRecipeCell(RecipeCell):
         acts[how]()
 
     def make_ready(self, how: str) -> None:
-        """Undo it, reset, and enable the group."""
+        """Undo the disturbance, reset, and enable the group."""
         panel = self.simulator.panel
         if how == "e-stop":
             panel.release_estop()

@@ -1,9 +1,9 @@
-"""A stop from a second thread, at a chosen checkpoint of whatever the main thread does.
+"""A stop from a second thread, at a chosen checkpoint of the main thread.
 
-The main thread stands still at that point until the second thread has had its stop acknowledged,
-or waits for a lock that the main thread holds; in that case it goes on to its next point outside
-of the lock, and waits there. So a run with a stop at a point is the same each time, although two
-real threads and real locks take part.
+The main thread waits at that point until the second thread's stop is acknowledged, or waits for a
+lock that the main thread holds; in that case it goes on to its next point outside the lock, and
+waits there. So a run with a stop at a point is the same each time, although two real threads and
+real locks take part.
 """
 
 import threading
@@ -25,7 +25,7 @@ _WAIT_S: Final = 60.0
 
 @dataclass(frozen=True)
 class Placement:
-    """A point of a run: its kind, what goes on, and in which step of the procedure."""
+    """A point of a run: its kind, its subject, and the step of the procedure."""
 
     point: Checkpoint
     what: str
@@ -36,15 +36,15 @@ class Placement:
 
 
 class Placements:
-    """Tells the distinct points of a run, and stops the controller at one of them.
+    """Lists the distinct points of a run, and stops the controller at one of them.
 
     Attributes:
-        distinct: The points at which a controller could be stopped, in their order.
-        refused: Why the stop was not acknowledged, if it was not.
+        distinct: The points at which a controller could be stopped, in order.
+        refused: The reason if the stop was not acknowledged.
         acknowledged: Whether it was.
 
     Args:
-        at: Where to stop; ``None`` for nowhere.
+        at: The point of the stop; ``None`` for none.
         on_acknowledged: Called, in the main thread's time, when it is.
     """
 
@@ -65,7 +65,7 @@ class Placements:
 
     @contextmanager
     def watching(self) -> Iterator[None]:
-        """See every checkpoint of the block, and the controller that is opened in it."""
+        """See every checkpoint of the block, and the controller opened in it."""
         with pytest.MonkeyPatch.context() as patch:
             for kind in _KINDS:
                 patch.setattr(kind, "__enter__", self._entering(kind.__enter__))
@@ -113,7 +113,7 @@ class Placements:
                 self._stop(self._controller, held=point is Checkpoint.HELD)
 
     def _placeable(self, here: Placement) -> bool:
-        # Once the logout is on its way there is no session left that could stop anything.
+        # Once the logout is on its way there is no session left to stop anything with.
         over = here.point in (Checkpoint.HELD, Checkpoint.EXCHANGE) and here.what == "Logout"
         return self._controller is not None and here not in self.distinct and not over
 
@@ -126,7 +126,7 @@ class Placements:
             else:
                 self.acknowledged = True
             finally:
-                self._at_lock.set()  # one that needs no lock never waits at any
+                self._at_lock.set()  # a point that needs no lock never waits at one
 
         self._stopper = threading.Thread(target=stop)
         self._stopper.start()

@@ -1,4 +1,4 @@
-"""Tool tables of both kinds of controller, as a state machine looks at them past the wire."""
+"""Tool tables of both kinds of controller, as a state machine reads them past the wire."""
 
 from abc import ABC, abstractmethod
 from itertools import count
@@ -25,7 +25,7 @@ from robolink.protocols.mailbox import from_frame, to_frame
 TOOLS: Final = (1, 2, 3)
 _UNIT_UM: Final = 1000.0
 _OWNER_SILENCE_S: Final = 10.1
-"""After this long without a sign of its owner a mailbox is free.
+"""A mailbox is free after its owner has been silent for this long.
 
 Source: docs/reference/mailbox.md, "Owners".
 """
@@ -39,7 +39,7 @@ class TableUnderTest(ABC):
     """A controller with a tool table.
 
     Attributes:
-        mishaps: What may happen to a write.
+        mishaps: The possible faults of a write.
     """
 
     mishaps: ClassVar[tuple[str, ...]]
@@ -54,23 +54,23 @@ class TableUnderTest(ABC):
 
     @abstractmethod
     def held(self) -> Held:
-        """Return what is stored, past the wire."""
+        """Return the stored value, past the wire."""
 
     @abstractmethod
     def selected(self) -> int:
-        """Return which tool is in force, past the wire."""
+        """Return the selected tool, past the wire."""
 
     @abstractmethod
     def put(self, tool: int, offset: ToolOffset) -> None:
-        """Store something, as a pendant or another program does."""
+        """Store a value, as a pendant or another program does."""
 
     @abstractmethod
     def plan(self, mishap: str) -> None:
-        """Let something happen to the next write."""
+        """Plan a fault for the next write."""
 
     @abstractmethod
     def calm_down(self) -> None:
-        """Let nothing more happen, and let pass what it takes until a new session is heard."""
+        """Plan nothing more, and wait until a new session is accepted."""
 
     @abstractmethod
     def restart(self) -> None:
@@ -78,11 +78,11 @@ class TableUnderTest(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Serve it no more."""
+        """Stop serving it."""
 
 
 class EpsonTable(TableUnderTest):
-    """An EPSON controller's."""
+    """The tool table of an EPSON controller."""
 
     mishaps = ("DROP_REPLY", "DISCONNECT", "DISCONNECT_BEFORE", "IGNORE_WRITE", "TRUNCATE_REPLY")
 
@@ -92,23 +92,23 @@ class EpsonTable(TableUnderTest):
         super().__init__(epson.register(self._name, self._simulator))
 
     def held(self) -> Held:
-        """Return what is stored, past the wire."""
+        """Return the stored value, past the wire."""
         return {tool: self._simulator.machine.tools.get(tool) for tool in TOOLS}
 
     def selected(self) -> int:
-        """Return which tool is in force, past the wire."""
+        """Return the selected tool, past the wire."""
         return self._simulator.machine.tools.selected
 
     def put(self, tool: int, offset: ToolOffset) -> None:
-        """Store something, as a pendant or another program does."""
+        """Store a value, as a pendant or another program does."""
         self._simulator.machine.tools.set(tool, offset)
 
     def plan(self, mishap: str) -> None:
-        """Let something happen to the next write."""
+        """Plan a fault for the next write."""
         self._simulator.faults.add(Fault(FaultAction[mishap], match="TLSet "))
 
     def calm_down(self) -> None:
-        """Let nothing more happen: the next login takes the place of the old one."""
+        """Plan nothing more: the next login replaces the old one."""
         self._simulator.faults = FaultPlan()
 
     def restart(self) -> None:
@@ -116,13 +116,13 @@ class EpsonTable(TableUnderTest):
         self._simulator.restart()
 
     def close(self) -> None:
-        """Serve it no more."""
+        """Stop serving it."""
         epson.unregister(self._name)
         self.journal.close()
 
 
 class PlcTable(TableUnderTest):
-    """A PLC mailbox's."""
+    """The tool table of a PLC mailbox."""
 
     mishaps = ("DROP_REPLY", "DISCONNECT", "DISCONNECT_BEFORE", "IGNORE_WRITE", "GARBLE_WRITE")
 
@@ -132,7 +132,7 @@ class PlcTable(TableUnderTest):
         super().__init__(softmotion.register(self._name, self._simulator))
 
     def held(self) -> Held:
-        """Return what is stored, past the wire."""
+        """Return the stored value, past the wire."""
         defined = self._now().memory.defined()
         return {
             tool: ToolOffset(*from_frame(defined[tool].tool, unit_um=_UNIT_UM))
@@ -142,22 +142,22 @@ class PlcTable(TableUnderTest):
         }
 
     def selected(self) -> int:
-        """Return which tool is in force, past the wire."""
+        """Return the selected tool, past the wire."""
         return self._simulator.plc.tools.selected
 
     def put(self, tool: int, offset: ToolOffset) -> None:
-        """Store something, as another program does."""
+        """Store a value, as another program does."""
         with self._simulator.acting():
             frame = to_frame(offset.components(), unit_um=_UNIT_UM)
             self._simulator.plc.memory.define(tool, frame, "by another")
 
     def plan(self, mishap: str) -> None:
-        """Let something happen to the next write."""
+        """Plan a fault for the next write."""
         fault = PlcFault(PlcFaultAction[mishap], match="write_command WRITE_TOOL")
         self._simulator.faults.add(fault)
 
     def calm_down(self) -> None:
-        """Let nothing more happen, and pass the ten seconds in which a mute owner keeps it."""
+        """Plan nothing more, and pass the ten seconds for which a silent owner keeps it."""
         self._simulator.faults = WireFaults()
         softmotion.clock_of(self._name).advance(_OWNER_SILENCE_S)
         self._now()
@@ -167,11 +167,11 @@ class PlcTable(TableUnderTest):
         self._simulator.panel.restart()
 
     def close(self) -> None:
-        """Serve it no more."""
+        """Stop serving it."""
         softmotion.unregister(self._name)
         self.journal.close()
 
     def _now(self) -> Plc:
-        """Return the PLC when it has looked at all that was written."""
+        """Return the PLC after it has read everything written."""
         with self._simulator.acting():
             return self._simulator.plc

@@ -1,4 +1,4 @@
-"""A controller that lets two clients be logged in at once, which no EPSON controller does."""
+"""A controller that accepts two logins at once, which no EPSON controller does."""
 
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.remote.link import EpsonServerLink
@@ -7,10 +7,10 @@ from robolink.protocols.epson_text import BadRequest, Request
 
 
 class SharedSimulator(EpsonSimulator):
-    """Without the rule of one client, the lease is all that keeps two operators apart."""
+    """Without the rule of one client, only the lease keeps two operators apart."""
 
     def take(self, link: EpsonServerLink, event: Request | BadRequest) -> None:
-        """Serve whoever asks as the one who is logged in, if he has logged in."""
+        """Serve a client as the logged-in one, if it has logged in."""
         self._slot.client = link if link in self._logged_in else None
         super().take(link, event)
         self._logged_in.discard(link)

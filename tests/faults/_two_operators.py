@@ -1,4 +1,4 @@
-"""Two operators in two processes on one cell: what each does when, and what must come of it."""
+"""Two operators in two processes on one cell: their steps, and the required results."""
 
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -14,24 +14,24 @@ from tests.faults._operator_process import Ended, OperatorProcess
 from tests.faults._operator_steps import Waiting
 
 Wish = dict[int, ToolOffset]
-"""What an operator wants in the tools, in the order in which he writes them."""
+"""The values that an operator intends for the tools, in writing order."""
 
 Start = Callable[[int], AbstractContextManager[ChangeCell]]
-"""Serves the cell of the run of a number."""
+"""Serves the cell of a run, by its number."""
 
 LOST: Final = frozenset({"LeaseHeldError", "LeaseLostError", "ToolChangedError"})
-"""How an operator is refused who has changed nothing."""
+"""The refusals of an operator who has changed nothing."""
 
 
 @dataclass
 class TwoOperators:
-    """Implements ``Run``: two processes, and what they did under which epoch.
+    """Implements ``Run``: two processes, and their steps under each epoch.
 
     Attributes:
         cell: The cell.
-        wishes: What the first and the second want.
-        unknown: How else one may end on this kind of controller: not knowing what he did.
-        overtaken: How one may end there who has not begun, because the other got in between.
+        wishes: The intended values of the first and the second.
+        unknown: The other possible end on this kind of controller: with an unknown outcome.
+        overtaken: The possible end of an operator who had not begun when the other got in between.
     """
 
     cell: ChangeCell
@@ -48,12 +48,12 @@ class TwoOperators:
         ]
 
     def waiting(self) -> Mapping[int, Waiting]:
-        """Return who stands before which step."""
+        """Return the next step of each operator."""
         states = {who: operator.state for who, operator in enumerate(self.operators)}
         return {who: state for who, state in states.items() if isinstance(state, Waiting)}
 
     def step(self, who: int) -> None:
-        """Let one do his step."""
+        """Let one do the next step."""
         operator = self.operators[who]
         if isinstance(operator.state, Waiting):
             if operator.state.kind == "tool write":
@@ -63,17 +63,17 @@ class TwoOperators:
         self.cell.act()
 
     def ends(self) -> list[str]:
-        """How each ended."""
+        """The end of each."""
         states = [operator.state for operator in self.operators]
         return [state.how for state in states if isinstance(state, Ended)]
 
     def abandon(self) -> None:
-        """End both where they are."""
+        """End both at once."""
         for operator in self.operators:
             operator.close()
 
     def check(self) -> None:
-        """Look at what came of it."""
+        """Check the result."""
         ends = [operator.end() for operator in self.operators]
         hows = {end.how for end in ends}
         assert hows <= {"done", *LOST, *self.unknown, *self.overtaken}, ends
@@ -90,7 +90,7 @@ class TwoOperators:
         assert self.cell.journal.verify().problems == ()
 
     def _check_no_overwrite_was_unseen(self) -> None:
-        """Whoever wrote a tool had put on record what it held until then."""
+        """An operator who wrote a tool had recorded its value before."""
         intents = self.cell.journal.entries(kinds=(EntryKind.INTENT,), newest_first=False)
         named = [
             (
@@ -107,9 +107,9 @@ class TwoOperators:
             assert seen == list(zip((old, *written), written, strict=False)), tool
 
     def _check_each_did_all_or_nothing(self, ends: list[Ended]) -> None:
-        """The tools hold what is left when those who did it all come one after the other.
+        """The tools' values are those after all successful operators, one after the other.
 
-        Who does not know what he did has done all of it, or nothing.
+        An operator with an unknown outcome has done all of it, or nothing.
         """
         ended = list(zip(self.wishes, ends, strict=True))
         done = [wish for wish, end in ended if end.how == "done"]
@@ -136,7 +136,7 @@ def follow_orders(
     unknown: frozenset[str] = frozenset(),
     overtaken: frozenset[str] = frozenset(),
 ) -> Counter[str]:
-    """Follow orders, check what comes of each, and return how often who was refused how."""
+    """Follow orders, check each result, and return the refusals with counts."""
     ends = Counter[str]()
     for number, (beginning, asleep) in enumerate(orders):
         with start(number) as cell:

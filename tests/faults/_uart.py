@@ -1,4 +1,4 @@
-"""A UART, bit by bit: what a receiver makes of bytes that were sent at other settings.
+"""A UART, bit by bit: the bytes that a receiver at other settings reads.
 
 Levels and sampling as every UART does it (a start bit 0, eight data bits, the lowest first, a
 parity bit or none, a stop bit 1; each sampled in its middle, counted from the edge of the start
@@ -15,23 +15,23 @@ _DATA_BITS: Final = 8
 
 @dataclass(frozen=True, slots=True)
 class UartSettings:
-    """How one end of a line is set: baud rate, and parity none, even or odd."""
+    """The settings of one end of a line: baud rate, and parity none, even or odd."""
 
     baud: int
     parity: Literal["N", "E", "O"] = "N"
 
     @property
     def character_bits(self) -> int:
-        """How many bits a character takes, start and stop bit counted."""
+        """The bits of a character, with start and stop bit."""
         return _DATA_BITS + 2 + (self.parity != "N")
 
     def parity_bit(self, byte: int) -> int:
-        """Return the bit behind the data."""
+        """Return the parity bit."""
         return (byte.bit_count() + (self.parity == "O")) % 2
 
 
 def heard(data: bytes, *, sent: UartSettings, by: UartSettings) -> bytes:
-    """Return what an end that is set to ``by`` reads when ``data`` is sent at ``sent``."""
+    """Return the bytes that an end set to ``by`` reads when ``data`` is sent at ``sent``."""
     levels = [bit for byte in data for bit in _character(byte, sent)]
 
     def level(at_s: float) -> int:

@@ -1,7 +1,7 @@
-"""Commands that are disturbed once, and whether what they say then is what stands.
+"""Commands with one disturbance, whose output is compared with the facts.
 
-A disturbance falls on one exchange, or on the journal from one durable transaction on; the
-simulator, past the wire, knows the truth.
+A disturbance hits one exchange, or the journal from one durable transaction on; the simulator has
+the facts, past the wire.
 """
 
 import json
@@ -31,7 +31,7 @@ class Command:
     words: tuple[str, ...]
 
     def run(self, cell: RecipeCell, folder: Path) -> Ended:
-        """Run it as a script would; its documents go to stdout."""
+        """Run it as a script would, with documents on stdout."""
         recipe = folder / "recipe.toml"
         recipe.write_text(self.case.recipe)
         words = [word.format(recipe=recipe, assist=cell.url) for word in self.words]
@@ -53,14 +53,14 @@ JOURNAL: Final = ("once", "from then on")
 
 @dataclass(frozen=True)
 class Disturbed:
-    """One disturbance: what, and on which exchange or transaction, counted from 0."""
+    """One disturbance: its kind, and its exchange or transaction, counted from 0."""
 
     how: str
     number: int
 
     @contextmanager
     def on(self, cell: RecipeCell) -> Iterator[None]:
-        """Let it come."""
+        """Apply it."""
         if self.how in JOURNAL:
             with commits(self._refused):
                 yield
@@ -77,7 +77,7 @@ class Disturbed:
 
 @contextmanager
 def commits(refused: Callable[[int], bool]) -> Iterator[list[int]]:
-    """Count the durable transactions of the journal; SQLite refuses those that it is told to."""
+    """Count the durable transactions of the journal, and make SQLite refuse the given ones."""
     write, seen = Store.write, list[int]()
 
     @contextmanager
@@ -100,7 +100,7 @@ def commits(refused: Callable[[int], bool]) -> Iterator[list[int]]:
 
 
 def whole_run(command: Command, folder: Path) -> tuple[list[str], int]:
-    """Run a command undisturbed; return its requests, and how many transactions it makes."""
+    """Run a command undisturbed; return its requests, and its number of transactions."""
     with command.case.cell() as cell, commits(lambda _number: False) as seen:
         ended = command.run(cell, folder)
         assert ended.code == 0, ended.err
@@ -109,7 +109,7 @@ def whole_run(command: Command, folder: Path) -> tuple[list[str], int]:
 
 
 def check(command: Command, disturbed: Disturbed, folder: Path) -> str:
-    """Disturb a run and compare what it says with the truth; return how it ended."""
+    """Disturb a run and compare its output with the facts; return how it ended."""
     with command.case.cell() as cell:
         with disturbed.on(cell):
             ended = command.run(cell, folder)
@@ -130,7 +130,7 @@ def _check_the_document(
     kept = any(e.kind is EntryKind.DONE for e in cell.journal.entries(kinds=(EntryKind.DONE,)))
     if written:
         assert said != "unchanged", ended.out
-        # What was proved and decided upon may stay; the error came after it.
+        # A tested and confirmed value may stay; the error came after it.
         assert ended.code == 6 or kept, ended.out
     if said == "unchanged":
         assert (written, selected) == (False, 1), ended.out

@@ -1,12 +1,12 @@
-"""One run, and the many worlds in which something came in between: each in a fork of this process.
+"""One run, and many worlds with a disturbance in it: each in a fork of this process.
 
-The run, its simulator and its journal are in this process. At an instant it forks, and in the child
-something happens there that does not happen in the parent: the program is killed, or somebody
-presses Ctrl-C or the emergency stop. What must be true then is checked in the child, while the run
-in the parent waits for its end. So one run serves all instants, and none starts a process.
+The run, its simulator and its journal are in this process. At an instant it forks, and a
+disturbance occurs in the child only: the program is killed, or somebody presses Ctrl-C or the
+emergency stop. The child checks the conditions then, while the run in the parent waits for its end.
+So one run serves all instants, and none starts a process.
 
-Where the program is killed nothing of it goes on, not even to clean up: its connection is gone, its
-process has ended for whoever asks the system, and the controller carries out what it was given.
+If the program is killed nothing of it goes on, not even to clean up: its connection is gone, its
+process has ended as far as the system shows, and the controller carries out what it has received.
 """
 
 import os
@@ -31,7 +31,7 @@ _OF_A_PROGRAM: Final[dict[type, tuple[str, ...]]] = {
     InProcessTransport: ("send", "receive", "receive_waiting", "wait_readable", "close"),
     InProcessMailboxLink: ("_exchange", "close"),
 }
-"""What a program does to its connection. It gets no further once it is dead."""
+"""The calls of a program on its connection. A dead program makes none of them."""
 
 
 class _Connection(Protocol):
@@ -39,15 +39,15 @@ class _Connection(Protocol):
 
 
 class Worlds(Instants):
-    """Sees the instants of a run, and lets something come in between at some of them.
+    """Sees the instants of a run, and disturbs some of them.
 
     Attributes:
-        came_at: Where it came.
-        told: What was wrong in those worlds, and where it came there.
+        came_at: The instant of the disturbance.
+        told: The faults found in those worlds, with their instants.
 
     Args:
-        comes: Whether it comes at an instant.
-        happens: What comes; without it the program is killed, at an exchange or at a commit.
+        comes: Whether to disturb an instant.
+        happens: The disturbance; without it the program is killed, at an exchange or at a commit.
     """
 
     def __init__(
@@ -66,11 +66,11 @@ class Worlds(Instants):
 
     @property
     def in_between(self) -> bool:
-        """Whether this is a world in which it came."""
+        """Whether this is a world with the disturbance."""
         return self._tells_to >= 0
 
     def pass_by(self, kind: Kind, what: str = "") -> None:
-        """Let one go by, or let it come."""
+        """Pass one instant, or disturb it."""
         if not self.in_between:
             super().pass_by(kind, what)
             at = self.passed[-1]
@@ -87,7 +87,7 @@ class Worlds(Instants):
 
         Args:
             run: The program.
-            check: What must be true in a world in which it was killed.
+            check: The conditions in a world in which it was killed.
         """
         self._check = check
         with self._deadly():
@@ -98,14 +98,15 @@ class Worlds(Instants):
 
         Args:
             run: The program.
-            check: What must be true of the end of one in which something came in between.
+            check: The conditions at the end of a disturbed world.
         """
         return self._run(run, check)
 
     def _run(self, run: Callable[[], Ended], check: Callable[[Ended], None]) -> Ended:
         try:
             with pytest.MonkeyPatch.context() as patch:
-                # A thread that stores something while the world forks would leave its lock behind.
+                # A thread that stores something while the process forks would leave its lock
+                # behind.
                 patch.setattr(DriverLink, "_sign_of_life", lambda _link: None)
                 ended = run()
             if self.in_between:
@@ -156,7 +157,7 @@ class Worlds(Instants):
         return True
 
     def _leave(self) -> None:
-        """Be the world without the program: look at it, and end."""
+        """Be the world without the program: check it, and end."""
         self._dead = False
         ended, program = _lease_view._has_ended, os.getppid()
         try:

@@ -12,7 +12,7 @@ def _own_state_folder(tmp_path, monkeypatch):
 
 @pytest.fixture(params=["sim", "tcp"])
 def serve(request):
-    """A maker of URLs for a simulator of the test's own."""
+    """Makes URLs for a test's own simulators."""
 
     clock = None if request.param == "sim" else ScaledClock(40.0)
     return lambda simulator: served(simulator, request.param, clock=clock)

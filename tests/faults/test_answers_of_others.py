@@ -1,7 +1,7 @@
-"""An answer that is late, old, joined to another, doubled or unasked never answers a question.
+"""A late, old, joined, doubled or unsolicited answer never answers a question.
 
-Each over a real link: TCP sockets, pseudo terminals, a virtual CAN bus. The values that are asked
-for differ from each other, so an answer in the wrong place shows.
+Each over a real link: TCP sockets, pseudo terminals, a virtual CAN bus. The requested values differ
+from each other, so an answer in the wrong place shows.
 """
 
 import os
@@ -30,7 +30,7 @@ SPLIT = PlcFaultAction.SPLIT_REPLY
 TWICE = PlcFaultAction.DUPLICATE_REPLY
 TIMEOUT_S = 0.8
 PATIENCE_S = 6.0
-"""Where nothing has to time out: the computer may be busy."""
+"""For exchanges that must not time out on a busy computer."""
 SLOTS = {2: ToolOffset(1, 2, 3, 4), 3: ToolOffset(-5, -6, -7, -8), 4: ToolOffset(9, 10, 11, 12)}
 
 
@@ -47,7 +47,7 @@ def relayed(**bends):
 
 
 def asked(controller, tools):
-    """Read tools; no value is another tool's. Return how many were answered."""
+    """Read tools; no value is another tool's. Return the number of answers."""
     answered = 0
     for tool in tools:
         try:
@@ -111,7 +111,7 @@ def test_f04_f05_f09_an_answer_of_a_plc_that_is_cut_split_or_doubled(link, actio
 
 
 def test_the_simulated_device_on_a_line_answers_one_request_after_the_other():
-    """Else a late answer could come at any time, which no device on a line does."""
+    """Otherwise a late answer could come at any time, which no device on a line sends."""
     simulator = SoftMotionSimulator(seed=7)
     simulator.faults.add(PlcFault(PlcFaultAction.DELAY, match="read_slot 2", seconds=0.1))
     with serve_modbus_rtu(simulator, clock=ScaledClock()) as host:
@@ -136,7 +136,7 @@ def test_the_simulated_device_on_a_line_answers_one_request_after_the_other():
     "length", [36, *(pytest.param(n, marks=pytest.mark.soak) for n in (3, 112))]
 )
 def test_f03_old_answers_on_a_serial_line_are_thrown_away(length):
-    """As long as the answer to the first question, to that for a slot, to that for the block."""
+    """The answers to the first question, to that for a slot, and to that for the block."""
     simulator = SoftMotionSimulator(seed=7)
     with serve_modbus_rtu(simulator, clock=ScaledClock()) as host:
         with robolink.connect(host.url) as controller:
@@ -160,8 +160,8 @@ def test_f03_old_bytes_on_a_new_connection_answer_nothing(old):
             controller = robolink.connect(url, timeout_s=PATIENCE_S)
         except (RemoteProtocolError, TransportError):
             return
-        # What looks like the answer to the login cannot be told from it; the true one is then
-        # one too many, and ends the session.
+        # Bytes that look like the answer to the login are taken for it; the true one is then one
+        # too many, and ends the session.
         with controller:
             assert asked(controller, [2, 3, 4]) == 0
 
@@ -179,7 +179,7 @@ def test_f06_f10_an_answer_that_nobody_asked_for_ends_the_session(more):
         return data
 
     def joined(data):
-        # The last answer to a read of tool 2: whatever is asked next could be answered by more.
+        # The last answer to a read of tool 2: any next question could be answered by more.
         if b"TLSet(2)" in sent[-1] and not doubled:
             doubled.append(data)
             return data + more
@@ -192,7 +192,7 @@ def test_f06_f10_an_answer_that_nobody_asked_for_ends_the_session(more):
             window = table._window
             assert asked(controller, [2]) == 1
             assert doubled
-            # Without the look at the status that goes before, whose name would give it away.
+            # Without the status reading before it, whose name would reveal it.
             with pytest.raises((RemoteProtocolError, TransportError)):
                 window.printed(spel.print_selected_tool())
             with pytest.raises((RemoteProtocolError, TransportError)):

@@ -1,7 +1,7 @@
-"""Command blocks and answers of a PLC that are lost, doubled, torn or numbered at the edge.
+"""A PLC's command blocks and answers when lost, doubled, torn or at the limit of their numbers.
 
-Over Modbus TCP, Modbus RTU and CANopen as real links; what the axis group began and how often a
-slot was changed, the PLC counts itself.
+Over Modbus TCP, Modbus RTU and CANopen as real links; the PLC itself counts the movements begun and
+the changes of a slot.
 """
 
 from contextlib import closing
@@ -38,7 +38,7 @@ def cell(request):
 
 
 def only(*links):
-    """Over these links in each run of the tests, over all in ``make soak``."""
+    """These links in each run of the tests, all links in ``make soak``."""
     others = [pytest.param(link, marks=pytest.mark.soak) for link in LINKS if link not in links]
     return pytest.mark.parametrize("cell", [*links, *others], indirect=True)
 
@@ -73,7 +73,7 @@ def test_f25_a_movement_whose_answer_is_lost_is_unproved_and_begun_once(cell, ho
     assert cell.simulator.faults.fired
     assert cell.commands.count("MOVE_LINEAR") == 1
     assert cell.movements_started <= 1
-    # Who lost the answer still owned the mailbox.
+    # The client that lost the answer still owned the mailbox.
     cell.clock.advance(OWNER_SILENCE_S)
     with cell.connect() as controller:
         for finding in recover(controller).left:
@@ -91,7 +91,7 @@ def test_f25_a_movement_whose_answer_is_lost_is_unproved_and_begun_once(cell, ho
     "first", [0, *(pytest.param(n, marks=pytest.mark.soak) for n in range(1, 8))]
 )
 def test_f26_whichever_answer_of_a_movement_is_lost_it_is_begun_once(first):
-    """In process and in simulated time: one run for every eighth answer, until none was lost."""
+    """In process and in simulated time: one run for every eighth answer, until none is lost."""
     for lost in range(first, 200, 8):
         with served("sim", SoftMotionSimulator(seed=7)) as cell:
             cell.simulator.faults.add(PlcFault(PlcFaultAction.DROP_REPLY, on_exchange=lost))
@@ -150,7 +150,7 @@ def test_f28_f32_a_block_whose_rest_never_comes_triggers_nothing(cell):
         pose = (1.0, 2.0, 3.0, 0.0, 0.0, 0.0)
         whole = list(encode_command(client.command(Opcode.WRITE_TOOL, SLOT, pose=pose)))
         begun = [whole[:cut] + [0] * (64 - cut) for cut in (1, 4, 32, 62, 63)]
-        # Both ends, operands and owner of the new one; its pose is still that of before.
+        # Both ends, operands and owner are the new one's; its pose is still the earlier one.
         stale = whole[:8] + [0] * 48 + whole[56:]
         for block in (*begun, stale, stale[:20] + whole[20:]):
             link.write_command(block)

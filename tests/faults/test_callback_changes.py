@@ -1,6 +1,6 @@
-"""A running SPEL+ program calls back over real sockets: kept when proved, else the old tool.
+"""A running SPEL+ program calls back over real sockets: a tested value is kept, else the old tool.
 
-Both ends are the real ones: companions/epson/recal.prg in the simulated controller, and the server.
+Both ends are real: companions/epson/recal.prg in the simulated controller, and the server.
 """
 
 from contextlib import closing
@@ -33,7 +33,7 @@ def kinds_of(cell):
 
 
 def require_sound(cell, old):
-    """The old tool, or a new one that was proved and is right; and the record says which."""
+    """The tool is the old one, or a new one, tested and right; and the record says which."""
     if cell.tool.rounded(3) != old.rounded(3):
         assert EntryKind.VERIFY in kinds_of(cell)
         assert cell.error_mm < 0.02
@@ -67,7 +67,7 @@ def test_a_needle_is_measured_written_proved_kept_and_on_record(cell):
 
 
 def test_it_works_with_any_control_device(cell):
-    """The program calls; nothing is sent to the controller, whoever may start it.
+    """The program calls; nothing is sent to the controller, whatever device starts it.
 
     Pendant, PC, remote I/O, Remote Ethernet: docs/reference/spel.md 9.
     """
@@ -82,7 +82,7 @@ def test_it_works_with_any_control_device(cell):
 
 
 def refused(cell, code, kinds):
-    """The old tool stays, and the journal says why."""
+    """Check that the old tool stays, and that the journal gives the reason."""
     old = cell.tool
     assert cell.run() == [code]
     assert cell.tool.rounded(3) == old.rounded(3)
@@ -125,7 +125,7 @@ def test_a_proof_by_the_poses_of_the_measurement_proves_nothing(cell):
 
 
 def test_a_pin_that_was_bumped_between_measurement_and_proof_is_found(cell):
-    """Both parts agree in themselves; only together do they tell."""
+    """Both parts agree in themselves; only together do they show the bump."""
     x, y, z = cell.simulator.world.pin_mm
     cell.simulator.world.pin_mm = (x + 0.15, y, z)
     cell.teach(21, PROVED)
@@ -170,7 +170,7 @@ def test_without_a_server_the_program_goes_on_with_the_old_tool(cell):
 
 
 def disturbed(tmp_path, number, kind):
-    """Disturb one exchange, then let the program run again undisturbed."""
+    """Disturb one exchange, then run the program again undisturbed."""
     cell = CallbackCell(tmp_path)
     try:
         cell.change_needle()
@@ -216,7 +216,7 @@ def test_a_value_that_was_bent_on_its_way_is_never_written(cell):
 
 
 def test_an_open_change_of_somebody_else_gives_no_value(cell):
-    """The PC was the control device before, and something of its own is not settled."""
+    """The PC was the control device before, and a job of its own is open."""
     from robolink.model import Marker, MarkerKind, new_operation
 
     log = cell.journal.log("epson:SIM00001")

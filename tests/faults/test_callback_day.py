@@ -1,4 +1,4 @@
-"""A day of production: eight simulated hours, a needle change an hour, faults among them."""
+"""A day of production: eight simulated hours, a needle change an hour, with faults."""
 
 from robolink_simulators.testkit.program_calls import CallFault
 
@@ -31,7 +31,7 @@ Fend
 
 
 class Shift:
-    """Watches production, changes needles, and lets things go wrong, each in its hour."""
+    """Watches production, changes needles, and causes each fault in its hour."""
 
     def __init__(self, cell):
         self.cell = cell
@@ -57,10 +57,10 @@ class Shift:
                 x, y, z = self.cell.simulator.world.pin_mm
                 self.cell.teach(11, MEASURED)
                 self.cell.simulator.world.pin_mm = (x + 0.15, y, z)
-                self.cell.teach(21, (75, -75))  # the pin is bumped before the proof
+                self.cell.teach(21, (75, -75))  # the pin is bumped before the turn test
 
     def produce(self):
-        """No part is made with a value that nobody proved."""
+        """No part is made with an untested value."""
         self.cycles += 1
         cell, now = self.cell, self.cell.tool.rounded(3)
         assert cell.simulator.machine.tools.selected == 1
@@ -75,9 +75,9 @@ class Shift:
         at = number - self.first_question
         bends = {
             (3, 7): CallFault(drop_answer=True),  # the value never arrives
-            (4, 9): CallFault(cut_before=True),  # the cable, in the middle of the proof
+            (4, 9): CallFault(cut_before=True),  # the cable fails in the middle of the turn test
             (5, 11): CallFault(drop_answer=True),  # KEEP is lost
-            (7, 12): CallFault(cut_after=True),  # kept, and the answer to that is lost
+            (7, 12): CallFault(cut_after=True),  # the value is kept, and the answer to that is lost
         }
         if (self.hour, at) == (8, 3):
             self.cell.restart_server()  # the PC is updated while the program measures
@@ -94,10 +94,10 @@ def test_a_day_of_production(tmp_path):
         assert points.get(1) != points.get(2)
         cell.run(most_s=40_000)
         assert "evening" in "".join(list(cell.runner.console)[-3:])
-        shift.produce()  # what is in force at the end
+        shift.produce()  # the tool selected at the end
         assert cell.simulator.now_ns > HOURS * 3600 * 10**9
         assert shift.cycles == HOURS * CYCLES + 1
-        # Hour 1 goes well; in 7 the program had KEEP before the link went.
+        # Hour 1 goes well; in hour 7 the program had KEEP before the link failed.
         assert shift.kept == [1, 7]
         assert len(cell.entries(EntryKind.DONE)) == 2
         assert len(cell.entries(EntryKind.ROLLED_BACK)) == 3  # 4, 5 and 6

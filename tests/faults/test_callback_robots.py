@@ -1,4 +1,4 @@
-"""Several robots of one controller call back, and what a PC settles after a cut on its own side."""
+"""Several robots of one controller call back; a PC recovers after a cut on its own side."""
 
 import pytest
 from robolink_simulators.cell.clock import ManualClock
@@ -50,7 +50,7 @@ def test_each_robot_is_calibrated_and_on_record_as_itself(cell):
 def test_what_robot_2_left_open_is_put_back_on_robot_2_when_robot_1_starts(cell):
     cell.change_needle_of(2)
     old = cell.tool
-    cut = 3 + 6 + 2  # HELLO, BEGIN, six touches, SOLVE, WROTE: in the proof
+    cut = 3 + 6 + 2  # HELLO, BEGIN, six touches, SOLVE, WROTE: in the turn test
     cell.calls.fault = lambda at, _line: power_off(cell) if at == cut else None
     with pytest.raises(PowerOff):
         cell.calibrate(2)
@@ -69,7 +69,7 @@ def test_what_robot_2_left_open_is_put_back_on_robot_2_when_robot_1_starts(cell)
 
 
 class PowerOff(BaseException):
-    """The controller loses its power now."""
+    """The controller loses its power at this moment."""
 
 
 def power_off(_cell):
@@ -87,7 +87,7 @@ def power_off(_cell):
     ],
 )
 def test_a_name_that_was_given_is_that_of_one_robot(controllers, serial, number, word):
-    """Else tool 1 of one robot and tool 1 of another would be one tool on record."""
+    """Otherwise tool 1 of one robot and tool 1 of another would be recorded as one tool."""
     talk = CallbackConversation(
         open_journal(), CallbackLimits(), peer="here", controllers=controllers
     )
@@ -99,8 +99,8 @@ def test_a_name_that_was_given_is_that_of_one_robot(controllers, serial, number,
 
 
 def test_a_pc_that_was_cut_off_settles_it_when_it_is_the_control_device(tmp_path):
-    """The program is never started again before: recover alone puts the old value back."""
-    address = "epson+sim://recovered"  # in process, the journal is that of the address
+    """The program is never started again before: recover alone restores the old value."""
+    address = "epson+sim://recovered"  # in process, the journal belongs to the address
     cell = CallbackCell(tmp_path, journal=memory_journal(address), controllers=(ON_RECORD,))
     cell.simulator.url = register("recovered", cell.simulator, clock=ManualClock())
     assert cell.simulator.url == address
@@ -111,7 +111,7 @@ def test_a_pc_that_was_cut_off_settles_it_when_it_is_the_control_device(tmp_path
         with pytest.raises(PowerOff):
             cell.run()
         cell.lose_power()
-        cell.restart_server()  # waits for the talk with the program: its lease is free
+        cell.restart_server()  # waits for the end of the program's conversation: its lease is free
         assert cell.tool.rounded(3) != old.rounded(3)
         own = ToolOffset(11.0, -3.0, -20.0)
         with robolink.connect(address) as controller:

@@ -1,4 +1,4 @@
-"""A program that calls back with edges of beams, or with what its camera saw."""
+"""A program that calls back with edges of beams, or with sightings of its camera."""
 
 from dataclasses import replace
 
@@ -44,7 +44,7 @@ def kinds_of(cell):
 
 
 def refused(cell, code, kinds):
-    """The old tool stays, and the journal says why."""
+    """Check that the old tool stays, and that the journal gives the reason."""
     old = cell.tool
     assert cell.run() == [code]
     assert cell.tool.rounded(3) == old.rounded(3)
@@ -85,7 +85,7 @@ def test_a_beam_that_is_always_broken_saw_nothing(beams):
 
 
 def test_beams_that_were_moved_since_they_were_learnt_show_in_the_proof(beams):
-    """The residuals of the measurement are as small as ever."""
+    """The residuals of the measurement are as small as before."""
     x, y, z = beams.recorded_mm
     beams.stand_at((x + 0.15, y, z))
     refused(beams, "drift", BACK)
@@ -153,7 +153,7 @@ def test_a_tip_that_is_not_seen_gives_no_value(camera):
 
 @pytest.fixture
 def frozen(tmp_path):
-    """A camera that takes one picture, and shows that again each time."""
+    """A camera that takes one picture and returns it each time."""
     runs = "VRun findTip\n"
     made = CameraCell(
         tmp_path, main=CameraCell.main.replace(runs, f"{runs}VSet findTip.RuntimeAcquire, 0\n")
@@ -164,7 +164,7 @@ def frozen(tmp_path):
 
 
 def test_a_picture_that_stands_still_shows_no_offset(frozen):
-    """It agrees with whatever offset the tool was turned by: the old one would be 'proved'."""
+    """It agrees with any offset that the tool turns about: the old one would be confirmed."""
     refused(frozen, "picture_stands_still", [EntryKind.REFUSED])
 
 
@@ -198,7 +198,7 @@ def test_a_spot_that_stands_still_in_the_proof_brings_the_old_value_back(camera)
 @pytest.mark.soak
 @pytest.mark.parametrize("factor", [1.05, 0.8])
 def test_a_camera_of_a_wrong_scale_shows_in_each_way_to_a_place(camera, factor):
-    """Turned 4 mm beside the tip, its circle is too large by as much, and no residual tells."""
+    """Turned 4 mm beside the tip, its circle is too large by as much, and no residual shows it."""
     camera.see(scaled(camera.simulator.world.camera, factor))
     camera.look_from(11, LOOKS, ToolOffset(8.0, -3.5, -20.0))
     refused(camera, "camera_changed", [EntryKind.REFUSED])

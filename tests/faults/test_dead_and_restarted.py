@@ -1,7 +1,7 @@
-"""Far ends that fall silent, come back late, start anew or forget the login.
+"""Far ends that fall silent, come back late, restart or forget the login.
 
-What was on its way is unproved and never sent again; whoever connects afterwards finds what is
-there, and says so.
+Requests on their way are unconfirmed and never sent again; the next client finds the present state,
+and reports it.
 """
 
 import threading
@@ -37,7 +37,7 @@ TIMEOUT_S = 2.0
 
 @pytest.fixture
 def controlled(serve_simulator):
-    """A controller in process, in simulated time, and what it is connected by."""
+    """A controller in process, in simulated time, and its link."""
     simulator = EpsonSimulator(seed=5)
     simulator.machine.tools.set(1, OLD)
     return simulator, serve_simulator(simulator).url
@@ -72,7 +72,7 @@ def test_f11_f12_a_write_that_is_held_back_is_unproved_and_arrives_at_most_once(
                 with pytest.raises(TransportClosedError):
                     controller.tools.write(1, NEW, expected=OLD)
                 outcomes = controller.outcomes
-            # Trying again asks for a login, which is not answered, and nothing else.
+            # Trying again sends a login, which is not answered, and nothing else.
             for _ in range(3):
                 with pytest.raises(RobolinkError):
                     robolink.connect(url, timeout_s=0.1)
@@ -90,7 +90,7 @@ def test_f11_f12_a_write_that_is_held_back_is_unproved_and_arrives_at_most_once(
 def test_f11_f12_so_is_a_command_block_over_modbus():
     simulator = SoftMotionSimulator(seed=7)
     with served("modbus-tcp", simulator) as cell:
-        # The operation code of WRITE_TOOL, 5205, as it stands on the wire.
+        # The operation code of WRITE_TOOL, 5205, as sent.
         with BendingRelay(port_of(cell.url), hold_at=(5205).to_bytes(2, "big")) as relay:
             behind = PlcCell(through(cell.url, relay), simulator, cell.clock)
             behind.journal = cell.journal
@@ -110,7 +110,7 @@ def test_f11_f12_so_is_a_command_block_over_modbus():
 
 
 def wait_for(condition):
-    """Wait until what is under way in another thread has arrived."""
+    """Wait until the work in another thread has got that far."""
     tick = threading.Event()
     for _ in range(500):
         if condition():
@@ -120,7 +120,7 @@ def wait_for(condition):
 
 
 STEPS = 6
-"""More than the exchanges of a change: where none is left, it ends as without a fault."""
+"""More than the exchanges of a change: with no exchange left, it ends as without a fault."""
 
 
 @pytest.mark.fault("F13")

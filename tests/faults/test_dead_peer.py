@@ -1,7 +1,7 @@
-"""A controller that loses its power says nothing: it is noticed all the same, and in time.
+"""A controller that loses its power sends nothing: it is noticed all the same, and in time.
 
-Idle within 3 s, and with a request under way within 1 s past its deadline. On a serial line nothing
-tells while it is idle: there the next request does. ``pytest -s`` shows what was measured.
+When idle within 3 s, and with a request under way within 1 s past its deadline. An idle serial line
+shows nothing: there the next request does. ``pytest -s`` shows the measured times.
 """
 
 import time
@@ -30,7 +30,7 @@ TIMEOUT_S = 1.0
 IDLE_S = 2.8
 PAST_S = 0.9
 _LOAD_S = 0.3
-"""A computer that does other things as well is late by this much."""
+"""A busy computer is late by this much."""
 
 TCP = {
     "EPSON, TCP": ("epson", "--tcp", "{address}:0"),
@@ -65,7 +65,7 @@ LINES = {"Modbus RTU": modbus_rtu, "EPSON, RS232": epson_serial, "CANopen": cano
 
 
 def seconds(act: Callable[[], object]) -> float:
-    """Return how long something takes that ends in an error of the link."""
+    """Return the time of a call that ends in a link error."""
     began = time.monotonic()
     with pytest.raises(RobolinkError):
         act()
@@ -73,7 +73,7 @@ def seconds(act: Callable[[], object]) -> float:
 
 
 def in_flight(url: str, cut: Callable[[], None]) -> dict[str, float]:
-    """Cut, then read, then write; return how long it took, the read past its deadline."""
+    """Cut, then read, then write; return both times, the read's past its deadline."""
     with robolink.connect(url, timeout_s=30.0) as controller:
         before = controller.tools.read(1)  # the simulator's first statement takes it a second
     with robolink.connect(url, timeout_s=TIMEOUT_S) as controller:

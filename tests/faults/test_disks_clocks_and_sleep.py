@@ -1,4 +1,4 @@
-"""A disk that is full, a record that is locked, a clock that jumps, a computer that sleeps.
+"""A full disk, a locked record, a clock that jumps, a computer that sleeps.
 
 Rows F61, F63, F64 and F65 of the catalogue: a real small file system, a real other process, real
 SIGSTOP and SIGCONT.
@@ -117,7 +117,7 @@ def test_f63_a_record_that_another_process_keeps_locked_is_waited_for_and_then_r
         assert refused.code == USAGE
         assert "another program keeps it locked" in refused.err
         assert changes(cell.requests[asked:]) == []
-        assert cell.run("status").code == 0  # looking goes on
+        assert cell.run("status").code == 0  # reading goes on
         other.communicate()
     assert cell.run("tool", "set", "1", "--x", "12.5", "--yes").code == 0
 
@@ -126,7 +126,7 @@ def test_f63_a_record_that_another_process_keeps_locked_is_waited_for_and_then_r
 
 
 class Jumping(runtime.SystemRuntime):
-    """Wall time that is another day each time it is asked, forth and back."""
+    """Wall time that is another day at each reading, forth and back."""
 
     def __init__(self) -> None:
         self._days = itertools.cycle((0, 400, -3000, 1, -1, 20_000))
@@ -165,7 +165,7 @@ def test_f64_a_time_out_lasts_as_long_as_it_is_whatever_the_clock_says(tmp_path)
         with robolink.connect(host.url, outcomes=mine, timeout_s=1.0) as controller:
             marker = controller.begin(MarkerKind.CHANGE, "a change", {})
             for _ in range(5):
-                with pytest.raises(LeaseHeldError):  # the lease has not run out, nor ever will
+                with pytest.raises(LeaseHeldError):  # the lease has not expired, and never will
                     other.look()
             controller.finish(marker)
             simulator.on_request = lambda _number, _text: time.sleep(1.5)
@@ -191,7 +191,7 @@ def frozen(process: ClientProcess) -> Iterator[None]:
 
 @pytest.fixture
 def beside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., ClientProcess]:
-    """Start a command in a process of its own."""
+    """Start a command in a separate process."""
     state = str(tmp_path / "state")
     monkeypatch.setenv("ROBOLINK_STATE_DIR", state)
 
@@ -203,7 +203,7 @@ def beside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Cli
 
 @pytest.mark.fault("F65")
 def test_f65_a_computer_that_slept_in_a_movement_calls_it_unproved_and_moves_nothing_more(beside):
-    """It sleeps for longer than the controller waits for a sign of it (3 s)."""
+    """It sleeps for longer than the controller waits for a sign of life (3 s)."""
     simulator = EpsonSimulator(seed=4, options=EpsonOptions(remote_timeout_s=3.0))
     simulator.machine.switch_motors(True)
     arm = simulator.machine.arm
@@ -262,9 +262,9 @@ else:
 
 
 def said_after_sleep(location: Path, identity: str, asleep_s: int) -> str:
-    """Let another process ask for a lease on this computer, which slept meanwhile.
+    """Let another process ask for a lease on this computer, which has slept meanwhile.
 
-    Only the clock that counts the time asleep is shifted, as a suspend does (time_namespaces(7)).
+    Only the clock that counts the time asleep is shifted, as by a suspend (time_namespaces(7)).
     """
     if shutil.which("unshare") is None:
         pytest.skip("there is no unshare here, to shift the clock that counts the time asleep")
@@ -282,7 +282,7 @@ def said_after_sleep(location: Path, identity: str, asleep_s: int) -> str:
 @pytest.mark.soak
 @pytest.mark.fault("F65")
 def test_f65_who_slept_has_lost_the_lease_and_begins_nothing_more(tmp_path):
-    """The lease is of a process that lives, and is lost by the time asleep alone."""
+    """The process with the lease lives, and lost it by the time asleep alone."""
     location, identity = tmp_path / "journal.db", "epson+tcp://192.168.0.1:5000"
     with closing(open_journal(str(location))) as journal:
         log = journal.log(identity)

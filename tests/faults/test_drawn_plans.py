@@ -1,8 +1,8 @@
-"""Tools are read and written while a drawn plan goes on: what is reported done stands there.
+"""Tools are read and written during a random plan of faults: writes reported as done are stored.
 
-One change in twelve exchanges meets a fault, whatever the link can have. What cannot be told ends
-in one of our errors; what is told is so. But for one thing: text has no checksum, so a digit that
-is bent on its way is another digit (docs/reference/faults.md F07, F08); a write finds it.
+One change in twelve exchanges meets a fault that the link can have. An unknown outcome ends in one
+of our errors; every report is true. There is one exception: text has no checksum, so an altered
+digit is another digit (docs/reference/faults.md F07, F08); a write finds it.
 """
 
 from collections import Counter
@@ -49,12 +49,12 @@ CELLS = {"epson": epson_cell, "softmotion": softmotion_cell}
 
 
 def bent(simulator):
-    """Return whether text was bent on its way."""
+    """Return whether text was altered on its way."""
     return any(fault.action in BENT for fault in simulator.faults.fired)
 
 
 def changed(cell, seed):
-    """Change a tool a few times; return how many changes were reported done, and the fired."""
+    """Change a tool a few times; return the number of changes reported done, and the faults."""
     simulator, stored = CELLS[cell](seed)
     done = 0
     try:
@@ -83,7 +83,7 @@ def run(cell, seeds):
 @pytest.mark.parametrize("cell", CELLS)
 def test_what_is_reported_done_is_done(cell, robolink_state):
     done, fired = run(cell, range(8))
-    assert done > 6  # else it would be no wonder
+    assert done > 6  # otherwise it would be no surprise
     assert len(fired) > 4
 
 
@@ -105,7 +105,7 @@ def test_what_is_reported_done_is_done_with_thousands_of_plans(cell, robolink_st
 
 @pytest.mark.parametrize("order", ["high_first", "pairs_swapped", "halves_swapped"])
 def test_a_slot_in_another_order_is_no_tool(order, robolink_state):
-    """A program that was changed while it ran has the same boot number, and a right checksum."""
+    """A program that was changed while running has the same boot number, and a right checksum."""
     simulator = SoftMotionSimulator()
     with served(simulator) as url, robolink.connect(url) as controller:
         controller.tools.write(3, ToolOffset(10.5, -3.25, -50), expected=None)

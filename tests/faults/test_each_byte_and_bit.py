@@ -1,6 +1,6 @@
-"""One answer of an EPSON controller cut, split and bent at each of its bytes; one request bent.
+"""An EPSON controller's answer cut, split and altered at each byte; a request altered.
 
-Text has no checksum (docs/reference/epson.md 1.1). What no check can see is found by reading back.
+Text has no checksum (docs/reference/epson.md 1.1). Reading back finds what no check can see.
 """
 
 import pytest
@@ -28,14 +28,14 @@ WRITTEN = b"#Execute,0\r\n"
 
 @pytest.fixture
 def controlled(serve_simulator):
-    """A controller in process, in simulated time, and what it is connected by."""
+    """A controller in process, in simulated time, and its link."""
     simulator = EpsonSimulator(seed=5)
     simulator.machine.tools.set(1, OLD)
     return simulator, serve_simulator(simulator).url
 
 
 def length_of(simulator, url, text):
-    """Return how many bytes the answer to a request has that contains ``text``."""
+    """Return the length of the answer to a request that contains ``text``."""
     with robolink.connect(url) as controller:
         assert controller.tools.read(1) == OLD
     log = [shown for _, _, shown in simulator.log]
@@ -60,7 +60,7 @@ def test_f04_an_answer_that_ends_at_any_byte_is_a_time_out_that_names_the_bytes(
 @pytest.mark.fault("F04")
 def test_f04_an_acknowledgement_that_ends_at_any_byte_leaves_the_write_unproved(controlled):
     simulator, url = controlled
-    # From the line end's first byte on it is whole.
+    # It is complete from the first byte of the line end on.
     for at in range(1, len(WRITTEN) - 1):
         simulator.machine.tools.set(1, OLD)
         simulator.faults.add(Fault(FaultAction.TRUNCATE_REPLY, match=WRITE, position=at))
@@ -104,7 +104,7 @@ def test_f05_an_answer_in_single_bytes_is_the_same_over_a_socket():
 
 
 def put_right(simulator, url):
-    """Do what a person does after an error: reset, and settle what is open."""
+    """Do what a person does after an error: reset and recover."""
     with robolink.connect(url) as controller:
         if simulator.condition.error:
             controller.reset_fault()
@@ -127,7 +127,7 @@ def test_f07_no_request_with_a_bent_bit_leaves_a_value_that_nobody_noticed(step,
             return data
         bent_at[1] = 0
         bent = bytearray(data)
-        # Another bit at each place; a digit becomes another digit by the lower ones.
+        # Another bit at each place; the lower bits make a digit another digit.
         bent[begin + bent_at[0]] ^= 1 << (bent_at[0] * 5 % 4)
         return bytes(bent)
 
@@ -151,5 +151,5 @@ def test_f07_no_request_with_a_bent_bit_leaves_a_value_that_nobody_noticed(step,
                     put_right(simulator, host.url)
                 held = simulator.machine.tools.get(1)
                 assert held == (NEW if said is None else OLD), f"place {place}: {said}"
-    # A blank bent into another character may still be read as a blank; digits never.
+    # An altered blank may still be read as a blank; digits never.
     assert refused > told

@@ -1,4 +1,4 @@
-"""What an EPSON controller refuses, gives up or suffers while it is commanded (F17 to F20)."""
+"""Refusals, time-outs and faults of an EPSON controller while it is commanded (F17 to F20)."""
 
 from dataclasses import replace
 
@@ -31,7 +31,7 @@ SLOW = MotionProfile(Path.STRAIGHT, 1, 1.0)
 
 @pytest.fixture
 def make(serve_simulator):
-    """A maker of controllers in process, in simulated time, and what they are connected by."""
+    """Makes controllers in process, in simulated time, each with its link."""
 
     def made(**options):
         simulator = EpsonSimulator(seed=5, options=replace(EpsonOptions(), **options))
@@ -120,7 +120,7 @@ def test_f18_a_refusal_because_another_statement_runs_did_nothing_and_is_not_rep
 
 
 def timing_out(request):
-    """Return what tells a relay that the answer to ``request`` becomes an error 19, once."""
+    """Return a function by which a relay turns the answer to ``request`` into an error 19, once."""
     asked: list[bytes] = []
     bent: list[bytes] = []
 
@@ -130,7 +130,7 @@ def timing_out(request):
         return data
 
     def to_client(data):
-        # On a busy machine a piece holds further answers, which the client waits for.
+        # On a busy computer a piece holds further answers, which the client waits for.
         answers = data.splitlines(keepends=True)
         for number, answer in enumerate(answers):
             if asked and not bent and answer.startswith(b"#Execute"):
@@ -181,7 +181,7 @@ def test_f19_a_movement_that_the_controller_timed_out_is_unproved_and_blocks_the
 
 
 def test_a_movement_that_is_refused_while_the_arm_moves_is_unproved(make):
-    """The refusal answered something else, such as a request that came twice."""
+    """The refusal answered something else, such as a duplicated request."""
     simulator, url = make()
     with robolink.connect(url) as controller:
         motion = lift(controller)

@@ -1,6 +1,6 @@
 """Whole tool changes over Remote RS232 on a pseudo terminal: stopped, disturbed.
 
-Where they are killed stands in ``test_killed``. A few stops are taken by default, all of them with
+``test_killed`` has the killed ones. A few stops are tried by default, all of them with
 ``ROBOLINK_ALL_KILL_POINTS=1``; ``pytest -s`` shows how many.
 """
 
@@ -75,7 +75,7 @@ def test_a_stop_at_each_point_of_a_change_on_a_serial_line_ends_it(tmp_path):
 
 POSSIBLE = [action for action in FaultAction if LinkKind.EPSON_SERIAL in links_of(action)]
 LATE_ANSWERS = 2
-"""An answer that was held back costs the session to which it comes, and never more."""
+"""A delayed answer costs the session in which it arrives, and never more."""
 
 USUAL = (FaultAction.DROP_REPLY, FaultAction.GARBLE_REPLY)
 

@@ -1,6 +1,6 @@
-"""An EPSON controller's serial line that echoes, brings noise, is taken, or answers NAK for ever.
+"""An EPSON controller's serial line that echoes, has noise, is in use, or answers NAK for ever.
 
-Rows F53 to F56 of the catalogue; the PLC's lines show them in their own files.
+Rows F53 to F56 of the catalogue; the PLC's lines are tested in their own files.
 """
 
 import os
@@ -25,7 +25,7 @@ NAK = b"\x15"
 
 @contextmanager
 def line_to(answer: Callable[[bytes], bytes]) -> Iterator[tuple[str, list[bytes]]]:
-    """A pseudo terminal whose far end answers each piece; yield its URL and what came."""
+    """A pseudo terminal whose far end answers each piece; yields its URL and these pieces."""
     far, near = os.openpty()
     tty.setraw(near)
     over, heard = threading.Event(), list[bytes]()
@@ -49,7 +49,7 @@ def line_to(answer: Callable[[bytes], bytes]) -> Iterator[tuple[str, list[bytes]
 
 
 def refused(url: str) -> RobolinkError:
-    """Connect in vain, without spinning meanwhile."""
+    """Fail to connect, without spinning meanwhile."""
     busy_s = time.process_time()
     with pytest.raises(RobolinkError) as caught:
         robolink.connect(url, timeout_s=0.5)

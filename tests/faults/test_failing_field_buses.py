@@ -1,4 +1,4 @@
-"""A bus that fails, a node that is not ours, noise, an adapter that is pulled out.
+"""A bus that fails, a foreign node, noise, an adapter that is pulled out.
 
 Rows F50, F51 and F54 of the catalogue, on a virtual CAN bus and on pseudo terminals.
 """
@@ -52,7 +52,7 @@ def test_f50_a_bus_error_reaches_everybody_who_waits(tmp_path, monkeypatch):
     with serve_canopen(simulator, CanPlace("virtual", tmp_path.name)) as host:
         with closing(open_mailbox_link(host.url, timeout_s=60.0)) as link:
             link.read_head()
-            host.close()  # nothing comes any more, and the heartbeat is lost in a while
+            host.close()  # nothing comes any more, and the heartbeat expires in a while
             monkeypatch.setattr(VirtualBus, "_recv_internal", failing)
             ends: list[RobolinkError] = []
 
@@ -73,7 +73,7 @@ def test_f50_a_bus_error_reaches_everybody_who_waits(tmp_path, monkeypatch):
             assert len(ends) == 4
             assert {type(error) for error in ends} <= {TransportBrokenError, TransportClosedError}
             assert sum("unplugged" in str(error) for error in ends) == 1
-            # It is not opened anew by itself, and says at once that it has ended.
+            # It is not reopened by itself, and reports at once that it has ended.
             with pytest.raises(TransportClosedError, match=r"has ended|is closed"):
                 link.beat(0x0101)
 
@@ -113,7 +113,7 @@ def test_f51_a_write_that_another_node_answers_is_unproved_and_not_written_again
 
 @contextmanager
 def line_to(answers: Any) -> Iterator[tuple[str, list[int], int]]:
-    """A pseudo terminal whose far end says ``answers(n)`` to the nth piece that comes."""
+    """A pseudo terminal whose far end answers the nth piece with ``answers(n)``."""
     far, near = os.openpty()
     tty.setraw(near)
     over, asked = threading.Event(), list[int]()

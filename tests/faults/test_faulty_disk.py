@@ -1,4 +1,4 @@
-"""The journal on a disk that is full, fails, lies, loses its power, or has bent a page."""
+"""The journal on a disk that is full, fails, lies, loses its power, or has altered a page."""
 
 from pathlib import Path
 
@@ -28,7 +28,7 @@ def added(journal, first, count):
 
 
 def operations(place):
-    """Return what a journal holds whose record is whole."""
+    """Return the operations in a journal whose record is whole."""
     journal = open_journal(str(place))
     try:
         assert journal.verify().problems == ()
@@ -88,7 +88,7 @@ def test_what_cannot_be_stored_is_an_error_and_nothing_that_was_stored_is_lost(f
     "seed", [None, 0, *(pytest.param(n, marks=pytest.mark.soak) for n in (1, 2, 3))]
 )
 def test_a_power_cut_takes_nothing_that_was_acknowledged(folder, seed):
-    """At each write and sync of the fifth entry; what a seed lets arrive, arrives torn."""
+    """At each write and sync of the fifth entry; what the seed lets arrive, arrives torn."""
     disk, path = folder
     place = path / "journal.db"
     added(open_journal(str(place)), 0, 4)

@@ -1,7 +1,7 @@
-"""A far end that never stops sending is told so, after little of it was read.
+"""A far end that never stops sending is reported after little of it was read.
 
-The figure that is asserted is what this process held at most (tracemalloc), not what the
-kernel buffered: the far end offers up to 64 MB and would go on.
+The asserted figure is the largest memory of this process (tracemalloc), not the kernel's buffers:
+the far end offers up to 64 MB and would go on.
 """
 
 import contextlib
@@ -46,7 +46,7 @@ FLOODS = {
 
 @pytest.fixture(scope="module", autouse=True)
 def _everything_is_imported(tmp_path_factory):
-    """Do what is done once before it is measured what a flood costs."""
+    """Do everything that happens only once before the memory of a flood is measured."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("ROBOLINK_STATE_DIR", str(tmp_path_factory.mktemp("state")))
         robolink.connect("epson+sim://flood-warm").close()
@@ -56,7 +56,7 @@ def _everything_is_imported(tmp_path_factory):
 
 @contextlib.contextmanager
 def flooding(greeting: bytes, flood: bytes) -> Iterator[int]:
-    """Serve one client on a port: answer its first bytes, then send without an end."""
+    """Serve one client on a port: answer its first bytes, then send endlessly."""
 
     def serve() -> None:
         client, _ = listener.accept()
@@ -93,7 +93,7 @@ def test_f66_an_epson_controller_that_floods_is_named_and_left(flood):
         controller = None
         with pytest.raises(RobolinkError) as caught:
             controller = robolink.connect(f"epson+tcp://127.0.0.1:{port}", timeout_s=1.0)
-            time.sleep(0.05)  # what comes now was asked by nobody
+            time.sleep(0.05)  # nobody asked for the bytes of this time
             controller.status()
         if controller is not None:
             controller.close()
@@ -112,7 +112,7 @@ STRAYS = {
 @pytest.mark.parametrize("stray", STRAYS)
 @pytest.mark.fault("F66")
 def test_a_modbus_server_that_floods_is_named_at_once(stray):
-    """No time-out: it is told what it is, long before the deadline, after some 16 kB."""
+    """No time-out: the error comes long before the deadline, after some 16 kB."""
     with flooding(b"", STRAYS[stray]) as port, little_is_held():
         url = parse_url(f"softmotion+modbus-tcp://127.0.0.1:{port}")
         client = open_modbus(url, timeout_s=60.0)
@@ -126,7 +126,7 @@ def test_a_modbus_server_that_floods_is_named_at_once(stray):
 
 @contextlib.contextmanager
 def flooded_line(flood: bytes, *, answers: bool) -> Iterator[str]:
-    """A pseudo terminal whose far end bytes without an end, at once or after one request."""
+    """A pseudo terminal whose far end sends bytes endlessly, at once or after one request."""
     far, near = os.openpty()
     tty.setraw(near)
     over = threading.Event()

@@ -1,8 +1,8 @@
-"""Ctrl-C, SIGTERM or SIGHUP at each step of a nozzle change: all of before is restored.
+"""Ctrl-C, SIGTERM or SIGHUP at each step of a nozzle change: everything is restored.
 
-Until the verification has passed, an interrupted change ends with the old value in tool 1: it
-was not written, or it is written back, and that is said. From then on the new value is kept.
-A fixed sample of them is taken; ``ROBOLINK_ALL_KILL_POINTS=1`` takes all.
+Until the verification has passed, an interrupted change ends with the old value in tool 1: it was
+not written, or it is restored, and a message says so. From then on the new value is kept. A fixed
+sample of them is tried; ``ROBOLINK_ALL_KILL_POINTS=1`` tries all.
 """
 
 import json
@@ -30,12 +30,12 @@ POSE = '$Execute,"Print RealPos"'
 
 CODES = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGHUP: 129}
 WAYS = tuple(CODES)
-"""Taken in turn: what cleans up after one, cleans up after all."""
+"""Used in turn: a clean-up that works for one works for all."""
 
 
 @pytest.fixture(scope="module")
 def last_pose():
-    """The running number of the request after which the proof is judged, in an undisturbed run."""
+    """The number of the request after which the turn test is judged, in an undisturbed run."""
     cell, whole = EpsonRecipeCell((1,)), Instants()
     assert cell.run(*calibrations.words(cell), "--json", instants=whole).code == 0
     cell.close()
@@ -44,12 +44,12 @@ def last_pose():
 
 @dataclass
 class Ending:
-    """One of the ways to end a command, which comes in between once.
+    """One of the ways to end a command, used once.
 
     Attributes:
-        begun: How many movements had begun by then, or were asked for just then.
-        asked: How many requests had come in.
-        kind: Of the instant.
+        begun: The number of movements begun by then, or requested just then.
+        asked: The number of requests by then.
+        kind: The kind of instant.
     """
 
     cell: EpsonRecipeCell
@@ -59,14 +59,14 @@ class Ending:
     kind: str = ""
 
     def __call__(self, at: Instant) -> None:
-        """Let it come."""
+        """Use it."""
         self.kind, self.way = at.kind, WAYS[at.number % len(WAYS)]
         self.begun = self.cell.moves_begun + (at.kind == "request")
         self.asked = len(self.cell.requests())
         signal.raise_signal(self.way)
 
     def check(self, ended: Ended, last_pose: int) -> None:
-        """What is true once the command has ended: verified it is kept, and else taken back."""
+        """Check the end of the command: a verified value is kept, any other one undone."""
         cell = self.cell
         assert ended.code == CODES[self.way], ended.err
         document = json.loads(ended.out)
@@ -93,7 +93,7 @@ class Ending:
 def check_last_line(
     err: str, moved: int, held: tuple[ToolOffset, ToolOffset], writes: int, selected: int
 ) -> None:
-    """It says what stands, what was written and what is selected, as it is past the wire."""
+    """It states position, written values and selected tool as they are past the wire."""
     line, (old, now) = err.splitlines()[-1].strip(), held
     assert line.startswith("Every movement has ended. " if moved else "Nothing moved. "), line
     if now != old:
@@ -105,7 +105,7 @@ def check_last_line(
     else:
         written = "Nothing was written."
     assert written in line
-    # Before it was read once, nobody claims to know it.
+    # Before the first reading nobody claims to know it.
     known = (f"Tool {selected} is selected.", "Selected tool: not checked.")
     assert line.endswith(known)
 
@@ -148,7 +148,7 @@ def test_a_second_signal_during_the_cleaning_up_breaks_nothing(tmp_path, monkeyp
 
 EVERY_COMMIT = 3
 SHARES = 8
-"""Into so many tests the instants are dealt, so that several workers can share them."""
+"""The instants are dealt to this many tests, so that several workers can share them."""
 
 
 @pytest.mark.fault("F24")

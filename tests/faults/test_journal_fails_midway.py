@@ -1,7 +1,7 @@
-"""The journal fails in the middle of a calibration: what was in force is restored all the same.
+"""The journal fails in the middle of a calibration: the earlier tool is restored all the same.
 
-Its marker, which names the tool of before and the old value, is stored before anything changes;
-so putting them back needs no further record. What cannot be recorded stays open for ``recover``.
+Its marker, which names the earlier tool and the old value, is stored before anything changes; so
+restoring them needs no further record. What cannot be recorded stays open for ``recover``.
 """
 
 from contextlib import contextmanager
@@ -44,7 +44,7 @@ class Failing:
 @pytest.fixture
 def cell(tmp_path, monkeypatch):
     with served_cell(tmp_path / "cell", monkeypatch) as cell:
-        assert cell.run("status").code == 0  # which stores who the controller is
+        assert cell.run("status").code == 0  # which stores the controller's identity
         yield cell, Failing(monkeypatch)
 
 
@@ -54,8 +54,8 @@ def check(cell, failing, number):
     assert cell.selected_tool == 1, number
     cell.check_settings_are_those_of_before()
     if shown.code != DOUBT:
-        # All is as it was, or the new value was proved and put on record; at most the note of the
-        # procedure could not be taken away, and a journal that failed at its first record has none
+        # Everything is as before, or the new value was tested and recorded; at most the marker of
+        # the procedure could not be removed, and a journal that failed at its first record has none
         # of a controller that has a backup.
         assert shown.code == USAGE
         left = {marker.kind for marker in cell.open_markers()}
@@ -69,11 +69,11 @@ def check(cell, failing, number):
     assert ("Tool 1 is selected." in said) or ("not confirmed" in said), said
     kept = cell.tool_1 != OLD_TIP
     if kept:
-        # It was measured, verified and put on record before.
+        # It was measured, verified and recorded before.
         assert "change of tool 1" not in [marker.request for marker in cell.open_markers()]
         assert "Tool 1 now holds" in said
     assert cell.open_markers() != ()
-    # Its lease could not be given up either; here the process lives on.
+    # Its lease could not be released either; here the process lives on.
     assert cell.run("recover", "--take-over", "it has ended").code in (0, DOUBT)
     assert cell.selected_tool == 1
     assert (cell.tool_1 != OLD_TIP) == kept

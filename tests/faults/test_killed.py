@@ -1,14 +1,14 @@
-"""A program killed anywhere: old or proved, what is in doubt is told, and ``recover`` ends it.
+"""A program killed anywhere: the value is old or tested, doubts are reported, recover ends them.
 
 Each act is a row. Its program runs once against a simulator of this process and dies at its
 instants: before a request is carried out (which it is all the same), before an answer leaves, and
-before and after each durable transaction of the journal; a controller's own program, before its
-statements. By default a sample is taken: the transactions, and what logs in or out, selects, starts
-or writes. ``ROBOLINK_ALL_KILL_POINTS=1`` takes all; ``pytest -s`` shows how many.
+before and after each durable transaction of the journal; a controller's own program dies before its
+statements. By default a sample is used: the transactions, and the requests that log in or out,
+select, start or write. ``ROBOLINK_ALL_KILL_POINTS=1`` uses all; ``pytest -s`` shows how many.
 
-That a real process dies like that is shown at four instants on each kind of line: SIGKILL before
-and after the write of a tool, and before and after the transaction that ends it is durable. There
-what was acknowledged must be in the journal's file.
+Four instants on each kind of line show that a real process dies like that: SIGKILL before and after
+the write of a tool, and before and after the transaction that ends it is durable. There
+acknowledged entries must be in the journal's file.
 """
 
 from collections.abc import Callable
@@ -59,11 +59,11 @@ LINES: Final[dict[str, Callable[[Path], AbstractContextManager[ChangeCell]]]] = 
 
 
 class Sample:
-    """Chooses the instants at which a program dies: all, or without the switch a part.
+    """Chooses the instants at which a program dies: all, or, without the switch, a part.
 
     Args:
         matters: Whether an instant belongs to the sample.
-        every: Of those, one in so many is taken.
+        every: One in so many of those is used.
     """
 
     def __init__(self, matters: Callable[[Instant], bool], *, every: int = 1) -> None:
@@ -72,7 +72,7 @@ class Sample:
         self._seen = 0
 
     def __call__(self, at: Instant) -> bool:
-        """Whether it dies there."""
+        """Whether the program dies there."""
         if at.kind not in ("request", "answer", "commit"):
             return False
         if EVERYTHING:
@@ -86,7 +86,7 @@ def matters_to(cell: ChangeCell, at: Instant) -> bool:
 
 
 def die(cell: ChangeCell, program: str, sample: Sample, check: Callable[[], None]) -> None:
-    """Run a program, let it die at the instants of a sample, and check what it leaves."""
+    """Run a program, let it die at the instants of a sample, and check the leftovers."""
     worlds = Worlds(sample)
     worlds.explore(lambda: cell.run(program, worlds), check)
     assert worlds.told == []
@@ -116,8 +116,8 @@ def test_f57_f58_a_change_killed_anywhere_is_recovered_as_a_whole(tmp_path, kind
         assert NOTHING_LEFT in cell.recover()
 
 
-# Where a change was killed, whose recovery is killed in turn: before the first answer of the
-# second kind after the first kind leaves. And which tools were written by then.
+# The instants at which a change is killed, and then its recovery: before the first answer of the
+# second kind after the first kind leaves. And the tools written by then.
 WRITE_1, WRITE_2 = '$Execute,"TLSet 1,', '$Execute,"TLSet 2,'
 LIST, LOOK = '$Execute,"TLSet"', "$GetStatus"
 ON_PLC = "write_command WRITE_TOOL"
@@ -133,7 +133,7 @@ LEFT: Final[dict[str, tuple[str, str, str, str, list[int]]]] = {
 
 
 class Left:
-    """Chooses the one instant: the first answer of the second kind after the first kind."""
+    """Chooses one instant: the first answer of the second kind after the first kind."""
 
     def __init__(self, first: str, second: str) -> None:
         self._path = [first] if first == second else [first, second]
@@ -240,7 +240,7 @@ def test_f58_a_value_that_was_refused_is_put_back_whatever_is_gone_meanwhile(tmp
 
 
 CALIBRATION_SHARES: Final = 4
-"""Into so many tests the instants of a whole run are dealt, so that workers can share them."""
+"""A whole run's instants are dealt to this many tests, so that workers can share them."""
 
 
 @pytest.mark.parametrize("share", range(CALIBRATION_SHARES))
@@ -260,7 +260,7 @@ def test_f60_a_calibration_killed_anywhere_leaves_the_old_or_the_new_value(share
 
 
 ORDER_SHARES: Final = 16
-"""Of a whole ordered change; each takes about 14 s of CPU."""
+"""The same for a whole ordered change; each takes about 14 s of CPU."""
 
 
 def at_the_write(at: Instant) -> bool:

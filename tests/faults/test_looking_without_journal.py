@@ -1,4 +1,4 @@
-"""A journal that cannot be used keeps nobody from looking at a controller and calming it."""
+"""With an unusable journal, status and stop still work."""
 
 import shutil
 import sqlite3
@@ -50,7 +50,7 @@ def spoil(how, path, monkeypatch):
 
 @pytest.fixture(scope="module", params=SAID)
 def spoiled(request):
-    """A cell whose journal held an open marker when it was spoiled."""
+    """A cell whose journal held an open marker when it became unusable."""
     folder = Path(tempfile.mkdtemp(prefix="robolink-looking-"))
     with pytest.MonkeyPatch.context() as monkeypatch:
         with served_cell(folder / "cell", monkeypatch) as cell:
@@ -75,7 +75,7 @@ def test_looking_and_calming_go_on_and_say_it_when_they_are_done(spoiled, comman
     assert shown.code == 0, shown.err
     assert SAID[how] in shown.err.splitlines()[-1]
     assert "was not sent" not in shown.err
-    # What can still be read of it is shown.
+    # The readable part of it is shown.
     assert ("a movement" in shown.err) == (how == "newer")
 
 

@@ -1,4 +1,4 @@
-"""What a lost, late, doubled or mangled answer may cost: never a second move, never a lie."""
+"""A lost, late, doubled or damaged answer never costs a second move, and never leads to a lie."""
 
 from contextlib import suppress
 from dataclasses import replace
@@ -115,7 +115,7 @@ def test_a_time_out_ends_the_link_and_not_only_the_request():
 
 @pytest.mark.fault("F26")
 def test_f26_whichever_answer_is_lost_a_movement_is_begun_once():
-    """In process and in simulated time: one run for each answer, until none was lost."""
+    """In process and in simulated time: one run for each answer, until none is lost."""
     for lost in range(100):
         fault = Fault(FaultAction.DROP_REPLY, on_exchange=lost)
         simulator = EpsonSimulator(seed=5, faults=[fault])
@@ -236,7 +236,7 @@ UNCLEAR = {
 
 @pytest.fixture
 def unclear():
-    """A simulator whose first acknowledgement of a request is bent into no acknowledgement."""
+    """A simulator whose first acknowledgement of a request is altered beyond recognition."""
 
     def make(match, position, shown):
         for seed in range(100):
@@ -335,7 +335,7 @@ def seed_that_bends_digits(position):
 )
 @pytest.mark.parametrize("which", [0, 1])
 def test_what_is_put_back_is_read_twice_before_it_is_trusted(serve, query, which):
-    """One digit is bent into another digit: a value like any other, but for the second look."""
+    """One digit is altered into another digit: only the second reading shows it."""
     position = len('#Execute,"')
     fault = Fault(FaultAction.GARBLE_REPLY, which, match=query, position=position)
     simulator = EpsonSimulator(seed=seed_that_bends_digits(position))

@@ -1,4 +1,4 @@
-"""A stop whose answers are lost: tried again, and never called done unseen (row F76)."""
+"""A stop whose answers are lost is tried again, and never reported as done unseen (row F76)."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -22,7 +22,7 @@ CREEPING = MotionProfile(Path.STRAIGHT, 5, 1.0)
 
 @contextmanager
 def creeping_robot() -> Iterator[tuple[EpsonSimulator, str]]:
-    """Serve a robot that moves 30 mm and whose client has gone."""
+    """Serve a robot that moves 30 mm and whose client is gone."""
     simulator = EpsonSimulator(seed=7)
     with serve_tcp(simulator) as host:
         controller = robolink.connect(host.url)
@@ -56,7 +56,7 @@ def test_f76_a_stop_that_is_never_answered_is_repeated_and_then_says_what_to_pre
         since = list(simulator.log)[before:]
         asked = [text for _, way, text in since if way == ">" and request_ in text]
         assert len(asked) == TRIES
-        # Nothing is lost any more: the next one sees it stand.
+        # Nothing is lost any more: the next client sees that it has stopped.
         assert stop_now(url).state is ControllerState.READY
         assert not simulator.machine.arm.moving
 

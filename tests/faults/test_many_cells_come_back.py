@@ -25,11 +25,11 @@ from robolink.transaction import Wanted, change_tools
 CELLS = 2000
 DOWN_S = 600.0
 ATTEMPT_S = 3.0
-"""An attempt that nobody answers takes so long."""
+"""The duration of an unanswered attempt."""
 
 
 class Cell:
-    """A cell behind the switch; knocks in a time of its own, which begins with the cut."""
+    """A cell behind the switch; knocks by its own clock, which begins with the cut."""
 
     def __init__(self) -> None:
         self.clock = ManualClock()
@@ -54,7 +54,7 @@ def test_f77_two_thousand_cells_that_come_back_do_not_knock_together():
     cells = [Cell() for _ in range(CELLS)]
     back_s = [connect_when_reachable(cell.knock, within_s=3600, clock=cell.clock) for cell in cells]
     assert max(back_s) < DOWN_S + ATTEMPT_S + LONGEST_PAUSE_S
-    # Once they have drifted apart, no second has more than thrice its share of the knocks.
+    # Once they have drifted apart, no second has more than three times its share of the knocks.
     seconds = Counter(int(at_s) for cell in cells for at_s in cell.knocked_s if at_s > 120)
     share = sum(seconds.values()) / (DOWN_S + LONGEST_PAUSE_S - 120)
     assert max(seconds.values()) < 3 * share

@@ -1,4 +1,4 @@
-"""Many threads on one controller: one procedure at a time, and nobody hears another's answer.
+"""Many threads on one controller: one procedure at a time, and no thread gets another's answer.
 
 Rows F48 and F49 of the catalogue, on the wires of each kind; the simulator's own log is the
 witness.
@@ -41,7 +41,7 @@ def tool(number: int) -> ToolOffset:
 
 
 def together(acts: Sequence[Callable[[], object]]) -> list[object]:
-    """Do all at the same moment; return what came of each, a refusal as its kind."""
+    """Run all at the same moment; return each result, a refusal as its kind."""
     ends: list[object] = [None] * len(acts)
     gate = threading.Barrier(len(acts))
 
@@ -71,7 +71,7 @@ def epson() -> Iterator[tuple[EpsonSimulator, str]]:
 
 
 def admitted(controller: Controller, others: threading.Semaphore) -> str:
-    """Begin a procedure and stay in it until everybody else was refused."""
+    """Begin a procedure and stay in it until all others were refused."""
     try:
         with controller.preserved("a procedure"):
             for _ in range(AT_ONCE - 1):
@@ -104,10 +104,10 @@ def test_f48_of_many_that_begin_at_the_same_moment_one_is_admitted_on_epson(epso
 
 @pytest.mark.fault("F48")
 def test_f48_of_many_that_connect_and_change_one_tool_of_a_plc_one_does(tmp_path):
-    """Or none, and who may have is told that it is not proved.
+    """Or none, and the possible one is told that it is unconfirmed.
 
-    Of a mailbox only the answer to its last command shows, whoever gave it. So on a busy computer
-    the refusal of one may hide the answer to the write of another, or overwrite its block.
+    A mailbox shows only the answer to its last command, whoever gave it. So on a busy computer the
+    refusal of one may hide the answer to the write of another, or overwrite its block.
     """
     with served("modbus-tcp") as cell:
         journal = memory_journal(tmp_path.name)
@@ -126,7 +126,7 @@ def test_f48_of_many_that_connect_and_change_one_tool_of_a_plc_one_does(tmp_path
         changes, doubted = cell.slot_changes(1) - slots, ends.count(OutcomeUnknownError)
         assert len(done) <= changes <= 1
         assert changes == len(done) or doubted
-        assert done or doubted  # somebody came as far as that
+        assert done or doubted  # one of them got that far
         overtaken = {OutcomeUnknownError, RemoteProtocolError}
         assert {end for end in ends if not isinstance(end, str)} <= {*REFUSALS, *overtaken}
         with robolink.connect(cell.url, outcomes=journal.log(cell.url)) as later:

@@ -1,4 +1,4 @@
-"""What robolink and its simulators listen on, who may speak there, and what they say of passwords.
+"""The open ports of robolink and its simulators, their permitted clients, and password secrecy.
 
 Rows F71, F73 and F74 of the catalogue.
 """
@@ -52,7 +52,7 @@ def fd(name: str) -> Path:
 
 
 def readable(address: str) -> str:
-    """Return an address of /proc/net, whose words are in the machine's order."""
+    """Return an address of /proc/net, whose words are in the machine's byte order."""
     words = bytes.fromhex(address)
     turned = b"".join(words[i : i + 4][::-1] for i in range(0, len(words), 4))
     return str(ipaddress.ip_address(turned))
@@ -62,7 +62,7 @@ def readable(address: str) -> str:
 def everything_served() -> Iterator[
     tuple[EpsonSimulator, SoftMotionSimulator, set[tuple[str, int]]]
 ]:
-    """Open every port that robolink and its simulators ever open; yield which are new."""
+    """Open every port that robolink and its simulators can open; yield the new ones."""
     before = listening()
     epson, plc, clock = EpsonSimulator(seed=2), SoftMotionSimulator(seed=2), ScaledClock()
     with ExitStack() as stack:
@@ -78,7 +78,7 @@ def everything_served() -> Iterator[
 
 @pytest.fixture
 def no_local_sockets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let a stop be listened for on a port: so it is where a path is too long, and on Windows."""
+    """Make stops arrive on a port, as with a path that is too long, and on Windows."""
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / ("long" * 30)))
 
 

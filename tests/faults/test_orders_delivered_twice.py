@@ -1,6 +1,6 @@
-"""One order delivered twice, whatever became of the first delivery: row F79.
+"""One order delivered twice, whatever happened to the first delivery: row F79.
 
-Where the first delivery was killed stands in ``test_killed``.
+``test_killed`` has the killed first deliveries.
 """
 
 from itertools import count
@@ -18,7 +18,7 @@ _desks = count()
 
 
 class Desk:
-    """Several programs on one machine with one record."""
+    """Several programs on one computer with one record."""
 
     def __init__(self) -> None:
         self.machine = SimpleMachine()
@@ -80,12 +80,12 @@ def test_f79_a_value_that_stood_already_makes_an_order_done_all_the_same():
 
 @pytest.mark.fault("F79")
 def test_f79_an_order_is_not_told_as_done_while_something_is_not_put_back():
-    """Production that is started on it would run with the selected tool of the measurement."""
+    """Production started on it would run with the tool selected for the measurement."""
     desk = Desk()
     with desk.connected() as controller:
         with carrying_out(controller, ORDER, JOB) as order:
             change_tools(controller, [Wanted(1, NEW[1], ANY)], order=order)
-        # As a process leaves it that is killed behind the transaction that keeps the value.
+        # As left by a process killed after the transaction that keeps the value.
         left = Marker("killed", MarkerKind.SELECTION, "calibrate tool 1", "then", {"tool": 1})
         controller.outcomes.begin(left)
         with (
@@ -100,7 +100,7 @@ def test_f79_an_order_is_not_told_as_done_while_something_is_not_put_back():
 
 @pytest.mark.fault("F79")
 def test_f79_a_first_order_begins_nothing_while_something_is_unsettled():
-    """Its job may move before anything is written, and would find out at its end only."""
+    """Its job may move before anything is written, and would find out only at its end."""
     desk = Desk()
     with desk.connected() as controller:
         left = Marker("killed", MarkerKind.SELECTION, "calibrate tool 1", "then", {"tool": 1})

@@ -1,7 +1,7 @@
-"""Two ends of a serial line that are set to different baud rates or parities: row F54.
+"""Two ends of a serial line with different baud rates or parities: row F54.
 
-A pseudo terminal carries bytes at no rate. So each piece passes through two UARTs that are
-computed bit by bit, both ways, and what the other end would have sampled is what it gets.
+A pseudo terminal carries bytes at no rate. So each piece passes through two UARTs that are computed
+bit by bit, both ways, and the other end gets the bytes that it would have sampled.
 """
 
 import pytest
@@ -41,7 +41,7 @@ def test_a_rate_that_is_three_percent_off_is_near_enough():
 )
 @pytest.mark.parametrize("theirs", OTHERS.values(), ids=OTHERS)
 def test_f54_an_epson_controller_at_other_settings_is_named(theirs, understood):
-    """What it hears, it does not understand; and if it did, its answer would not be taken."""
+    """It does not understand what it receives; and its answer would not be accepted."""
     simulator = EpsonSimulator(seed=3)
     far = simulator.connect_serial(0)
 

@@ -1,4 +1,4 @@
-"""A program with an open change, in real time: quiet for longer than the silence, then killed."""
+"""A program with an open change, in real time: idle beyond the silence limit, then killed."""
 
 import subprocess
 import sys

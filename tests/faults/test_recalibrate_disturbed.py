@@ -1,12 +1,12 @@
 """`robolink change RECIPE.toml`, disturbed at each instant of its run (F21, F22, F24).
 
-Ctrl-C ends a run with the old values in all tools, or with the new ones once all are proved,
-and with the selected tool, power and speed as before. After an emergency stop, an opened guard,
-a failed drive or a withdrawn permit not everything can be restored: message and marker name what
-is left, and after the reset one more command puts it right. Outputs stay as the recipe switched
-them, and the end of the run names them.
+Ctrl-C ends a run with the old values in all tools, or with the new ones once all are tested, and
+with the selected tool, power and speed as before. After an emergency stop, an opened guard, a
+failed drive or a withdrawn permit not everything can be restored: message and marker name the rest,
+and after the reset one more command recovers it. Outputs stay as the recipe switched them, and the
+end of the run names them.
 
-By default a sample is taken. ``ROBOLINK_ALL_KILL_POINTS=1`` takes all, on a PLC without the
+By default a sample is used. ``ROBOLINK_ALL_KILL_POINTS=1`` uses all instants, on a PLC without the
 inner ones of rows of polls. ``pytest -s`` shows how many.
 """
 
@@ -36,18 +36,19 @@ TESTS: Final = [
 MATTERS: Final = re.compile(
     r'\$(SetIO|Execute,"(Tool \d|TLSet \d))|write_command (SELECT|WRITE|OWNER)|[A-Z]'
 )
-"""Switches, selects, writes, takes or gives back; or is a question."""
+"""Instants that switch, select, write, take or release; and questions."""
 POLLS: Final = re.compile("wait|(request|answer) (read_head|beat)")
-"""What the driver of a PLC does in a row while something moves."""
+"""The repeated acts of a PLC driver during a movement."""
 
 SHOWS_LATER: Final = re.compile(r"commit|answer \d+: (read|beat)")
-"""What happens to a controller while the driver stores something, or just after a PLC was read,
-shows with the next exchange, which is an instant of its own."""
+"""A disturbance while the driver stores something, or just after a PLC was read, shows with the
+next exchange, which is an instant of its own.
+"""
 
 
 @pytest.fixture(scope="module")
 def instants(tmp_path_factory):
-    """Tells the instants of a whole run of each recipe, which is then as it should be."""
+    """Returns the instants of a whole run of each recipe, which is checked first."""
     known: dict[str, list[Instant]] = {}
 
     def of(name: str) -> list[Instant]:

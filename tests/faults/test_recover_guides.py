@@ -1,4 +1,4 @@
-"""`robolink recover` is one way through all that is open, and never speaks against itself."""
+"""`robolink recover` leads through all open jobs without contradicting itself."""
 
 import json
 import re
@@ -21,7 +21,7 @@ WRITTEN = re.compile(r'\$Execute,"TLSet 1, XY')
 
 @pytest.fixture
 def cell(tmp_path):
-    """A cell whose link was cut in the turn that was to prove the new value of tool 1."""
+    """A cell whose link was cut during the turn of tool 1's turn test."""
     command = COMMANDS["EPSON: recalibrate"]
     with command.case.cell() as cell:
         assert isinstance(cell, EpsonRecipeCell)
@@ -214,7 +214,7 @@ def test_at_a_desk_the_page_shows_what_is_read_and_marks_nothing(cell, answer, c
         ended = cell.run("recover")
     assert ended.code == code, ended.err
     assert cell.changed() == changed
-    # Who wants the new value is asked before the robot moves, and "2" agrees to nothing.
+    # A person who wants the new value is asked before the robot moves, and "2" agrees to nothing.
     listed = ["Start moving"] if answer == "2" else []
     assert desk.asked == ["Look at the robot: which needle is mounted?", *listed]
     page = next(one for one in desk.pages if isinstance(one, ChoiceSubject))

@@ -1,4 +1,4 @@
-"""A new value that a person chose after a crash is kept when its turn test has passed."""
+"""A new value that a person chose after a crash is kept once its turn test has passed."""
 
 import re
 from collections.abc import Callable
@@ -26,11 +26,11 @@ MOVED = re.compile(r'\$Execute,"(Go|Move) ')
 
 @contextmanager
 def somebody(cell, answers=None):
-    """Let a person sit at the terminal, who jogs; yields what they are asked.
+    """Put a person who jogs at the terminal; yields the questions.
 
     Args:
-        cell: Where.
-        answers: What they say at the numbered question in place of that.
+        cell: The cell.
+        answers: Replacements for the answers, by the question's number.
     """
     asked = []
 
@@ -83,7 +83,7 @@ class Desk(_operator.AssistedOperator):
 
 
 def killed_at(cell, dies, check):
-    """Let the program of the turn test die where it is told to, and check what it leaves."""
+    """Let the turn test's program die at the given instant, and check the leftovers."""
     assert cell.run("recover", "--dry-run").code == 6
     worlds = Worlds(lambda at: dies(at, worlds.passed))
     worlds.explore(lambda: new_chosen(cell, instants=worlds), check)
@@ -92,7 +92,7 @@ def killed_at(cell, dies, check):
 
 
 def verified(cell):
-    """Return whether each turn test on record passed."""
+    """Return, for each recorded turn test, whether it passed."""
     log = cell.journal.log(cell.url)
     return [entry.details["passed"] for entry in log.recorded(kinds=(EntryKind.VERIFY,))]
 
@@ -102,7 +102,7 @@ def moves_asked(passed):
 
 
 def coming_down(at, passed):
-    """The middle of the first way down to the pin that the robot goes by itself."""
+    """The middle of the robot's first own descent to the pin."""
     downs = [one for one in passed if one.kind == "request" and "Move XY" in one.what]
     waits = (
         [one for one in passed[passed.index(downs[4]) :] if one.kind == "wait"] if downs[4:] else []
@@ -118,7 +118,7 @@ def test_killed_in_the_turn_test_nothing_is_lost_and_the_next_one_keeps_the_valu
         assert MarkerKind.CHANGE in kinds(cell)
         assert verified(cell) == []
         written = len(cell.writes())
-        # Nobody there: it stays as it was, and nothing moves.
+        # Nobody is there: everything stays as it was, and nothing moves.
         asked = cell.moves_asked()
         assert cell.run("recover", "--dry-run").code == 6
         assert cell.moves_asked() == asked

@@ -1,4 +1,4 @@
-"""What stands after a crash is neither the old nor the new value; a calibration was cut short.
+"""Recoveries of a value that is neither old nor new, and of a calibration that was cut short.
 
 Rows F59 and F60 of the catalogue.
 """
@@ -61,7 +61,7 @@ def mailbox() -> Iterator[Lossy]:
         frame = to_frame(THIRD.components(), unit_um=1000.0)
 
         def put_third() -> None:
-            cell.clock.advance(0.05)  # by then the program has looked at what it was told
+            cell.clock.advance(0.05)  # by then the program has read the command
             with cell.simulator.acting():
                 memory.define(1, frame, "by hand")
 
@@ -83,7 +83,7 @@ def test_f59_a_third_value_is_a_conflict_that_blocks_motion_until_a_person_decid
                 controller.tools.write(1, NEW, expected=before)
         lossy.put_third()
         with robolink.connect(lossy.url) as controller:
-            for _ in range(2):  # as often as it is run
+            for _ in range(2):  # however often it is run
                 (finding,) = recover(controller).left
                 assert finding.verdict is Verdict.CONFLICT
                 group = controller.groups[0]
@@ -125,7 +125,7 @@ def check_begins_again(cell: EpsonRecipeCell, touches: list[int]) -> None:
     cell.come_to_rest()
     assert cell.changed() == set()
     asked = cell.moves_asked()
-    assert cell.run(*calibrations.words(cell)).code == 6  # the movement in doubt comes first
+    assert cell.run(*calibrations.words(cell)).code == 6  # the unconfirmed movement comes first
     recovered = cell.run("recover", "--yes")
     assert recovered.code == 0, recovered.err
     assert cell.moves_asked() == asked == 5
@@ -135,6 +135,6 @@ def check_begins_again(cell: EpsonRecipeCell, touches: list[int]) -> None:
 
 
 def touches_of(cell: EpsonRecipeCell) -> list[int]:
-    """Return how many poses each measurement on record is made of."""
+    """Return the number of poses of each recorded measurement."""
     measured = cell.journal.entries(kinds=(EntryKind.CALIBRATION,))
     return [len(entry.details["poses"]) for entry in measured]  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""What a format rounds is no difference, and the next number that it can hold is one."""
+"""The rounding of a format is no difference, and the next number that it can hold is one."""
 
 from contextlib import contextmanager
 
@@ -16,7 +16,7 @@ from robolink.errors import ReadBackError
 from tests.contract._softmotion_cell import served
 
 LAST_DIGIT_MM = 0.001
-"""Of EPSON's text: three decimals leave."""
+"""The resolution of EPSON's text: three decimals."""
 SLOT = 15
 
 

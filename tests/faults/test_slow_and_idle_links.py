@@ -1,4 +1,4 @@
-"""Slow answers, slow movements, links that are reset: which deadline counts for what.
+"""Slow answers, slow movements, links that are reset: the deadline that applies to each.
 
 Rows F67, F68 and F75 of the catalogue, over real sockets and a pseudo terminal.
 """
@@ -35,7 +35,7 @@ from tests.unit._scripted_modbus import rtu, tcp, words
 
 TIMEOUT_S = 0.6
 EACH_S = 0.25
-"""Between two bytes; the whole of any answer here takes 7 s and more."""
+"""The time between two bytes; the whole of any answer here takes 7 s and more."""
 
 ANYWHERE = WorkBox()
 
@@ -142,7 +142,7 @@ def test_f68_a_movement_of_two_minutes_is_no_silence_on_epson():
             assert motion.wait(timeout_s=600) is MotionOutcome.ARRIVED
             took_s = (controller.clock.now_ns() - began_ns) / NS_PER_S
             assert took_s > 110
-            # It was looked at meanwhile, so that a stop of the machine would have shown.
+            # The state was read meanwhile, so a stop of the machine would have shown.
             assert controller.exchanges - asked > took_s / 5
             assert controller.outcomes.open_markers() == ()
         assert simulator.machine.arm.moves_started == 1
@@ -168,7 +168,7 @@ def test_f68_a_movement_of_twelve_seconds_is_no_silence_on_a_plc():
 
 @pytest.fixture(params=["epson", "mailbox"])
 def far_end(request: pytest.FixtureRequest) -> Iterator[tuple[str, Callable[[], int]]]:
-    """A controller, and how often its tool 1 was written."""
+    """A controller, and the number of writes of its tool 1."""
     if request.param == "epson":
         simulator = EpsonSimulator(seed=2)
         written = simulator.machine.flash_writes
@@ -192,7 +192,8 @@ def test_f75_a_link_that_is_reset_while_idle_leaves_nothing_in_doubt(far_end):
                 controller.tools.read(1)
             assert "ry again" in broken.value.remedy
             assert controller.outcomes.open_markers() == ()
-            # A PLC is looked at once more, to tell its start from a broken link; no more than that.
+            # A PLC is read once more, to distinguish its restart from a broken link; no more than
+            # that.
             assert firewall.opened <= 2
         with robolink.connect(there) as controller:
             controller.require_settled("a movement")

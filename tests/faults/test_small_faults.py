@@ -1,9 +1,9 @@
-"""One small thing goes wrong on the wire in a whole two-pose calibration, whichever it is.
+"""One small fault of the wire in a whole two-pose calibration, of every kind.
 
-A request or an answer is dropped, late, doubled, cut short at any byte, or one bit of an answer
-is another, at the first exchange of each shape in each step of the calibration. By default a
-sample; ``make soak`` takes all, and ``python -m tests.faults.small`` too, which can be
-interrupted and prints the counts.
+A request or an answer is dropped, late, doubled, cut short at any byte, or one bit of an answer is
+flipped, at the first exchange of each shape in each step of the calibration. By default a sample;
+all with ``make soak``, and with ``python -m tests.faults.small``, which can be interrupted and
+prints the counts.
 """
 
 import random
@@ -26,7 +26,7 @@ DECISIVE = {
 
 
 def told(runs: list[Planned]) -> Counter[str]:
-    """Make runs and count how they ended; fail with the first that broke a promise."""
+    """Make runs and count their ends; fail with the first that broke a promise."""
     ends = Counter[str]()
     for run in runs:
         ended = outcome(run)
@@ -41,7 +41,7 @@ def test_a_sample_of_small_faults_costs_no_second_movement_and_no_wrong_value(ki
     runs = drawn(kind, _SAMPLE[kind], seed=15)
     ends = told(runs)
     print(f"\n{kind}: {ends.total()} faults in {len(runs)} runs: {dict(ends)}")  # noqa: T201
-    assert set(ends) != {"done"}  # the driver met them
+    assert set(ends) != {"done"}  # the driver did meet the faults
 
 
 @pytest.mark.soak

@@ -1,6 +1,6 @@
-"""What a PLC, its field bus or another client does wrong, over real links.
+"""Faults of a PLC, its field bus or another client, over real links.
 
-Each is a clear error, and the PLC's own counters show that nothing was carried out twice.
+Each gives a clear error, and the PLC's own counters show that nothing was carried out twice.
 """
 
 from collections.abc import Iterator
@@ -45,7 +45,7 @@ TIMEOUT_S = 0.4
 
 @contextmanager
 def plc_with(*faults: PlcFault, **options: object) -> Iterator[PlcCell]:
-    """Serve a PLC with habits and planned faults over Modbus TCP."""
+    """Serve a PLC with options and planned faults over Modbus TCP."""
     mailbox = replace(MailboxOptions(), **options)  # type: ignore[arg-type]
     simulator = SoftMotionSimulator(options=PlcOptions(mailbox=mailbox), faults=faults)
     with served("modbus-tcp", simulator) as cell:
@@ -65,7 +65,7 @@ def check_nothing_was_written(cell):
 
 
 def lift(controller):
-    """Begin a movement that takes long."""
+    """Begin a slow movement."""
     group = controller.groups[0]
     return group.move_to(above(group.pose(), 20.0), SLOW, box=ANYWHERE)
 
@@ -220,7 +220,7 @@ def test_an_owner_that_died_is_named_and_displaced_after_its_silence(cell):
         assert f"{cell.owner:08X}" in refusal.value.what
         assert "10 s after its last sign" in refusal.value.remedy
         cell.clock.advance(OWNER_SILENCE_S)
-        recover(next_one)  # what the dead one left is read first
+        recover(next_one)  # the dead client's leftovers are read first
         next_one.tools.write(3, NEW, expected=None)
     assert (cell.slot_changes(SCRATCH), cell.slot_changes(3)) == (1, 1)
 

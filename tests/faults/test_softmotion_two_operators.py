@@ -1,8 +1,8 @@
 """Two operators on one PLC: the lease of a shared journal, the ownership, and the comparison.
 
-Two PCs that share no journal are kept apart by the PLC alone (docs/reference/faults.md F46, F47).
-Of all orders in which two take their steps a sample is followed; ``ROBOLINK_ALL_KILL_POINTS=1``
-follows all. ``pytest -s`` shows how many there are.
+Two PCs that share no journal are kept apart by the PLC alone (docs/reference/faults.md F46, F47). A
+sample of all orders of their steps is followed; ``ROBOLINK_ALL_KILL_POINTS=1`` follows all.
+``pytest -s`` shows how many there are.
 """
 
 import os
@@ -44,7 +44,7 @@ def other_pc(tmp_path):
 
 
 def about_to(cell, kind: StepKind):
-    """Return Ann, who owns the mailbox and stands before a step."""
+    """Return Ann, who owns the mailbox and is about to do a step."""
     ann = OperatorProcess(cell.url, cell.folder, "Ann", {1: ANNS})
     while not cell.owner:
         ann.step()
@@ -90,8 +90,8 @@ def test_f47_a_frozen_owner_whose_mailbox_was_taken_writes_nothing_when_it_comes
     assert bob(cell, other_pc).how == "done"
     ann.thaw()
     refused = ann.end()
-    # Her block went out, and the PLC refused it. If her first look shows his acknowledgement
-    # still, the write is unknown to her (docs/reference/mailbox.md).
+    # Her block went out, and the PLC refused it. If her first reading still shows his
+    # acknowledgement, the outcome of her write is unknown to her (docs/reference/mailbox.md).
     assert refused.how in {"RejectedError", "OutcomeUnknownError"}
     assert "another client" in refused.said
     assert cell.values_written() == [BOBS]
@@ -105,7 +105,7 @@ def test_of_two_that_ask_for_the_mailbox_in_the_same_instant_one_gets_it(cell, o
     refused = bob(cell, other_pc)
     assert refused.how == "LeaseHeldError"
     assert f"(client {cell.owner:08X}) commands the PLC" in refused.said
-    # His is the answer that she finds; it says that the mailbox is hers.
+    # She finds the answer to him; it says that the mailbox is hers.
     assert ann.end().how == "done"
     assert cell.values_written() == [ANNS]
 
@@ -118,7 +118,7 @@ def test_a_write_counts_as_done_when_the_group_s_own_tool_was_read_too(cell, oth
     refused = bob(cell, other_pc)
     assert refused.how == "LeaseHeldError", refused.said
     ended = ann.end()
-    # His refused request has taken the place of her answer in the mailbox.
+    # His refused request has replaced her answer in the mailbox.
     assert ended.how == "OutcomeUnknownError"
     assert "READ_TOOL" in ended.said
     assert list(cell.journal.entries(kinds=(EntryKind.DONE,))) == []
@@ -142,11 +142,12 @@ def test_who_compared_before_the_other_wrote_is_told_what_is_there_now(cell, oth
 
 
 UNKNOWN = frozenset({"OutcomeUnknownError"})
-"""The mailbox shows the answer to its last command only. When somebody asks for the mailbox and
-is refused in between, the owner never sees what became of his write."""
+"""The mailbox shows only the answer to its last command. If somebody asks for the mailbox and is
+refused in between, the owner never sees the outcome of the write.
+"""
 
 OVERTAKEN = frozenset({"RemoteProtocolError"})
-"""The same to somebody who has asked for the mailbox and has written nothing yet."""
+"""The same for somebody who has asked for the mailbox and has written nothing yet."""
 
 
 @pytest.mark.fault("F46")
@@ -164,7 +165,7 @@ def test_f46_every_order_of_their_steps_ends_with_one_writer_after_the_other(tmp
     wishes = ({1: ANNS}, {1: BOBS})
     ends = follow_orders(orders, start, wishes, unknown=UNKNOWN, overtaken=OVERTAKEN)
     if whole:
-        # Who owns the mailbox cannot lose the lease to somebody who asks for the mailbox first.
+        # The owner of the mailbox cannot lose the lease to somebody who asks for the mailbox first.
         occurring = LOST - {"LeaseLostError"} | UNKNOWN | OVERTAKEN
         assert set(ends) == occurring, "an order that must occur did not"
     print(f"PLC: {orders.seen} orders; refused: {dict(ends)}")  # noqa: T201 - for pytest -s

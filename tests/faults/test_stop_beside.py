@@ -1,4 +1,4 @@
-"""``robolink stop`` beside a robolink that has the controller, or that was killed having it."""
+"""``robolink stop`` beside a robolink that has locked the controller, or was killed then."""
 
 import time
 
@@ -33,7 +33,7 @@ def plc():
 
 @pytest.fixture
 def beside(tmp_path):
-    """Start a command in a process of its own."""
+    """Start a command in a separate process."""
 
     def started(*arguments):
         return ClientProcess(
@@ -95,5 +95,5 @@ def test_a_movement_left_by_a_killed_jog_is_stopped(epson, beside, capsys):
     assert entry.run(["-c", url, "stop"]) == 0
     assert not simulator.machine.arm.moving
     assert "has stopped" in capsys.readouterr().out
-    # What the killed one left to be found is taken away.
+    # The killed process's leftovers are removed.
     assert list(holders_of(far_end_of(url))) == []

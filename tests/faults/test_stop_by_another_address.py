@@ -1,4 +1,4 @@
-"""A stop is one of the controller, not of the address by which it came."""
+"""A stop belongs to the controller, not to the address by which it came."""
 
 import json
 from contextlib import ExitStack
@@ -21,7 +21,7 @@ from tests.faults.test_stop_beside import await_that
 
 @pytest.fixture
 def beside(tmp_path):
-    """Start a command in a process of its own."""
+    """Start a command in a separate process."""
 
     def started(*arguments):
         return ClientProcess(
@@ -54,7 +54,7 @@ def epson():
 
 
 def let_go(url):
-    """Let the PLC move again and leave the note: what somebody does at the machine itself."""
+    """Let the PLC move again and leave the note, as somebody at the machine itself does."""
     with robolink.connect(url) as controller:
         controller.reset_fault()
 
@@ -144,7 +144,7 @@ def test_another_controller_at_the_same_address_was_not_stopped(capsys):
     with serve_tcp(other, port=port):
         capsys.readouterr()
         assert main.run(["-c", url, "jog", "x+1", "--yes"]) == 0, capsys.readouterr()
-        # What is taken away at the address is what was left about this one.
+        # The reset at this address removes only the note about this controller.
         assert main.run(["-c", url, "reset", "--yes"]) == 0
     first.machine.switch_motors(True)
     with serve_tcp(first, port=port):

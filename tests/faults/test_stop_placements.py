@@ -1,11 +1,11 @@
 """`stop()` from a second thread, at every distinct point of a whole `recalibrate`.
 
-A point is a kind of checkpoint (a lock, an exchange, a commit, a question, a step), what goes on
-there, and the step of the procedure. After the acknowledgement there is no movement, no output,
-no write and no success, except that tool, power and speed are restored and each tool of an open
-change once (docs/reference/rules.md 5).
+A point is a kind of checkpoint (a lock, an exchange, a commit, a question, a step), its subject,
+and the step of the procedure. After the acknowledgement there is no movement, no output, no write
+and no success, except that tool, power and speed are restored and each tool of an open change once
+(docs/reference/rules.md 5).
 
-By default a sample is taken. ``ROBOLINK_ALL_KILL_POINTS=1`` takes all; ``pytest -s`` counts them.
+By default a sample is used. ``ROBOLINK_ALL_KILL_POINTS=1`` uses all; ``pytest -s`` counts them.
 """
 
 import os
@@ -30,7 +30,7 @@ _SAMPLE = 5
 
 @dataclass
 class AtRest:
-    """What the machine was like when the stop was acknowledged."""
+    """The state of the machine when the stop was acknowledged."""
 
     cell: RecipeCell
     moves: int = -1
@@ -40,7 +40,7 @@ class AtRest:
     requests: int = 0
 
     def __call__(self) -> None:
-        """Look."""
+        """Record the state."""
         cell = self.cell
         assert not cell.moving, "the stop was acknowledged while the robot moves"
         self.moves, self.where = cell.moves_begun, cell.where()
@@ -68,7 +68,7 @@ def check_nothing_went_on(cell: RecipeCell, ended: Ended, rest: AtRest) -> None:
     assert all(count == 1 for count in after.values()), after
     for tool in after:
         assert cell.tools()[tool] == cell.before[tool], "a write that is no roll-back"
-    # A value that could not be put back outranks the stop (docs/commands.md).
+    # A value that could not be restored outranks the stop (docs/commands.md).
     unproved = {marker.kind for marker in cell.open_markers()} - {MarkerKind.SELECTION}
     assert ended.code == (6 if unproved else 10), (ended.code, ended.err)
     if not cell.changed():
@@ -81,7 +81,7 @@ def check_nothing_went_on(cell: RecipeCell, ended: Ended, rest: AtRest) -> None:
 
 
 def check_said(cell: RecipeCell, ended: Ended) -> None:
-    """Whatever could not be restored is named, and one command after the reset puts it right."""
+    """What could not be restored is named, and one command after the reset recovers it."""
     check_markers_are_named(cell.open_markers(), ended)
     if cell.selected != 1 or cell.open_markers():
         assert cell.run("reset").code == 0
@@ -95,7 +95,7 @@ def check_said(cell: RecipeCell, ended: Ended) -> None:
 
 @pytest.fixture(scope="module")
 def placements(tmp_path_factory):
-    """Tells the distinct points of a whole run of each recipe, which is then as it should be."""
+    """Returns the distinct points of a whole run of each recipe, which is checked first."""
     known: dict[str, list[Placement]] = {}
 
     def of(name: str) -> list[Placement]:

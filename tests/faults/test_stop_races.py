@@ -1,7 +1,7 @@
-"""`stop()` from a second thread at random moments, in real time: what placements might have missed.
+"""`stop()` from a second thread at random moments, in real time, to find what placements missed.
 
-Before the latch, 208 of 400 such stops were acknowledged and the movement in preparation still
-left. The moments are drawn over the time that a start of a movement takes here.
+Before there was a latch, 208 of 400 such stops were acknowledged and the movement in preparation
+still left. The moments are drawn over the time that a start of a movement takes here.
 """
 
 import random
@@ -34,7 +34,7 @@ def move(group, dz_mm):
 
 
 class Stopper(threading.Thread):
-    """Stops after a delay; ``acknowledged`` is how many movements had begun by then."""
+    """Stops after a delay; ``acknowledged`` is the number of movements begun by then."""
 
     def __init__(self, controller, moves_begun, delay_s):
         super().__init__()
@@ -48,7 +48,7 @@ class Stopper(threading.Thread):
 
 
 def races(controller, moves_begun, trials, *, reset):
-    """Stop as many movements in preparation; return how many had left, and begun after all."""
+    """Stop prepared movements; return how many had left, and how many began all the same."""
     group = controller.groups[0]
     begun = time.perf_counter()
     move(group, STEP_MM).wait(timeout_s=20)

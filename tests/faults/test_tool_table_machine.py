@@ -1,8 +1,8 @@
-"""A tool table in any order of calls, mishaps and strangers is what a dictionary would be.
+"""A tool table behaves like a dictionary in any order of calls, faults and foreign writes.
 
-Hypothesis draws the order: read, write, clear, select, change two tools, undo, another writer,
-a lost answer, recovery, a new session, a restart of the controller. After each of them the
-controller holds, past the wire, what the dictionary holds.
+Hypothesis draws the order: read, write, clear, select, change two tools, undo, another writer, a
+lost answer, recovery, a new session, a restart of the controller. After each of them the controller
+holds, past the wire, the dictionary's values.
 """
 
 from typing import Any, ClassVar
@@ -145,7 +145,7 @@ class ToolTableMachine(RuleBasedStateMachine):
             plan = plan_undo(self.controller)
             undo(self.controller, plan)
         except (ConfigError, ToolChangedError, SelectedToolError):
-            return  # there is none, another has written since, or it would leave no tool in force
+            return  # there is none, another has written since, or no tool would be selected
         for step in plan.steps:
             self.held[step.tool] = step.requested
 
@@ -186,7 +186,7 @@ class ToolTableMachine(RuleBasedStateMachine):
         before = dict(self.held)
         recover(self.controller, keep=keep, confirm=lambda _finding: True)
         now = self.table.held()
-        # What another wrote meanwhile stays; of our own, the old or the new value.
+        # A value written by another client meanwhile stays; of our own, the old or the new one.
         assert sum(now[tool] != before[tool] for tool in TOOLS) <= 1
         self.held, self.unsettled = now, False
 

@@ -1,7 +1,7 @@
-"""Rows F41, F42 and F45 of the catalogue: which tool, when, and who else writes it.
+"""Rows F41, F42 and F45 of the catalogue: which tool, when, and the other writers.
 
-On an EPSON controller over TCP and on PLC mailboxes over their field buses; what the controller
-really holds, and how often it was written, is read past the wire.
+On an EPSON controller over TCP and on PLC mailboxes over their field buses; the controller's real
+values, and the number of writes, are read past the wire.
 """
 
 from collections.abc import Callable, Iterator
@@ -41,14 +41,14 @@ OF_THE_PENDANT = ToolOffset(15.5, 1.25, -21.0)
 
 @dataclass
 class Held:
-    """A controller that holds :data:`STORED` in tool 1, and the truth about it.
+    """A controller that holds :data:`STORED` in tool 1, and its true state.
 
     Attributes:
-        url: Where it is served.
-        now: What tool 1 holds, past the wire.
+        url: Its URL.
+        now: The value of tool 1, past the wire.
         put: Writes tool 1, past the wire, as a pendant does.
         before_each: Calls something before each request is carried out.
-        writes: How often a client wrote a tool so far.
+        writes: The number of tool writes by clients so far.
     """
 
     url: str
@@ -116,7 +116,7 @@ def held(request: pytest.FixtureRequest) -> Iterator[Held]:
 # ---- F41
 
 WRONG = (-1, 16, 100, 2**63, -(2**63), True, 1.0, 1.5, float("nan"), "1", "", None, (1,))
-"""No tool of any of them; some of them count as 1 to Python."""
+"""Not a tool of any of them; Python counts some of them as 1."""
 
 
 @pytest.fixture
@@ -251,16 +251,16 @@ def test_f42_no_tool_of_a_plc_is_changed_while_its_group_moves() -> None:
 
 @pytest.mark.fault("F45")
 def test_f45_what_a_pendant_writes_at_any_step_is_found_out(held: Held) -> None:
-    """Up to the last look it is refused, with both values; only the write itself is blind."""
+    """Up to the last reading it is refused, with both values; only the write itself is blind."""
     steps: list[str] = []
-    for requests in ([], steps):  # who was never met before is asked more
+    for requests in ([], steps):  # a new controller is asked more
         assert write_with_the_pendant_at(held, None, requests) == "done"
     ends = [write_with_the_pendant_at(held, step, []) for step in range(len(steps))]
     written = next(step for step, text in enumerate(steps) if is_write(text))
     last_look = max(step for step, end in enumerate(ends) if end == "refused")
     assert last_look < written
     assert set(ends[: last_look + 1]) == {"refused"}, list(zip(steps, ends, strict=True))
-    # Nothing that could still see it stands between the last look and the write.
+    # No reading that could still see it lies between the last check and the write.
     assert not any(is_look(text) for text in steps[last_look + 1 : written])
     assert ends[written + 1 :].count("read back") >= 1, list(zip(steps, ends, strict=True))
 
@@ -278,8 +278,8 @@ def write_with_the_pendant_at(held: Held, step: int | None, seen: list[str]) -> 
 
     Args:
         held: The controller.
-        step: Counted from 0, without the looks at whether a command is done; ``None`` for never.
-        seen: Is told the requests.
+        step: Counted from 0, without the polls for the end of a command; ``None`` for never.
+        seen: Receives the requests.
 
     Returns:
         How it ended: refused, done, or found out by reading back.
@@ -290,7 +290,7 @@ def write_with_the_pendant_at(held: Held, step: int | None, seen: list[str]) -> 
     def act(text: str) -> None:
         nonlocal left
         if text == "read_head":
-            return  # how often it is asked whether a command is done yet is chance
+            return  # the number of polls for the end of a command is random
         seen.append(text)
         if left is not None:
             if left == 0:

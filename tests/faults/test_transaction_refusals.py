@@ -1,4 +1,4 @@
-"""A nozzle change that is refused leaves the old tool in place, and why is on record."""
+"""A refused nozzle change leaves the old tool in place and records the reason."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ class Cell:
         self.controller = controller
 
     def mount(self, dx_mm):
-        """Put a nozzle on whose tip is off the first one's by so much."""
+        """Mount a nozzle whose tip is this far from the first one's."""
         self.simulator.world.tips[1] = replace(STORED, x_mm=STORED.x_mm + dx_mm)
 
     def change(self, *, operator=None, listener=None):
@@ -73,7 +73,7 @@ def test_a_nozzle_that_is_too_far_off_is_refused(cell):
 
 
 class GivesUp(AssistedOperator):
-    """A person who ends it when the pin has not been reached after some steps."""
+    """A person who gives up if the pin is not reached after some steps."""
 
     def poll(self, wait_s):
         self.patience = getattr(self, "patience", 60) - 1
@@ -97,7 +97,7 @@ def test_a_pin_that_is_not_reached_is_refused(cell):
 
 
 class LooseNozzle(Listener):
-    """The nozzle slips when the robot begins to turn after the write."""
+    """A nozzle that slips when the robot begins to turn after the write."""
 
     def __init__(self, cell):
         self.cell = cell

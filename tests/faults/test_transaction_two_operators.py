@@ -1,10 +1,10 @@
 """Two operators in two processes on one cell, in every order of their steps (F46, F47).
 
-Each reads one tool or two, then changes them if they still hold what he read. A real controller
-serves one client at a time, which one of the tests shows; the others let both be logged in, so
-that nothing but the lease and the comparison keeps them apart. All orders of two who change one
-tool are followed, and a sample of those with two tools; ``ROBOLINK_ALL_KILL_POINTS=1`` follows
-all. ``pytest -s`` shows how many there are.
+Each reads one tool or two, then changes them if they still hold the values read. A real controller
+serves one client at a time, which one of the tests shows; the others let both log in, so that only
+the lease and the comparison keep them apart. All orders of two operators who change one tool are
+followed, and a sample of those with two tools; ``ROBOLINK_ALL_KILL_POINTS=1`` follows all. ``pytest
+-s`` shows how many there are.
 """
 
 import os
@@ -48,7 +48,7 @@ PAIRS = {
     "two tools and the second of them": (ANN, only(BOB, 2)),
 }
 ALIKE = ("one tool", "two tools")
-"""Where the two do the same, it makes no difference who of them goes first."""
+"""Both do the same, so it makes no difference which of them goes first."""
 
 
 @pytest.mark.parametrize("pair", PAIRS)
@@ -81,7 +81,7 @@ class OnPaper:
         pass
 
     def seen(self):
-        """Return what can be seen of the order: who came first where two steps conflict."""
+        """Return the visible part of the order: which came first of two conflicting steps."""
         return frozenset(
             (one[:2], other[:2])
             for one, other in combinations(self.done, 2)
@@ -90,7 +90,7 @@ class OnPaper:
 
 
 def steps(*tools, by_mailbox=False):
-    """Return what somebody does who writes these tools, much simplified."""
+    """Return the steps of an operator who writes these tools, much simplified."""
     reads = [Waiting("tool read", 0, tool) for tool in tools]
     writes = [Waiting("tool write", 1, tool, by_mailbox) for tool in tools]
     begun, ended = Waiting("journal write", 0), Waiting("journal write", 1)
@@ -163,7 +163,7 @@ def test_f47_a_frozen_holder_whose_lease_was_taken_sends_nothing_when_it_comes_b
 
 
 def recovered_after(cell: ChangeCell, *, seconds: float) -> Recovery:
-    """Recover when so much time has passed since the holder's last sign of life."""
+    """Recover this long after the holder's last sign of life."""
     outcomes = cell.journal.log(cell.url, clock=ManualClock(round(seconds * NS_PER_S)))
     with robolink.connect(cell.url, outcomes=outcomes) as controller:
         return recover(controller)

@@ -1,4 +1,4 @@
-"""A journal that cannot be kept: the controller is not touched, and what to do is said.
+"""A journal that cannot be written: the controller is not touched, and the error says what to do.
 
 The real command line against a served simulator (F61, F62, F63).
 """
@@ -25,7 +25,7 @@ NOBODY = 65534
 
 @contextmanager
 def full_disk(path, monkeypatch):
-    """Let the file have no more pages than it has, as a full disk would."""
+    """Limit the file to its present pages, as a full disk would."""
     prepare = connection._prepare
 
     def prepared(connection):
@@ -48,7 +48,7 @@ def read_only(path, monkeypatch):
     path.parent.chmod(0o555)
     root = os.geteuid() == 0
     if root:
-        os.seteuid(NOBODY)  # rights do not count for root
+        os.seteuid(NOBODY)  # permissions do not count for root
     try:
         yield
     finally:
@@ -68,7 +68,7 @@ def corrupt(path, monkeypatch):
 
 @contextmanager
 def newer(path, monkeypatch):
-    """Let a newer robolink have been here."""
+    """Mark the file as written by a newer robolink."""
     with sqlite3.connect(path) as connection:
         connection.execute("UPDATE schema_version SET version = version + 1")
     connection.close()
@@ -98,7 +98,7 @@ BROKEN = {
 
 @pytest.fixture
 def folder():
-    """A folder into which every user may look."""
+    """A folder that every user may read."""
     folder = Path(tempfile.mkdtemp(prefix="robolink-transaction-"))
     folder.chmod(0o755)
     yield folder
@@ -107,7 +107,7 @@ def folder():
 
 @pytest.fixture
 def cell(folder, monkeypatch):
-    """A cell that was written to before, with a journal in a folder of its own."""
+    """A cell that was written to before, with a journal in its own folder."""
     with served_cell(folder / "cell", monkeypatch) as cell:
         (folder / "journal").mkdir()
         monkeypatch.setenv("ROBOLINK_JOURNAL", str(folder / "journal" / "journal.db"))

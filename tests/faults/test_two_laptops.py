@@ -1,10 +1,10 @@
 """Two computers on one controller that share no journal.
 
-docs/security.md, "Two laptops on one controller", says what is shown here.
+docs/security.md, "Two laptops on one controller", makes the statements tested here.
 
-The second one has a state folder of its own and types commands: while the first is connected in
-the same process too, and in ``make soak`` in a process of its own. What the controller itself
-keeps apart is kept apart; what it does not is said on the page, and shown here.
+The second computer has its own state folder and types commands: in the same process while the first
+is connected, and in ``make soak`` in a separate process. The tests show what the controller itself
+keeps apart, and what it does not.
 """
 
 import json
@@ -42,7 +42,7 @@ OLD, MINE = ToolOffset(12.0, -3.5, -20.0), ToolOffset(12.1, -3.5, -20.0)
 
 
 class Laptop:
-    """Another computer: another journal."""
+    """Another computer, with another journal."""
 
     def __init__(self, folder: Path, url: str, capsys, monkeypatch, *, apart: bool) -> None:
         self.folder, self.url, self.apart = folder, url, apart
@@ -50,7 +50,7 @@ class Laptop:
         folder.mkdir()
 
     def types(self, *words):
-        """Return the exit code and the document of a command that is typed there."""
+        """Return the exit code and the document of a command typed there."""
         close_files()
         ended = self._typed(words)
         close_files()
@@ -63,7 +63,7 @@ class Laptop:
         return code, json.loads(self._capsys.readouterr().out)
 
     def types_meanwhile(self, *words):
-        """Do the same while this computer is connected: its journal stays open."""
+        """The same while this computer is connected: its journal stays open."""
         if not self.apart:
             return self._typed(words)
         clean = {k: v for k, v in os.environ.items() if not k.startswith("ROBOLINK")}
@@ -87,7 +87,7 @@ def _this_computer(tmp_path, monkeypatch):
 
 @pytest.fixture
 def apart():
-    """Whether the other laptop has a process of its own beside a connection of this one."""
+    """Whether the other laptop has its own process beside a connection of this one."""
     return False
 
 
@@ -131,7 +131,7 @@ def test_an_epson_controller_serves_one_laptop_the_other_can_not_even_look(epson
         assert document["error"]["controller_state"] == "unchanged"
         code, document = other.types_meanwhile("--timeout", "0.5", "stop")
         assert code == 3, document  # a stop is a command too: the emergency stop is not
-        assert mine.tools.read(1) == MINE  # and the one who was first has noticed nothing
+        assert mine.tools.read(1) == MINE  # and the first client has noticed nothing
     assert simulator.machine.tools.get(1) == MINE
 
 
@@ -169,7 +169,7 @@ def test_what_one_laptop_must_settle_holds_up_that_laptop_and_not_the_other(lapt
         assert simulator.machine.tools.get(1) == ToolOffset(12.4, -3.5, -20.0)
 
 
-# ---- a PLC: whoever commands owns the mailbox
+# ---- a PLC: the client that commands owns the mailbox
 
 
 @in_both_ways
@@ -217,7 +217,7 @@ def test_a_person_at_the_other_laptop_may_take_a_plc_and_the_first_is_refused(pl
 
 
 def test_who_speaks_the_mailbox_himself_can_pretend_to_be_the_owner_and_is_found_out(plc):
-    """Nothing on a field bus proves who asks: the page says so."""
+    """Nothing on a field bus proves a client's identity: the page says so."""
     simulator, url, _ = plc
     with robolink.connect(url) as mine:
         assert isinstance(mine, SoftMotionController)

@@ -1,7 +1,7 @@
-"""What a command that was disturbed says about the controller is what stands there.
+"""The messages of a disturbed command about the controller are true.
 
-By default a sample of each run is disturbed. ``make soak`` takes every exchange and every
-durable transaction; ``pytest -s`` shows how many, and how they ended.
+By default a sample of each run is disturbed. ``make soak`` uses every exchange and every durable
+transaction; ``pytest -s`` shows how many, and how they ended.
 """
 
 import re
@@ -21,7 +21,7 @@ from tests.faults._what_stands import (
 
 _DECIDES = re.compile(r'\$Execute,"(Tool \d|TLSet \d, XY)|write_command (SELECT|WRITE_T)')
 _SAMPLE = 5
-"""Exchanges of a long run that are disturbed."""
+"""The number of disturbed exchanges in a long run."""
 
 
 def disturbed_and_checked(
@@ -54,7 +54,7 @@ def test_a_tool_set_says_what_stands_whatever_goes_wrong(tmp_path, name):
 def test_a_recalibration_says_what_stands_wherever_it_is_disturbed(tmp_path, name):
     command = COMMANDS[name]
     requests, commits = whole_run(command, tmp_path)
-    # The last write of a tool, the turns about the new tip after it, and the way back.
+    # The last write of a tool, the turns about the new tip after it, and the roll-back.
     decisive = [n for n, request in enumerate(requests) if _DECIDES.match(request)]
     spread = range(decisive[-2], len(requests), (len(requests) - decisive[-2]) // 4)
     at = sorted({decisive[0], *(n + 1 for n in decisive[-3:]), *spread})[:_SAMPLE]
@@ -72,6 +72,6 @@ def test_what_stands_is_said_at_every_exchange_and_commit(tmp_path, name, how):
     requests, commits = whole_run(command, tmp_path)
     count = len(requests) if how in WIRE else commits
     runs = [Disturbed(how, number) for number in range(count)]
-    # A snapshot of a PLC has a checksum: one that was bent is read again, and nothing is lost.
+    # A snapshot of a PLC has a checksum: an altered one is read again, and nothing is lost.
     mended = name.startswith("PLC") and str(how).endswith("GARBLE_REPLY")
     disturbed_and_checked(name, command, runs, tmp_path, mended=mended)

@@ -1,6 +1,6 @@
-"""A write that is acknowledged and not done, and one to a tool that is not the one in force.
+"""A write that is acknowledged but not done, and a write to a tool that is not selected.
 
-Neither may be followed by a movement: rows F43 and F44 of the catalogue.
+No movement may follow either of them: rows F43 and F44 of the catalogue.
 """
 
 from dataclasses import replace
@@ -51,7 +51,7 @@ def test_f43_a_plc_that_says_done_and_keeps_the_old_value_is_not_believed():
 
         def forget(number: int, tool: Any, name: str) -> None:
             lied.append(number)
-            if len(lied) > 1:  # what puts the old value back is done
+            if len(lied) > 1:  # the write that restores the old value is carried out
                 define(number, tool, name)
 
         memory.define = forget  # type: ignore[method-assign]
@@ -83,7 +83,7 @@ def test_f44_a_movement_in_another_tool_than_the_one_in_force_is_refused_on_epso
                 group.move_to(target, slow, box=ANYWHERE)
             assert refusal.value.reason is NotReadyReason.WRONG_TOOL
         assert machine.arm.moves_started == began
-        assert machine.tools.selected == 2  # nor is it changed behind anybody's back
+        assert machine.tools.selected == 2  # nor is it changed unnoticed
 
 
 @pytest.mark.fault("F44")
@@ -103,7 +103,7 @@ def test_f44_a_movement_in_another_tool_than_the_one_in_force_is_refused_on_a_pl
 @pytest.mark.fault("F44")
 @pytest.mark.parametrize("slot", [0, 1])
 def test_f44_a_tool_that_the_machine_sets_behind_the_slot_is_not_moved_by(slot):
-    """The slot reads as selected; the axis group works with something else."""
+    """The slot reads as selected; the axis group uses another one."""
     with served("modbus-tcp") as cell, cell.connect() as controller:
         controller.tools.select(slot)
         group = controller.groups[0]
@@ -113,7 +113,7 @@ def test_f44_a_tool_that_the_machine_sets_behind_the_slot_is_not_moved_by(slot):
             group.move_to(above(here, 1.0), QUICK, box=ANYWHERE)
         assert refusal.value.reason is NotReadyReason.WRONG_TOOL
         assert cell.movements_started == 0
-        # What is said to be selected already is selected again, and then it is so.
+        # A tool reported as already selected is selected again, and then it is.
         controller.tools.select(slot)
         assert group.pose().coordinates() == pytest.approx(here.coordinates(), abs=1e-6)
         group.move_to(above(here, 1.0), QUICK, box=ANYWHERE).wait(timeout_s=10)

@@ -1,7 +1,7 @@
-"""Valid input, changed in a few places: what random input almost never gets past the door.
+"""Valid input with a few changes, because random input is almost always refused at once.
 
 In the suite each statement is tried on the same few examples every time; ``make soak`` tries it on
-other ones each time, many more.
+many new ones each time.
 """
 
 import struct
@@ -41,7 +41,7 @@ def fuzzed(few: int, many: int, **drawn: st.SearchStrategy[Any]) -> Decorator:
                 suppress_health_check=list(HealthCheck),
             )(given(**drawn)(once))()
 
-        # Not functools.wraps: pytest would ask for fixtures called as the values that are drawn.
+        # Not functools.wraps: pytest would look for fixtures with the names of the drawn values.
         run.__name__, run.__doc__, run.__module__ = test.__name__, test.__doc__, test.__module__
         return run
 
@@ -63,7 +63,7 @@ def edited_words(draw: st.DrawFn, valid: tuple[int, ...]) -> list[int]:
 
 
 def sealed(words: list[int], crc_at: int) -> tuple[int, ...]:
-    """Return a block with its checksum made right again, and its end equal to its beginning."""
+    """Return a block with a correct checksum, and its end equal to its beginning."""
     sealed_words = list(words)
     sealed_words[crc_at] = crc16(sealed_words[:crc_at])
     sealed_words[-1] = sealed_words[0]
@@ -72,7 +72,7 @@ def sealed(words: list[int], crc_at: int) -> tuple[int, ...]:
 
 @st.composite
 def edited_bytes(draw: st.DrawFn, valid: bytes) -> bytes:
-    """Return bytes with up to five changed, left out, doubled or put in."""
+    """Return bytes with up to five changed, left out, doubled or inserted."""
     data = bytearray(valid)
     for _ in range(draw(st.integers(1, 5))):
         at = draw(st.integers(0, len(data)))

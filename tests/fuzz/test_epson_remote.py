@@ -1,4 +1,4 @@
-"""EPSON remote control, with requests and answers that are nearly right."""
+"""EPSON remote control with nearly valid requests and answers."""
 
 import math
 import re
@@ -68,7 +68,7 @@ PARSERS = (
 
 
 def events_of(codec, data):
-    """Return what a codec makes of bytes and the end of the stream, up to its refusal."""
+    """Return a codec's events for bytes and the end of the stream, up to its refusal."""
     found = []
     with suppress(RemoteProtocolError):
         codec.receive_data(data)
@@ -107,7 +107,7 @@ def test_what_is_printed_is_read_or_refused(data, parse):
 
 
 class Listener(Client):
-    """Hears any byte."""
+    """Accepts any byte."""
 
     def heard(self):
         return self.link.outgoing().decode("latin-1").removesuffix("\n").removesuffix("\r")
@@ -148,7 +148,7 @@ def test_a_controller_answers_or_hangs_up_whatever_it_is_asked(data):
 
 
 class Distorting(InProcessTransport):
-    """Changes what comes from the controller, from the nth piece on."""
+    """Alters the controller's output from the nth piece on."""
 
     def __init__(self, simulator, clock):
         super().__init__(parse_url("epson+sim://fuzz"), simulator, clock, simulator.lock)
@@ -206,7 +206,7 @@ LONG = "7" * 5000
 
 @pytest.mark.parametrize("text", [*PRINTED, "00100000001,4002"])
 def test_a_number_of_thousands_of_digits_is_no_number(text):
-    """Python refuses to read one, with an error that is none of ours."""
+    """Python refuses to read one, with an error that is not ours."""
     for digits in re.finditer(r"\d+", text):
         longer = text[: digits.start()] + LONG + text[digits.end() :]
         for parse in PARSERS:

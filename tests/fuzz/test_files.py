@@ -1,4 +1,4 @@
-"""Files that are nearly right: read as they are written, or refused by a ConfigError."""
+"""Nearly valid files are read as written, or refused with a ConfigError."""
 
 import json
 from contextlib import suppress
@@ -122,12 +122,12 @@ READERS = {
 
 @pytest.fixture(autouse=True, scope="module")
 def folder(tmp_path_factory):
-    """Where each example is written; one file, since there are thousands of them."""
+    """The folder for the examples; one file, since there are thousands of them."""
     Folder.path = tmp_path_factory.mktemp("fuzz")
 
 
 class Folder:
-    """Set by the fixture; hypothesis hands none to what it calls."""
+    """Set by the fixture; hypothesis passes no fixtures to the functions it calls."""
 
     path: Path
 
@@ -151,7 +151,7 @@ def test_a_file_that_is_nearly_right_is_read_or_refused(tried):
     kind, content = tried
     file = Folder.path / "tried"
     file.write_bytes(content)
-    # Its words may stand in the error as they are: what is shown is escaped at the console's door.
-    # A pose that is not finite is refused as the solvers refuse it.
+    # Its words may be in the error unchanged: output to the console is escaped. A pose that is not
+    # finite is refused as the solvers refuse it.
     with suppress(ConfigError, CalibrationError):
         READERS[kind][0](file)

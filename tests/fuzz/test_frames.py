@@ -1,4 +1,4 @@
-"""Lines and frames that are nearly right: call-back, RS232, Modbus and CANopen."""
+"""Nearly valid lines and frames: call-back, RS232, Modbus and CANopen."""
 
 from contextlib import suppress
 from typing import Any
@@ -29,7 +29,7 @@ from robolink.transport.modbus.frames import Area, FrameError, ModbusRequest, Rt
 from tests.fuzz._mutating import BYTES, edited_bytes, fuzzed
 from tests.unit._scripted_can import IDENTITY, NODE, SDO_ANSWER, SDO_ASK, FakeClock, ScriptedBus
 
-# Lines of the call-back and frames of RS232 that are nearly right, their check sums made right.
+# Nearly valid lines of the call-back and frames of RS232, with correct checksums.
 
 LIMITS = CallbackLimits(tolerance_mm=0.1, max_change_mm=2.0, sigma_mm=0.01)
 OFFSET = ToolOffset(12.0, -3.5, -20.0)
@@ -47,7 +47,7 @@ LINES = (
 
 @st.composite
 def edited_lines(draw: st.DrawFn, line: CallbackLine) -> bytes:
-    """Return a line with some characters changed and its check sum right."""
+    """Return a line with some characters changed and a correct checksum."""
     body = encode_line(line)[:-2].rpartition(b"*")[0]
     text = draw(edited_bytes(body)).decode("latin-1")
     return f"{text}*{check_sum(text):X}".encode("latin-1")
@@ -57,11 +57,11 @@ def edited_lines(draw: st.DrawFn, line: CallbackLine) -> bytes:
 def test_a_line_of_the_call_back_is_read_or_refused(data):
     with suppress(RemoteProtocolError):
         line = decode_line(data)
-        assert encode_line(line)[:-2] == data  # nothing that is read can be written otherwise
+        assert encode_line(line)[:-2] == data  # no event that was read can be written otherwise
 
 
 def test_the_seeds_are_right():
-    """Else every statement here would hold of refusals alone."""
+    """Otherwise every test here would only test refusals."""
     conversation = CallbackConversation(memory_journal("seeds"), LIMITS, peer="127.0.0.1")
     words = [conversation.answer(decode_line(encode_line(line)[:-2])).word for line in LINES[:3]]
     conversation.close()
@@ -95,7 +95,7 @@ DIALOGUE = (
 
 
 def on_the_line() -> tuple[tuple[bytes, bytes], ...]:
-    """Return each request and its answer as they stand on the line."""
+    """Return each request and its answer as sent on the line."""
     host, device = (EpsonBinaryCodec(role, DIALECT) for role in (Role.HOST, Role.DEVICE))
     frames = []
     for request, answer in DIALOGUE:
@@ -111,7 +111,7 @@ ASKED, ANSWERED = zip(*on_the_line(), strict=True)
 
 @st.composite
 def edited_frames(draw: st.DrawFn, whole: tuple[bytes, ...]) -> bytes:
-    """Return some frames, changed before their check sums were made; the last may be cut."""
+    """Return some frames, changed before their checksums were computed; the last may be cut."""
     frames = b""
     for frame in draw(st.lists(st.sampled_from(whole), min_size=1, max_size=3)):
         body = draw(edited_bytes(frame[1:-2])) or frame[1:2]
@@ -132,7 +132,7 @@ def test_a_host_at_a_serial_line_reads_a_frame_or_refuses_it(data, cut):
 
 
 def frames_read(role, data, cut):
-    """Return what a codec makes of bytes up to its refusal; in two pieces it is the same."""
+    """Return a codec's events for bytes up to its refusal; in two pieces they are the same."""
 
     def found(*pieces):
         codec, events = EpsonBinaryCodec(role, DIALECT), []
@@ -147,7 +147,7 @@ def frames_read(role, data, cut):
     return found(data)
 
 
-# Modbus frames and CANopen objects that are nearly right, at both ends.
+# Nearly valid Modbus frames and CANopen objects, at both ends.
 
 ASKED_FRAMES = (
     ModbusRequest(1, 3, Area.HOLDING, 100, 20),
@@ -160,7 +160,7 @@ MOST_FRAMES = 400
 
 
 def answered(server, framing, number):
-    """Return the bytes of a request and those of its answer, as they are when all goes well."""
+    """Return the bytes of a request and those of its valid answer."""
     request = framing.pack(ASKED_FRAMES[number], 7)
     server.feed(request)
     taken = server.take()
@@ -183,7 +183,7 @@ def checksum(data):
 
 
 def repaired(frame):
-    """Return a frame of a serial line with its checksum made right again."""
+    """Return a frame of a serial line with a correct checksum."""
     return frame[:-2] + checksum(frame[:-2])
 
 
@@ -226,7 +226,7 @@ def test_a_plc_takes_a_request_from_a_line_or_drops_it(data):
 
 
 class Node:
-    """The SDO server of a node whose objects are zeros; the nth of its frames is another."""
+    """The SDO server of a node whose objects are zeros; its nth frame is altered."""
 
     def __init__(self, nth, other):
         self.nth, self.other, self.count = nth, other, 0

@@ -1,4 +1,4 @@
-"""The mailbox, with blocks that are nearly right and whose checksum is right."""
+"""The mailbox, with nearly valid blocks whose checksum is correct."""
 
 import math
 from contextlib import suppress
@@ -41,7 +41,7 @@ SLOT = encode_slot(Slot(counter=3, defined=True, tool=TOOL, name="nozzle"))
 COMMAND = encode_command(
     Command(5, Opcode.WRITE_TOOL, operands=(3, 0, 0, 0), pose=TOOL, name="n", owner=9), heartbeat=1
 )
-"""Blocks as they are when all goes well."""
+"""Valid blocks."""
 
 
 @fuzzed(10, 20_000, words=edited_words(RESPONSE))
@@ -52,7 +52,7 @@ def test_a_response_is_decoded_or_refused(words):
         except BlockError:
             continue
         again = decode_response(encode_response(response))
-        # By its text, in which even what is no number equals itself.
+        # By its text, in which even a NaN equals itself.
         assert repr(again) == repr(response)
 
 
@@ -82,7 +82,7 @@ def test_a_command_is_decoded_or_refused(words):
 def test_a_device_number_is_decoded_or_refused(words):
     with suppress(BlockError):
         number = decode_device_id(words)
-        # Four words of 0 are those of a program that has no number.
+        # Four words of 0 come from a program without a number.
         assert number is None or 0 < number < 2**32
 
 
@@ -102,18 +102,18 @@ def test_a_plc_stays_sound_whatever_command_it_is_given(data):
         draft = client.command(
             opcode,
             data.draw(st.sampled_from((0, 1, 3, 15, 16, -1))),
-            # One number that no machine has, mostly: whole random words are refused for another.
+            # Usually one impossible number: whole random words are refused for another reason.
             pose=with_one_of(TOOL, data.draw(st.integers(0, 11)), data.draw(LREALS)),
             dynamics=with_one_of(DYNAMICS, data.draw(st.integers(0, 11)), data.draw(LREALS)),
         )
         words = list(encode_command(draft, heartbeat=1))
         if data.draw(st.integers(0, 3)) == 0:
             words = data.draw(edited_words(tuple(words)))
-        words[0] = draft.sequence  # or it would be no command at all
+        words[0] = draft.sequence  # otherwise it would be no command at all
         client.link.write_command(sealed(words, COMMAND_CRC))
         client.wait(data.draw(st.sampled_from((0.0, 0.01, 0.6))))
         check_is_sound(client)
-    # A stop is taken whatever went before, also by another client.
+    # A stop is accepted whatever went before, also from another client.
     stranger = linked(simulator, owner=0xBADCAFE)
     stranger.tell(Opcode.STOP)
     client.wait(2.0)
@@ -121,12 +121,12 @@ def test_a_plc_stays_sound_whatever_command_it_is_given(data):
 
 
 def with_one_of(numbers, at, other):
-    """Return numbers, one of them replaced; none where there is no such place."""
+    """Return numbers with one of them replaced; none if there is no such place."""
     return tuple(other if place == at else number for place, number in enumerate(numbers))
 
 
 def check_is_sound(client):
-    """Check that what the PLC shows can be read, and that no tool is one that it must not take."""
+    """Check that the PLC's output can be read, and that it holds no forbidden tool."""
     now = client.now()
     assert all(map(math.isfinite, (*now.tcp, *now.axes, *now.answer.pose)))
     for number in range(1, 16):
@@ -208,7 +208,7 @@ def test_a_write_is_called_done_only_when_the_slot_holds_it(data):
 
 
 def test_a_command_that_is_nearly_right_does_get_past_the_door():
-    """The seeds of the above are accepted as they are, so that the edits are what is tried."""
+    """The seeds of the above are accepted unchanged, so only the edits are under test."""
     simulator = SoftMotionSimulator()
     client, _ = owning(simulator)
     done = client.done(Opcode.WRITE_TOOL, 3, pose=TOOL, name="n")

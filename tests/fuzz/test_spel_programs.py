@@ -1,4 +1,4 @@
-"""SPEL+ programs that are nearly right: built or refused with a place, and run without surprise."""
+"""Nearly valid SPEL+ programs: built, or refused with a place, and run without surprise."""
 
 import re
 import time
@@ -14,7 +14,7 @@ from robolink_simulators.epson.spel.source_text import ProgramRefused
 from tests.fuzz._mutating import fuzzed
 
 LONGEST_S = 5.0
-"""What one small program may take on a busy machine; in a loop without end it would be minutes."""
+"""The time of a small program on a busy computer; an endless loop would take minutes."""
 
 PROGRAMS = (
     """Global Preserve Real g_offset(15, 5)
@@ -89,7 +89,7 @@ VALUES = st.sampled_from((NUMBERS + " " + NAMES).split(" "))
 
 @st.composite
 def nearly_right(draw):
-    """Return a program with some words changed, left out, moved or said many times."""
+    """Return a program with some words changed, left out, moved or repeated."""
     words = WORDS.findall(draw(st.sampled_from(PROGRAMS)))
     for _ in range(draw(st.integers(1, 4))):
         at = draw(st.integers(0, len(words) - 1))
@@ -121,7 +121,7 @@ def judged(
     files: dict[str, str] | None = None,
     undeclared: Literal["error", "double"] = "error",
 ) -> list[str]:
-    """Build a program, and let it run for a moment; return what is wrong with its text."""
+    """Build a program, and let it run for a moment; return the faults of its text."""
     simulator = EpsonSimulator(serial="SIM00001", options=EpsonOptions(undeclared=undeclared))
     began = time.process_time()
     with TemporaryDirectory() as folder:

@@ -1,4 +1,4 @@
-"""Ten tests of a company that uses robolink, written from its pages alone."""
+"""Ten tests by a company that uses robolink, written from its pages alone."""
 
 import json
 from concurrent.futures import ThreadPoolExecutor
@@ -14,7 +14,7 @@ NEEDLE = ToolOffset(10.0, 0.5, -50.0)
 
 
 def fit_needle(url, tool=2, password=None):
-    """What our line does after a change of needle: write the offset that the setter measured."""
+    """Write the offset that the setter measured, as our line does after a needle change."""
     with robolink.connect(url, password=password) as controller:
         return controller.tools.write(tool, NEEDLE, expected=controller.tools.read(tool))
 

@@ -1,11 +1,11 @@
-"""``python -m tests.mutants``: mutants made by machine, and what kills them.
+"""``python -m tests.mutants``: automatically made mutants, and the tests that kill them.
 
-Mutants are drawn by a seed from every place of the product that can be changed. Each is run against
+Mutants are drawn by a seed from every place of the product that can be changed. Each runs against
 the tests that execute its line, the quickest first, until one fails; if none does, against the
 adversary's two hundred virtual hours. Every judgement is a line of ``build/mutants/results.jsonl``,
-so that it can be gone on with at any time. What survives both has to be gone through by hand:
+so that a run can be continued at any time. Survivors must be reviewed by hand:
 ``tests/mutants/gone_through.toml`` says of each whether it is equivalent, or what finds it now.
-Ends with 1 while one is not in it.
+Ends with 1 while one is missing there.
 """
 
 import argparse
@@ -23,7 +23,7 @@ FOLDER = ROOT / "build" / "mutants"
 
 
 def main() -> int:
-    """Judge what is left of a draw, as long as there is time, and print the table."""
+    """Judge the rest of a draw while there is time, and print the table."""
     parser = argparse.ArgumentParser(prog="python -m tests.mutants")
     parser.add_argument("--seed", type=int, default=32, help="of the draw")
     parser.add_argument("--draw", type=int, default=300, help="how many mutants")

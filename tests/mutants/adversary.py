@@ -1,6 +1,6 @@
-"""``python -m tests.mutants.adversary FOLDER``: records which lines the adversary executes.
+"""``python -m tests.mutants.adversary FOLDER``: record the lines that the adversary executes.
 
-Its histories are the same each time, so a mutant in another line cannot be found by it.
+Its histories are the same each time, so it cannot find a mutant in another line.
 """
 
 import sys
@@ -12,7 +12,7 @@ from tests.mutants.places import PACKAGES, ROOT
 
 
 def main() -> int:
-    """Run the two hundred hours of a mutant with nothing changed; 1 where a rule is broken then."""
+    """Run the two hundred hours without a mutant; 1 if a rule is broken then."""
     folder = Path(sys.argv[1])
     folder.mkdir(parents=True, exist_ok=True)
     seen = coverage.Coverage(

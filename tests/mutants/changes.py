@@ -1,9 +1,9 @@
-"""Where the product's own lines can be changed, and to what: five kinds of small defects.
+"""Possible changes of the product's lines: five kinds of small defects.
 
-Each is what a tired person writes: a comparison that is off by its equal sign or turned round, a
-constant that is off by one, two things in the other order, a condition that is negated, a call that
-is missing. Left out is what says nothing to a machine: docstrings, sentences for people, type
-annotations, ``__repr__``, version numbers, how a data class is made.
+Each is a typical slip: a comparison without its equal sign or reversed, a constant that is off by
+one, two swapped things, a negated condition, a missing call. Text without effect on the program is
+left out: docstrings, sentences for people, type annotations, ``__repr__``, version numbers, the
+arguments of data classes.
 """
 
 import ast
@@ -17,7 +17,7 @@ from typing import Final
 
 
 class Kind(StrEnum):
-    """What is wrong in a mutant."""
+    """The kind of defect in a mutant."""
 
     COMPARISON = "comparison"
     CONSTANT = "constant"
@@ -33,16 +33,16 @@ class Mutant:
     Attributes:
         file: The module, from the root of the tree.
         where: The function or class that it is in, by its qualified name; empty at module level.
-        kind: What is wrong.
-        line: The first line of what is changed.
-        last_line: Its last line.
-        statement: First and last line of the statement that it is part of, without its body.
+        kind: The kind of defect.
+        line: The first changed line.
+        last_line: The last changed line.
+        statement: First and last line of its statement, without the body.
         called: Whether it runs when a function is called, not when the module is imported.
-        begin: Where the changed text begins, in bytes of the file.
-        end: Where it ends.
-        before: What stands there.
-        after: What stands there instead.
-        nth: Which one of those that are alike in ``file``, ``where`` and change.
+        begin: The start of the changed text, in bytes of the file.
+        end: Its end.
+        before: The old text.
+        after: The new text.
+        nth: Its place among those that are alike in ``file``, ``where`` and change.
     """
 
     file: str
@@ -65,7 +65,7 @@ class Mutant:
 
     @property
     def name(self) -> str:
-        """What it is called, also after lines above it were added or taken away."""
+        """Its name, which stays the same when lines above it are added or removed."""
         nth = f" #{self.nth + 1}" if self.nth else ""
         return f"{self.file} {self.where or 'module'}: {self.change}{nth}"
 
@@ -113,10 +113,10 @@ _TURNED: Final[dict[type[ast.cmpop], tuple[str, str]]] = {
 }
 _ORDERED: Final = (ast.Lt, ast.LtE, ast.Gt, ast.GtE)
 _SENTENCES: Final = frozenset({"tr", "declared", "spoken", "joined", "TypeVar", "getLogger"})
-"""What they are given is for people, or a name that nothing looks at."""
+"""Calls whose arguments are for people, or are names without effect."""
 
 _FOR_PEOPLE: Final = frozenset({"help", "short_help", "epilog", "metavar", "remedy", "strict"})
-"""Keywords whose values are for people; and ``strict`` of ``zip``, which asserts only."""
+"""Keywords whose values are for people; and ``strict`` of ``zip``, which only asserts."""
 
 _ALIKE: Final = frozenset(
     [
@@ -145,8 +145,9 @@ _ALIKE: Final = frozenset(
         "escape",
     ]
 )
-"""Functions and methods that return what they are given in another form: one can forget them.
-Without another call a value would be of another type, which says little: it fails at once."""
+"""Functions and methods that return their argument in another form, so that one can forget them.
+Without any other call a value would have another type, which fails at once and shows little.
+"""
 
 _TWINS: Final = tuple(
     frozenset(words.split())
@@ -171,11 +172,11 @@ _TWINS: Final = tuple(
         "a b c",
     )
 )
-"""Words for things that one has two of."""
+"""Words for things that come in pairs."""
 
 
 class _Finder(ast.NodeVisitor):
-    """Goes through a module and keeps what could be changed."""
+    """Walks through a module and keeps the possible changes."""
 
     def __init__(self, file: str, source: bytes) -> None:
         self.found: list[Mutant] = []
@@ -188,7 +189,7 @@ class _Finder(ast.NodeVisitor):
         self._depth = 0
         self._statement = (1, 1)
 
-    # Where we are.
+    # The present place.
 
     def visit(self, node: ast.AST) -> None:
         if isinstance(node, ast.stmt):
@@ -239,15 +240,15 @@ class _Finder(ast.NodeVisitor):
             self.generic_visit(node)
 
     def visit_Import(self, node: ast.Import) -> None:
-        """Nothing is changed in it."""
+        """Skip it: nothing in it is changed."""
 
     def visit_ImportFrom(self, node: ast.ImportFrom) -> None:
-        """Nothing is changed in it."""
+        """Skip it: nothing in it is changed."""
 
     def visit_JoinedStr(self, node: ast.JoinedStr) -> None:
-        """Nothing is changed in it: up to Python 3.11 its parts have no place of their own."""
+        """Skip it: up to Python 3.11 its parts have no positions of their own."""
 
-    # What is changed.
+    # The changes.
 
     def visit_If(self, node: ast.If) -> None:
         if isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
@@ -376,7 +377,7 @@ class _Finder(ast.NodeVisitor):
         if after:
             self._keep(Kind.CONSTANT, node, *self._span(node), after)
 
-    # How it is kept.
+    # Keeping a change.
 
     def _block(self, body: Sequence[ast.stmt]) -> None:
         for first, second in pairwise(body):
@@ -396,7 +397,7 @@ class _Finder(ast.NodeVisitor):
             self._keep(Kind.ORDER, node, begin, end, right + between + left)
 
     def _condition(self, test: ast.expr) -> None:
-        """Keep its negation, unless another kind of change comes to the same."""
+        """Keep the negation, unless another kind of change has the same effect."""
         if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
             return
         if (
@@ -465,7 +466,7 @@ def _head_end(node: ast.expr | ast.stmt) -> int:
 
 
 def _other(value: object) -> str:
-    """Return another constant of the same type, as text; nothing where there is no good one."""
+    """Return another constant of the same type, as text; empty if there is no good one."""
     if isinstance(value, bool):
         return str(not value)
     if isinstance(value, int):
@@ -476,7 +477,7 @@ def _other(value: object) -> str:
 
 
 def _may_be_mixed_up(first: ast.expr, second: ast.expr) -> bool:
-    """Return whether two arguments look alike: twins, or of the same unit or noun."""
+    """Return whether two arguments look alike: a pair, or of the same unit or noun."""
     numbers = [one.value for one in (first, second) if isinstance(one, ast.Constant)]
     if len(numbers) == 2:
         return isinstance(numbers[0], int | float) and isinstance(numbers[1], int | float)
@@ -493,14 +494,14 @@ def _may_be_mixed_up(first: ast.expr, second: ast.expr) -> bool:
 
 
 def _may_swap(first: ast.stmt, second: ast.stmt) -> bool:
-    """Return whether two statements could stand the other way round without a missing name."""
+    """Return whether two statements could be swapped without a missing name."""
     simple = (ast.Expr, ast.Assign, ast.AugAssign, ast.AnnAssign)
     if not (isinstance(first, simple) and isinstance(second, simple)):
         return False
     if not any(isinstance(one, ast.Call) for node in (first, second) for one in ast.walk(node)):
         return False  # nobody sees in which order two plain values were kept
     if all(isinstance(one, ast.Assign) and _is_local(one) for one in (first, second)):
-        return False  # what two locals are given seldom depends on which is first
+        return False  # the values of two locals seldom depend on their order
     if isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant):
         return False
     if isinstance(second, ast.Expr) and isinstance(second.value, ast.Constant):

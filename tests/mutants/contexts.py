@@ -1,9 +1,9 @@
-"""A plug-in of pytest that records which test executes which line, and what each test costs.
+"""A pytest plug-in that records which test executes which line, and the cost of each test.
 
-``pytest -p tests.mutants.contexts`` writes a data file of coverage, each test a context of its own,
+``pytest -p tests.mutants.contexts`` writes a data file of coverage, with a context for each test,
 and a list of costs to the folder that ``ROBOLINK_MUTANTS_LINES`` names, one of each for every
-process that shares the tests. It has to be named on the command line: then it is loaded before the
-fixtures of robolink, and sees what is executed when a module is imported.
+process that shares the tests. It must be named on the command line: then it is loaded before the
+fixtures of robolink, and records the lines executed by imports.
 """
 
 import json
@@ -33,7 +33,7 @@ _coverage.start()
 
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
-    """Give a test, its fixtures included, a context, and note its CPU time."""
+    """Give a test, with its fixtures, a context, and note its CPU time."""
     begun_s = time.process_time()
     _coverage.switch_context(item.nodeid)
     try:
@@ -53,6 +53,6 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
 
 
 def pytest_sessionfinish() -> None:
-    """Write what was seen."""
+    """Write the records."""
     _coverage.stop()
     _coverage.save()

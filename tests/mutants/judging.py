@@ -1,4 +1,4 @@
-"""One mutant after the other in a copy of the tree: its tests first, then the adversary."""
+"""One mutant after another in a copy of the tree: its tests first, then the adversary."""
 
 import json
 import os
@@ -17,29 +17,29 @@ from tests.mutants.lines import Lines
 from tests.mutants.places import ROOT
 
 MOST_CPU_S: Final = 120.0
-"""CPU time that a mutant's tests are given together; as much again is given to the adversary."""
+"""The CPU time of a mutant's tests together; the adversary gets as much again."""
 
 MOST_WALL_S: Final = 1800.0
-"""Time by the clock after which a judgement is given up on a machine that does other things."""
+"""Wall time after which a judgement is given up on a busy computer."""
 
 _FIRST: Final = 12
 _NEXT: Final = 150
-"""How many tests are collected at first and then: most mutants die in the first of them."""
+"""Tests collected at first, and each time after: most mutants die in the first batch."""
 
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What became of a mutant.
+    """The judgement of a mutant.
 
     Attributes:
         by: ``tests``, ``soak``, or ``neither``.
-        how: ``failed``, ``hang`` where it ran out of time, else empty.
+        how: ``failed``, ``hang`` if it ran out of time, else empty.
         what: The test that failed, or the rule that was broken.
-        why: What it said.
+        why: Its message.
         executed: Whether a test executes the line.
-        asked: How many tests were asked.
-        passed: How many of them passed.
-        cpu_s: What it took.
+        asked: The number of tests run.
+        passed: The number that passed.
+        cpu_s: The CPU time.
     """
 
     by: str
@@ -60,7 +60,7 @@ class Copy:
     """A copy of the tree, and a process in it that judges.
 
     Args:
-        folder: Where it is made; what is there is replaced.
+        folder: Its folder; existing files are replaced.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -76,7 +76,7 @@ class Copy:
                 shutil.copy2(ROOT / name, folder / name)
         beside = folder.with_name("shared")
         if not beside.exists() and (ROOT.parent / "shared").exists():
-            beside.symlink_to(ROOT.parent / "shared")  # some tests read what lies beside the tree
+            beside.symlink_to(ROOT.parent / "shared")  # some tests read files beside the tree
         paths = [str(folder), str(folder / "cli"), str(folder / "simulators")]
         home = self._work / "home"
         home.mkdir()
@@ -90,14 +90,14 @@ class Copy:
         )
 
     def close(self) -> None:
-        """End the process; the copy stays, for whoever wants to look."""
+        """End the process; the copy stays for inspection."""
         if self._server.stdin:
             self._server.stdin.close()
         self._server.wait(MOST_WALL_S)
         shutil.rmtree(self._work, ignore_errors=True)
 
     def judge(self, mutant: Mutant, lines: Lines) -> Judgement:
-        """Return what finds a mutant: a test, else the adversary, else nothing."""
+        """Return the finder of a mutant: a test, else the adversary, else nothing."""
         tests = lines.tests_of(mutant)
         asked = lines.affordable(tests)
         by_tests = self._by_tests(mutant, asked)
@@ -152,7 +152,7 @@ class Copy:
         return Judgement(by="neither", asked=len(asked), passed=passed, cpu_s=round(spent_s, 2))
 
     def _is_sound(self, test: str, part: list[str]) -> bool:
-        """Return whether what failed passes without the mutant, after the same tests as then."""
+        """Return whether the failed test passes without the mutant, after the same tests."""
         before = tuple(part[: part.index(test) + 1] if test in part else [test])
         if before not in self._sound:
             told = self._ask("tests", cpu_s=MOST_CPU_S, tests=list(before))
@@ -166,7 +166,7 @@ class Copy:
         self._made += 1
         try:
             path.write_bytes(mutant.applied(sound))
-            # What was compiled is known by size and time in seconds, and both can be as before.
+            # Python compares compiled files by size and time in seconds, and both may be unchanged.
             os.utime(path, (times.st_atime, times.st_mtime + self._made))
             yield
         finally:
@@ -194,7 +194,7 @@ def _function(test: str) -> str:
 
 
 def _files() -> list[str]:
-    """Return what belongs to the tree, and the compiled catalogues, by path from its root."""
+    """Return the files of the tree, and the compiled catalogues, by path from its root."""
     command = ["git", "ls-files", "-co", "--exclude-standard"]
     listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
     made = [path.relative_to(ROOT).as_posix() for path in (ROOT / "robolink").rglob("*.mo")]

@@ -1,9 +1,9 @@
-"""Which tests execute a line, and in which order they are asked.
+"""The tests that execute a line, and their order.
 
-The default suite is run once with coverage, each test a context (:mod:`tests.mutants.contexts`).
-When only tests have changed since, only their files are run again; when the product has, all are.
-What an ambient helper of tests changed is not noticed: a test is run as it is today in any case,
-only which lines it executes is of then.
+The default suite is run once with coverage, each test a context (:mod:`tests.mutants.contexts`). If
+only tests have changed since, only their files are run again; if the product has, all are. Changes
+in shared test helpers are not noticed: tests run as they are today in any case, only the record of
+their lines is older.
 """
 
 import ast
@@ -24,29 +24,31 @@ from tests.mutants.changes import Mutant
 from tests.mutants.places import ROOT, modules, sources
 
 COVERAGE: Final = "coverage==7.17.5"
-"""No other command needs it, so it is no dependency of development."""
+"""No other command needs it, so it is no development dependency."""
 
 FOLDER: Final = "ROBOLINK_MUTANTS_LINES"
-"""The environment variable that tells :mod:`tests.mutants.contexts` where to write."""
+"""The environment variable with the folder for :mod:`tests.mutants.contexts`."""
 
 FEW: Final = 10
-"""Where fewer tests than these execute a line, those that execute its module are asked as well:
-what a process makes once, the first test alone is seen to execute. So they are where a function
-remembers its results."""
+"""If fewer tests than these execute a line, those that execute its module are run as well: an
+object made once per process is recorded for the first test alone. The same applies where a function
+remembers its results.
+"""
 
 MOST_RECORDED_S: Final = 40.0
-"""Tests are taken until they cost so much CPU, coverage included. A mutant is given three times as
-much, so that one that takes longer has made them slower."""
+"""Tests are taken up to this CPU time, coverage included. A mutant gets three times as much, so
+that one that takes longer has made them slower.
+"""
 
 LONGEST_S: Final = 10.0
-"""A test that costs more is not asked."""
+"""A more expensive test is not run."""
 
 
 def record(folder: Path) -> None:
-    """Run the tests of which nobody knows yet what they execute; the first time that is all.
+    """Run the tests without a record; the first time these are all.
 
     Args:
-        folder: Where the record is. Each run adds a folder to it.
+        folder: The folder of the record. Each run adds a folder to it.
     """
     product = sources(ROOT)
     files = [path.relative_to(ROOT).as_posix() for path in (ROOT / "tests").rglob("test_*.py")]
@@ -86,7 +88,7 @@ def record(folder: Path) -> None:
 
 
 def _environment(folder: Path) -> dict[str, str]:
-    """Return an environment with coverage in it, which is installed beside the record."""
+    """Return an environment with coverage, which is installed beside the record."""
     beside = folder / "coverage"
     if not (beside / "coverage").exists():
         pip = [sys.executable, "-m", "pip", "install", "--quiet", "--no-deps", "--target"]
@@ -95,7 +97,7 @@ def _environment(folder: Path) -> dict[str, str]:
 
 
 def _batches(folder: Path) -> list[Path]:
-    """Return the runs of the record that came to their end, the oldest first."""
+    """Return the complete runs of the record, the oldest first."""
     return sorted(path.parent for path in folder.glob("*/tests.json"))
 
 
@@ -104,10 +106,10 @@ def _hash(path: Path) -> str:
 
 
 class Lines:
-    """What was recorded of which test executes what.
+    """The record of lines by test.
 
     Args:
-        folder: Where the batches of the record are, each a folder.
+        folder: The folder of the record's batches, each a folder.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -143,7 +145,7 @@ class Lines:
         return self._executed[file]
 
     def adversary_executes(self, mutant: Mutant) -> bool:
-        """Return whether the adversary comes to a mutant's line at all; its histories are fixed."""
+        """Return whether the adversary reaches a mutant's line at all; its histories are fixed."""
         rows = _rows(self._folder / "adversary" / "lines", ROOT / mutant.file)
         seen = {number for _, numbers in rows for number in _numbers(numbers)}
         first = min(mutant.line, mutant.statement[0])
@@ -166,7 +168,7 @@ class Lines:
                 direct |= whole
             more = whole - direct if len(direct) < FEW else set()
         else:
-            # What a module holds shows where it is used, also in modules that import it.
+            # The contents of a module show where they are used, also in modules that import it.
             direct = whole | {test for test, seen in executed.items() if test and seen & around}
             direct, more = direct | self._of_importers(mutant.file), set()
         return self._ordered(direct, mutant) + self._ordered(more, mutant)
@@ -201,7 +203,7 @@ class Lines:
         return [test for _, _, test in sorted(ranked)]
 
     def affordable(self, tests: list[str]) -> list[str]:
-        """Return the first of them, up to what a mutant is given."""
+        """Return the first tests, up to the limit for a mutant."""
         taken, spent_s = [], 0.0
         for test in tests:
             spent_s += self._costs.get(test, 1.0)
@@ -222,7 +224,7 @@ def _rows(data: Path, module: Path) -> list[tuple[str, bytes]]:
 
 
 def _numbers(numbits: bytes) -> set[int]:
-    """Return the lines that a set of bits stands for (coverage.numbits)."""
+    """Return the lines in a set of bits (coverage.numbits)."""
     return {
         8 * place + bit for place, byte in enumerate(numbits) for bit in range(8) if byte >> bit & 1
     }
@@ -240,7 +242,7 @@ def _lines_of_functions(file: str) -> frozenset[int]:
 
 @cache
 def _remembering(file: str) -> frozenset[str]:
-    """Return the qualified names of functions that are executed once for what they are given."""
+    """Return the qualified names of functions that run once per argument."""
     found: set[str] = set()
 
     def look(node: ast.AST, scope: str) -> None:
@@ -258,7 +260,7 @@ def _remembering(file: str) -> frozenset[str]:
 
 @cache
 def _importers() -> dict[str, set[str]]:
-    """Return for each module those that import something of it, also by way of its package."""
+    """Return, for each module, those that import from it, also by way of its package."""
     files, trees = {}, {}
     for path in modules(ROOT):
         file = path.relative_to(ROOT).as_posix()

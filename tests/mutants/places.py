@@ -10,7 +10,7 @@ from tests.mutants.changes import Mutant, mutants_of
 
 ROOT: Final = Path(__file__).parents[2]
 PACKAGES: Final = ("robolink", "cli/robolink_cli")
-"""The product. The simulators are the judge."""
+"""The product. The simulators are the judges."""
 
 LEFT_OUT: Final = ("robolink/version.py", "robolink/locale/", "robolink/lazy_exports.py")
 
@@ -24,7 +24,7 @@ def modules(root: Path) -> Iterator[Path]:
 
 
 def sources(root: Path) -> str:
-    """Return a short hash over the product's lines; with another one all results are of old."""
+    """Return a short hash over the product's lines; a new hash outdates all results."""
     digest = hashlib.sha256()
     for path in modules(root):
         digest.update(path.relative_to(root).as_posix().encode() + b"\0" + path.read_bytes())
@@ -40,14 +40,14 @@ def mutants(root: Path) -> list[Mutant]:
 
 
 def drawn(root: Path, *, seed: int, count: int) -> list[Mutant]:
-    """Return some of them, in an order of their own, so that the first ones are a sample too.
+    """Return some of them in a random order, so that the first ones are a sample too.
 
-    Each place has the same chance. A line that is added elsewhere changes the lot of no other.
+    Each place has the same chance. A line added elsewhere does not change another's draw.
 
     Args:
         root: The tree.
-        seed: Of the draw.
-        count: How many.
+        seed: The seed of the draw.
+        count: The number of mutants.
     """
 
     def lot(mutant: Mutant) -> bytes:
@@ -64,7 +64,7 @@ def drawn(root: Path, *, seed: int, count: int) -> list[Mutant]:
 
 
 def _compiles(changed: bytes, sound: bytes) -> bool:
-    """Return whether a mutant is Python, and something else than what stood there."""
+    """Return whether a mutant is valid Python, and differs from the original."""
     try:
         return ast.dump(ast.parse(changed)) != ast.dump(ast.parse(sound))
     except SyntaxError:

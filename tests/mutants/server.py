@@ -1,7 +1,8 @@
-"""``python -m tests.mutants.server``, started in a copy of the tree: judges what stands there.
+"""``python -m tests.mutants.server``, started in a copy of the tree: judges that copy.
 
-It imports what is not the product once, and forks for each judgement, so that a judgement begins in
-milliseconds and leaves nothing behind. A line of JSON on its input asks, one on its output answers.
+It imports everything but the product once, and forks for each judgement, so that a judgement begins
+in milliseconds and leaves nothing behind. A line of JSON on its input is a request, one on its
+output the answer.
 """
 
 import contextlib
@@ -35,13 +36,13 @@ _HEAVY: Final = (
     "platformdirs",
 )
 _MEMORY: Final = 8 << 30
-"""Address space of a judgement in bytes; a mutant that never stops appending ends there."""
+"""Address space of a judgement in bytes; a mutant that appends endlessly ends there."""
 
 WAITING_S: Final = 60
-"""What a single test may take by the clock before it counts as hanging."""
+"""Wall time after which a single test counts as hanging."""
 
 _MISSING: Final = re.compile(r"^ERROR: not found: .*?/(tests/\S+)$", re.MULTILINE)
-"""What pytest says of a test that is not there, such as one made from data that are not."""
+"""pytest's message for a missing test, such as one made from missing data."""
 
 Asked = dict[str, Any]
 
@@ -119,7 +120,7 @@ def _in_a_child(asked: Asked, answer: int) -> None:
 
 
 def _judged(asked: Asked) -> Asked:
-    """Fork, wait for the judgement, end whatever is left of it."""
+    """Fork, wait for the judgement, and end any remaining processes."""
     reading, writing = os.pipe()
     begun_s = time.monotonic()
     child = os.fork()

@@ -1,4 +1,4 @@
-"""What was found out, on file, and as the table of docs/reliability.md, "Mutants by machine"."""
+"""The results, on file, and as the table of docs/reliability.md, "Mutants by machine"."""
 
 import hashlib
 import json
@@ -13,13 +13,13 @@ from tests.mutants.places import ROOT
 
 
 class Results:
-    """The judgements of before, and what a person made of the survivors.
+    """Earlier judgements, and the review of the survivors.
 
-    A judgement holds as long as its module has the same text; tests may change meanwhile.
+    A judgement holds while its module has the same text; tests may change meanwhile.
 
     Args:
-        file: Where the judgements are, a line each; of a mutant the first and the last count.
-        by_hand: What was gone through by hand.
+        file: The judgements, one a line; the first and the last of a mutant count.
+        by_hand: The reviewed survivors.
     """
 
     def __init__(self, file: Path, by_hand: Path) -> None:
@@ -50,11 +50,11 @@ class Results:
             file.write(json.dumps(row) + "\n")
 
     def judged(self, mutant: Mutant) -> bool:
-        """Return whether there is a judgement of it as it is now."""
+        """Return whether there is a judgement of its present form."""
         return _key(mutant) in self._rows
 
     def first(self, mutant: Mutant) -> dict[str, Any]:
-        """Return its first judgement, before anybody did something about it."""
+        """Return its first judgement, before any reaction to it."""
         return self._rows[_key(mutant)][0]
 
     def last(self, mutant: Mutant) -> dict[str, Any]:
@@ -66,7 +66,7 @@ class Results:
         return self.judged(mutant) and self.last(mutant)["by"] == "neither"
 
     def verdict(self, mutant: Mutant) -> str:
-        """Return what a person found, empty where nobody has looked."""
+        """Return a person's verdict, empty if nobody has looked."""
         return self._by_hand.get(mutant.name, "")
 
 
@@ -79,8 +79,8 @@ def table(chosen: Sequence[Mutant], results: Results) -> Iterator[str]:
     """Yield the table by kind, and the survivors one by one.
 
     Args:
-        chosen: What was drawn.
-        results: What became of them, as far as they were judged.
+        chosen: The drawn mutants.
+        results: Their results, as far as they were judged.
     """
     judged = [one for one in chosen if results.judged(one)]
     yield f"{len(judged)} of {len(chosen)} drawn were judged."

@@ -1,4 +1,4 @@
-"""Finds sentences of the catalogue that are all but the same: one message, said in two ways.
+"""Finds almost identical sentences of the catalogue: one message in two wordings.
 
 ``python -m tests.packaging._near_copies`` prints the pairs that nobody has reviewed.
 """
@@ -14,12 +14,12 @@ from babel.messages.pofile import read_po
 
 CATALOGUE = Path(__file__).parents[2] / "robolink" / "locale" / "robolink.pot"
 REVIEWED = Path(__file__).with_name("near_copies.txt")
-"""Two sentences and an empty line, again and again: pairs that are meant to differ."""
+"""Pairs that are meant to differ: two sentences and an empty line each."""
 
 SHORTEST = 6
-"""Words; shorter ones are labels, which are alike without saying the same."""
+"""Words; shorter sentences are labels, which may be alike with different meanings."""
 MOST = 2
-"""So many words may be others, more or fewer."""
+"""The number of words that may be changed, added or missing."""
 
 _VALUE = re.compile(r"(?<!{){[^{}]+}")
 
@@ -27,13 +27,13 @@ Pair = tuple[str, str]
 
 
 def sentences() -> list[str]:
-    """Return the sentences of the catalogue, each in one line."""
+    """Return the sentences of the catalogue, each as one line."""
     with CATALOGUE.open("rb") as file:
         return [str(message.id).replace("\n", "\\n") for message in read_po(file) if message.id]
 
 
 def near_copies(said: Iterable[str]) -> Iterator[Pair]:
-    """Yield the pairs that differ in at most two words and fill in the same values."""
+    """Yield the pairs that differ in at most two words and have the same values."""
     groups = defaultdict(list)
     for sentence in said:
         words = sentence.split()
@@ -47,13 +47,13 @@ def near_copies(said: Iterable[str]) -> Iterator[Pair]:
 
 
 def reviewed() -> set[Pair]:
-    """Return the pairs that somebody has read and left as they are."""
+    """Return the pairs that somebody has read and left."""
     blocks = REVIEWED.read_text("utf-8").strip("\n").split("\n\n")
     return {(one, other) for one, other in (block.split("\n") for block in blocks)}
 
 
 def _with_common_words(group):
-    """Yield those that share two words side by side: six words of which two differ always do."""
+    """Yield the pairs that share two neighbouring words, as six words of which two differ do."""
     places = defaultdict(list)
     for number, (_, words) in enumerate(group):
         for two in set(pairwise(words)):
@@ -65,7 +65,7 @@ def _with_common_words(group):
 
 
 def _differing(one, other) -> int:
-    """Return how many words have to be put in, taken out or changed; more than two is three."""
+    """Return the number of words to insert, delete or change; more than two counts as three."""
     line = list(range(len(other) + 1))
     for row, word in enumerate(one, 1):
         line, above = [row], line

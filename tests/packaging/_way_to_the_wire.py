@@ -1,11 +1,11 @@
-"""Which files a tool write, a recipe, a request in the simulator and poses pass through.
+"""The files through which a tool write, a recipe, a request in the simulator and poses pass.
 
-``python -m tests.packaging._way_to_the_wire`` prints them. Counted are files of the three packages
-in which a function is entered, once each, from the call of a function of a given name until the
-request is handed to the socket: that of the tool write, or the first movement of a recipe. In the
-simulator, from the bytes of a tool write until its tool is stored; with poses, from the call of the
-method's ``solve`` until it returns. Not counted: what runs because a module is being imported, and
-class bodies and comprehensions of their own, since nothing is entered there.
+``python -m tests.packaging._way_to_the_wire`` prints them. It counts the files of the three
+packages in which a function is entered, once each, from the call of a function of a given name
+until the request is passed to the socket: that of the tool write, or the first movement of a
+recipe. In the simulator, from the bytes of a tool write until its tool is stored; with poses, from
+the call of the method's ``solve`` until it returns. Not counted: code that runs because a module is
+being imported, and class bodies and comprehensions, since nothing is entered there.
 """
 
 import sys
@@ -26,11 +26,11 @@ _FUNCTION: Final = 1  # CO_OPTIMIZED: the code of a function, not of a module or
 
 @dataclass
 class WayToTheWire:
-    """What was entered on the way, by the function from which it is counted.
+    """The functions entered on the way, by the function at which counting starts.
 
     Attributes:
-        request: What the bytes of the request contain.
-        entered: For each function from which is counted, the files and their functions.
+        request: A part of the request's bytes.
+        entered: For each function at which counting starts, the files and their functions.
         stack: The calls that were open when the request was sent, outermost first, as file and
             function; empty until then.
     """
@@ -42,7 +42,7 @@ class WayToTheWire:
     _importing: FrameType | None = None
 
     def follow(self, act: Callable[[], object]) -> None:
-        """Call ``act``, and look at each call of this thread meanwhile."""
+        """Call ``act``, and record each call of this thread meanwhile."""
         sys.setprofile(self._look)
         try:
             act()
@@ -50,7 +50,7 @@ class WayToTheWire:
             sys.setprofile(None)
 
     def of_the_library(self, name: str) -> set[str]:
-        """Return the files of the library that were entered, from a function on."""
+        """Return the entered files of the library, from a function on."""
         return {file for file in self.entered[name] if file.startswith("robolink/")}
 
     def _look(self, frame: FrameType, event: str, called: object) -> None:
@@ -85,10 +85,10 @@ class WayToTheWire:
 
 @dataclass
 class WayToTheSolver(WayToTheWire):
-    """What was entered while poses were solved, from the method's ``solve`` until it returned.
+    """The functions entered while poses are solved, from the method's ``solve`` until it returns.
 
-    ``stack`` holds the calls that were open where most files were, from :meth:`PointsSource.find`
-    on, in which the poses come to be; ``command`` the same from the command's function on.
+    ``stack`` holds the calls that were open when most files were, from :meth:`PointsSource.find`
+    on, where the poses are made; ``command`` the same from the command's function on.
     """
 
     command: list[tuple[str, str]] = field(default_factory=list)
@@ -116,7 +116,7 @@ class WayToTheSolver(WayToTheWire):
 
 @dataclass
 class WayIntoTheSimulator(WayToTheWire):
-    """What was entered from the bytes of a request until the simulator holds its tool."""
+    """The functions entered from the bytes of a request until the simulator has stored its tool."""
 
     def _sends(self, frame: FrameType) -> bool:
         return False
@@ -145,7 +145,7 @@ def _file_of(frame: FrameType) -> str | None:
 def follow_a_tool_write(url: str) -> WayToTheWire:
     """Write tool 1 from the command line, twice, and follow the second write.
 
-    The first makes the journal and the first backup: what a controller costs once.
+    The first one makes the journal and the first backup, which a controller needs once.
 
     Args:
         url: The controller.
@@ -165,9 +165,9 @@ def follow_a_recipe(url: str, recipe: Path, assist: str) -> WayToTheWire:
     """Change a nozzle by a recipe, and follow it up to the first movement.
 
     Args:
-        url: The controller, an EPSON one. Its robot moves, and it is written.
+        url: The controller, an EPSON one. Its robot moves, and its tool is written.
         recipe: The recipe.
-        assist: Who stands at the cell.
+        assist: The person at the cell.
     """
     from robolink_cli import main
 
@@ -180,7 +180,7 @@ def follow_a_recipe(url: str, recipe: Path, assist: str) -> WayToTheWire:
 def follow_into_the_simulator() -> WayIntoTheSimulator:
     """Hand two tool writes to a simulated EPSON controller, and follow the second.
 
-    With the first it has read a line of this shape: what it does once in a process.
+    With the first it has parsed a line of this shape, which it does once in a process.
     """
     from robolink_simulators.epson.device import EpsonSimulator
 
@@ -203,7 +203,7 @@ def follow_typed_poses(url: str) -> WayToTheSolver:
     """Calibrate tool 1 from two poses on the command line, twice, and follow the second time.
 
     Args:
-        url: The controller. It is written.
+        url: The controller, whose tool is written.
     """
     from robolink_cli import main
 
@@ -218,7 +218,7 @@ def follow_typed_poses(url: str) -> WayToTheSolver:
 
 
 def main() -> None:
-    """Print what a tool write and two poses pass through, with a simulated controller."""
+    """Print the files for a tool write and two poses, with a simulated controller."""
     import os
 
     from robolink_simulators.cell.clock import ScaledClock

@@ -1,4 +1,4 @@
-"""The figures that are published: each by its case, and none from a busy machine."""
+"""Published figures: each from its case, and none from a busy machine."""
 
 import importlib
 import json

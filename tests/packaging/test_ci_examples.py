@@ -1,4 +1,4 @@
-"""What the pages say of pipelines, nights and limits is what runs and holds."""
+"""The pages' statements about pipelines, nights and limits run and hold."""
 
 import importlib.util
 import json
@@ -43,7 +43,7 @@ def one(name):
 
 @pytest.fixture
 def environment(tmp_path):
-    """As in the container, but for ports that are free here."""
+    """The container's environment, with ports that are free here."""
     cells = tmp_path / "cells.toml"
     text = (EXAMPLES / "container.toml").read_text(encoding="utf-8")
     cells.write_text(re.sub(r'"0\.0\.0\.0:\d+"', '"127.0.0.1:0"', text), encoding="utf-8")
@@ -110,7 +110,7 @@ def test_what_the_container_runs_works_in_a_plain_shell(environment):
         served.kill()
 
 
-# ``make nightly``: every part is run, bounded, and told as it ended.
+# ``make nightly``: every part is run, bounded, and reported with its end.
 
 ROOT = Path(__file__).parents[2]
 _SPEC = importlib.util.spec_from_file_location("nightly", ROOT / "tools/nightly.py")

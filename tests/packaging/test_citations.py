@@ -1,4 +1,4 @@
-"""Citations and roles lead to something that is there, and pages stay short."""
+"""Citations and roles lead to existing targets, and pages stay short."""
 
 import ast
 import re
@@ -32,7 +32,7 @@ ROOMS = ("robolink", "cli", "simulators", "companions", "benchmarks", "tests", "
 SUFFIXES = (".py", ".md", ".lark", ".toml", ".st", ".prg")
 
 GAP = r"\s+(?:(?:#|//|\*)\s+)?"
-"""Blanks, or a line break with the sign of a comment behind it."""
+"""Blanks, or a line break followed by a comment sign."""
 
 NUMBER = r"(?:F\d\d|\d{1,2}(?:\.\d{1,2})?)(?![\d/]|\.\d)"
 CITED = re.compile(
@@ -57,7 +57,7 @@ def texts() -> Iterator[tuple[Path, str]]:
 
 
 def slug(heading: str) -> str:
-    """The anchor that GitHub, and the pages that `make docs` builds, make of a heading."""
+    """Return a heading's anchor on GitHub, and on the pages that `make docs` builds."""
     plain = re.sub(r"[`*]|\[([^]]*)\]\([^)]*\)", r"\1", heading)
     return re.sub(r"[^\w\- ]", "", plain.lower()).replace(" ", "-")
 
@@ -74,7 +74,7 @@ def numbers(page: Path) -> set[str]:
 
 
 def pages_of(name: str) -> list[Path]:
-    """What a cited path stands for: itself, or a decision record by its number."""
+    """Return the page of a cited path: the path itself, or a decision record by its number."""
     path = ROOT / name
     return [path] if path.exists() else sorted(path.parent.glob(f"{path.name}-*.md"))
 
@@ -187,10 +187,9 @@ def test_a_citation_that_leads_somewhere_is_followed(text):
     assert not list(wrong_citations(text))
 
 
-# A role of a docstring, such as a function's name to click on, leads to something that is there.
-#
+# A role of a docstring, such as a function's name to click on, leads to an existing target.
 # A short name is looked for where a reader would: in the class and module of the docstring, with
-# what these import, and among what the packages around the module hand out.
+# what these import, and among the names that the packages around the module export.
 
 PACKAGES = ("robolink", "cli/robolink_cli", "simulators/robolink_simulators")
 ROLE = re.compile(r":(?:py:)?(mod|class|func|meth|attr|data|exc|const|obj):`([^`]*)`")
@@ -198,7 +197,7 @@ DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 
 class Role(NamedTuple):
-    """A role in a docstring: where it stands, and what it names."""
+    """A role in a docstring: its place and its target."""
 
     module: str
     owners: tuple[str, ...]
@@ -206,7 +205,7 @@ class Role(NamedTuple):
 
 
 def modules() -> Iterator[tuple[str, ast.Module]]:
-    """Yield every module that has a role, by its dotted name; others would show nothing."""
+    """Yield every module with a role, by its dotted name; others have nothing to check."""
     for package in PACKAGES:
         top = (ROOT / package).parent
         for path in sorted((ROOT / package).rglob("*.py")):
@@ -231,7 +230,7 @@ def texts_with_roles(
 
 
 def targets(text: str) -> Iterator[str]:
-    """Yield what the roles of a docstring name."""
+    """Yield the targets of a docstring's roles."""
     for _, written in ROLE.findall(text):
         named = re.fullmatch(r"[^<]*<([^>]*)>", written)
         target = (named[1] if named else written).strip().lstrip("~!.")
@@ -256,7 +255,7 @@ def imported(tree: ast.Module) -> dict[str, tuple[str, str]]:
 
 
 def followed(thing: Any, names: list[str]) -> bool:
-    """Return whether an attribute's attribute and so on is there, annotated ones included."""
+    """Return whether a chain of attributes exists, annotated ones included."""
     for number, name in enumerate(names):
         if not hasattr(thing, name):
             said = {key for one in getattr(thing, "__mro__", ()) for key in _said(one)}
@@ -266,7 +265,7 @@ def followed(thing: Any, names: list[str]) -> bool:
 
 
 def _said(one: type) -> set[str]:
-    # What __init__ alone gives to an object is an attribute as well where the docstring names it.
+    # An attribute that __init__ alone sets counts as well if the docstring names it.
     text = one.__doc__ or ""
     return {*get_annotations(one), *re.findall(r"^ {4,8}([\w, ]+):", text, re.M)}
 
@@ -283,7 +282,7 @@ def absolute(names: list[str]) -> bool:
 
 
 def leads_somewhere(role: Role, trees: dict[str, ast.Module]) -> bool:
-    """Return whether what a role names is there."""
+    """Return whether a role's target exists."""
     names = role.target.split(".")
     if names[0] in {package.rpartition("/")[2] for package in PACKAGES} or len(names) > 2:
         return absolute(names)
@@ -304,7 +303,7 @@ def leads_somewhere(role: Role, trees: dict[str, ast.Module]) -> bool:
 
 @cache
 def trees() -> dict[str, ast.Module]:
-    """Return these modules; not at import, where each process of the suite would read them all."""
+    """Return these modules; not at import, where each process of the suite would parse them all."""
     return dict(modules())
 
 
@@ -321,14 +320,14 @@ def test_what_a_docstring_names_is_there(package):
 
 
 def without_a_page(text: str, pages: dict[str, dict[str, object]]) -> list[str]:
-    """Return what the roles of a text name by its whole path and no page of the API describes."""
+    """Return the targets with a whole path in a text that no page of the API describes."""
     names = {f"{package}.{name}" for package in pages for name in pages[package]}
     whole = [target for target in targets(text) if target.startswith("robolink")]
     return [one for one in whole if one not in pages and not {one, one.rpartition(".")[0]} & names]
 
 
 def members(thing: object) -> Iterator[object]:
-    """Yield what the page of a class describes with it."""
+    """Yield the members that a class's page describes."""
     if isinstance(thing, type):
         shown = (one for name, one in vars(thing).items() if not name.startswith("_"))
         yield from (one for one in shown if isinstance(one, FunctionType | property))
@@ -375,11 +374,9 @@ def test_a_wrong_name_is_found(module, owners, target, there):
     assert leads_somewhere(Role(module, owners, target), trees()) is there
 
 
-# Nobody reads a house full of paper: how many pages and records there are, and how long two are.
-#
-# The history is in git. A page that would be one too many is joined with the one that its reader
-# has
-# open anyway; so is a decision record with the one on its subject.
+# Nobody reads a house full of paper: the number of pages and records, and the length of two.
+# The history is in git. A page too many is joined with the one that its reader has open anyway; so
+# is a decision record with the one on its subject.
 
 DOCS = ROOT / "docs"
 

@@ -1,4 +1,4 @@
-"""Dependencies: bounds, hashes, and a wheelhouse for a PC that has no network."""
+"""Dependencies: bounds, hashes, and a wheelhouse for a PC without a network."""
 
 import json
 import os
@@ -22,9 +22,8 @@ from tests.versions._beneath import FAILING, REASONS
 from tests.versions._declared import ROOT, lowest, project, pythons, run_time_dependencies, tried
 from tests.versions._runs import runs
 
-# Each run-time dependency has a lowest and a highest version, and these are what was tried.
-#
-# ``make versions`` runs robolink with them and writes what it saw into
+# Each run-time dependency has a lowest and a highest version, and these are the tried ones.
+# ``make versions`` runs robolink with them and writes the results into
 # ``tests/versions/tried.json``.
 
 IMPORT = re.compile(r"^ *(?:from (\w+)[\w.]* import |import (\w+)[\w.]*(?: as \w+)?$)", re.M)
@@ -50,10 +49,10 @@ def test_a_dependency_has_both_bounds_and_what_is_installed_lies_between(require
 
 def test_each_package_that_the_sources_import_is_a_dependency_or_an_extra():
     wanted = {requirement.name.replace("-", "_") for requirement in run_time_dependencies()}
-    # pydantic_core comes with pydantic, each release of which asks for one of its versions.
+    # Each release of pydantic requires one version of pydantic_core.
     packages = {"can": "python_can", "serial": "pyserial", "pydantic_core": "pydantic"}
     ours = {"robolink", "robolink_cli", "robolink_simulators", "pytest", "_typeshed"}
-    # A clone compiles its catalogues with it; what is installed brings them compiled.
+    # A clone compiles its catalogues with it; an installation has them compiled.
     ours.add("babel")
     imported = set()
     for part in ("robolink", "cli/robolink_cli", "simulators/robolink_simulators"):
@@ -102,7 +101,7 @@ def test_with_the_lowest_version_of_each_the_chosen_tests_pass(tmp_path):
     assert " passed" in run.carry_out(tmp_path / "venv")["tests"]
 
 
-# What is installed by hash, what is said of it, and that nothing else slips in.
+# Packages installed by hash, the statements about them, and that nothing else slips in.
 
 LOCKS = ("requirements.lock", "requirements-dev.lock")
 ENTRY = re.compile(
@@ -183,7 +182,7 @@ WHEEL = "robolink_tiny-1.0-py3-none-any.whl"
 
 @pytest.fixture
 def index(tmp_path):
-    """A folder with one wheel, where pip finds nothing else and installs nothing."""
+    """A folder with one wheel, in which pip finds nothing else and installs nothing."""
     about = "Metadata-Version: 2.1\nName: robolink-tiny\nVersion: 1.0\n"
     with zipfile.ZipFile(tmp_path / WHEEL, "w") as wheel:
         wheel.writestr("robolink_tiny-1.0.dist-info/METADATA", about)
@@ -255,7 +254,7 @@ def test_a_lock_for_other_pythons_is_told_and_the_ranges_are_taken(index, python
     assert (done.returncode, "by the ranges" in done.stderr) == (1, False)
 
 
-# ---- what is said of it
+# ---- statements about them
 
 
 @pytest.fixture(scope="module")
@@ -298,7 +297,7 @@ def test_the_licence_of_all_that_runs_is_the_one_that_the_notice_names(said):
         assert "AFFERO" not in text
 
 
-# What ``make wheelhouse`` gathers is enough for a PC that has no network.
+# The wheels that ``make wheelhouse`` gathers are enough for a PC without a network.
 
 TARGETS = {
     "linux": {"sys_platform": "linux", "platform_system": "Linux", "os_name": "posix"},

@@ -1,4 +1,4 @@
-"""Examples of docstrings and commands of the pages run and are those of today."""
+"""Examples of docstrings and commands of the pages run and are up to date."""
 
 import doctest
 import enum
@@ -18,13 +18,10 @@ from babel.messages.pofile import read_po
 from robolink_cli import main
 from robolink_cli.command_map import RENAMED
 
-# What takes three parameters or more says what each is, and shows a use of it that runs.
-#
-# Looked at are functions, methods and constructors that a package hands out. A value (dataclass,
-# enumeration, error) describes its attributes instead; a method that carries out one of a class
-# above
-# it, or of an interface, is described there; a class of which its docstring says by what
-# it is made is not called by anybody else.
+# A callable with three or more parameters says what each is, and shows an example that runs.
+# Functions, methods and constructors that a package exports are checked. A value (dataclass,
+# enumeration, error) describes its attributes instead; a method of an interface or of a class above
+# is described there; a class whose docstring says what makes it is not called by users.
 
 ROOT = Path(__file__).parents[2]
 TOPS = {
@@ -39,13 +36,13 @@ HELD = sorted(
         for path in folder.rglob("__init__.py")
     }
 )
-"""Packages whose callables are held to it: all of the library, and all of the simulators."""
+"""Packages whose callables are checked: all of the library, and all of the simulators."""
 
 MANY = 3
 
 
 def handed_out(package: str) -> Iterator[tuple[str, Any]]:
-    """Yield the names that a package lists, and what they are."""
+    """Yield a package's exported names with their objects."""
     module = importlib.import_module(package)
     for name in getattr(module, "__all__", ()):
         yield name, getattr(module, name)
@@ -57,11 +54,11 @@ INTERFACES = [
     for _, value in handed_out(package)
     if inspect.isclass(value) and getattr(value, "_is_protocol", False)
 ]
-"""What controllers and their parts, methods and lines carry out, and where it is described."""
+"""The interfaces of controllers and their parts, methods and lines, which have the descriptions."""
 
 
 def parameters(called: Any) -> list[str]:
-    """Return the names of what is given to a callable."""
+    """Return the names of a callable's parameters."""
     return [name for name in inspect.signature(called).parameters if name not in ("self", "cls")]
 
 
@@ -72,7 +69,7 @@ def is_value(kind: type) -> bool:
 
 
 def callables(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """Yield what is called of one name: itself, or its constructor and methods."""
+    """Yield the callables of one name: itself, or its constructor and methods."""
     if inspect.isfunction(value):
         yield name, value
     if not inspect.isclass(value):
@@ -91,7 +88,7 @@ def callables(name: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 
 def same(one: Any, other: Any) -> bool:
-    """Return whether two methods take the same."""
+    """Return whether two methods have the same parameters."""
     return inspect.isfunction(other) and parameters(one) == parameters(other)
 
 
@@ -118,7 +115,7 @@ def test_what_takes_many_parameters_says_what_each_is_and_shows_a_use(package):
 
 
 def modules() -> Iterator[str]:
-    """Yield the modules that hold an example."""
+    """Yield the modules with an example."""
     for top, folder in TOPS.items():
         for path in sorted(folder.rglob("*.py")):
             if ">>> " in path.read_text(encoding="utf-8"):
@@ -130,7 +127,7 @@ def test_every_example_of_a_docstring_runs(tmp_path, monkeypatch):
     finder = doctest.DocTestFinder(exclude_empty=True)
     runner = doctest.DocTestRunner(verbose=False)
     shown: list[str] = []
-    # Else each docstring has every file looked at that was ever read for a traceback.
+    # Otherwise each docstring makes Python check every file ever read for a traceback.
     monkeypatch.setattr(linecache, "checkcache", lambda *_: None)
     for module in modules():
         for number, test in enumerate(finder.find(importlib.import_module(module), globs={})):
@@ -143,10 +140,9 @@ def test_every_example_of_a_docstring_runs(tmp_path, monkeypatch):
     assert runner.tries > 1_000
 
 
-# Every command of README and of the pages is one of today, and takes what is typed after it.
-#
-# Nothing is carried out here: names, options and numbers of arguments are those of the command.
-# ``tests/contract/test_pages_typed.py`` types whole parts of pages.
+# Every command of README and of the pages exists, and accepts its typed arguments.
+# Nothing is carried out here: only names, options and numbers of arguments are checked.
+# ``tests/contract/test_pages_typed.py`` runs whole parts of pages.
 
 PAGES = [
     *(ROOT / name for name in ("README.md", "README.zh.md", "SECURITY.md")),
@@ -159,11 +155,11 @@ LINE = re.compile(r"^(?: {4,}|\$ | *)\$? ?(robolink .+)$")
 FENCE = re.compile(r"^ *```")
 CUT = re.compile(r"\s+(?:[#|>&;]|2>).*$|\s{3,}\S.*$|\s+\.\.\.?$")
 LEAST = 300
-"""So many commands there are at least; fewer, and this reads the pages wrongly."""
+"""The least number of commands; with fewer, the pages were parsed wrongly."""
 
 
 def blocks(text: str) -> Iterator[str]:
-    """Yield the lines of fenced and indented blocks, with those that go on joined."""
+    """Yield the lines of fenced and indented blocks, with continued lines joined."""
     inside = False
     for line in text.replace("\\\n", " ").splitlines():
         if FENCE.match(line):
@@ -173,7 +169,7 @@ def blocks(text: str) -> Iterator[str]:
 
 
 def commands(page: Path) -> list[str]:
-    """Return what a page tells to type, as it is typed, without what the shell does with it."""
+    """Return the commands of a page as typed, without the shell's part."""
     text = page.read_text(encoding="utf-8")
     found = [match[1] for line in blocks(text) if (match := LINE.match(line))]
     fenced = re.sub(r"^ *```.*?^ *```", "", text, flags=re.M | re.S)
@@ -182,7 +178,7 @@ def commands(page: Path) -> list[str]:
 
 
 def problem(line: str) -> str | None:
-    """Return what is wrong with a command, ``None`` when the command line would take it."""
+    """Return the fault of a command, ``None`` if the command line accepts it."""
     words = shlex.split(line.replace("[", "").replace("]", ""))[1:]
     command: click.Command = main.cli
     context = click.Context(command, info_name="robolink")
@@ -237,7 +233,7 @@ def test_a_command_that_cannot_be_typed_is_told(line, why):
 
 
 def test_the_sentences_of_troubleshooting_are_those_of_the_screen():
-    """Each quoted sentence stands in the catalogue; ``...`` stands for what is filled in."""
+    """Each quoted sentence is in the catalogue; ``...`` stands for a filled-in value."""
     page = (ROOT / "docs" / "stopping.md").read_text(encoding="utf-8")
     page = page.partition("\n## Troubleshooting: ")[2]
     quoted = re.findall(r'^\| "(.+?)" \|', page, re.M)

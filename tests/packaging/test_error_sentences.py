@@ -1,7 +1,7 @@
-"""Every error that is raised, in the sources: three lines at its likely fill, and what to do.
+"""Every error raised in the sources: three lines with likely values, and what to do.
 
-``tests/cli/test_wrong_commands.py`` holds the answers to wrong commands; this holds all others, as
-far as their sentences stand where they are raised.
+``tests/cli/test_wrong_commands.py`` checks the answers to wrong commands; this module checks all
+others whose sentences are written where they are raised.
 """
 
 import ast
@@ -50,16 +50,16 @@ LIKELY = {
     "when": "2026-11-29 14:58 (UTC+1)",
     "why": "the disk is full",
 }
-"""What fills a sentence, as long as it is likely to be; all else is a name or a number."""
+"""Values of a likely length; all others are a name or a number."""
 
 OF_VARIABLES = "{request} was accepted, but reads back as {found!r}, not {requested!r}."
-"""Its values are those of a variable, never a whole offset."""
+"""The sentence about a variable, whose values are never a whole offset."""
 
 OF_CELLS = "Cell {cell} needs robot {expected}; at {url} there is {found}."
-"""Its values are models of robots."""
+"""The sentence about a cell, whose values are robot models."""
 
 TOLD_TO_PROGRAMS = ("robolink/serving/", "robolink/protocols/", "robolink/testing/")
-"""What is raised there is a line for a robot program, or a report: nobody reads what to do."""
+"""Errors raised here become a line for a robot program, or a report: nobody reads what to do."""
 
 SAID_ELSEWHERE = {
     "LeaseHeldError at robolink/controllers/softmotion/ownership.py",  # set when it is known
@@ -68,7 +68,7 @@ SAID_ELSEWHERE = {
 
 
 def sentence(node):
-    """Return the sentence that an expression is; ``None`` where it is not written there."""
+    """Return the sentence of an expression; ``None`` if it is not written there."""
     if not isinstance(node, ast.Call):
         return node.value if isinstance(node, ast.Constant) else None
     name = getattr(node.func, "id", "")
@@ -96,7 +96,7 @@ def filled(text):
 
 @pytest.fixture(scope="module")
 def raised():
-    """All calls that make an error: where, its kind, what happened, what to do."""
+    """Return all calls that make an error: place, class, what happened, what to do."""
     found = []
     for folder in SHIPPED:
         for path in sorted((ROOT / folder).rglob("*.py")):

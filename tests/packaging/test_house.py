@@ -1,4 +1,4 @@
-"""The house: rooms and names that a newcomer can take in, ways that do not grow unnoticed."""
+"""The house: manageable folders and names, and call paths that do not grow unnoticed."""
 
 import ast
 import importlib
@@ -17,15 +17,16 @@ from tests.packaging._way_to_the_wire import (
 )
 from tools import api, house
 
-# The house: rooms that can be taken in at a look, and one thing under one name.
+# The house: folders that are understood at a glance, and one thing under one name.
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("robolink", "cli/robolink_cli", "simulators/robolink_simulators")
 MOST_MODULES = 16
 """Fewer folders are easier to find one's way in than shorter ones: a subject is split when it is
-two, not when it is long."""
+two, not when it is long.
+"""
 MOST_LINES = 500
-"""Of a module that stays one idea; most are far shorter."""
+"""The most lines of a module; most are far shorter."""
 IMPORT = re.compile(r"^from (robolink[\w.]*) import (\([^)]*\)|[\w, ]+)", re.MULTILINE)
 CLASS = re.compile(r"^class ([A-Za-z]\w*)", re.MULTILINE)
 
@@ -88,7 +89,7 @@ def test_whoever_gave_something_wrong_is_told_what_to_do_next():
 
 
 MOST_GROWTH = 1.02
-"""So much more than docs/contributing.md shows goes by; beyond it the page is written anew."""
+"""A growth by this much over docs/contributing.md is accepted; beyond it the page is rewritten."""
 
 
 @pytest.fixture(scope="module")
@@ -141,10 +142,10 @@ class Thing:
     assert (one.code, sorted(one.lengths)) == (9, [1, 10])
 
 
-# What is public: one place to import each name from, shown by ``dir`` and on docs/api.md.
+# The public names: one place to import each from, shown by ``dir`` and on docs/api.md.
 
 PLAIN = (int, float, str, bool)
-"""Two constants with one value are not one thing."""
+"""Two constants of equal value may mean different things."""
 
 
 @pytest.fixture(scope="module")
@@ -175,7 +176,7 @@ def test_what_the_front_door_offers_comes_from_one_package_beneath(public):
 
 
 def inits():
-    """Yield each package with what its ``__init__`` says."""
+    """Yield each package with the text of its ``__init__``."""
     for top in ("robolink", "simulators/robolink_simulators"):
         for path in sorted((ROOT / top).rglob("__init__.py")):
             parts = path.parent.relative_to((ROOT / top).parent).parts
@@ -204,7 +205,7 @@ def test_the_list_for_readers_is_the_list_of_the_program(package):
 
 
 def test_no_other_package_hands_out_what_it_does_not_list():
-    """``from x import a as a`` is how the type checker alone is told."""
+    """``from x import a as a`` is how only the type checker is told."""
     for package, source in inits():
         if package in LAZY:
             continue
@@ -239,8 +240,7 @@ def test_what_pages_and_examples_import_is_public(public):
     assert strange == []
 
 
-# The ways of a tool write to the wire, and of poses to the solver, grow no longer unnoticed.
-#
+# The call paths of a tool write to the wire, and of poses to the solver, do not grow unnoticed.
 # docs/decisions/0023-how-short-the-way-of-a-tool-write-is.md says what the figures mean.
 
 MOST_FILES = {"set_tool": 84, "change_tools": 45}

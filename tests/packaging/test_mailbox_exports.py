@@ -1,4 +1,4 @@
-"""What is shipped for a PLC is what the schema says, and other programs can read it."""
+"""The files shipped for a PLC match the schema, and other programs can read them."""
 
 import csv
 import io

@@ -1,4 +1,4 @@
-"""Every page says at its top for whom it is and what it is, and is no longer than that allows.
+"""Every page names its readers and its kind at the top, and keeps the length for its kind.
 
 Line 1 is the title, line 3 names readers and kind: ``*For technicians. How-to.*``. The page that
 lists the others, docs/README.md, has a part for each reader.
@@ -31,14 +31,14 @@ LISTED = re.compile(r"\]\((?P<page>[\w.-]+\.md)(?:#[\w-]+)?\)")
 
 
 class Head(NamedTuple):
-    """What the top of a page says of it."""
+    """The statements at the top of a page."""
 
     readers: frozenset[str]
     kind: str
 
 
 def head(text: str) -> Head | None:
-    """Return what a page says of itself; None where it does not say so, or elsewhere."""
+    """Return the statements of a page; None if there are none, or at another place."""
     title, blank, line, after, *_ = [*text.splitlines(), *[""] * 4]
     if not title.startswith("# ") or blank or after:
         return None
@@ -50,13 +50,13 @@ def head(text: str) -> Head | None:
 
 
 def words(text: str) -> int:
-    """Count the words that are read through: tables and code are not."""
+    """Count the words to be read through: without tables and code."""
     prose = INDENTED.sub("", TABLE.sub("", FENCED.sub("", text)))
     return len(prose.split())
 
 
 def listed(index: str) -> list[tuple[str, str]]:
-    """Return each page that the index lists, with the reader under whom it stands."""
+    """Return each page in the index, with the reader under whom it is listed."""
     parts = re.split(r"^## For (\w+)\n", index, flags=re.M)[1:]
     return [
         (found["page"], reader)

@@ -1,4 +1,4 @@
-"""The exported program of the mailbox: read by others, in two profiles, as text and as XML."""
+"""The exported mailbox program: read by third-party tools, in two profiles, text and XML."""
 
 import csv
 import io
@@ -70,7 +70,7 @@ def plain(text):
 
 
 def declared_names(text):
-    """Return every name that a text declares: of types, blocks, members, variables, codes."""
+    """Return every name declared in a text: types, blocks, members, variables, codes."""
     text = plain(text)
     names = GLOBAL.findall(text)
     for section in re.findall(r"\bVAR(?:_\w+)?\b(.*?)\bEND_VAR\b", text, re.DOTALL):
@@ -224,7 +224,7 @@ KINDS = ("inputVars", "outputVars", "inOutVars")
 
 
 def test_openplc_finds_every_body_as_a_paragraph():
-    """Its first stage, xml2st, looks for the child p of ST and knows the name space 0201 alone."""
+    """Its first stage, xml2st, looks for the child p of ST and accepts only the name space 0201."""
     for profile in ExportProfile:
         usual, other = (
             plc_texts(profile, 0, "Kin_Scara3_Z", schema=schema) for schema in PlcopenSchema
@@ -257,7 +257,7 @@ def test_what_is_known_of_the_error_numbers_is_in_the_program():
 
 
 def test_the_program_looks_at_its_registers_once_a_cycle():
-    """A server of another task may write between two looks: what was checked would not be done."""
+    """A server in another task may write between two readings, after the check."""
     body = plain(program_texts(FULL)["robolink_program.st"]).rpartition("END_VAR")[2]
     assert re.findall(r"\b\w*box := \w+[,;]", body) == [
         "inbox := command,",

@@ -1,4 +1,4 @@
-"""The schema that editors read is the one the loader uses, and the page explains all of it."""
+"""The schema for editors is the one that the loader uses, and the page explains all of it."""
 
 import json
 import re
@@ -42,7 +42,7 @@ def tables(schema):
 
 
 def spelled(value, *, required):
-    """Yield what the page must say about a key: required, its default, its limits."""
+    """Yield the page's required words about a key: required, its default, its limits."""
     if required:
         yield "required"
     for number in (value.get("default"), value.get("minimum"), value.get("maximum")):

@@ -1,4 +1,4 @@
-"""The catalogue of sentences: complete, translated, and none said twice in other words."""
+"""The catalogue of sentences: complete, translated, and without two wordings of one message."""
 
 import io
 import re
@@ -46,7 +46,7 @@ def test_the_catalogue_holds_what_the_sources_say(tmp_path):
     assert fresh.read_text() == CATALOGUE.read_text(), "run: make messages"
 
 
-# Every translation fills in the same values, in a form that a terminal shows straight.
+# Every translation fills in the same values, in a form that a terminal displays correctly.
 
 CHINESE = CATALOGUE.parent / "zh_CN" / "LC_MESSAGES"
 
@@ -54,7 +54,7 @@ AMBIGUOUS = "\u00b1\u00b0\u2192\u2026\u201c\u201d\u2500"
 """One column wide on some consoles and two on others (cp936)."""
 
 OTHER_WORDS = {"刀具": "工具", "标定": "校准", "教导": "示教", "马达": "电机", "重置": "复位"}
-"""A word that is not used, and the one that is: one word for one thing."""
+"""A word that is not used, and its replacement: one word for one thing."""
 
 NAMED = re.compile(r"(?<![\w-])--[a-z][a-z-]+|\b[a-z]+_(?:mm|deg)\b|\$[A-Z]\w+|[\w/]+\.(?:md|toml)")
 """Names of options, keys, statements and files, which are the same in every language."""
@@ -71,7 +71,7 @@ def translated():
 
 
 def values(sentence):
-    """Return the placeholders with their conversions, in no order."""
+    """Return the placeholders with their conversions, unordered."""
     return sorted(part[1:] for part in map(str_part, Formatter().parse(sentence)) if part[1])
 
 
@@ -80,7 +80,7 @@ def str_part(part):
 
 
 def is_filled(sentence):
-    """Return whether ``tr`` fills the sentence in: braces alone are text."""
+    """Return whether ``tr`` fills the sentence in; otherwise braces are text."""
     return re.search(r"(?<!{){[a-z_]\w*[^{}]*}", sentence) is not None
 
 
@@ -106,7 +106,7 @@ def faults(english, chinese):
 
 
 def test_every_sentence_has_a_translation(translated):
-    """``python tools/translations.py --missing`` prints those that have none."""
+    """``python tools/translations.py --missing`` prints the sentences without one."""
     said = dict(translated)
     assert sorted(said) == sorted(one.id for one in entries(CATALOGUE)), "run: make messages"
     assert [english for english, chinese in translated if not chinese] == []
@@ -121,7 +121,7 @@ PLACES = {
     10: ("stays", "motors on", "motors OFF", "power LOW", "power HIGH"),
     20: ("Z+ up", "Z- down", "Turn keys"),
 }
-"""Columns that the wizard's screens leave, and what stands in them."""
+"""Column widths on the wizard's screens, and their texts."""
 
 
 @pytest.mark.parametrize("widest", [(one, most) for most, those in PLACES.items() for one in those])
@@ -197,11 +197,11 @@ def test_what_a_machine_can_be_said_to_be_has_a_word(translated):
     assert [code for code in codes if not said.get(str(code)) and code not in shown_otherwise] == []
 
 
-# One message is one sentence: no two of the catalogue say the same in other words.
+# One message is one sentence: no two in the catalogue say the same in other words.
 
 
 def test_no_sentence_is_all_but_a_copy_of_another():
-    """A pair that is meant to differ goes into ``near_copies.txt``; else one of the two goes."""
+    """A pair that is meant to differ goes into ``near_copies.txt``; else one of them goes."""
     found = set(near_copies(sentences()))
     assert len(found & reviewed()) > 50, "the search finds nothing, or the list is of another day"
     assert sorted(found - reviewed()) == []
@@ -232,13 +232,13 @@ def test_other_values_labels_and_other_sentences_are_none(one, other):
     assert list(near_copies([one, other])) == []
 
 
-# Sentences say ``+-``, which every console has; a page makes the sign of it, at one place.
+# Sentences contain ``+-``, which every console has; one function turns it into the sign on pages.
 
 SHIPPED = ("robolink", "cli", "simulators", "companions", "docs")
 OTHER_WAYS = ("\u00b1", r"\u00b1", "+/-")
 ONE_PLACE = "robolink/report/_markup.py"
 OF_OTHERS = "cli/robolink_cli/console/output.py"
-"""Writes what people typed, or a page says, for a console that lacks the sign."""
+"""Writes other people's text for a console that lacks the sign."""
 
 
 def test_no_source_and_no_page_has_another_way():
@@ -269,7 +269,7 @@ def test_no_translation_has_another_way():
         ),
         ("+-", "\u00b1 "),
         ("可重复至+-0.035 mm", "可重复至\u00b1 0.035 mm"),
-        # What is no half width stays as it was written.
+        # Text that is not a half width stays as written.
         ("needle A+-2", "needle A+-2"),
         ("x+-y", "x+-y"),
     ],

@@ -1,4 +1,4 @@
-"""What is installed is what was meant to be, and an integrator needs nothing else."""
+"""The wheel contains the intended files, and an integrator needs nothing else."""
 
 import configparser
 import gettext
@@ -21,7 +21,7 @@ from robolink_cli.commands.shipped.shipped_files import pages_folder, recipe_sch
 import robolink
 from tools.package_page import package_page, urls
 
-# What is installed is what was meant to be, and nothing else.
+# The installation contains the intended files, and nothing else.
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = {
@@ -206,7 +206,7 @@ def test_ci_runs_what_a_person_runs():
     assert script.read_text().rstrip().endswith("exec make test")
 
 
-# The project of an integrator, outside of this one, against the wheel and nothing else.
+# An integrator's project, outside this one, with the wheel and nothing else.
 
 PROJECT = ROOT / "tests" / "integrator"
 
@@ -232,7 +232,7 @@ def test_the_tests_of_an_integrator_pass_with_the_wheel(tmp_path):
         "--target", str(tmp_path / "installed"), str(wheel))  # fmt: skip
     project = tmp_path / "project"
     shutil.copytree(PROJECT, project)
-    # What robolink needs is taken from here; robolink itself stands before it, from the wheel.
+    # The packages that robolink needs come from here; robolink itself comes first, from the wheel.
     boot = (
         f"import sys; sys.path.insert(0, {str(tmp_path / 'installed')!r});"
         "import robolink, pytest; print('robolink is', robolink.__file__);"

@@ -1,4 +1,4 @@
-"""Where Windows lacks what others have: a chosen part of the suite, and the suite of Windows."""
+"""A chosen part of the suite without the features that Windows lacks, and the suite of Windows."""
 
 import ast
 import os
@@ -12,13 +12,11 @@ import pytest
 
 from tests.windows._windows_python import ROOT, TAKEN_ALONG
 
-# A chosen part of the suite in a Python that lacks what Windows lacks.
-#
-# Source: docs/reference/rules.md 10.
-#
-# What the library, the simulators and the command line use where it exists is taken away before
-# anything of theirs is imported: modules cannot be imported, names are gone. pyserial chooses
-# its own half by the operating system, so ``ports`` and ``doctor`` cannot be run this way.
+# A chosen part of the suite in a Python without the features that Windows lacks.
+# Source: docs/reference/rules.md 10. Optional features that the library, the simulators and the
+# command line use are removed before any of their modules is imported: modules cannot be imported,
+# names are gone. pyserial chooses its own half by the operating system, so ``ports`` and ``doctor``
+# cannot be run this way.
 
 PROGRAM = '''
 import os, select, signal, socket, sys
@@ -68,14 +66,14 @@ CHOSEN = (
 )
 
 LEFT_OUT = (
-    # It takes names away itself.
+    # It removes names itself.
     "tests/unit/test_transport_tcp_failures.py::"
     "test_a_link_works_where_the_platform_lacks_something",
-    # What they start has all of POSIX.
+    # The programs that they start have all of POSIX.
     "tests/unit/test_recipe_files.py::test_pydantic_waits_for_the_first_recipe",
     "tests/cli/test_cli_frame.py::test_looking_at_the_commands_loads_none_of_the_heavy_packages",
     "tests/cli/test_cli_output.py::test_no_console_makes_a_sentence_fail",
-    # Thousands of files that are read alike everywhere.
+    # Thousands of files that are read the same everywhere.
     "tests/unit/test_recipe_files.py::test_whatever_stands_in_a_place_is_accepted_or_told",
 )
 
@@ -133,11 +131,11 @@ def test_transport_safety_record_driver_and_command_line_work_without_posix():
     assert int(passed) > 200
 
 
-# The tests that run under Windows' Python have beside them what every test reads.
+# The tests that run under Windows' Python have the files that every test reads.
 
 
 def of_tests(module):
-    """Yield the modules of the tests that a module imports, and those that these import."""
+    """Yield the test modules that a module imports, and those that these import."""
     tree = ast.parse(Path(module.__file__).read_text(encoding="utf-8"))
     for node in ast.walk(tree):
         name = node.module if isinstance(node, ast.ImportFrom) else None

@@ -16,10 +16,10 @@ _LOOK_S: Final = 0.05
 class CanProxy:
     """Carries frames between the clients' bus and the node's; a context manager.
 
-    What goes wrong goes wrong with the answers of the node's SDO server.
+    The faults occur in the answers of the node's SDO server.
 
     Attributes:
-        frames: SDO requests that a client sent since the fault was chosen.
+        frames: SDO requests sent by a client since the fault was chosen.
 
     Args:
         near: Name of the clients' bus.
@@ -36,7 +36,7 @@ class CanProxy:
         self._waiting: tuple[Begins, Fault] | None = None
         self._late: list[tuple[float, can.Message]] = []
         self._ended = threading.Event()
-        # One a way: a thread for both would wait for the one while the other has come.
+        # One for each direction: a single thread would wait for one bus while the other has frames.
         self._threads = [
             threading.Thread(target=carry, name="faulty bus", daemon=True)
             for carry in (self._carry_requests, self._carry_answers)
@@ -55,12 +55,12 @@ class CanProxy:
         self._far.shutdown()
 
     def arm(self, fault: Fault, begins: Begins = lambda _frame: True) -> None:
-        """Choose what goes wrong, from the first request on for which ``begins`` says so."""
+        """Choose the fault, from the first request on for which ``begins`` returns true."""
         self.frames.clear()
         self._waiting, self._fault = (begins, fault), ""
 
     def put(self, data: bytes) -> None:
-        """Let an old answer of the node stand on the clients' bus (F03)."""
+        """Put an old answer of the node on the clients' bus (F03)."""
         self._near.send(_frame(_ANSWERS + self._node, data))
 
     def _carry_requests(self) -> None:

@@ -1,4 +1,4 @@
-"""Clients of other makers, and ours, asked the same three things: two values, and one write."""
+"""Third-party clients, and ours, with the same three tasks: two values to read, and one write."""
 
 import socket
 from collections.abc import Callable, Iterator
@@ -21,7 +21,7 @@ from tests.peers._can_proxy import CanProxy
 from tests.peers._faulty_proxy import Begins, Fault, SerialProxy, TcpProxy
 
 TIMEOUT_S: Final = 0.5
-"""Given to every client; all else is as it comes."""
+"""Given to every client; all other settings are the defaults."""
 
 _NODE: Final = 5
 _buses = count()
@@ -32,18 +32,18 @@ class Wire(Protocol):
 
     @property
     def frames(self) -> list[Any]:
-        """What the client sent since the fault was chosen."""
+        """The client's frames since the fault was chosen."""
 
     def arm(self, fault: Fault, begins: Begins = ...) -> None:
-        """Choose what goes wrong, and from which request on."""
+        """Choose the fault, and the request at which it begins."""
 
 
 class Peer(Protocol):
     """One client on one proxy.
 
     Attributes:
-        wire: What it talks over.
-        oldest: What an old answer that waits for it looks like, as bytes.
+        wire: Its proxy.
+        oldest: The bytes of an old answer that waits for it.
     """
 
     wire: Wire
@@ -55,7 +55,7 @@ class Peer(Protocol):
         """Read value 1 or 2, which differ."""
 
     def write(self) -> None:
-        """Write something once."""
+        """Write once."""
 
     def is_write(self, frame: bytes) -> bool:
         """Whether a frame carries that write."""
@@ -99,7 +99,7 @@ class NaiveSocket:
 
 
 class Pymodbus:
-    """pymodbus 3 with its defaults but for the time-out."""
+    """pymodbus 3 with its defaults except the time-out."""
 
     stale = bytes([0, 1, 0, 0, 0, 5, 255, 4, 2, 0, 99])
 
@@ -131,7 +131,7 @@ class Pymodbus:
 
 
 class Minimalmodbus:
-    """minimalmodbus 2 on a serial line, with its defaults but for the time-out."""
+    """minimalmodbus 2 on a serial line, with its defaults except the time-out."""
 
     stale = bytes([1, 4, 2, 0, 99, 0xF8, 0xDB])
 
@@ -221,7 +221,7 @@ class Ours:
         elif stale:
             self.wire.prelude = self.stale
         self._controller = robolink.connect(self.url, timeout_s=TIMEOUT_S)
-        # Two writes, so that it owns the mailbox and knows what the tool holds.
+        # Two writes, so that it owns the mailbox and knows the stored tool.
         tools = self._controller.tools
         tools.write(3, ToolOffset(7, 7, 7), expected=tools.read(3))
         tools.write(3, ToolOffset(5, 5, 5), expected=ToolOffset(7, 7, 7))
@@ -261,7 +261,7 @@ PEERS: Final[dict[str, Callable[[ExitStack], Any]]] = {
 
 @contextmanager
 def peer(name: str) -> Iterator[Any]:
-    """Serve a simulator behind a proxy, with one client of that name in front."""
+    """Serve a simulator behind a proxy, with one client of that name before it."""
     with ExitStack() as stack:
         client = PEERS[name](stack)
         try:

@@ -1,4 +1,4 @@
-"""A PLC whose core is what another compiler has made, and whose other texts are interpreted."""
+"""A PLC whose core is compiled by a third-party compiler, with its other texts interpreted."""
 
 import struct
 import subprocess
@@ -17,10 +17,10 @@ from tests.unit.structured_text._behaviours import sources
 
 
 class CompiledCore:
-    """A process that executes the compiled core; started anew with each start of the PLC.
+    """A process that executes the compiled core; restarted with each start of the PLC.
 
     Attributes:
-        calls: How often it was asked.
+        calls: The number of calls.
     """
 
     def __init__(self, program: Path, served: ExitStack) -> None:
@@ -30,7 +30,7 @@ class CompiledCore:
         self.calls = 0
 
     def take_over(self, block: BlockType, which: int) -> None:
-        """Let the compiled block act in the place of the interpreted one."""
+        """Let the compiled block act in place of the interpreted one."""
         found = list(leaves(block))
 
         def run(frame: Frame) -> None:
@@ -64,7 +64,7 @@ class CompiledCore:
 def compiled_plc(
     program: Path, served: ExitStack, cores: list[CompiledCore]
 ) -> Callable[[MachineModel, Mapping[str, float], PlcOptions], StructuredPlc]:
-    """Return what makes a PLC with the compiled core; ``cores`` gets it, for its count of calls."""
+    """Return a maker of PLCs with the compiled core; ``cores`` gets it, for its count of calls."""
 
     def make(model: MachineModel, parameters: Mapping[str, float], options: PlcOptions) -> Any:
         plc = StructuredPlc(model, parameters, options, sources(model.kinematics.name))

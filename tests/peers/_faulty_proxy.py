@@ -1,4 +1,4 @@
-"""A proxy, TCP or serial, on which answers come late, in pieces, or not at all."""
+"""A TCP or serial proxy on which answers come late, in pieces, or not at all."""
 
 import contextlib
 import os
@@ -16,10 +16,10 @@ Fault = Literal["", "F01", "F05", "F11", "F25"]
 F25: requests arrive, answers do not (docs/reference/faults.md)."""
 
 Begins = Callable[[bytes], bool]
-"""Tells by a frame of the client whether things go wrong from it on."""
+"""Returns whether faults begin with a frame of the client."""
 
 LATE_S: Final = 0.8
-"""Later than the time that every client is given (0.5 s)."""
+"""Later than the time-out of every client (0.5 s)."""
 
 _CHUNK: Final = 4096
 
@@ -28,7 +28,7 @@ class FaultyProxy(ABC):
     """Carries bytes both ways; a context manager.
 
     Attributes:
-        frames: What the client sent since the fault was chosen, send by send.
+        frames: The client's sends since the fault was chosen.
         prelude: Bytes of an old answer that wait for the client when it connects (F03).
     """
 
@@ -51,20 +51,20 @@ class FaultyProxy(ABC):
         self._close()
 
     def arm(self, fault: Fault, begins: Begins = lambda _frame: True) -> None:
-        """Choose what goes wrong, from the first request on for which ``begins`` says so."""
+        """Choose the fault, from the first request on for which ``begins`` returns true."""
         self.frames.clear()
         self._waiting, self._fault = (begins, fault), ""
 
     @abstractmethod
     def _serve(self) -> None:
-        """Carry until the end."""
+        """Carry bytes until the end."""
 
     @abstractmethod
     def _close(self) -> None:
-        """Let go of everything."""
+        """Close everything."""
 
     def _carry(self, client: int, server: int) -> None:
-        """Carry between two descriptors until one ends."""
+        """Carry bytes between two descriptors until one ends."""
         self._late.clear()
         os.write(client, self.prelude)
         while not self._ended.is_set():
@@ -95,7 +95,7 @@ class FaultyProxy(ABC):
         elif self._fault == "F05":
             for byte in data:
                 os.write(client, bytes([byte]))
-                time.sleep(0.0005)  # a reader that waits wakes up between two of them
+                time.sleep(0.0005)  # a waiting reader wakes up between two of them
         elif self._fault not in ("F11", "F25"):
             os.write(client, data)
 
@@ -108,10 +108,10 @@ class FaultyProxy(ABC):
 
 
 class TcpProxy(FaultyProxy):
-    """In front of a server on loopback; one client after the other.
+    """A proxy before a server on loopback; one client at a time.
 
     Attributes:
-        port: Where clients connect to.
+        port: The port for clients.
     """
 
     def __init__(self, server_port: int) -> None:
@@ -138,10 +138,10 @@ class TcpProxy(FaultyProxy):
 
 
 class SerialProxy(FaultyProxy):
-    """In front of a serial port.
+    """A proxy before a serial port.
 
     Attributes:
-        port: What clients open.
+        port: The port that clients open.
     """
 
     def __init__(self, server_port: str) -> None:
@@ -153,7 +153,7 @@ class SerialProxy(FaultyProxy):
         tty.setraw(self._server)
 
     def push(self, data: bytes) -> None:
-        """Let bytes of an old answer stand in the client's port (F03)."""
+        """Put bytes of an old answer into the client's port (F03)."""
         os.write(self._client, data)
 
     def _serve(self) -> None:

@@ -1,4 +1,4 @@
-"""MATIEC and STruC++, where they are installed: they make a program of the mailbox's core.
+"""MATIEC and STruC++, if installed: they make a program of the mailbox's core.
 
 The program reads the pins of one call as numbers from its standard input, executes a block of the
 core, and writes the pins to its standard output: that of the interpreter's own memory, so that
@@ -24,11 +24,11 @@ from robolink_simulators.structured_text.data_types import (
 )
 
 BLOCKS: Final = ("RL_MailboxCore", "RL_SlotTable")
-"""What the exported program calls of the core."""
+"""The blocks of the core that the exported program calls."""
 
 _KINDS: Final = ("var_input", "var_output", "var_in_out")
 _HOLDER: Final = "holder"
-"""A variable inside of the core at which the simulated PLC looks."""
+"""A variable inside the core that the simulated PLC reads."""
 _MAIN: Final = "RL_Bench"
 _CXX: Final = ("c++", "-std=c++17", "-O1", "-w")
 _CC: Final = ("cc", "-O1", "-w")
@@ -40,8 +40,8 @@ class Leaf:
 
     Attributes:
         steps: Names of members and places in arrays, the pin's own name first.
-        type: What it is.
-        shift: Of each place in an array: the number of the first one.
+        type: Its type.
+        shift: For each place in an array: the number of the first one.
     """
 
     steps: tuple[str | int, ...]
@@ -88,29 +88,29 @@ def _below(
 
 
 class IecCompiler:
-    """A compiler of another maker.
+    """A third-party compiler.
 
     Attributes:
-        name: Of the compiler.
-        command: What it is called on the command line.
+        name: The compiler's name.
+        command: Its name on the command line.
     """
 
     name: str
     command: str
 
     def missing(self) -> str:
-        """Return what is not on this computer, empty for nothing."""
+        """Return the missing parts on this computer, empty for none."""
         if shutil.which(self.command) is None:
             return f"{self.name} is not on this computer: no {self.command} on the PATH"
         return ""
 
     def compiled(self, core: str, folder: Path) -> Path:
-        """Return a program of the core that stands in ``folder``."""
+        """Return a program of the core in ``folder``."""
         raise NotImplementedError
 
 
 class Matiec(IecCompiler):
-    """beremiz/matiec, to C. ``MATIEC_LIB`` names its folder lib where it is not found."""
+    """beremiz/matiec, to C. ``MATIEC_LIB`` names its folder lib if it is not found."""
 
     name, command = "MATIEC", "iec2c"
 
@@ -136,7 +136,7 @@ class Matiec(IecCompiler):
 
 
 class Strucpp(IecCompiler):
-    """Autonomy-Logic/STruCpp, to C++. ``STRUCPP_RUNTIME`` names its headers where not found."""
+    """Autonomy-Logic/STruCpp, to C++. ``STRUCPP_RUNTIME`` names its headers if not found."""
 
     name, command = "STruC++", "strucpp"
 
@@ -185,7 +185,7 @@ def _blocks(types: Mapping[str, DataType]) -> Sequence[BlockType]:
 
 
 def _bench_text(core: str) -> str:
-    """A program that calls the one block or the other, with a variable for each of its pins."""
+    """Return a program that calls either block, with a variable for each of its pins."""
     types = _types(core)
     declared, branches = ["which : INT;"], []
     for at, block in enumerate(_blocks(types)):
@@ -218,7 +218,7 @@ def _type_name(types: Mapping[str, DataType], of: DataType) -> str:
 
 
 def _harness(core: str, head: str, path: Callable[[int, Leaf], str]) -> str:
-    """The outer loop in C: which block, its numbers, one call, its numbers."""
+    """Return the outer loop in C: which block, its numbers, one call, its numbers."""
     text = [head, "int main(void) {\n  static double n[8192];\n  double which;\n  start();\n"]
     text.append("  while (fread(&which, sizeof which, 1, stdin) == 1) {\n")
     for at, block in enumerate(_blocks(_types(core))):

@@ -22,17 +22,17 @@ _TCP, _TIME_TO_LIVE, _WINDOW = 6, 64, 65535
 _STEP_US: Final = 500
 
 Said = tuple[bool, bytes]
-"""Whether the client sent it, and what."""
+"""Whether the client sent it, and the bytes."""
 
 
 def write_modbus_tcp(path: Path, dialogue: Iterable[Said]) -> None:
-    """Write the one connection in which a Modbus client and a server said this."""
+    """Write the one connection with these messages of a Modbus client and a server."""
     packets = _Connection().packets(dialogue)
     _write(path, _RAW_IP, ((n * _STEP_US, packet) for n, packet in enumerate(packets)))
 
 
 def write_can(path: Path, frames: Iterable[can.Message]) -> None:
-    """Write frames with 11-bit identifiers, with the times at which they were seen."""
+    """Write frames with 11-bit identifiers, with their times."""
     records = (
         (
             round(frame.timestamp * 1e6),

@@ -1,4 +1,4 @@
-"""A relay on loopback that keeps what passes between one client and one server."""
+"""A relay on loopback that keeps the traffic between one client and one server."""
 
 import select
 import socket
@@ -13,8 +13,8 @@ class Relay:
     """Carries one TCP connection; a context manager.
 
     Attributes:
-        port: Where the client connects to.
-        dialogue: What passed, oldest first: whether the client sent it, and the bytes.
+        port: The port for the client.
+        dialogue: The traffic, oldest first: whether the client sent it, and the bytes.
 
     Args:
         server_port: Where the server listens, on loopback.

@@ -1,4 +1,4 @@
-"""Runs tshark over a capture of a written tool; what both buses are judged by."""
+"""Runs tshark over a capture of a tool write, for the judges of both buses."""
 
 import subprocess
 from collections.abc import Iterable, Sequence
@@ -42,12 +42,12 @@ def dissected(
 
 
 def summaries(capture: Path, *, where: str = "frame", options: Sequence[str] = ()) -> list[str]:
-    """Return the lines that tshark shows for the frames that match."""
+    """Return the lines that tshark prints for the frames that match."""
     return _tshark(capture, *options, "-Y", where)
 
 
 def complaints(capture: Path, *, options: Sequence[str] = ()) -> list[str]:
-    """Return the frames in which tshark finds something wrong."""
+    """Return the frames that tshark finds faulty."""
     return summaries(capture, where=_COMPLAINT, options=options)
 
 

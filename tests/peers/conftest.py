@@ -1,4 +1,4 @@
-"""What all foreign judges need: a state folder of their own, and compiled C programs."""
+"""Fixtures of all third-party judges: their own state folder, and compiled C programs."""
 
 import subprocess
 from pathlib import Path

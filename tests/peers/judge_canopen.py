@@ -1,4 +1,4 @@
-"""canopen's client, told our data sheet and nothing else, reads the simulated node."""
+"""canopen's client, with our data sheet only, reads the simulated node."""
 
 import os
 import socket
@@ -55,7 +55,7 @@ def node(simulator, place):
 
 
 def seen(register, wanted):
-    """Wait until something of which canopen tells all callbacks is as wanted."""
+    """Wait until a value that canopen reports to all callbacks is as wanted."""
     came = threading.Event()
 
     def keep(told):
@@ -67,7 +67,7 @@ def seen(register, wanted):
 
 
 def response(node):
-    """Have a copy made and return what it says."""
+    """Have a copy made and return its contents."""
     node.sdo[MAILBOX]["snapshot"].raw = 1
     return decode_response(struct.unpack("<112H", node.sdo[RESPONSE].raw))
 

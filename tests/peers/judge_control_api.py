@@ -39,7 +39,7 @@ def test_a_client_in_another_language_calibrates_and_stops():
 
 
 def ends(process: int) -> bool:
-    """Return whether a process that nobody stops comes to its end by itself."""
+    """Return whether a process ends by itself without a stop."""
     for _ in range(100):
         try:
             os.kill(process, 0)

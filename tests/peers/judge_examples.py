@@ -1,4 +1,4 @@
-"""The programs of examples/, as somebody runs them who has installed the wheel and nothing else.
+"""The programs of examples/, run as by a user with the wheel and nothing else.
 
 Third-party checkers read them against the wheel; then each is run with good and with wrong input.
 """
@@ -31,7 +31,7 @@ pytestmark = [pytest.mark.timeout(300), pytest.mark.skipif(os.name == "nt", reas
 
 @pytest.fixture(scope="session")
 def installed(tmp_path_factory):
-    """An environment with the wheel in place of the sources; what robolink needs is shared."""
+    """An environment with the wheel in place of the sources; robolink's dependencies are shared."""
     folder = tmp_path_factory.mktemp("installed")
     build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
     subprocess.run(build, cwd=ROOT, check=True, capture_output=True)
@@ -41,8 +41,8 @@ def installed(tmp_path_factory):
     install = [python, "-m", "pip", "install", "--quiet", "--no-deps", "--no-index", str(wheel)]
     subprocess.run(install, check=True)
     (packages,) = (folder / "env/lib").glob("python3.*/site-packages")
-    # A line in such a file is a folder to import from; the .pth files in there are not read, and
-    # the one of the sources is among them.
+    # A line in such a file is a folder to import from; the .pth files in that folder are not read,
+    # and the one of the sources is among them.
     (shared,) = (Path(sys.prefix) / "lib").glob("python3.*/site-packages")
     (packages / "shared.pth").write_text(f"{shared}\n")
     where = "import robolink, robolink_cli; print(robolink.__file__)"
@@ -93,7 +93,7 @@ def run(installed, tmp_path):
 
 @pytest.fixture
 def cells(run, tmp_path):
-    """Twelve cells on ports and a cell file with their names; returns what each was served as."""
+    """Twelve cells on ports and a cell file with their names; returns the simulator of each."""
     (tmp_path / "sim.toml").write_text(
         'schema = "robolink/sim-cells/1"\n'
         '[cells.line]\nkind = "epson"\ntcp = "127.0.0.1:0"\nspeed = 50\ncount = 12\n'
@@ -109,12 +109,12 @@ def cells(run, tmp_path):
         os.kill(served["pid"], signal.SIGTERM)
 
 
-# What checkers of types say
+# Results of type checkers
 
 
 @pytest.fixture
 def typed(tmp_path):
-    """The programs, and one with a fault that only who reads robolink's own types can find."""
+    """The programs, and one with a fault that only a reader of robolink's own types can find."""
     wrong = tmp_path / "wrong.py"
     wrong.write_text("import robolink\n\nrobolink.connect('x').tools.read('one')\n")
     return [*TYPED, str(wrong)]
@@ -155,7 +155,7 @@ def test_pyright_finds_nothing_in_its_strict_mode(installed, typed, tmp_path):
     assert Path(fault["file"]).name == "wrong.py"
 
 
-# What a driver needs of other packages
+# The third-party packages that a driver needs
 
 
 def test_tools_are_written_with_nothing_but_platformdirs(installed, cells, tmp_path, run):
@@ -260,7 +260,7 @@ def test_node_tells_a_program_that_repeats_a_write_from_one_that_does_not(run, c
     careful = run(*judge, *write)
     assert (careful.code, "arrived: 1" in careful.out) == (0, True), careful
     port = cell["url"].rpartition(":")[2]
-    twice = (  # what a client does that takes a lost answer for a lost request
+    twice = (  # the behaviour of a client that takes a lost answer for a lost request
         "import socket\n"
         "for _ in range(2):\n"
         f"    with socket.create_connection(('127.0.0.1', {port})) as wire:\n"

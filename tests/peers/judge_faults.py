@@ -1,7 +1,7 @@
-"""What other makers' clients do, and ours, when an answer is late, old, in pieces, or lost.
+"""Behaviour of third-party clients, and ours, when an answer is late, old, in pieces, or lost.
 
-All of them talk through the same proxy to the same simulators. What is asserted is what ours
-do; what the others do is printed, so that docs/contributing.md can be compared: ``pytest -s``.
+All of them use the same proxy to the same simulators. The assertions are about ours; the results of
+the others are printed, to be compared with docs/contributing.md: ``pytest -s``.
 """
 
 import time
@@ -23,7 +23,7 @@ _LONGEST_S = 5.0
 
 
 class Shown:
-    """What one client returned for one fault, in words."""
+    """The result of one client for one fault, in words."""
 
     def __init__(self, client: Any, truth: dict[int, object]) -> None:
         self._client = client
@@ -36,7 +36,7 @@ class Shown:
         self._do(lambda: self._client.read(which), self._truth[which])
 
     def write(self) -> None:
-        """Write once; that it was acknowledged is all that can be right."""
+        """Write once; an acknowledgement is all that can be right."""
         self._do(self._client.write, None)
 
     def _do(self, act: Callable[[], object], right: object) -> None:
@@ -60,9 +60,9 @@ def truth_of(client: Any) -> dict[int, object]:
 
 
 def shown(name: str, fault: Any) -> tuple[Shown, int]:
-    """Let a client meet a fault; return what it returned, and how many frames it sent.
+    """Let a client meet a fault; return its result, and the number of frames sent.
 
-    Of a write (F25) those that carry it are counted.
+    For a write (F25) only the frames that carry it are counted.
     """
     with peer(name) as client:
         result = Shown(client, truth_of(client))
@@ -89,7 +89,7 @@ FAULTS = ("F01", "F03", "F05", "F11", "F25")
 
 @pytest.mark.parametrize(
     ("fault", "name"),
-    # F05 splits an answer, and a CAN frame comes whole.
+    # F05 splits an answer, but a CAN frame arrives whole.
     [
         (fault, name)
         for fault in FAULTS
@@ -100,7 +100,7 @@ FAULTS = ("F01", "F03", "F05", "F11", "F25")
 def test_what_is_returned_when(name, fault):
     try:
         result, frames = shown(name, fault)
-    except RemoteProtocolError:  # ours does not even connect where an old answer waits
+    except RemoteProtocolError:  # ours does not even connect while an old answer waits
         assert fault == "F03"
         print(f"\n{fault} | {name} | refuses to connect (RemoteProtocolError)")  # noqa: T201
         return

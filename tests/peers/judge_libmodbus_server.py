@@ -1,4 +1,4 @@
-"""Our driver for mapped PLCs against a PLC that a C program on libmodbus plays."""
+"""Our driver for mapped PLCs with a PLC in the form of a C program on libmodbus."""
 
 import subprocess
 from collections.abc import Iterator
@@ -31,7 +31,7 @@ class MappedPlc:
     in_force: list[list[float]] = field(default_factory=list)
 
     def end(self) -> None:
-        """End the process and collect what it took over, each time."""
+        """End the process and collect the values that it applied, each time."""
         self.process.kill()
         printed, _ = self.process.communicate(timeout=PATIENCE_S)
         takeovers = [line for line in printed.splitlines() if line.startswith("in force ")]
@@ -73,7 +73,7 @@ def rtu_plc(programs):
 
 @pytest.fixture(params=["tcp", "rtu"])
 def plc(request):
-    """The PLC, both ways."""
+    """The PLC, on both links."""
     return request.getfixturevalue(f"{request.param}_plc")
 
 
@@ -86,7 +86,7 @@ def compared_plc(plc):
 
 
 def values(*tools: ToolOffset) -> list[float]:
-    """Return what the PLC prints about tools."""
+    """Return the PLC's printed lines about tools."""
     return [value for t in tools for value in (t.x_mm, t.y_mm, t.z_mm, t.u_deg)]
 
 

@@ -90,7 +90,7 @@ def test_discrete_inputs_overlay_the_input_registers(mbpoll):
 def test_a_command_that_mbpoll_writes_is_acknowledged(mbpoll):
     command = Command(1, Opcode.OWNERSHIP, operands=(1, 0, 0, 0), owner=0xC0FFEE)
     mbpoll(HOLDING, 0, COMMAND_WORDS, *encode_command(command))
-    for _ in range(20):  # the PLC looks at it in its next cycle
+    for _ in range(20):  # the PLC reads it in its next cycle
         response = decode_response(words_of(mbpoll(INPUT_HEX, 0, RESPONSE_WORDS)))
         if response.ack_head:
             break

@@ -1,7 +1,7 @@
-"""schemathesis reads the control API's own document and asks each kind of simulator all it says.
+"""schemathesis sends each kind of simulator every request in the control API's document.
 
 Schemathesis has its own environment (``.venv/schemathesis``, ``make peers``): it needs other
-versions of what the tests run with.
+versions of the packages that the tests use.
 """
 
 import json
@@ -42,7 +42,7 @@ pytestmark = [
 
 @pytest.fixture
 def judged(tmp_path):
-    """Has a simulator of some kind judged by a document; returns how that ended, and the text."""
+    """Has a simulator of some kind judged by a document; returns the exit code, and the text."""
     with ExitStack() as stack:
 
         def judge(kind, document, *options):

@@ -1,8 +1,8 @@
 """The schema of PLCopen, version 2.01, reads the exported XML.
 
-It states no licence, so it is not here: ``TC6_SCHEMA`` names a copy (docs/contributing.md).
-CODESYS writes the name space of version 2.0 (docs/reference/structured_text.md 3), so that stands
-in the place of its own unless 0201 is exported.
+It states no licence, so it is not here: ``TC6_SCHEMA`` names a copy (docs/contributing.md). CODESYS
+writes the name space of version 2.0 (docs/reference/structured_text.md 3), so that replaces the
+schema's own unless 0201 is exported.
 """
 
 import os
@@ -24,7 +24,7 @@ pytestmark = pytest.mark.skipif(
 
 
 def complaints(text, schema=PlcopenSchema.CODESYS):
-    """Return what the schema says against a file."""
+    """Return the schema's complaints about a file."""
     published = Path(SCHEMA).read_text(encoding="utf-8").replace("tc6_0201", f"tc6_{schema}")
     judge = etree.XMLSchema(etree.fromstring(published.encode()))
     judge.validate(etree.fromstring(text.encode()))

@@ -1,4 +1,4 @@
-"""Two foreign compilers execute the exported core: the words are those of our interpreter."""
+"""Two third-party compilers execute the exported core: their words equal our interpreter's."""
 
 from contextlib import ExitStack
 
@@ -13,7 +13,7 @@ from tests.unit.structured_text._drawn import drawn_commands
 
 CORE = "robolink_core.st"
 ANY = "Kin_Scara3_Z"
-"""Whichever: in the core it matters only whether one is exported for."""
+"""Any kinematics: to the core it matters only whether one is exported."""
 
 
 @pytest.fixture(scope="module", params=COMPILERS, ids=lambda compiler: compiler.name)

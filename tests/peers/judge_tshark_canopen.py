@@ -1,4 +1,4 @@
-"""tshark dissects what our client and the simulated PLC say on a CAN bus."""
+"""tshark dissects the traffic of our client and the simulated PLC on a CAN bus."""
 
 import struct
 import threading
@@ -27,12 +27,12 @@ DOWNLOAD_SEGMENT, INITIATE_DOWNLOAD = "0", "1"
 COMMAND = 0x2100
 CLIENT_SDO = 0x605
 OPERATIONAL = (0x705, b"\x05")
-"""A heartbeat; one comes every 100 ms only."""
+"""A heartbeat; one comes only every 100 ms."""
 
 
 @pytest.fixture
 def frames(tmp_path):
-    """What a listener on the bus saw while a tool was written."""
+    """The frames that a listener on the bus received while a tool was written."""
     seen: list[can.Message] = []
     operational = threading.Event()
 
@@ -53,13 +53,13 @@ def frames(tmp_path):
 
 @pytest.fixture
 def capture(frames, tmp_path):
-    """The capture of that."""
+    """The capture of these frames."""
     write_can(tmp_path / "canopen.pcap", frames)
     return tmp_path / "canopen.pcap"
 
 
 def downloads(capture, index):
-    """Return the words of each download to an object, put together from its segments."""
+    """Return the words of each download to an object, joined from its segments."""
     data: list[bytes] = []
     sizes: list[int] = []
     wanted = False

@@ -1,4 +1,4 @@
-"""tshark dissects what our client and the simulated PLC say over Modbus TCP."""
+"""tshark dissects the traffic of our client and the simulated PLC over Modbus TCP."""
 
 import struct
 
@@ -34,7 +34,7 @@ WRITE_REGISTERS = 16
 
 @pytest.fixture
 def dialogue():
-    """What was said while a tool was written."""
+    """The traffic while a tool was written."""
     with serve_modbus_tcp(SoftMotionSimulator()) as host:
         port = parse_url(host.url).port
         assert port is not None
@@ -45,13 +45,13 @@ def dialogue():
 
 @pytest.fixture
 def capture(dialogue, tmp_path):
-    """The capture of that."""
+    """The capture of it."""
     write_modbus_tcp(tmp_path / "modbus.pcap", dialogue)
     return tmp_path / "modbus.pcap"
 
 
 def blocks(capture, where):
-    """Return the registers of each frame that carries some."""
+    """Return the registers of each frame that has some."""
     found = dissected(capture, [REGISTERS], where=f"{where} && {REGISTERS}")
     return [[int(word) for word in text.split(",")] for (text,) in found]
 

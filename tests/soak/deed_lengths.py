@@ -1,7 +1,7 @@
-"""``python -m tests.soak.deed_lengths [KIND ..]``: measure how long each deed is, undisturbed.
+"""``python -m tests.soak.deed_lengths [KIND ..]``: measure each deed's undisturbed length.
 
-Prints the rows of ``tests/soak/adversary/deed_lengths.py``: the least of three runs of each
-deed, so that what is placed within it is met.
+Prints the rows of ``tests/soak/adversary/deed_lengths.py``: the least of three runs of each deed,
+so that faults placed within it occur.
 """
 
 import sys
@@ -36,7 +36,7 @@ POINTS: Final = (
 
 
 class _Counting:
-    """Counts what passes, hour by hour."""
+    """Counts requests and points, hour by hour."""
 
     def __init__(self) -> None:
         self.requests: list[Counter[str]] = []
@@ -44,7 +44,7 @@ class _Counting:
         self._counts = False
 
     def patches(self) -> Iterator[Any]:
-        """Yield what has to be in place meanwhile."""
+        """Yield the patches needed for the count."""
         pass_point, take, do = VirtualCell._pass_point, CountedFaults.take, VirtualCell._do
         due, last = CountedActs.due, ""
 
@@ -82,7 +82,7 @@ class _Counting:
 
 
 def rows(kind: CellKind) -> Iterator[str]:
-    """Yield what was measured of a kind of cell."""
+    """Yield the measured rows for a kind of cell."""
     measured = [deed for deed in deeds_of(kind) if deed is not Deed.COMMAND]
     deeds = measured * RUNS
     hours = tuple(Hour(number, deed, Habit(), ()) for number, deed in enumerate(deeds))

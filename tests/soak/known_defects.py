@@ -1,10 +1,10 @@
-"""Defects that robolink had, or that its rules speak of, each as a named replacement of functions.
+"""Defects that robolink had or that its rules mention, each as a named replacement of functions.
 
-None is an edit of the source: :data:`DEFECTS` says what is put in the place of what for the time
-of one history. Most were found from outside: in robolink, by foreign clients, proxies, a second
-thread in the worst microsecond, careless people (docs/reliability.md, "What was found from outside,
-and what holds now"), or in the systems that others trust, by their users; ``found_by`` says so. The
-others break one sentence of docs/reference/rules.md each.
+The source is not edited: :data:`DEFECTS` lists the replacements for the time of one history. Most
+were found from outside: in robolink, by foreign clients, proxies, a second thread in the worst
+microsecond, careless people (docs/reliability.md, "What was found from outside, and what holds
+now"), or in other trusted systems, by their users; ``found_by`` says so. The others break one
+sentence of docs/reference/rules.md each.
 """
 
 from collections.abc import Mapping
@@ -20,14 +20,14 @@ from tests.soak.adversary import CellKind
 
 @dataclass(frozen=True, slots=True)
 class KnownDefect:
-    """One defect, put back.
+    """One defect, restored.
 
     Attributes:
-        name: What is wrong, in one line.
-        replacements: What is put in the place of what dotted names lead to.
-        kind: The kind of cell that can have it; ``None`` for each.
-        found_by: Who found it from outside, in a few words; empty where nobody has.
-        missed_because: Why no rule finds it in the hours that are run; empty where one does.
+        name: The defect, in one line.
+        replacements: The objects that replace dotted names.
+        kind: The kind of cell that can have it; ``None`` for all.
+        found_by: Who found it from outside, in a few words; empty for nobody.
+        missed_because: Why no rule finds it in the hours that are run; empty if one does.
     """
 
     name: str

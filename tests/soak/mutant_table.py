@@ -1,7 +1,7 @@
-"""``python -m tests.soak.mutant_table [WORDS]``: put known defects back, print what finds each.
+"""``python -m tests.soak.mutant_table [WORDS]``: restore known defects, print the finds.
 
-The machine is looked at first: without a defect every rule has to hold in the same hours. Ends
-with 1 when one was broken there, or when a defect is missed of which that was not known.
+First comes a run without defects: every rule must hold in the same hours. Ends with 1 if one was
+broken there, or if a defect is missed that is not known to be missed.
 """
 
 import sys
@@ -14,26 +14,26 @@ from tests.soak.adversary import CellKind, run
 from tests.soak.known_defects import DEFECTS, KnownDefect
 
 MOST_HOURS: Final = 200
-"""Virtual robot-hours in which a defect has to be found."""
+"""Virtual robot-hours in which a defect must be found."""
 
 HOURS_A_SEED: Final = 10
 KINDS: Final = (CellKind.EPSON, CellKind.SOFTMOTION)
-"""A defect that both can have is looked for in them by turns."""
+"""A defect that both kinds can have is looked for in them in turn."""
 
 SEEDS: Final = range(MOST_HOURS // HOURS_A_SEED)
-"""In this order, for every defect alike; none was chosen because it finds something."""
+"""The seeds, in this order for every defect; none was chosen because it finds something."""
 
 
 @dataclass(frozen=True, slots=True)
 class Search:
-    """How a known defect was looked for.
+    """The search for a known defect.
 
     Attributes:
         defect: The defect.
-        rule: Which rule was broken first, empty where none was.
-        seed: Under which seed.
-        hours: Virtual hours until then; all of them where nothing was found.
-        cpu_s: What that took.
+        rule: The first broken rule, empty for none.
+        seed: The seed.
+        hours: Virtual hours until then; all of them if nothing was found.
+        cpu_s: The CPU time.
     """
 
     defect: KnownDefect
@@ -50,7 +50,7 @@ class Search:
 
 
 def search_for(defect: KnownDefect) -> Search:
-    """Run seed after seed with a defect put back, until a rule is broken or the hours are over."""
+    """Run seed after seed with a defect restored, until a rule is broken or the hours are over."""
     begun_s, hours = time.process_time(), 0
     for seed in SEEDS:
         kind = defect.kind or KINDS[seed % len(KINDS)]
@@ -64,7 +64,7 @@ def search_for(defect: KnownDefect) -> Search:
 
 
 def broken_without_a_defect() -> list[str]:
-    """Return the rules that do not hold in the same hours as the code is, in words; none should."""
+    """Return, as text, the rules that the unchanged code breaks in these hours; should be none."""
     return [
         f"seed {seed}, {kind}: {one}"
         for kind in KINDS
@@ -92,7 +92,7 @@ def table(searches: Sequence[Search]) -> Iterator[str]:
 
 
 def main(words: Sequence[str]) -> int:
-    """Print it all, or of those defects only whose name holds one of some words."""
+    """Print the whole table, or only the defects whose names contain one of some words."""
     sound = [] if words else broken_without_a_defect()
     if not words:
         hours = len(KINDS) * MOST_HOURS

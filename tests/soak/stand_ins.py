@@ -1,6 +1,6 @@
-"""What is put in the place of functions of robolink, so that a known defect is back.
+"""Replacements for functions of robolink that restore known defects.
 
-Which stands for which: :mod:`tests.soak.known_defects`.
+:mod:`tests.soak.known_defects` assigns them.
 """
 
 import contextlib
@@ -50,7 +50,7 @@ def none_of_them(*_given: object) -> list[Any]:
 
 
 def nothing(*_given: object, **_named: object) -> None:
-    """Stand in for a look that refuses."""
+    """Never refuse, in place of a check that does."""
 
 
 # Stopping.
@@ -60,13 +60,13 @@ _announced = EpsonSession._announced
 
 
 def asked_before_the_lock(session: EpsonSession, request: Any) -> str:
-    """Ask the latch, and only then wait for the lock of the exchange."""
+    """Check the latch, and only then wait for the lock of the exchange."""
     session.latch.admit(command_class_of(request), request.name)
     return _announced(session, request)
 
 
 def admitted_unasked(session: Any, request: Any, what: str) -> None:
-    """Look at everything but the latch under the lock."""
+    """Check everything but the latch under the lock."""
     checkpoint(Checkpoint.HELD, what)
     session._check_usable(request)
     if session._pending is not None and request.name == "Abort":
@@ -74,7 +74,7 @@ def admitted_unasked(session: Any, request: Any, what: str) -> None:
 
 
 def latched_when_at_rest(controller: ControllerCore) -> None:
-    """Bring the machine to rest first, and latch then."""
+    """Stop the machine first, and close the latch then."""
     for group in controller.groups:
         group.stop()
     controller.latch.close()
@@ -86,14 +86,14 @@ def open_while_stopping(_latch: StopLatch) -> Iterator[None]:
 
 
 def stop_not_looked_after(ask: Function, _clock: object, *, controller: str) -> Any:
-    """Send the Stop that ends tasks, and take a refusal of it for rest."""
+    """Send the Stop that ends tasks, and take its refusal for a stopped machine."""
     with contextlib.suppress(RobolinkError):
         ask("Stop")
     return parse_status(ask("GetStatus"))
 
 
 def stop_sent_only(commands: CommandSender) -> None:
-    """Take a stop that was acknowledged for rest."""
+    """Take an acknowledged stop for a stopped machine."""
     commands.stop()
 
 
@@ -101,7 +101,7 @@ _stop = ControllerCore.stop
 
 
 def released_at_once(controller: ControllerCore) -> None:
-    """Open the latch when the machine rests, without anybody's word."""
+    """Open the latch when the machine has stopped, without a person's release."""
     _stop(controller)
     controller.release_stop()
 
@@ -112,7 +112,7 @@ _begin = MarkerStore.begin
 
 
 def unmarked(*kinds: MarkerKind) -> Function:
-    """Return a beginning that stores nothing for some kinds of markers."""
+    """Return a begin function that stores nothing for some kinds of markers."""
 
     def begin(
         store: Any,
@@ -134,7 +134,7 @@ def unmarked(*kinds: MarkerKind) -> Function:
 
 
 def one_marker_for_all() -> Function:
-    """Return a beginning that gives every movement the operation of the first."""
+    """Return a begin function that gives every movement the first one's operation."""
 
     def begin(
         store: Any,
@@ -152,7 +152,7 @@ def one_marker_for_all() -> Function:
 
 
 def forgotten_selection(preserver: Any, marker: Marker) -> None:
-    """Forget the marker of a procedure without selecting the tool of before."""
+    """Drop the marker of a procedure without selecting the earlier tool."""
     preserver._link.markers.clear(marker)
 
 
@@ -173,7 +173,7 @@ def still_usable(wire: Any, error: RobolinkError) -> RobolinkError:
 
 @contextmanager
 def settled_by_silence(store: MarkerStore, marker: Marker) -> Iterator[None]:
-    """Forget the marker of what was not answered."""
+    """Drop the marker of an unanswered request."""
     try:
         yield
     except RobolinkError:
@@ -182,7 +182,7 @@ def settled_by_silence(store: MarkerStore, marker: Marker) -> Iterator[None]:
 
 
 def unread(tools: Any, marker: Marker) -> Finding:
-    """Say that a write did not take without looking."""
+    """Report a failed write without reading back."""
     tool, before = int(str(marker.details["tool"])), marker.details.get("before")
     details = {**marker.details, "value": before, "found_later": True}
     entry = NewEntry(EntryKind.NOT_APPLIED, operation=marker.operation, tool=tool, details=details)
@@ -193,7 +193,7 @@ _prepare = connection._prepare
 
 
 def not_synced(connection: sqlite3.Connection) -> None:
-    """Leave it to the system when what was committed reaches the disk."""
+    """Leave it to the system when committed data reach the disk."""
     _prepare(connection)
     connection.execute("PRAGMA synchronous=OFF")
 
@@ -207,7 +207,7 @@ def owner_not_compared(command: Any, now: Any) -> bool:
 
 
 def lease_not_proved(lease: Any, rows: Any, _purpose: str, _operator: str) -> Grip:
-    """Take the look at the lease for the lease."""
+    """Assume the lease from a reading of it."""
     return Grip(1)
 
 
@@ -215,20 +215,20 @@ _take_aside = EpsonSession._take_aside
 
 
 def shown_whole(session: EpsonSession, event: object, *, hidden: bool = False) -> None:
-    """Show what came unasked, the password of a bent login too."""
+    """Print unsolicited text, even the password of an altered login."""
     _take_aside(session, event)
 
 
-# The change, and what is said of it.
+# The change, and its report.
 
 
 def keeping(controller: Any, *, keep: bool) -> Settler:
-    """Keep what nobody verified, whatever the person said."""
+    """Keep an unverified value, whatever the person said."""
     return Settler(controller, keep=True)
 
 
 def requested_believed(write: Any) -> Any:
-    """Take the answer to a write for the proof of it."""
+    """Take the answer to a write as confirmation."""
     return write.requested if write.acknowledged else write.read_doubted()
 
 
@@ -240,15 +240,15 @@ _init = TouchPlan.__init__
 
 
 def nominal(plan: TouchPlan, *given: Any, **named: Any) -> None:
-    """Bring the tip straight back over the pin, and judge nothing."""
+    """Move the tip straight back over the pin, and judge nothing."""
     _init(plan, *given, **{**named, "nominal": True})
 
 
-# What people at the machine, the clock and a frozen process show.
+# Acts of people at the machine, the clock, and a frozen process.
 
 
 def remembered(read: Function) -> Function:
-    """Return a look at the selected tool that is made once a session."""
+    """Return a reading of the selected tool that is made once a session."""
 
     def selected(table: Any) -> int | None:
         if not hasattr(table, "remembered"):
@@ -273,12 +273,12 @@ _write = ToolTableCore.write
 
 
 def three_digits(table: Any, tool: int, offset: ToolOffset, *, expected: Any) -> Any:
-    """Write what one kind of controller prints, on every kind."""
+    """Write the digits that one kind of controller prints, on every kind."""
     return _write(table, tool, offset.rounded(3), expected=expected)
 
 
 def newest_by_the_clock(outcomes: Any, tool: int | None) -> str:
-    """Take for the newest change the one with the latest time of day."""
+    """Take the entry with the latest time of day for the newest change."""
     ends = outcomes.recorded(tool=tool, kinds=(EntryKind.DONE,))
     newest = max(ends, key=lambda entry: str(entry.at), default=None)
     return "" if newest is None else undo_history.id_of_change(newest)
@@ -288,7 +288,7 @@ _clear = MarkerStore.clear
 
 
 def selection_stays_open(store: Any, marker: Marker, *entries: NewEntry) -> None:
-    """Forget that a procedure ran, but for its marker in the journal."""
+    """Forget that a procedure ran, except for its marker in the journal."""
     if marker.kind is not MarkerKind.SELECTION or marker.operation not in store._under_way:
         _clear(store, marker, *entries)
         return
@@ -301,7 +301,7 @@ _secure = Lease.secure
 
 
 def still_mine(lease: Any, rows: Any, purpose: str, operator: str) -> Grip:
-    """Believe that what was held once is held."""
+    """Assume that a lease once held is still held."""
     return Grip(lease._epoch) if lease.held else _secure(lease, rows, purpose, operator)
 
 
@@ -309,7 +309,7 @@ _put_one_back = putting_back._put_one_back
 
 
 def over_anything(controller: Any, step: Any, *, spoiled: bool, selected: int) -> Any:
-    """Put the old value back whatever is there by now."""
+    """Restore the old value whatever is stored by now."""
     return _put_one_back(controller, step, spoiled=True, selected=selected)
 
 
@@ -320,7 +320,7 @@ _pose = EpsonGroup.pose
 
 
 def a_tenth_off(group: EpsonGroup) -> Pose:
-    """Tell a pose that is not where the tip is."""
+    """Report a pose that is not the tip's."""
     pose = _pose(group)
     return replace(pose, x_mm=pose.x_mm + 0.1)
 
@@ -329,6 +329,6 @@ _take_leave = EpsonController._take_leave
 
 
 def with_another_robot(controller: EpsonController) -> None:
-    """Leave with the second robot in force."""
+    """Leave with the second robot selected."""
     controller._link.session.exchange("SetCurRobot", "2")
     _take_leave(controller)

@@ -1,6 +1,6 @@
-"""Ten thousand changes that call back, with faults by chance: no unverified value stays.
+"""Ten thousand changes that call back, with random faults: no unverified value stays.
 
-Each share of them is a controller, a PC and a journal of its own that live through it.
+Each share of them runs on its own controller, PC and journal.
 """
 
 import random
@@ -24,7 +24,7 @@ def no_fault(_cell, _rng):
 
 
 def bent_exchange(cell, rng):
-    """Something happens to one exchange, or to two."""
+    """Disturb one exchange, or two."""
     names = tuple(CallFault.__dataclass_fields__)
     first = len(cell.calls.questions)
     struck = {
@@ -52,7 +52,7 @@ def touch_beside(cell, rng):
 
 
 def aside(rng):
-    """Return by how much something is bumped: so far that it counts."""
+    """Return a bump large enough to count."""
     return rng.choice((-1, 1)) * rng.uniform(0.12, 0.2)
 
 
@@ -64,7 +64,7 @@ def pin_bumped(cell, rng):
 
 
 def beam_dark(cell, rng):
-    """One of the beams never switches."""
+    """Keep one of the beams from switching."""
     cell.simulator.world.disconnect(rng.choice(BEAM_INPUTS))
     cell.undo = lambda: cell.stand_at(cell.recorded_mm)
 
@@ -95,7 +95,7 @@ def false_finds(cell, _rng):
 
 
 def camera_bumped(cell, rng):
-    """Once, at some exchange, between two looks or before the proof."""
+    """Bump the camera once, at some exchange, between two looks or before the turn test."""
     camera, at = cell.simulator.world.camera, len(cell.calls.questions)
     x, y, z = camera.middle_mm
     at += rng.randrange(cell.exchanges)
@@ -109,7 +109,7 @@ def camera_bumped(cell, rng):
 
 
 FAULTS = (no_fault, bent_exchange, bent_exchange, pc_restarts, None)
-"""``None``: the power goes at some statement."""
+"""``None``: the power fails at some statement."""
 
 OWN_FAULTS = {
     "pin": (touch_beside, pin_bumped),
@@ -119,7 +119,7 @@ OWN_FAULTS = {
 
 
 def one_change(cell, rng, own_faults):
-    """Let one change go as chance has it; tell whether a new value stays."""
+    """Run one change with random faults; return whether a new value stays."""
     cell.calls.fault, cell.undo = lambda _number, _line: None, lambda: None
     cell.change_needle()
     old, fault = cell.tool, rng.choice((*FAULTS, *own_faults))
@@ -146,13 +146,13 @@ def test_no_unverified_value_stays(tmp_path, record_property, kind, share):
         cell.length = len(cell.statements())
         cell.exchanges = len(cell.calls.questions)
         kept = sum(one_change(cell, rng, OWN_FAULTS[kind]) for _ in range(CHANGES))
-        assert CHANGES / 20 < kept < CHANGES * 19 / 20  # both ends came up
+        assert CHANGES / 20 < kept < CHANGES * 19 / 20  # both ends occurred
         cell.calls.fault = lambda _number, _line: None
         cell.change_needle()
         assert cell.run() == ["kept"]
         assert cell.open_markers() == []
         assert cell.journal.verify().problems == ()
-        # What is on record as last is what the tool holds.
+        # The last recorded value is the tool's.
         (last,) = cell.entries(EntryKind.DONE, limit=1)
         assert list(last.details["value"]) == list(cell.tool.rounded(3).components())
         record_property("kept", kept)

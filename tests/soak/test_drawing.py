@@ -1,4 +1,4 @@
-"""What a seed draws can come to pass: in its kind of cell, on its link, within its deed."""
+"""The draws of a seed can occur: in its kind of cell, on its link, within its deed."""
 
 import pytest
 from robolink_simulators.faults import FaultAction, LinkKind, PlcFaultAction, links_of
@@ -32,7 +32,7 @@ def disturbances(kind, seeds=range(25)):
 
 
 def is_told_instant(one):
-    """Return whether a disturbance is one of those that are placed where they tell most."""
+    """Return whether a disturbance is one of those placed at a significant instant."""
     return any(
         (instant.kind, instant.what, instant.match) == (one.kind.value, one.what, one.match)
         and one.at in range(instant.first, instant.first + instant.count)

@@ -1,4 +1,4 @@
-"""Lines of the command line are drawn from all commands, and run in a virtual cell."""
+"""Command lines are drawn from all commands, and run in a virtual cell."""
 
 import random
 from collections import Counter
@@ -65,7 +65,7 @@ def test_commands_do_in_a_virtual_cell_what_they_say():
     assert story.broken == [], story.told()
     done, refused = (story.endings[f"type a command: {end}"] for end in ("done", "ConfigError"))
     assert (done, refused) == (6, 1)
-    # A stop and a look at what it does go over the wire that is watched.
+    # A stop and a reading of its effect use the watched wire.
     stop, look = (story.lines(hour=hour) for hour in (5, 6))
     assert any(line.endswith("> $Abort") for line in stop)
     assert any(line.endswith("> $Login") for line in look)

@@ -1,4 +1,4 @@
-"""Histories of fresh seeds that broke a rule, cut to what it took: each rule holds in them now.
+"""Histories of fresh seeds that broke a rule, cut to the essentials: now each rule holds in them.
 
 docs/reliability.md says of each what was wrong, in which of the two, and what holds now.
 """
@@ -46,17 +46,17 @@ HALF_A_FILE = drawn_history(919893192, 20)
 LOST_RECORD = drawn_history(177058577, 20).without_hours(
     [hour for hour in range(20) if hour not in (8, 9)]
 )
-"""A program that calls back, and a journal that somebody has deleted."""
+"""A program that calls back, and a journal that somebody deleted."""
 NO_HEAD = drawn_history(17250169, 20)
 """A journal that has lost the note of its last entry, and a program that calls back."""
 FROZEN_PROGRAM = drawn_history(919892947, 20).without_hours(
     [hour for hour in range(20) if hour not in (1, 2, 4)]
 )
-"""A hand cannot select a tool while the PLC's program stands still."""
+"""A hand cannot select a tool while the PLC's program is stopped."""
 SWAPPED = drawn_history(966517133, 20).without_hours(
     [hour for hour in range(20) if hour not in (4, 5)]
 )
-"""Two characters of a read-back changed places, and the disk kept what they said."""
+"""Two characters of a read-back changed places, and the disk kept the result."""
 
 
 @pytest.mark.soak

@@ -1,4 +1,4 @@
-"""Whole cells against seeded disturbances: a sample; ``make soak`` runs many more."""
+"""Whole cells with seeded disturbances: a sample; ``make soak`` runs many more."""
 
 import os
 import subprocess
@@ -16,7 +16,7 @@ TWO_STOPS = History(
     CellKind.SOFTMOTION,
     (Hour(1, Deed.CHANGE_NOZZLE, Habit("ben"), (STOP, STOP)),),
 )
-"""As seed 371 was drawn when it was found."""
+"""Seed 371 as drawn when it was found."""
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -24,11 +24,11 @@ def test_every_rule_holds_in_forty_disturbed_hours(seed):
     story = run(seed, HOURS)
     assert story.broken == [], story.told()
     assert story.hours == HOURS
-    assert sum(story.met.values()) >= HOURS // 2  # they came to pass, and were not only drawn
+    assert sum(story.met.values()) >= HOURS // 2  # they occurred, and were not only drawn
 
 
 def test_two_threads_that_stop_a_plc_at_once_are_both_told_of_rest():
-    """The stop that came second ended the first one's, whose caller was told while it braked."""
+    """The second stop ended the first, whose caller was told while the robot was braking."""
     story = live_through(TWO_STOPS)
     assert story.broken == [], story.told()
     assert story.checks["AtRestWhenStopped"] >= 2, "as it was drawn"

@@ -1,4 +1,4 @@
-"""Every kind of cell: its deeds come off undisturbed, and what is broken in it is found."""
+"""Every kind of cell: its deeds succeed undisturbed, and its defects are found."""
 
 import os
 import subprocess

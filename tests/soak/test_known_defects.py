@@ -1,4 +1,4 @@
-"""Known defects that are restored are found; all of them: ``make soak`` prints the table."""
+"""Restored known defects are found; ``make soak`` prints the table of all."""
 
 from contextlib import ExitStack
 from functools import cache

@@ -1,4 +1,4 @@
-"""What people at the machine do while robolink asks, and the defects that only this shows."""
+"""Acts of people at the machine while robolink asks, and the defects that only these show."""
 
 import pytest
 

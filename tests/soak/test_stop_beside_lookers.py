@@ -1,4 +1,4 @@
-"""The time of a stop, alone and with 50 who look on at the same time."""
+"""The time of a stop, alone and with 50 watchers at the same time."""
 
 import statistics
 import subprocess
@@ -19,7 +19,7 @@ pytestmark = [pytest.mark.simulator_only, pytest.mark.soak, pytest.mark.timeout(
 LOOKERS = 50
 STOPS = 40
 MORE_S = 0.5
-"""A stop that waited for one of those who look on would wait for their line: a second."""
+"""A stop that waited for one watcher would wait for its line: a second."""
 
 LOOKING = """
 import sys, threading, time
@@ -42,7 +42,7 @@ sys.stdin.read()
 
 @contextmanager
 def looking(url, pause_s):
-    """Let fifty threads of another process look on, each with a pause between its looks."""
+    """Start fifty threads of another process that watch, each with a pause between its readings."""
     command = [sys.executable, "-c", LOOKING, url, str(LOOKERS), str(pause_s)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as others:
         assert others.stdout is not None

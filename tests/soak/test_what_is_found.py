@@ -1,4 +1,4 @@
-"""A defect that is put in is found, told, cut short, and becomes a test."""
+"""An injected defect is found, reported, shortened, and becomes a test."""
 
 from collections.abc import Callable
 from functools import cache
@@ -25,7 +25,7 @@ HISTORY = History(
 LONGER = History(
     3, CellKind.EPSON, (*HISTORY.hours, Hour(2, Deed.SELECT_TOOL, Habit(person="ben"), ()))
 )
-"""With an hour behind the one that counts, which has to be left out too."""
+"""The history with another hour after the essential one, to be left out too."""
 
 HISTORIES = pytest.mark.parametrize(
     "history", [HISTORY, pytest.param(LONGER, marks=pytest.mark.soak)], ids=["two hours", "three"]

@@ -1,4 +1,4 @@
-"""The lease of one controller, seen by several holders in one journal in memory."""
+"""The lease of one controller, seen by several holders through one journal in memory."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -21,23 +21,23 @@ ELSEWHERE: Final = LeaseHolder(
 
 @dataclass
 class Leases:
-    """A journal and the time that passes for all on this computer."""
+    """A journal, and the common time of all holders on this computer."""
 
     journal: Journal
     clock: ManualClock = field(default_factory=lambda: ManualClock(start_ns=1_000_000_000_000))
 
     def log(self, holder: LeaseHolder, clock: ManualClock | None = None) -> JournalOutcomeLog:
-        """Return the log of a holder, whose clock may be another."""
+        """Return the log of a holder, who may have another clock."""
         return self.journal.log(IDENTITY, holder=holder, clock=clock or self.clock)
 
     def entries(self) -> list[Recorded]:
-        """Return what is on record about leases, oldest first."""
+        """Return the journal entries about leases, oldest first."""
         return list(self.journal.entries(kinds=(EntryKind.LEASE,), newest_first=False))
 
 
 @contextmanager
 def leases_in_memory() -> Iterator[Leases]:
-    """Keep a journal for the time of a test."""
+    """Keep a journal during a test."""
     journal = memory_journal(new_operation())
     try:
         yield Leases(journal)

@@ -1,4 +1,4 @@
-"""A client that knows the mailbox's codec and nothing of the driver, on any link."""
+"""A client that knows only the mailbox's codec, not the driver, on any link."""
 
 from dataclasses import replace
 
@@ -28,7 +28,7 @@ MCS, ACS = CoordinateSystem.MCS, CoordinateSystem.ACS
 
 
 class MailboxClient:
-    """Sends commands one at a time and reads what comes of them."""
+    """Sends commands one at a time and reads the responses."""
 
     def __init__(self, link, owner=0xC0FFEE):
         self.link = link
@@ -55,7 +55,7 @@ class MailboxClient:
         return replace(command, **fields)
 
     def write(self, command):
-        """Write a command with a fresh beat."""
+        """Write a command with a fresh heartbeat."""
         self.beats += 1
         self.link.write_command(
             encode_command(command, heartbeat=heartbeat_word(self.epoch, self.beats))
@@ -83,13 +83,13 @@ class MailboxClient:
         return now
 
     def refused(self, opcode, *operands, **fields) -> int:
-        """Send a command that ends in error and return the class of it."""
+        """Send a command that ends in error and return its error class."""
         now = self.settled(self.tell(opcode, *operands, **fields))
         assert now.state == CommandState.ERROR, now
         return now.error_class
 
     def settled(self, now: Response) -> Response:
-        """Return the snapshot that shows the end of the command that ``now`` acknowledges."""
+        """Return the snapshot that shows the end of the command acknowledged in ``now``."""
         for _ in range(2000):
             if CommandState(now.state).final:
                 break
@@ -98,7 +98,7 @@ class MailboxClient:
         return now
 
     def after_a_cycle(self) -> Response:
-        """Return what the mailbox shows once its program has looked at the machine again."""
+        """Return the snapshot after the mailbox program has read the machine again."""
         self.wait(0.01)
         return self.now()
 
@@ -114,20 +114,20 @@ class MailboxClient:
         self.link.beat(heartbeat_word(self.epoch, self.beats))
 
     def wait(self, seconds):
-        """Let time pass, beating."""
+        """Let time pass, with heartbeats."""
         while seconds > 0:
             self.beat()
             self.link.clock.sleep(min(seconds, 0.1))
             seconds -= 0.1
 
     def move(self, x=0.0, y=0.0, z=0.0, *, mode=0, dynamics=LINE, **fields) -> Response:
-        """Command a line to a place beside the present TCP."""
+        """Command a straight move to a place beside the present TCP."""
         pose = shifted(self.now().tcp, x, y, z)
         operands = (0, 0, MCS, mode)
         return self.tell(Opcode.MOVE_LINEAR, *operands, pose=pose, dynamics=dynamics, **fields)
 
     def end_of(self, sequence) -> Finished:
-        """Wait until a movement has ended and return how."""
+        """Wait until a movement has ended and return its end."""
         for _ in range(1000):
             for end in self.now().finished:
                 if end.sequence == sequence:
@@ -137,12 +137,12 @@ class MailboxClient:
 
 
 def shifted(pose, x=0.0, y=0.0, z=0.0):
-    """Return a pose some way from another."""
+    """Return a pose beside another one."""
     return (pose[0] + x, pose[1] + y, pose[2] + z, *pose[3:])
 
 
 def linked(simulator, owner=0xC0FFEE) -> MailboxClient:
-    """Connect a client to a simulator of this process, on a clock that stands still."""
+    """Connect a client to a simulator of this process, on a stopped clock."""
     clock = ManualClock(simulator.now_ns)
     simulator.present_ns = clock.now_ns
     return MailboxClient(InProcessMailboxLink("sim", simulator, clock, 3.0), owner)

@@ -1,4 +1,4 @@
-"""The tests of the simulated mailbox, once more with the exported program behind it (soak)."""
+"""The tests of the simulated mailbox, repeated with the exported program (soak)."""
 
 import pytest
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
@@ -13,11 +13,11 @@ DIFFERING = {
     "test_the_state_of_an_interrupted_movement_is_shown_while_it_is_the_last_command": "nothing "
     "tells a program that another one has interrupted its movement",
 }
-"""Tests that hold for the modelled program alone, and why."""
+"""Tests that hold for the modelled program alone, with reasons."""
 
 
 def offer_programs(metafunc: pytest.Metafunc) -> None:
-    """Give a test each program that may stand behind the mailbox."""
+    """Parametrize a test with each program that can run the mailbox."""
     if FIXTURE not in metafunc.fixturenames:
         return
     programs: list[object] = [MODELLED]
@@ -28,7 +28,7 @@ def offer_programs(metafunc: pytest.Metafunc) -> None:
 
 @pytest.fixture
 def mailbox_program(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
-    """The program that a simulated PLC gets unless it is given one; its name."""
+    """The name of the program that a simulated PLC gets by default."""
     name: str = request.param
     if name == EXECUTED:
         from tests.unit.structured_text._behaviours import of_program

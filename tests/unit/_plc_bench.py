@@ -1,4 +1,4 @@
-"""A driver and a simulated PLC without a wire between them; time stands until somebody waits."""
+"""A driver and a simulated PLC without a wire between them; time passes only in waits."""
 
 from pathlib import Path
 
@@ -19,7 +19,7 @@ NO_HANDSHAKE = EXAMPLES / "no-handshake.toml"
 
 
 class LocalClient:
-    """Reaches into the PLC's memory; ``fail`` names writes, by number, whose answer is lost."""
+    """Accesses the PLC's memory; ``fail`` names writes, by number, whose answer is lost."""
 
     def __init__(self, plc, identity):
         self.plc = plc
@@ -79,7 +79,7 @@ class LocalClient:
 
 
 class Bench:
-    """One map, one PLC, and drivers of it one after the other, with one record."""
+    """One map, one PLC, and successive drivers with one record."""
 
     def __init__(self, path, *, identity, confirmed=True):
         self.map = load_map(Path(path))
@@ -91,7 +91,7 @@ class Bench:
                 confirm_whole_map(controller)
 
     def connect(self):
-        """Return a driver; ``client`` of the bench is what it speaks through."""
+        """Return a driver that uses the bench's ``client``."""
         self.client = LocalClient(self.plc, self.identity)
         self.client.clock.advance(self.plc.now_ns / 1e9)
         outcomes = memory_journal(self.identity).log(self.identity)

@@ -1,4 +1,4 @@
-"""A CANopen node that is a function, on a bus that is not there."""
+"""A CANopen node that is a function, on a fake bus."""
 
 import struct
 
@@ -22,7 +22,7 @@ class FakeClock:
 
 
 class ScriptedBus:
-    """Hands each frame that is sent to ``answer``, which returns (identifier, data) frames."""
+    """Hands each sent frame to ``answer``, which returns (identifier, data) frames."""
 
     def __init__(self, clock, answer):
         self.clock = clock

@@ -1,4 +1,4 @@
-"""A Modbus server that is a list of answers, on a line that is not there."""
+"""A Modbus server that is a list of answers, on a fake line."""
 
 from pymodbus.framer import FramerRTU, FramerSocket
 from pymodbus.pdu import DecodePDU
@@ -20,7 +20,7 @@ class FakeClock:
 
 
 class ScriptedLine:
-    """A transport whose far side answers the nth frame with what the nth script step says.
+    """A transport that answers the nth frame by the nth step of a script.
 
     A step takes the frame and returns pieces; a piece is bytes, or (seconds, bytes) for later.
     """

@@ -39,14 +39,14 @@ def at_cycle(group, count=1):
 
 
 def settled(group):
-    """Let time pass until nothing happens by itself any more."""
+    """Let time pass until nothing happens any more by itself."""
     while (change := group.next_change()) is not None:
         assert change < group.now_ns + 600 * S
         group.advance(change)
 
 
 def shifted(group, x_mm=0.0, y_mm=0.0, z_mm=0.0, c_deg=0.0):
-    """Return a target that lies beside the present TCP, in MCS."""
+    """Return a target beside the present TCP, in MCS."""
     x, y, z, a, b, c = group.read_actual_position().values
     return Target((x + x_mm, y + y_mm, z + z_mm, a, b, c + c_deg))
 
@@ -70,7 +70,7 @@ def in_error(**options):
 
 
 def way(group):
-    """Return the axis values until everything is over, cycle by cycle."""
+    """Return the axis values, cycle by cycle, until everything has ended."""
     places = [group.values]
     while group.next_change() is not None:
         group.advance(group.now_ns + CYCLE_NS)
@@ -79,18 +79,18 @@ def way(group):
 
 
 def tcp_mm(group):
-    """Return where the TCP is, in MCS."""
+    """Return the TCP's place, in MCS."""
     return group.read_actual_position().values[:3]
 
 
 def kind(execution):
-    """Return what an execution complains about."""
+    """Return the error class of an execution."""
     error = execution.outputs.error
     return None if error is None else error.kind
 
 
 def moved(group, x_mm=0.0, y_mm=0.0, z_mm=0.0, **more):
-    """Command a line beside the present TCP and expect it to be accepted."""
+    """Command a straight move beside the present TCP and expect its acceptance."""
     execution = group.move_linear_absolute(shifted(group, x_mm, y_mm, z_mm), LINE, **more)
     assert execution.outputs.busy
     return execution
@@ -108,6 +108,6 @@ MACHINES = (
     "Kin_4AxisPalletizer",
     "Kin_Tripod_Rotary",
 )
-"""Kinematics that differ in what a movement or a person meets."""
+"""Kinematics with different conditions for movements and people."""
 
 NOZZLE = CoordRef(10.0, -5.0, 40.0, 0.0, 0.0, 20.0)

@@ -1,4 +1,4 @@
-"""The rows of the vendor's table, and poses of each kinematics that are drawn at random."""
+"""The rows of the vendor's table, and random poses of each kinematics."""
 
 import math
 import random
@@ -31,7 +31,7 @@ DOF = {
     "Kin_Tripod_Rotary": 0,
     "Kin_Tripod_Linear": 0,
 }
-"""How much of the flange's orientation stays open, of each kinematics that stands alone."""
+"""The open degrees of freedom of the flange's orientation, for each kinematics on its own."""
 
 AXES = {
     "Kin_Scara2_Z": 3,
@@ -68,11 +68,11 @@ SHIFTED = {
         "dOffsetC": 30.0,
     },
 }
-"""Shifts that any position kinematics can carry in front of it, by orientation kinematics."""
+"""Shifts that any position kinematics can carry, by orientation kinematics."""
 
 
 def unlike_the_default(name: str) -> dict[str, float]:
-    """Return parameters that are all there and no zeros, so that none can be left out."""
+    """Return all parameters with non-zero values, so that a missing one shows."""
     position, _, orientation = name.partition("+")
     given = dict(SHIFTED.get(orientation, {}))
     if position == "Kin_Pos_RRR":
@@ -99,7 +99,7 @@ def image_of(kinematics: KinematicsModel, wanted: Matrix = NO_TURN) -> Orientati
 
 @dataclass(frozen=True, slots=True)
 class DrawnPose:
-    """One random axis position of a machine, and other axes to look for it from."""
+    """One random axis position of a machine, and other axes to start the search from."""
 
     kinematics: KinematicsModel
     axes: AxisValues
@@ -110,7 +110,7 @@ class DrawnPose:
         return self.kinematics.flange(self.axes)
 
     def require_found(self) -> None:
-        """Demand that the image holds it, and that its axes are found again from anywhere."""
+        """Check that the image holds it, and that its axes are found from any start."""
         kinematics, flange = self.kinematics, self.flange
         space = image_of(kinematics, flange.rotation)
         assert space.holds(flange.rotation)
@@ -126,7 +126,7 @@ class DrawnPose:
         self._require_steady(flange)
 
     def _require_steady(self, flange: Frame) -> None:
-        """Demand the very axes where they are looked for from where they are."""
+        """Check that the search from the axes themselves returns them."""
         kinematics = self.kinematics
         again = kinematics.axes_for(flange, kinematics.configuration(self.axes), self.axes)
         for a, b, kind in zip(again, self.axes, kinematics.kinds, strict=True):

@@ -25,13 +25,13 @@ _names = count()
 
 
 def wanted(*tools: int) -> list[Wanted]:
-    """Return what makes the new values of the old ones."""
+    """Return the intended changes, with the old values expected."""
     return [Wanted(tool, NEW[tool], OLD[tool]) for tool in tools]
 
 
 @dataclass
 class Cell:
-    """A simulated controller, whoever is connected to it, and the record."""
+    """A simulated controller, its clients, and the record."""
 
     simulator: EpsonSimulator
     journal: Journal
@@ -39,7 +39,7 @@ class Cell:
 
     @property
     def identity(self) -> str:
-        """Under which the journal knows it."""
+        """The controller's name in the journal."""
         return self.simulator.url
 
     def log(self, operator: str = "Ann", **signed: str) -> JournalOutcomeLog:
@@ -53,18 +53,18 @@ class Cell:
 
     @contextmanager
     def connected(self, log: JournalOutcomeLog | None = None) -> Iterator[Controller]:
-        """Connect as somebody."""
+        """Connect as a person."""
         with robolink.connect(self.simulator.url, outcomes=log or self.log()) as controller:
             yield controller
 
     @property
     def tools(self) -> dict[int, ToolOffset | None]:
-        """What is stored in both, past the wire."""
+        """The stored values of both tools, past the wire."""
         return {tool: self.simulator.machine.tools.get(tool) for tool in OLD}
 
     @property
     def writes(self) -> int:
-        """How often the flash was written."""
+        """The number of writes to flash."""
         return self.simulator.machine.flash_writes
 
     def put(self, tool: int, offset: ToolOffset) -> None:
@@ -86,11 +86,11 @@ class Cell:
         self.simulator.on_reply = look
 
     def entries(self, *kinds: EntryKind) -> list[Recorded]:
-        """Return what is on record, oldest first."""
+        """Return the journal entries, oldest first."""
         return list(self.journal.entries(kinds=kinds, newest_first=False))
 
     def story(self, tool: int | None = None) -> list[str]:
-        """Return what is on record in words, oldest first."""
+        """Return the journal entries in words, oldest first."""
         return [str(entry.kind) for entry in self.entries() if tool in (None, entry.tool)]
 
 

@@ -12,7 +12,7 @@ S = 1_000_000_000
 
 
 class Client:
-    """One link to a simulator, and the time it is given."""
+    """One link to a simulator, with the test's own time."""
 
     def __init__(self, simulator: EpsonSimulator, now_ns: int = 0) -> None:
         self.simulator = simulator
@@ -23,16 +23,16 @@ class Client:
         self.link.receive(f"{request}\r\n".encode(), self.simulator.now_ns)
 
     def ask(self, request: str) -> str:
-        """Send a request and return what came back at once, without its terminator."""
+        """Send a request and return the immediate answer without its terminator."""
         self.send(request)
         return self.heard()
 
     def heard(self) -> str:
-        """Return what is ready, without the last terminator."""
+        """Return the available answers, without the last terminator."""
         return self.link.outgoing().decode().removesuffix("\n").removesuffix("\r")
 
     def wait(self, seconds: float) -> str:
-        """Let time pass, then return what is ready."""
+        """Let time pass, then return the available answers."""
         self.simulator.advance(self.simulator.now_ns + round(seconds * S))
         return self.heard()
 
@@ -46,7 +46,7 @@ class Client:
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Parametrize what more than one module does."""
+    """Parametrize tests of more than one module."""
     offer_programs(metafunc)
 
 

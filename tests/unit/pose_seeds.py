@@ -1,4 +1,4 @@
-"""Files of poses as each maker writes them, small: what slips are made in."""
+"""Small pose files as each maker writes them, for the tests of slips."""
 
 import json
 
@@ -177,4 +177,4 @@ SEEDS = {
     "one_melfa.prg": (_each(_melfa, TILTED[1:2]), {}),
     "one_fanuc.ls": (_each(_fanuc, TILTED[1:2]), {}),
 }
-"""Name of the file: its text, and what a person says because it does not."""
+"""By file name: the text, and the options for data that the file lacks."""

@@ -1,10 +1,10 @@
-"""Single slips in files of poses, and what becomes of each.
+"""Single slips in files of poses, and the outcome of each.
 
 A slip is one thing that goes wrong when a file is typed, copied, printed or mailed: a blank or a
 bracket is lost, a letter O stands for 0, a comma for a point, stars for a number that did not fit.
-Left out are slips that make another valid file, because nothing in it tells: a digit that is
-another digit, a sign or a point that is gone or moved, a whole row or record that is gone or stands
-twice, and a record that became a comment with a blank behind its sign.
+Slips that make another valid file are left out, as nothing in the file shows them: a changed digit,
+a missing or moved sign or point, a missing or doubled row or record, and a record turned into a
+comment by a blank after its sign.
 """
 
 import re
@@ -20,7 +20,7 @@ NUMBER = re.compile(
     r"(?![\w.])(?<![,])|(?<![\w.])[+-]?\d+\.\d+(?=mm|rad|deg)"
 )
 KEY = re.compile(r"\s*(?:DECL\b[^=\n]*=|\"?\w+\"?\s*[:=]|global\s+\w+\s*=|(?:CONST|VAR)\b.*:=)")
-"""A line that begins with the name of what it says; a row that stands twice is another row."""
+"""A line that begins with its own name; a doubled row is another row."""
 WORD = re.compile(r"[A-Za-z_]+")
 SIGNS = "{}[]()<>,;:=\"'/"
 OTHER = {"{": "(", "}": ")", "[": "(", "]": ")", "(": "[", ")": "]", ",": ";", ";": ",", ":": ";"}
@@ -29,7 +29,7 @@ UNITS = {"mm": ("cm", "m", "inch"), "deg": ("rad", "grad"), "rad": ("deg",), "m"
 
 @dataclass(frozen=True)
 class Slip:
-    """One slip: its kind, the line in which it happened, and the text that came out."""
+    """One slip: its kind, its line, and the resulting text."""
 
     kind: str
     line: int
@@ -72,8 +72,8 @@ def _pieces(text: str) -> Iterator[tuple[str, int, int, str]]:
         for share in (0.1, 0.25, 0.5, 0.75, 0.9):
             cut = begin + int(len(line) * share)
             if not text[begin:cut].strip() or not text[cut:end].strip():
-                continue  # the whole line is gone
-            # Inside the first or the last number a cut only makes another number of it.
+                continue  # the whole line is missing
+            # Inside the first or the last number a cut only makes another number.
             numbers = [found.span() for found in NUMBER.finditer(text, begin, end)]
             last = [one for one in numbers if not re.search(r"\d[.,]\d", text[one[1] : end])]
             if not any(first < cut < after for first, after in (*numbers[:1], *last)):
@@ -152,7 +152,7 @@ def _of_word(found: re.Match[str]) -> Iterator[tuple[str, int, int, str]]:
 
 
 def read_as(path: Path, choices: ReadingChoices) -> tuple[tuple[object, ...], ...]:
-    """Return what matters of the poses of a file."""
+    """Return the essentials of the poses in a file."""
     from robolink.calibration import rotation_of
 
     return tuple(
@@ -168,7 +168,7 @@ def read_as(path: Path, choices: ReadingChoices) -> tuple[tuple[object, ...], ..
 def outcome(
     path: Path, choices: ReadingChoices, wanted: tuple[tuple[object, ...], ...]
 ) -> tuple[str, str]:
-    """Return ``same``, ``refused``, ``asked`` or ``silent``, and what was said."""
+    """Return ``same``, ``refused``, ``asked`` or ``silent``, and the message."""
     try:
         found = read_as(path, choices)
     except AmbiguousPosesError as asked:

@@ -1,6 +1,4 @@
-"""What the record tells of accuracy: the rows of a cell, their bounds, how well a stored Z is
-known.
-"""
+"""Accuracy from the record: the rows of a cell, their bounds, and how well a stored Z is known."""
 
 import math
 import random
@@ -34,7 +32,7 @@ from robolink.methods.one_touch.solvers import find_stored_z
 from robolink.model import EntryKind, NewEntry, Recorded, Signature, ToolOffset, plain_offset
 from robolink.timing import wall_time
 
-# What the journal tells of the rows of a cell, and what of it does not count.
+# The journal's data for the rows of a cell, and the data that do not count.
 
 ALIKE = LooksAlike("PIN-07", "n-angle")
 
@@ -340,7 +338,7 @@ def test_more_records_cost_less():
     assert upper_half_width(0.01, 4) > upper_half_width(0.01, 20) > 0.01 * math.sqrt(3)
 
 
-# Whether the record says how well a stored Z is known: only a measurement of it does.
+# Whether the record shows how well a stored Z is known: only a measurement of it does.
 
 OLD = ToolOffset(12.0, -4.0, -20.0)
 MEASURED = replace(OLD, z_mm=-20.4)
@@ -353,7 +351,7 @@ def log(request):
 
 
 class Log:
-    """Puts calibrations and writes on record, the oldest first."""
+    """Records calibrations and writes, the oldest first."""
 
     def __init__(self, controller):
         self.controller, self._count = controller, 0
@@ -393,14 +391,14 @@ def test_z_that_was_measured_has_the_interval_of_then(log):
     assert log.half_of(MEASURED) is None
     log.calibrated(OLD, MEASURED, measured=Z, z_from="measured")
     assert log.half_of(MEASURED) == 0.02
-    # A value that is not that one has nothing to do with it.
+    # Another value has nothing to do with it.
     assert log.half_of(OLD) is None
 
 
 @pytest.mark.parametrize(
     ("more", "half"),
     [
-        ({"z_from": "kept"}, None),  # of another needle, for all that is known
+        ({"z_from": "kept"}, None),  # of another needle, as far as is known
         ({"z_from": "kept", "nozzle": "N-1"}, 0.02),  # the same needle
         ({"z_from": "kept", "nozzle": "N-2"}, None),
         ({"z_from": "measured", "length_checked": {"u_mm": 0.01}}, (0.02**2 + 0.0196**2) ** 0.5),
@@ -431,10 +429,10 @@ def test_a_z_that_was_typed_or_is_no_tip_is_not_known(log):
     other = replace(MEASURED, z_mm=-21.0)
     log.typed(MEASURED, other)
     assert log.half_of(other) is None
-    # A value by difference stands aside of where the tip was found.
+    # A value by difference lies beside the found tip.
     log.calibrated(other, OLD, measured=Z, z_from="measured", tip=MEASURED)
     assert log.half_of(OLD) is None
-    # Without an interval there is none to go back to.
+    # Without an interval there is none to use.
     log.calibrated(
         OLD, MEASURED, measured=Z, z_from="measured", of_measurement={"half_width95": []}
     )
@@ -451,7 +449,7 @@ def test_changes_by_one_touch_go_back_to_where_they_began(log):
     )  # fmt: skip
     found = find_stored_z(log.controller, 1, longer)
     assert (found.half95_mm, found.entry) == (0.02, 1)
-    # One whose Z was never measured says nothing, whatever follows.
+    # One whose Z was never measured shows nothing, whatever follows.
     again = replace(longer, z_mm=-20.5)
     log.calibrated(
         longer, again, measured=XY, z_from="kept",

@@ -1,4 +1,4 @@
-"""The adversary's seeds, rules and books, apart from its hours."""
+"""The adversary's seeds, rules and books, without its hours."""
 
 import sqlite3
 import subprocess
@@ -31,7 +31,7 @@ from tests.soak.adversary.seed_records import (
     source_digest,
 )
 
-# Rules of the adversary that no known defect breaks: each says so when it is broken.
+# Rules of the adversary that no known defect breaks: each reports when it is broken.
 
 WRITE = SentRequest(SentKind.WRITE, '$Execute,"TLSet 2, XY(1, 2, 3, 0)"', 2)
 MOVE = SentRequest(SentKind.MOVE, '$Execute,"Move XY(1, 2, 3, 0)"')
@@ -47,11 +47,11 @@ class OpenMarker:
         self.marker = BookedMarker("one", "set", "TLSet 2", details)
 
     def markers(self):
-        """Return it."""
+        """Return the marker."""
         return [self.marker]
 
     def holder(self):
-        """Return who holds the lease."""
+        """Return the holder of the lease."""
         return {"pid": 101}
 
     def last_number(self):
@@ -61,7 +61,7 @@ class OpenMarker:
 
 @pytest.fixture
 def begun():
-    """Begin an hour with a line, and return its rules, its machine and what is broken in it."""
+    """Begin an hour with a line; return its rules, its machine and its broken rules."""
 
     def begin(line=(), *, requested=USUAL_TOOL):
         history = drawn_history(23, hours=2)
@@ -93,7 +93,7 @@ def test_a_dry_run_sends_nothing_that_writes(begun, process, line, broken):
     rules.contract.leaving(process, WRITE)
     assert found() == broken
     rules.contract.left()
-    rules.contract.leaving(process, WRITE)  # the people put something right
+    rules.contract.leaving(process, WRITE)  # the people recover something
     assert found() == broken
 
 
@@ -147,7 +147,7 @@ def test_what_was_acknowledged_as_stopped_stands_until_something_is_sent(
     assert found() == ["AtRestWhenStopped"]
 
 
-# Fresh seeds: drawn from the commit, beside everything that was ever run.
+# Fresh seeds: drawn from the commit, apart from all seeds ever run.
 
 COMMIT = "0123456789abcdef0123456789abcdef01234567"
 
@@ -239,7 +239,7 @@ def test_sources_that_differ_from_the_commit_draw_nothing(tmp_path):
         committed(tmp_path)
 
 
-# What the adversary reads of a journal whose file has lost pages.
+# The adversary's readings of a journal whose file has lost pages.
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""A backup file says everything and is read strictly; what counts as a difference from it."""
+"""A backup file is complete and read strictly; the differences from it."""
 
 import json
 import os
@@ -33,7 +33,7 @@ from robolink.errors import (
 from robolink.files.named import require_free
 from robolink.model import ControllerFacts, ToolOffset
 
-# A backup file says everything, is read strictly, and never takes another one's place.
+# A backup file is complete, is read strictly, and never replaces another one.
 
 TIP = ToolOffset(12.345, -3.25, -20.002, 90.0)
 AXES = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
@@ -95,7 +95,7 @@ OF_0_1 = """{
   }
 }
 """
-"""What robolink 0.1.0 wrote; it is never remade (docs/api.md)."""
+"""A backup by robolink 0.1.0, never remade (docs/api.md)."""
 
 
 def test_a_backup_of_an_earlier_version_is_read():
@@ -240,7 +240,7 @@ def test_a_folder_that_is_missing_is_told(tmp_path):
         save(FULL, tmp_path / "none" / "cell.json")
 
 
-# What counts as a difference, and what a restore would do about it.
+# The differences from a backup, and the restore's treatment of each.
 
 COMPARED_TIP = ToolOffset(12.0, -3.5, -20.0, 179.9999)
 URL = "epson+tcp://192.168.0.1:5000"

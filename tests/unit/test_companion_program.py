@@ -25,9 +25,8 @@ from robolink.protocols.spel_callback import CallbackLine, CallbackWord
 from robolink.serving import CallbackConversation, CallbackLimits
 
 # robolink_tools.prg is legal SPEL+, and the simulated companion does what it says.
-#
-# The program itself runs on the simulated controller, and what it stores is compared with what
-# the simulated companion stores. Its lines have few forms, every one of which must be known here.
+# The program itself runs on the simulated controller, and its stored values are compared with those
+# of the simulated companion. Its lines have few forms, every one of which must be known here.
 
 PROGRAM = Path(__file__).parents[2] / "companions" / "epson" / "robolink_tools.prg"
 FORBIDDEN = re.compile(
@@ -65,7 +64,7 @@ def formed(line):
 
 
 class Program:
-    """The program itself, run by the simulator on a machine; its variables are read and set."""
+    """The program itself, run by the simulator on a machine; tests read and set its variables."""
 
     def __init__(self, machine):
         options, condition = EpsonOptions(globals_at_start="kept"), Condition(monitoring_only=False)
@@ -116,7 +115,7 @@ def machine():
 
 
 def simulated(machine):
-    """Return the same variables after the simulator's companion has run."""
+    """Return the same variables after a run of the simulator's companion."""
     variables = Variables("-1")
     Companion(machine, variables).publish()
     (begin,), (end,) = (variables.get(f"robolink_{name}", "Long") for name in ("begin", "end"))
@@ -187,16 +186,16 @@ PUT_NOTHING_BACK, SAYS_IT_KEPT = "1", "2"
 
 
 class RefusingRecord:
-    """A log to which nothing can be added before a person has done something."""
+    """A log that accepts no entry until a person has done something."""
 
     def __init__(self, error):
         self.error = error
 
     def ask(self, who):
-        """Take who the robot is."""
+        """Accept the robot's identity."""
 
     def open_markers(self):
-        """Return what is open: nothing is."""
+        """Return no open markers."""
         return ()
 
     def append(self, *entries):
@@ -205,13 +204,13 @@ class RefusingRecord:
 
 
 class RefusingJournal:
-    """Gives nothing but such a log."""
+    """A journal with such a log only."""
 
     def __init__(self, error):
         self.error = error
 
     def log(self, controller, *, signature):
-        """Return it."""
+        """Return the log."""
         return RefusingRecord(self.error)
 
 

@@ -1,4 +1,4 @@
-"""Cell files: which are read, what wins, and what is wrong in them."""
+"""Cell files: their places, their precedence, and their faults."""
 
 import sys
 

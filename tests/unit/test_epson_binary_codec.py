@@ -48,8 +48,8 @@ PARAMETERS = {
     "SetIOWord": [BYTES, WORDS],
     "SetMemIOWord": [BYTES, WORDS],
 }
-# Printed text may hold what begins and ends frames. Only a quote before an ETX before the very
-# check sum that would belong there cannot be told from an end.
+# Printed text may hold the bytes that begin and end frames. Only a quote before an ETX before the
+# checksum that would match there cannot be told from an end.
 TEXTS = st.text(st.sampled_from('ab"\x02\x03\x06\x15 ,\r\nä'), max_size=20).filter(
     lambda text: text[-1:] not in ("\r", "\n") and '"\x03' not in text
 )
@@ -169,7 +169,7 @@ def test_one_changed_byte_is_an_error_or_never_ends(
         event = host.next_event()
     except RemoteProtocolError:
         return
-    # A first byte turned from success to refusal, or back, is outside the check sum.
+    # The checksum does not cover a first byte turned from success to refusal, or back.
     assert event is NEED_DATA or place == 0 or (event != sent and host.bytes_held)
 
 

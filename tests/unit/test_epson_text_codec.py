@@ -1,4 +1,4 @@
-"""Remote Ethernet as text: flags and codes, what each role may send, what always holds."""
+"""Remote Ethernet as text: flags and codes, the messages of each role, and general rules."""
 
 import string
 from dataclasses import fields
@@ -150,7 +150,7 @@ def test_only_execute_takes_a_statement_and_only_login_a_password():
     assert by_form[ParameterForm.VARIABLE] == ["GetVariable", "SetVariable"]
 
 
-# What each role may send, and what it may not.
+# The messages that each role may send, and those that it may not.
 
 
 @pytest.mark.parametrize("terminator", [b"\r\n", b"\r", b"\n"])
@@ -315,7 +315,7 @@ def test_an_impossible_codec_is_refused(role, options):
         EpsonTextCodec(role, **options)
 
 
-# What holds for any messages, cut in any way.
+# Rules for any messages, cut in any way.
 
 PRINTABLE = "".join(chr(code) for code in range(0x20, 0x7F))
 LATIN = st.characters(min_codepoint=0, max_codepoint=255, exclude_characters="\r\n")
@@ -421,7 +421,7 @@ NOISE = st.one_of(
 
 
 def outcome(role: Role, parts: list[bytes]) -> tuple[list[Event], bool]:
-    """Return what was read before the stream broke, and whether it broke."""
+    """Return the events before the stream broke, and whether it broke."""
     codec = EpsonTextCodec(role, max_line=40)
     events: list[Event] = []
     try:

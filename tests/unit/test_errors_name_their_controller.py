@@ -1,4 +1,4 @@
-"""An error that leaves a driver says of which controller it is, and what that was asked."""
+"""An error that leaves a driver names the controller and the request."""
 
 from dataclasses import replace
 
@@ -62,7 +62,7 @@ def test_what_was_named_nearer_to_the_cause_stays():
 
 def test_a_kind_of_another_package_need_not_name_its_controller():
     class Tools(ToolTableCore):
-        """The tools of a kind that says nothing but what happened."""
+        """The tools of a kind whose errors say only what happened."""
 
         def indices(self):
             return (1, 2)
@@ -89,7 +89,7 @@ def test_a_kind_of_another_package_need_not_name_its_controller():
             raise AssertionError
 
     class Arm(ControllerCore):
-        """A kind that says nothing but what happened."""
+        """The arm of a kind whose errors say only what happened."""
 
         exchanges = 0
 

@@ -1,4 +1,4 @@
-"""Fault plans: read from files, drawn from a seed, and counted, never rolled."""
+"""Fault plans: read from files, drawn from a seed, and counted, never random."""
 
 import hashlib
 from pathlib import Path
@@ -30,7 +30,7 @@ from robolink.errors import ConfigError, OutcomeUnknownError
 from robolink.model import ToolOffset
 from tools.fault_tables import tables
 
-# Fault plans in files: read, refused with line and key, and applied where they can happen.
+# Fault plans in files: read, refused with line and key, and applied where they can occur.
 
 HEAD = 'schema = "robolink/faults/1"\nlink = "epson+tcp"\n'
 PAGE = Path(__file__).parents[2] / "docs" / "fault-plans.md"
@@ -196,7 +196,7 @@ MAILBOXES = (LinkKind.MODBUS_TCP, LinkKind.MODBUS_RTU, LinkKind.CAN, LinkKind.MA
 
 
 def test_a_seed_draws_the_same_plan_on_every_machine():
-    """The digest stands here, so that another Python, or another order of a set, shows."""
+    """The digest is stored here, so that another Python, or another order of a set, shows."""
     drawn = (*drawn_faults(7, LinkKind.EPSON_TCP, RATES), *drawn_plc_faults(7, LinkKind.CAN, RATES))
     assert hashlib.sha256(repr(drawn).encode()).hexdigest()[:16] == "464a8a8679b527eb"
 
@@ -260,7 +260,7 @@ def test_rates_have_limits(numbers):
         FaultRates(**numbers)
 
 
-# The fault plan counts, and never rolls.
+# The fault plan counts, and is never random.
 
 REPLY = b"#GetStatus,00100000001,0000\r\n"
 

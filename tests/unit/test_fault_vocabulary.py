@@ -1,4 +1,4 @@
-"""What each planned fault does to requests, replies, links and devices, seen from the wire."""
+"""The effects of each planned fault on requests, replies, links and devices, seen from the wire."""
 
 import pytest
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
@@ -122,7 +122,7 @@ def test_nobody_is_told_of_a_half_open_link(login, connect):
     assert other.ask("$Login,") == ""  # the first one still has the only place
     simulator.advance(simulator.now_ns + 61_000_000_000)  # until the remote time-out
     assert other.ask("$Login,") == "#Login,0"
-    assert simulator._links._links == [other.link]  # nothing is kept of the dead one
+    assert simulator._links._links == [other.link]  # nothing of the dead one is kept
 
 
 @pytest.mark.parametrize("action", ["reset", "half_open", "restart"])

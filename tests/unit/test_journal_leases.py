@@ -1,6 +1,4 @@
-"""One at a time on a controller: who has its lease, who may take it, and whether its holder still
-lives.
-"""
+"""One client at a time on a controller: who holds the lease, who may take it, who still lives."""
 
 import os
 import signal
@@ -20,7 +18,7 @@ from robolink.journal._lease_view import LEASE_S
 from robolink.model import EntryKind, NewEntry
 from tests.unit._lease_logs import ANNA, BERT, ELSEWHERE, HERE, IDENTITY, leases_in_memory, marker
 
-# One at a time on a controller: who has the lease, who may take it, who is told of its loss.
+# One client at a time on a controller: who has the lease, who may take it over, who is told.
 
 
 @pytest.fixture
@@ -334,7 +332,7 @@ def test_a_holder_on_another_computer_is_watched_and_replaced_when_silent(leases
 
 
 class Waiting(ManualClock):
-    """Does something whenever somebody waits on it."""
+    """Does something whenever it is waited on."""
 
     def __init__(self, act):
         super().__init__()
@@ -377,7 +375,7 @@ def test_a_lease_whose_holder_makes_no_sense_is_watched_like_a_stranger(leases):
 
 
 def kept(log):
-    """Hold the lease for a block."""
+    """Hold the lease during a block."""
     with log.hold("a check"):
         pass
 
@@ -415,7 +413,7 @@ def test_ctrl_c_behind_a_commit_puts_an_answer_on_record_once(leases):
 
 @contextmanager
 def behind_commit(number):
-    """Let Ctrl-C come right behind one of the commits of a block."""
+    """Send Ctrl-C right after one of the commits of a block."""
     commits = 0
 
     def passed(_point, what):

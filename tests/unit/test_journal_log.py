@@ -191,7 +191,7 @@ def test_what_a_tool_was_last_proved_to_hold_is_found(journal, log):
     assert journal.last_value(IDENTITY, 4).details == {"value": None}
     assert value_of(5) is None
     assert value_of(3, "another") is None
-    # What a recovery read counts too: the write before it was taken back, unrecorded.
+    # A recovery's reading counts too: the write before it was undone without a record.
     log.append(NewEntry(EntryKind.NOT_APPLIED, tool=3, details={"value": 1}))
     assert value_of(3) == 1
 
@@ -212,7 +212,7 @@ def test_one_log_serves_several_threads(journal, log):
     assert journal.verify().problems == ()
 
 
-# The hash chain: any sequence of entries verifies, and whatever is changed afterwards is found.
+# The hash chain: any sequence of entries verifies, and any later change is found.
 
 COLUMNS = list(STORED)
 TEXTS = st.text(st.characters(), max_size=8)

@@ -1,4 +1,4 @@
-"""Where a journal is: named by a variable, a path or a URL, and not on a network share."""
+"""The place of a journal: named by a variable, a path or a URL, and not on a network share."""
 
 import subprocess
 import sys
@@ -11,7 +11,7 @@ from robolink.journal import _places, default_location
 from robolink.journal._places import place_of
 from robolink.journal.store.connection import parameters_of
 
-# Where a journal is: named by a variable, a path or a URL, and shown without passwords.
+# The place of a journal: named by a variable, a path or a URL, and shown without passwords.
 
 
 @pytest.fixture(autouse=True)
@@ -152,9 +152,9 @@ def test_a_file_system_of_this_computer_is_none(kind):
     [
         (mount("/srv", "nfs") + mount("/srv/local", "ext4"), None),
         (mount("/srv", "ext4") + mount("/srv/local", "nfs"), "nfs"),
-        (mount("/srv/local", "ext4") + mount("/srv/local", "cifs"), "cifs"),  # the last one covers
+        (mount("/srv/local", "ext4") + mount("/srv/local", "cifs"), "cifs"),  # the last one counts
         (mount("/srv/local", "cifs") + mount("/srv/local", "ext4"), None),
-        # What is mounted at / is this computer's own: a diskless PC, a container.
+        # A file system mounted at / is this computer's own: a diskless PC, a container.
         (mount("/", "9p"), None),
         ("nonsense\n90 27 0:50 / /srv\n" + mount("/srv/local", "nfs"), "nfs"),
         ("", None),

@@ -1,4 +1,4 @@
-"""Values as JSON documents and back: every public one, and what is refused."""
+"""Values as JSON documents and back: every public class, and refused documents."""
 
 import copy
 import itertools
@@ -53,13 +53,13 @@ NOT_DATA = {
 
 
 def back(value, kind=None):
-    """Return what a value becomes on its way through JSON."""
+    """Return the result of a value's conversion to JSON and back."""
     document = json.loads(json.dumps(to_json(value), allow_nan=False))
     return from_json(kind or type(value), document)
 
 
 def sample(kind, last):
-    """Return a value that an annotation allows: of the first member of a union, or the last."""
+    """Return a value for an annotation: of the first member of a union, or the last."""
     members = members_of(kind)
     kind = members[-1 if last else 0]
     origin, inner = get_origin(kind), get_args(kind)
@@ -98,7 +98,7 @@ def sample(kind, last):
 
 @pytest.fixture(scope="module")
 def made():
-    """The schema of every public value, those without one, and the classes."""
+    """The schema of every public value, the classes without one, and all classes."""
     found, without = value_schemas.schemas()
     kinds = {value_schemas.key_of(it): it for it in value_schemas.values().values()}
     return found, without, {key: kinds[key] for key in found if key in kinds}
@@ -352,7 +352,7 @@ def test_what_is_no_document_is_refused(document):
 
 @dataclass(frozen=True)
 class Later:
-    """A class that was given a field after its first version."""
+    """A class that got a field after its first version."""
 
     json_version: ClassVar[int] = 2
     x_mm: float
@@ -371,7 +371,7 @@ def test_an_older_document_may_lack_what_has_a_default_and_nothing_else():
 
 @dataclass(frozen=True)
 class Holder:
-    """A class of somebody else that holds a value whose class has a later version."""
+    """A third-party class that holds a value whose class has a later version."""
 
     later: Later
 

@@ -1,4 +1,4 @@
-"""Values as JSON knows them, and back: each class by its annotations."""
+"""Values in JSON and back: each class by its annotations."""
 
 import json
 import math
@@ -21,7 +21,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Shared:
-    """One that writes and reads itself."""
+    """A class that writes and reads itself."""
 
     parts: int
 

@@ -1,4 +1,4 @@
-"""What stands on a controller: no answer is forgotten, and open blocks give signs of life."""
+"""The state of a controller: no answer is forgotten, and open blocks send signs of life."""
 
 import ast
 import threading
@@ -32,7 +32,7 @@ from robolink.runner import Confirm, Runner, RunSettings
 from robolink.runtime import in_a_thread, replaced
 from tests.contract._quiet_time import QuietTime
 
-# What stands on a controller is told from what was begun, answered, read and recorded.
+# The state of a controller follows from what was begun, answered, read and recorded.
 
 OLD, NEW = ToolOffset(12.0, -3.5, -20.0), ToolOffset(12.5, -3.5, -20.0)
 WHEN = "2026-01-01T00:00:00+00:00"
@@ -256,7 +256,7 @@ def test_what_one_connection_did_not_look_at_is_as_the_one_before_left_it():
     assert describe_outcome(back).endswith("as before. Tool 1 is selected.")
 
 
-# No answer is forgotten: what asks, asks through what records, whoever calls it.
+# No answer is forgotten: every function that asks records through the same one, whoever calls it.
 
 PLACES = [Path(robolink.__file__).parent, Path(robolink_cli.__file__).parent]
 
@@ -266,25 +266,25 @@ PRIMITIVES = {
     "wizard/state.py",
     "session/check_before_start.py",
 }
-"""Where a person is asked for a word, and the answer is kept."""
+"""The functions that ask a person and keep the answer."""
 
 NO_VALUE_RESTS_ON_IT = {
     "runner/_place_question.py",  # a place: the pose and how it was touched are in the measurement
-    "commands/companions/check_map.py",  # what an HMI shows: kept with its map
+    "commands/companions/check_map.py",  # a value on an HMI: kept with its map
 }
 
 
 class Person:
-    """Says what is in the list."""
+    """Answers from a list."""
 
     def __init__(self, *words):
         self.words = list(words)
 
     def ask(self, question, kind):
-        """Hear it."""
+        """Accept a question."""
 
     def tell(self, text):
-        """Hear it."""
+        """Accept a message."""
 
     def poll(self, wait_s):
         return self.words.pop(0)
@@ -345,7 +345,7 @@ def test_nobody_asks_a_person_past_what_keeps_the_answer():
 
 
 def _asks(call):
-    """Whether it puts a question to an operator: ``x.ask(..., Question.Y)``, or a shown prompt."""
+    """Whether the call asks an operator: ``x.ask(..., Question.Y)``, or a displayed prompt."""
     name = call.func.attr if isinstance(call.func, ast.Attribute) else getattr(call.func, "id", "")
     if name in ("ask_yes_no", "ask_yes_no_or"):
         return True

@@ -1,4 +1,4 @@
-"""What robolink logs and traces: all that passes, no secret, and nothing that ends a change."""
+"""Logs and traces of robolink: all traffic, no secret, and no effect on a change."""
 
 import logging
 import sys
@@ -33,7 +33,7 @@ def cell():
 
 
 class Heard(logging.Handler):
-    """What was logged since the test began."""
+    """The log records since the test began."""
 
     def __init__(self):
         super().__init__()
@@ -61,7 +61,7 @@ def listening(level):
 
 @pytest.fixture
 def heard():
-    """Every record of robolink, as it is made."""
+    """Every log record of robolink, as it is made."""
     with listening(logging.DEBUG) as heard:
         yield heard
 
@@ -74,7 +74,7 @@ def new_record(url):
     return memory_journal(url).log(url)
 
 
-# What is logged.
+# The contents of the log.
 
 
 def test_a_library_sets_up_nothing_but_a_handler_that_does_nothing():
@@ -165,13 +165,14 @@ def test_a_process_without_logging_is_not_made_to_load_it(monkeypatch):
     assert "logging" not in sys.modules
 
 
-# What a kind without bytes tells.
+# The records of a kind without bytes.
 
 
 def test_a_kind_with_a_link_of_its_own_tells_its_requests(heard, monkeypatch):
     machine, told = SimpleMachine(tools={1: ToolOffset(12, -3.5, -20)}), []
     controller = SimpleController(machine, identity="acme+usb://17")
-    # One that knows nothing of logs: what the latch admits is told all the same.
+    # A controller without logging of its own: requests that the latch admits are logged all the
+    # same.
     controller.latch.tell(lambda request: None)
     monkeypatch.setattr(registry, "find_opener", lambda _url: lambda *_terms: controller)
     opened = robolink.connect("acme+usb://17", trace=lambda *passage: told.append(passage[1:]))
@@ -189,7 +190,7 @@ def test_a_mailbox_in_this_process_tells_its_words():
     assert {len(data) for direction, data in told if direction == "received"} >= {72, 224}
 
 
-# What no log and no trace holds.
+# Contents that no log and no trace has.
 
 
 @pytest.mark.fault("F71")
@@ -215,11 +216,11 @@ def test_a_login_that_is_bent_on_its_way_shows_nowhere(cell, heard, split):
     assert said
     assert not shows(told.decode("latin-1") + "".join(said))
     assert not shows("".join(record.getMessage() + record.request for record in heard))
-    assert b"!Login,13\r" in told  # the answer to a login that was bent in the password
+    assert b"!Login,13\r" in told  # the answer to a login with an altered password
 
 
 def shows(text):
-    """Whether a text has six characters of the password in a row."""
+    """Whether a text contains six consecutive characters of the password."""
     return any(PASSWORD[at : at + 6] in text for at in range(len(PASSWORD) - 5))
 
 
@@ -273,11 +274,11 @@ def test_a_line_break_in_what_comes_forges_no_line(heard):
     assert [one.getMessage() for one in heard] == [r"here: received #x\r\n2026 INFO"]
 
 
-# What listens and fails.
+# Listeners that fail.
 
 
 class Broken(logging.Handler):
-    """One that raises, as a handler of somebody's own may."""
+    """A handler that raises, as a third-party one may."""
 
     def handle(self, record):
         raise OSError(28, "No space left on device")

@@ -1,4 +1,4 @@
-"""The mailbox's blocks, code tables and counters: as in the register map, whole or refused."""
+"""The mailbox's blocks, code tables and counters: as in the register map, complete or refused."""
 
 import pytest
 from hypothesis import given, settings
@@ -48,7 +48,7 @@ from robolink.protocols.mailbox import (
     slot_start,
 )
 
-# The mailbox's blocks: layout as in the register map, whole or refused.
+# The mailbox's blocks: layout as in the register map, complete or refused.
 
 WORDS = st.lists(st.integers(0, 0xFFFF), max_size=112)
 POSE = (412.5, -103.25, 87.125, 30.0, 40.0, 50.0)
@@ -73,7 +73,7 @@ def fault_of(decode, words):
 @settings(deadline=None, max_examples=50)
 def test_the_checksum_is_the_one_of_modbus_rtu(words):
     data = b"".join(word.to_bytes(2, "little") for word in words)
-    swapped = FramerRTU.compute_CRC(data)  # as it goes over the wire: low byte first
+    swapped = FramerRTU.compute_CRC(data)  # as sent: low byte first
     assert crc16(words) == (swapped & 0xFF) << 8 | swapped >> 8
 
 
@@ -160,7 +160,7 @@ def test_a_torn_snapshot_is_refused_or_is_one_of_the_two(cut, tcp, ack):
 
 @pytest.mark.fault("F29", "F30")
 def test_zeroes_are_no_command():
-    # What a CODESYS watchdog leaves of the holding registers.
+    # The holding registers after a CODESYS watchdog has zeroed them.
     assert fault_of(decode_command, (0,) * 64) is BlockFault.EMPTY
 
 
@@ -292,7 +292,7 @@ def test_to_release_a_held_stop_or_to_press_a_button_needs_the_permit():
 
 
 def test_codes_are_append_only():
-    # A number once given stays; new members may follow.
+    # An assigned number never changes; new members may follow.
     assert [bit.name for bit in Bits][:10] == [
         *("POWERED", "IN_SYNC", "TRACKING", "TOOL_KNOWN", "BUSY"),
         *("JOGGING", "SIMULATED", "OWNED", "INTERRUPTED", "PERMITTED"),

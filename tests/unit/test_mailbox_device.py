@@ -1,4 +1,4 @@
-"""The number that a PLC draws once, and its angles: the same rotation as those of EPSON."""
+"""A PLC's once-drawn number, and its angles: the same rotation as EPSON's."""
 
 import json
 import math
@@ -26,7 +26,7 @@ from robolink.protocols.mailbox import (
 from tests.unit._mailbox_client import linked
 from tests.unit.softmotion_driver._cell import Cell
 
-# The number that a PLC draws once: in words, in a simulator, and as the driver reads it.
+# The number that a PLC draws once: as words, in a simulator, and read by the driver.
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""A CANopen node that misbehaves, on a bus that is not there."""
+"""A CANopen node that misbehaves, on a fake bus."""
 
 import struct
 from typing import Any
@@ -94,7 +94,7 @@ def test_a_lost_heartbeat_names_itself_while_an_answer_is_awaited(link_to):
 
 def test_a_heartbeat_that_this_computer_was_too_busy_to_hear_is_waited_for(link_to):
     bus, link = link_to(node_with(200))
-    bus.clock.sleep(60)  # nobody ran: not this thread, and not the one that hands frames over
+    bus.clock.sleep(60)  # neither this thread nor the one that passes frames on has run
     bus.late = [(HEARTBEAT, b"\x05")]
     link.beat(0x0101)
     assert bus.sent[-1] == (RPDO1, b"\x01\x01")
@@ -324,6 +324,6 @@ def test_frames_of_a_bus_by_multicast_stay_on_this_computer(monkeypatch):
     url = parse_url("softmotion+can://239.74.163.2?interface=udp_multicast&node=1")
     with pytest.raises(ConnectError, match="as far as here"):
         open_canopen_link(url, timeout_s=1.0)
-    # 0 hops is this computer alone; classic frames are what a node on a bus understands.
+    # 0 hops means this computer only; nodes on a bus understand classic frames.
     assert asked["hop_limit"] == 0
     assert asked["fd"] is False

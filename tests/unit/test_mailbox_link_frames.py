@@ -1,4 +1,4 @@
-"""Modbus frames: what is taken for an answer, and what is not."""
+"""Modbus frames: which ones are accepted as answers, and which are not."""
 
 import struct
 from contextlib import suppress
@@ -72,7 +72,7 @@ def test_a_damaged_byte_on_a_serial_line_never_gives_another_value(words, place,
     frame = bytearray(rtu(read_answer(words)))
     frame[place] ^= flip
     with suppress(FrameError):
-        assert RtuFraming().take(frame) is None  # it seems to be longer: more is waited for
+        assert RtuFraming().take(frame) is None  # it seems to be longer, so the rest is awaited
 
 
 @pytest.mark.fault("F08")
@@ -83,7 +83,7 @@ def test_f08_swapped_neighbours_on_a_serial_line_never_give_another_value(words,
     assume(frame[place] != frame[place + 1])
     frame[place], frame[place + 1] = frame[place + 1], frame[place]
     with suppress(FrameError):
-        assert RtuFraming().take(frame) is None  # it seems to be longer: more is waited for
+        assert RtuFraming().take(frame) is None  # it seems to be longer, so the rest is awaited
 
 
 @pytest.mark.fault("F06")
@@ -199,7 +199,7 @@ ASKED_BY_PYMODBUS = {
 
 
 def payload_by_pymodbus(request):
-    """Return what pymodbus sends for a request."""
+    """Return the bytes that pymodbus sends for a request."""
     if request.function == 16:
         pdu: ModbusPDU = WriteMultipleRegistersRequest(
             address=request.address, registers=list(request.values)
@@ -239,7 +239,7 @@ PAYLOADS = st.one_of(
 
 
 def taken(framing, frame):
-    """Return the reply that a frame gives, ``None`` where it is no frame or not a whole one."""
+    """Return the reply in a frame, ``None`` for an invalid or incomplete frame."""
     try:
         return framing.take(bytearray(frame))
     except FrameError:
@@ -271,7 +271,7 @@ def test_a_whole_answer_says_what_pymodbus_reads_in_it(payload):
         assert told(reply) == told_by_pymodbus(payload)
 
 
-# A count that was damaged, and two bytes of the answer that are the sum over what it counts.
+# A damaged count, and two bytes of the answer that match the checksum of the part it counts.
 CUT_BY_CHANCE = bytes.fromhex("031eb5143dfcd817c99c8d7d1ef24772d706390e1ca9c4f66268a5eeacb3b4eb6c")
 
 
@@ -296,6 +296,6 @@ def test_of_a_damaged_answer_nothing_is_taken_that_pymodbus_refuses(
         buffer = bytearray(frame)
         with suppress(FrameError):
             reply = framing.take(buffer)
-            if reply is not None:  # judged by the bytes that it was taken from
+            if reply is not None:  # judged by the original bytes
                 payload_taken = frame[head : len(frame) - len(buffer) - sum_bytes]
                 assert told(reply) == told_by_pymodbus(payload_taken)

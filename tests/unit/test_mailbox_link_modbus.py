@@ -1,4 +1,4 @@
-"""Modbus over TCP and on a serial line: whose answer an answer is, and what a refusal means."""
+"""Modbus over TCP and on a serial line: matching answers, and the meaning of refusals."""
 
 from itertools import pairwise
 
@@ -19,7 +19,7 @@ from robolink.transport.modbus.rtu import RtuExchange, RtuLine
 from robolink.transport.modbus.tcp import TcpExchange
 from tests.unit._scripted_modbus import IDENTITY, ScriptedLine, rtu, tcp, words
 
-# Over TCP: whose answer an answer is, and what a refusal means.
+# Over TCP: matching answers to requests, and the meaning of refusals.
 
 
 def over_tcp(*steps):
@@ -46,7 +46,7 @@ def test_a_second_copy_of_an_answer_answers_nothing():
 @pytest.mark.fault("F03")
 @pytest.mark.parametrize("so_far", [0, 5])
 def test_an_old_answer_with_the_very_number_answers_nothing(so_far):
-    """A gateway kept it from an earlier connection: all of it, or its first bytes so far."""
+    """A gateway kept it from an earlier connection: all of it, or only its first bytes."""
     old = tcp(words(99), 1)
     rest = [old[so_far:]] if so_far else []
     line, client = over_tcp(lambda frame: [*rest, tcp(words(7), 1)])
@@ -175,17 +175,17 @@ def test_what_cannot_be_asked_for_is_not_sent(ask):
     assert not line.sent
 
 
-# On a serial line: whose answer an answer is, when no frame carries a number.
+# On a serial line: matching answers to requests when no frame carries a number.
 
 
 def honest(frame):
-    """Answer a read with as many words as it asks for, each its own number."""
+    """Answer a read with the requested number of words, each its own number."""
     function, count = frame[1], int.from_bytes(frame[4:6], "big")
     return [rtu(words(*range(count), function=function), unit=frame[0])]
 
 
 def over_rtu(*steps, echo=False):
-    """A line whose opening question is answered, then ``steps``."""
+    """A line whose opening question is answered, followed by ``steps``."""
 
     def first(frame):
         return [frame, *honest(frame)] if echo else honest(frame)

@@ -1,4 +1,4 @@
-"""What the URL of a mailbox may say, and a serial port as a transport."""
+"""The URLs of a mailbox, and a serial port as a transport."""
 
 import os
 import subprocess
@@ -29,7 +29,7 @@ from robolink.transport._url import UrlOptions
 from robolink.transport.modbus.mailbox import _take_places
 from robolink.transport.serial_port import SerialSettings, open_serial, serial_device
 
-# What the URL of a mailbox may say, and what an import of the package costs.
+# The allowed URLs of a mailbox, and the cost of importing the package.
 
 TCP = "softmotion+modbus-tcp://192.0.2.1:502"
 RTU = "softmotion+modbus-rtu:///dev/no-such-port"
@@ -172,7 +172,7 @@ def soon(seconds=1.0):
 
 @pytest.fixture
 def line():
-    """An open port and the descriptor at its other end."""
+    """An open port and the descriptor of its other end."""
     far, device = os.openpty()
     tty.setraw(device)
     url = parse_url(f"desk+serial://{os.ttyname(device)}")

@@ -1,4 +1,4 @@
-"""What one end of the mailbox says, the other end reads."""
+"""Blocks written by one end of the mailbox are read by the other."""
 
 import struct
 

@@ -1,4 +1,4 @@
-"""What a measurement goes on with: the flange, the last touch, a cell on paper, former names."""
+"""The inputs of a measurement: the flange, the last touch, a paper cell, former names."""
 
 import math
 from dataclasses import replace
@@ -43,7 +43,7 @@ from robolink.runner import Ask, Confirm, Look, Move, Notify, Seek, TeachPrompt,
 from robolink.stations import CameraStation, Station, StationKind
 from robolink.testing import PaperCell
 
-# With what one touch of the next nozzle is compared, and what follows from a wrong answer.
+# The reference for one touch of the next nozzle, and the result of a wrong answer.
 
 HERE = Pose(330.0, 120.0, 20.0, 0.0, tool=0)
 STORED = ToolOffset(12.0, -4.0, -20.0)
@@ -52,7 +52,7 @@ PIN = (310.0, 95.0, -40.0)
 
 
 def kept(tool=1, station="PIN-07", value=STORED, **said: Any):
-    """Return what is on record of a calibration that was kept."""
+    """Return the journal entry of a kept calibration."""
     touch = {
         "station": station, "x_mm": PIN[0], "y_mm": PIN[1], "z_mm": PIN[2], "u_deg": 90.0,
         "sigma_mm": 0.03, "changes": 3, "full_sigma_mm": 0.01, "touch_sigma_mm": 0.02,
@@ -145,7 +145,7 @@ def test_a_difference_carries_what_two_touches_scatter_however_many_came_before(
     (Absolute(Pin(*PIN), 0.02), 0.0),
 ])  # fmt: skip
 def test_the_tip_comes_down_over_the_pin_at_the_u_of_the_last_touch(solver, u_deg):
-    """Where a runout is, another U would show another tip."""
+    """With runout, another U would show another tip."""
     source = OneTouchSource(solver)
     cell = PaperCell(HERE, STORED, PIN)
     course: Any = source.procedure(STORED, HERE)
@@ -164,7 +164,7 @@ def test_the_tip_comes_down_over_the_pin_at_the_u_of_the_last_touch(solver, u_de
 
 @pytest.mark.parametrize("pin_sigma_mm", [None, 0.03])
 def test_a_tip_is_as_sure_as_its_pin(pin_sigma_mm, controller):
-    """Against the place of a pin, the interval is unknown where nobody stated how sure that is."""
+    """Relative to a pin, the interval is unknown if nobody stated the pin's accuracy."""
     method, site = find_method("one-touch"), site_at(controller, sigma_mm=pin_sigma_mm)
     source: Any = method.source(method.parameters(basis="absolute", clearance_mm=4.0), site)
     found = PaperCell(HERE, STORED, PIN).run(source.procedure(STORED, HERE))
@@ -192,14 +192,14 @@ def test_a_difference_beyond_the_largest_change_of_the_site_is_refused(controlle
         touched(replace(STORED, x_mm=12.6))
 
 
-# The cell on paper: what it answers follows from where the tip is, and from nothing else.
+# The paper cell: its answers follow from the tip's place alone.
 
 PAPER_TIP = Pose(300.0, 100.0, 20.0, 90.0, tool=0)
 TIP = ToolOffset(12.0, -4.0, -20.0)
 
 
 def answers(*steps):
-    """Return what came of each step, or the code with which it was refused."""
+    """Return the answer to each step, or the code of its refusal."""
     heard = []
     for step in steps:
         try:
@@ -210,7 +210,7 @@ def answers(*steps):
 
 
 def down(number, *, falling=False):
-    """Seek from where the tip is to 10 mm beneath."""
+    """Seek from the tip's place to 10 mm below."""
     target = Pose(300.0, 100.0, 10.0, 90.0, tool=0)
     return Seek(target, InputEdge(number, falling=falling), 2.0, "down")
 
@@ -285,7 +285,7 @@ def test_what_was_asked_told_and_offered_is_kept():
     assert [type(step).__name__ for step in cell.steps] == ["Move", "Notify", "Confirm"]
 
 
-# Whatever tool is in force: it is the flange that a measurement moves, and goes on with.
+# Whatever tool is selected, a measurement moves the flange and reports its poses.
 
 SOURCES: dict[str, Any] = {
     "two-pose": TwoPoseSource(),
@@ -295,7 +295,7 @@ SOURCES: dict[str, Any] = {
 
 
 class Leaves:
-    """Looks which tool is in force when something is asked, and goes."""
+    """Notes the selected tool at a question, and leaves."""
 
     def __init__(self, controller):
         self.selected = []
@@ -331,7 +331,7 @@ def test_tool_zero_is_selected_before_a_touch_is_asked_for(method):
         assert person.selected == [0, 0, 0, 0]
 
 
-# Names that entries of before gave to calibration methods.
+# Former names of calibration methods in old entries.
 
 
 def test_what_was_written_before_is_the_name_of_a_method():

@@ -1,6 +1,4 @@
-"""Sentences: one door for all, in the words of the program that shows them, the language and the
-time of the place.
-"""
+"""Sentences: one function for all, in the words of the program, its language and its local time."""
 
 import ast
 import os
@@ -27,12 +25,12 @@ from robolink.pose_tables.values import OpenQuestion, unclear
 from robolink.remedy_words import RemedyWord, remedy_word, speaking
 from robolink.timing import local_label
 
-# Every sentence goes through one door, in a form that can be collected and filled.
+# Every sentence goes through one function, in a form that can be collected and filled.
 
 ROOT = Path(__file__).parents[2]
 PACKAGES = ("robolink", "cli/robolink_cli", "simulators/robolink_simulators")
 CALLED = re.compile(r"\b(tr|declared)\s*\(")
-"""Stands in every module that has a sentence; a tree of the others would show nothing."""
+"""Every module with a sentence has this; parsing the others would show nothing."""
 
 
 def sources():
@@ -41,7 +39,7 @@ def sources():
 
 @cache
 def looked_at():
-    """Return each module with its calls and the lines that come too early; trees are large."""
+    """Return each module's calls and the lines that run too early; parse trees are large."""
     found = []
     for path in sources():
         source = path.read_text(encoding="utf-8")
@@ -58,7 +56,7 @@ def sentences(tree):
 
 
 def when_imported(top):
-    """Yield what runs when a module is imported: bodies of functions do not."""
+    """Yield the code that runs at import: the bodies of functions do not."""
     waiting = [top]
     while waiting:
         node = waiting.pop()
@@ -83,7 +81,7 @@ def too_early(tree):
 
 
 def placeholders(sentence):
-    """Names between braces; braces around anything else are text."""
+    """Return the names in braces; other text in braces is text."""
     return set(re.findall(r"(?<!{){([a-z_]\w*)[^{}]*}", sentence))
 
 
@@ -141,14 +139,14 @@ def test_what_would_be_translated_too_early_is_found():
     assert sorted(set(too_early(ast.parse(source)))) == [1, 3, 4, 5, 6]
 
 
-# A sentence of the library asks for things in the words of the program that shows it.
+# A sentence of the library names the next step in the words of the program that shows it.
 
 LIBRARY = Path(robolink.__file__).parent
 OPTION = re.compile(r"(?<![\w-])--[a-z]")
 
 
 def own_sentences(calls):
-    """Yield the sentences of a module that a person is shown, of its calls."""
+    """Yield a module's sentences for people, among its calls."""
     for node in calls:
         if node.func.id == "tr" and isinstance(node.args[0], ast.Constant):
             yield node.args[0].value
@@ -182,7 +180,7 @@ def test_each_program_says_it_in_its_own_words():
     assert remedy_word(RemedyWord.RECORD) == "trace"
 
 
-# Which language a name means, where sentences come from, and what a record keeps of them.
+# The language of a name, the source of sentences, and the part of them that a record keeps.
 
 
 @pytest.fixture
@@ -245,7 +243,7 @@ def test_a_cell_file_comes_before_the_users_and_both_before_the_system(tmp_path,
     assert chosen_language([], environment) == "zh"
     (tmp_path / "robolink.toml").write_text('language = "en"\n')
     assert chosen_language([], environment) == "en"
-    (tmp_path / "robolink.toml").write_text("language = ]")  # said by whoever needs the file
+    (tmp_path / "robolink.toml").write_text("language = ]")  # reported where the file is needed
     assert chosen_language([], environment) == "zh"
     assert chosen_language([], {**environment, "ROBOLINK_LANG": "en"}) == "en"
 
@@ -360,12 +358,12 @@ def test_a_language_without_a_catalogue_leaves_english(tmp_path, monkeypatch):
     assert languages.speak("en") is True
 
 
-# A person reads the time of the place with its zone; records keep UTC.
+# People read local time with its zone; records keep UTC.
 
 RAW = re.compile(
     r"\b(?:when|at|since)=[\w.]*\.(?:begun_at|taken_at|found_at)\b|\{[\w.]*\.begun_at\}"
 )
-"""A recorded label as it is, in a sentence."""
+"""A raw recorded label in a sentence."""
 
 
 @pytest.fixture

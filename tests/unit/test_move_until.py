@@ -1,4 +1,4 @@
-"""Movements until a sensor switches: Till and Find, what the true tip does to beams and pins."""
+"""Movements until a sensor switches: Till and Find, and the true tip at beams and pins."""
 
 import math
 import random
@@ -18,7 +18,7 @@ from robolink.errors import LocalProtocolError
 from robolink.model import Hand, Pose
 from robolink.protocols import spel
 
-# Till and Find: what is written, and what a command window makes of it.
+# Till and Find: the statements sent, and their effect in a command window.
 
 NUMBERS = SpelNumbers()
 TARGET = Pose(200.0, 420.0, -70.0, 0.0, hand=Hand.RIGHT)
@@ -201,7 +201,7 @@ class SensedCell:
         assert execution.error is None, execution.error
 
     def find(self, dx_mm=0.0, dz_mm=0.0):
-        """Move past an edge and return where the flange was then."""
+        """Move past an edge and return the flange's place at the edge."""
         here = self.machine.arm.flange()
         target = f"XY({here.x_mm + dx_mm}, {here.y_mm}, {here.z_mm + dz_mm}, {here.u_deg}) /R"
         self.run(f"Move {target} Find Sw({INPUT}) = On")
@@ -209,12 +209,12 @@ class SensedCell:
         return self.machine.found.coordinates
 
     def beam(self, **options):
-        """Return a beam across X through the place of the tip, deep enough to be broken."""
+        """Return a beam across X through the tip's place, deep enough to be broken."""
         x_mm, y_mm, z_mm = self.world.tip_mm()
         return LightBeam((x_mm, y_mm, z_mm + 2.0), heading_deg=90.0, **options)
 
     def shift(self, dx_mm):
-        """Put the arm beside where it is, as by hand."""
+        """Move the arm a little, as by hand."""
         arm = self.machine.arm
         target = replace(arm.flange(), x_mm=arm.flange().x_mm + dx_mm)
         arm.place(inverse(arm.model, target, arm.hand), self._now_ns)

@@ -1,4 +1,4 @@
-"""A map that is wrong is not confirmed, and what nobody compared is not changed."""
+"""A wrong map is not confirmed, and a component that was not compared is not changed."""
 
 from dataclasses import replace
 
@@ -35,7 +35,7 @@ def _own_state_folder(tmp_path, monkeypatch):
 
 
 def changed(register_map, **numbers):
-    """The map with other numbers for components, in both tools; each is made from the right one."""
+    """The map with other component numbers in both tools; each is made from the right one."""
     slots = {
         tool: replace(
             slot,
@@ -52,7 +52,7 @@ EXCHANGED = {"y": lambda s: s["z"], "z": lambda s: s["y"]}
 
 
 class Machine:
-    """A PLC, what its own screen shows, and a driver with a map that may be wrong."""
+    """A PLC, its own screen, and a driver with a map that may be wrong."""
 
     def __init__(self, wrong=None, path=COMMIT_BIT, true=TRUE):
         self.right = load_map(path)
@@ -101,10 +101,10 @@ class Machine:
     ids=["exchanged", "sign", "tenfold", "next tool", "radians"],
 )
 def test_a_wrong_map_is_not_confirmed(wrong, compared, finds):
-    """The sign, the scale and the place of each component are seen when it is compared."""
+    """The comparison shows the sign, the scale and the place of each component."""
 
     def spoilt(right):
-        if finds == "2.x":  # the whole second tool stands where the first is looked for
+        if finds == "2.x":  # the second tool's registers are used for the first
             slots = {1: replace(right.slots[2], tool=1), 2: replace(right.slots[1], tool=2)}
             return replace(right, slots=slots)
         return changed(right, **wrong)
@@ -119,7 +119,7 @@ def test_a_wrong_map_is_not_confirmed(wrong, compared, finds):
 
 
 def test_the_wrong_word_order_is_not_confirmed():
-    """Without a probe nothing else would show it: 12.5 mm are whole thousandths in two words."""
+    """Without a probe nothing else shows it: 12.5 mm are whole thousandths in two words."""
     right = load_map(LEVEL)
     turned = {
         name: lambda s, name=name: replace(s[name], low_word_first=True) for name in ("x", "y", "z")
@@ -132,7 +132,7 @@ def test_the_wrong_word_order_is_not_confirmed():
 
 
 def test_what_was_not_compared_is_not_changed():
-    """Y and Z are exchanged; X alone was compared, which is right."""
+    """Y and Z are exchanged; only X was compared, and it is right."""
     machine = Machine(lambda right: changed(right, **EXCHANGED))
     machine.compare(X)
     before = machine.plc.truth()["stored"]
@@ -184,7 +184,7 @@ def test_a_component_counts_for_each_tool_that_is_laid_out_alike_and_was_looked_
         )
     )
     other.compare(X, Y, Z, U, MapValue(2, "x"))
-    with pytest.raises(NotComparedError, match=r"2\.y"):  # laid out in another way
+    with pytest.raises(NotComparedError, match=r"2\.y"):  # with another layout
         other.set(2, y_mm=1.0)
 
 
@@ -259,7 +259,7 @@ def test_equal_in_one_tool_alone_is_told_apart_in_the_other():
     wanted = to_compare(machine.map, machine.found(), {})
     assert not any(one.why_not for one in wanted)
     assert {str(one.value) for one in wanted} >= {"2.y", "2.z"}
-    # 1.y is not 2.y, so it still tells which tool it is.
+    # 1.y differs from 2.y, so it still shows the tool.
     made = machine.compare(Y).compared[Y]
     assert (made.tells_tool, made.tells_component) == (True, False)
 

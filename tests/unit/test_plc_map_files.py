@@ -1,4 +1,4 @@
-"""Map files and register lists: everything that is wrong is told, with the path of its key."""
+"""Map files and register lists: every fault is reported with the path of its key."""
 
 import subprocess
 import sys
@@ -19,7 +19,7 @@ from robolink.register_maps import (
 )
 from robolink.register_maps._drafts import component_of
 
-# Map files: everything that is wrong is told, with the path of its key.
+# Map files: every fault is reported with the path of its key.
 
 GOOD = """
 schema = "robolink/plc-map/1"
@@ -210,7 +210,7 @@ def test_what_is_wrong_is_told_with_its_path(write, case):
 
 def test_all_problems_are_told_at_once(write):
     text = GOOD.replace("address = 12", "address = 11").replace("address = 10", "address = 70000")
-    assert len(said(check_map(write(text)))) == 1  # what pydantic finds comes first
+    assert len(said(check_map(write(text)))) == 1  # pydantic's findings come first
     text = GOOD + "[probe]\naddress = 12\nvalue = 0.0\n"
     assert set(said(check_map(write(text)))) == {"probe", "probe.value"}
 

@@ -1,4 +1,4 @@
-"""A wrong probe says what the map should say; a map without one is confirmed by a person."""
+"""A wrong probe shows what the map should say; a person confirms a map without one."""
 
 import json
 from dataclasses import replace
@@ -31,7 +31,7 @@ def _own_state_folder(tmp_path, monkeypatch):
 
 
 def controller_with(**changes):
-    """A driver whose map has another probe than the PLC that it is connected to."""
+    """A driver whose map has another probe than its PLC."""
     right = load_map(COMMIT_BIT)
     assert right.probe is not None
     number = replace(right.probe.number, **changes)

@@ -1,4 +1,4 @@
-"""Maps that no example shows, and numbers in registers of every type and order."""
+"""Maps that no example has, and numbers in registers of every type and order."""
 
 import math
 import struct
@@ -14,7 +14,7 @@ from robolink.model import ANY, ToolOffset
 from robolink.register_maps import Number, NumberType, RegisterTable
 from tests.unit._plc_bench import Bench
 
-# Maps that no example shows: LREAL, swapped bytes, a flag for defined tools, reading only.
+# Maps that no example has: LREAL, swapped bytes, a flag for defined tools, read-only.
 
 _names = count()
 
@@ -197,7 +197,7 @@ def test_a_whole_number_that_does_not_fit_is_refused():
 def test_words_in_the_wrong_order_and_no_numbers_are_absurd():
     real = Number(RegisterTable.HOLDING, 0, NumberType.REAL)
     swapped = Number(RegisterTable.HOLDING, 0, NumberType.REAL, low_word_first=True)
-    # The round ones become denormals, which a check of ranges takes for nought.
+    # The round ones become denormals, which a range check takes for zero.
     for value in (12.3456, 0.25, -7.5, 1.0, 50.0, 100.0):
         assert real.is_absurd(real.decode(swapped.encode(value)))
         assert not real.is_absurd(real.decode(real.encode(value)))

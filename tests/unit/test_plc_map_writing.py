@@ -1,4 +1,4 @@
-"""Writing through a map: the three handshakes, refusals, and answers that are lost."""
+"""Writing through a map: the three handshakes, refusals, and lost answers."""
 
 from itertools import count
 from struct import pack, unpack
@@ -68,7 +68,7 @@ def test_a_commit_bit_follows_the_values_and_is_taken_back(commit_bit):
     assert not controller.outcomes.open_markers()
 
 
-# With its words in the other order X is 3.14 mm: numbers of a tool, too.
+# With its words in the other order X is 3.14 mm: a possible value of a tool, too.
 A_TOOL_IN_BOTH_ORDERS = ToolOffset(unpack("<f", pack("<HH", 0x4049, 0x4120))[0], 0.0, 0.0)
 
 
@@ -416,7 +416,7 @@ def test_an_unconfirmed_map_is_refused_before_anything_else_is_looked_at():
     with bench.connect() as controller:
         controller.status()
         before = controller.exchanges
-        # What would be refused for another reason too is refused for this one first.
+        # A request with a second fault is refused for this one first.
         for tool, value in ((1, NEW), (1, ZERO)):
             for act in (
                 lambda tool=tool: controller.tools.require_writable(tool),
@@ -434,14 +434,14 @@ def test_an_unconfirmed_map_is_refused_before_anything_else_is_looked_at():
 
 
 class Nobody:
-    """A person who is not to be troubled."""
+    """A person who must not be disturbed."""
 
     def tell(self, text: str) -> None:
-        """Not to be told anything."""
+        """Accept no message."""
         raise AssertionError(text)
 
     def ask(self, question: str, kind: Question) -> None:
-        """Not to be asked anything."""
+        """Accept no question."""
         raise AssertionError(question)
 
     def poll(self, wait_s: float) -> str | None:

@@ -1,4 +1,4 @@
-"""Poses in programs and messages of others: made here as their makers write them."""
+"""Poses in third-party programs and messages, made here as their makers write them."""
 
 import json
 

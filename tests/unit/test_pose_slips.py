@@ -25,7 +25,7 @@ PLACED = ("line ", "pose ")
 
 
 def judged(folder, name, text, options, slips):
-    """Return the slips that changed poses in silence, and refusals that name no place."""
+    """Return the slips that silently changed poses, and refusals without a place."""
     choices = ReadingChoices(**options)
     path = folder / name
     path.write_text(text, encoding="utf-8")
@@ -82,7 +82,7 @@ def test_a_long_program_is_read_in_seconds(tmp_path, name):
     begin = text[: text.index("\n") + 1] if name in ("kuka.dat", "ur.script") else ""
     record = text[len(begin) :].removesuffix("ENDDAT\n").removesuffix("end\n")
     numbered = re.compile(r"(?<!G)P[123]\b|P\[[123]\]|pin[123]\b")
-    # Points have a number of their own.
+    # Points have their own number.
     copies = [numbered.sub(_renumbered(at), record) for at in range(2000)]
     path = tmp_path / name
     path.write_text(begin + "".join(copies), encoding="utf-8")

@@ -1,4 +1,4 @@
-"""Tables of poses: columns, units, separators and encodings; and twenty as people have them."""
+"""Tables of poses: columns, units, separators and encodings; and twenty real tables."""
 
 import json
 from contextlib import suppress
@@ -333,7 +333,7 @@ POSES = st.tuples(NUMBERS.filter(lambda x: abs(x) > 10), NUMBERS, NUMBERS, ANGLE
 
 
 def written(rows, form):
-    """Return rows of poses in one of the forms that people have, and what has to be said."""
+    """Return rows of poses in one of the usual forms, and the options needed."""
     if form == "json":
         names = ("x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
         return json.dumps([dict(zip(names, row, strict=True)) for row in rows]), {}
@@ -369,7 +369,7 @@ def test_what_is_written_in_any_form_is_read_back(tmp_path_factory, form, rows):
     try:
         found = read_poses(path, ReadingChoices(**choices))
     except AmbiguousPosesError:
-        # Small angles may be radians: then it asks, and reads nothing.
+        # Small angles may be radians: then robolink asks, and reads nothing.
         assert all(abs(angle) < 6.3 for row in rows for angle in row[3:])
         return
     same(found, *rows)
@@ -384,8 +384,7 @@ def test_rubbish_gives_poses_or_a_sentence(tmp_path_factory, text):
         assert read_poses(path).entries
 
 
-# Twenty tables as people have them, unedited, with the poses that they stand for.
-#
+# Twenty real tables, unedited, with the poses that they stand for.
 # They are not part of the source archive; the tests skip where the folder is absent.
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data" / "pose_tables"

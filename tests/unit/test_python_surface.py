@@ -1,4 +1,4 @@
-"""What a script meets: names, arguments that are mistaken, representations, the tree of errors."""
+"""The Python surface: names, mistaken arguments, representations, the tree of errors."""
 
 import contextlib
 import copy
@@ -48,14 +48,14 @@ from robolink.testing import PaperCell
 from robolink.transaction import Wanted, change_tools
 from robolink.version import VERSION
 
-# A public name that was given up works for one more version, and says what it is now.
+# A deprecated public name works for one more version, and names its successor.
 
 ROWS = [(package, name, new) for package, row in OLD_NAMES.items() for name, new in row.items()]
 IDS = [f"{package}.{name}" for package, name, _ in ROWS]
 
 
 def told(act):
-    """Return the warnings of an act, and what it gave."""
+    """Return the warnings of an act, and its result."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         given = act()
@@ -63,7 +63,7 @@ def told(act):
 
 
 def tried(act, *args, **kwargs):
-    """Call what may fail on what it is given; the warning comes first."""
+    """Call a function that may fail with an argument; the warning comes first."""
     with contextlib.suppress(AttributeError):
         act(*args, **kwargs)
 
@@ -117,7 +117,7 @@ def test_the_old_names_end_with_the_version_that_the_warning_says():
 
 
 class Tolerance:
-    """A class with a method that was given up."""
+    """A class with a deprecated method."""
 
     limit_mm = 0.2
 
@@ -320,7 +320,7 @@ def test_a_source_that_proves_in_its_own_way_needs_no_other_hook():
     assert made.proof_of(basis) == ("context", 1, "result", "tip", 0.1)
 
 
-# What a script gives by mistake is named for what it is, and nothing is sent.
+# A script's mistaken argument is named for what it is, and nothing is sent.
 
 
 @pytest.fixture
@@ -491,7 +491,7 @@ def test_the_action_of_a_fault_may_be_a_word_and_nothing_else():
         Fault(cast("Any", "drop_replies"))
 
 
-# What a prompt shows of a controller: which one, and its state as it was read last.
+# A controller at a prompt: its name, and its last read state.
 
 
 @pytest.mark.parametrize(
@@ -534,11 +534,11 @@ def test_a_journal_says_where_it_is_and_its_log_of_whom(tmp_path):
         assert repr(journal).endswith(", read only>")
 
 
-# The tree of errors that is drawn at the top of the module is the one that is there.
+# The tree of errors drawn at the top of the module matches the code.
 
 
 def drawn():
-    """Return each drawn class with its parent."""
+    """Return each class in the drawing with its parent."""
     path: list[str] = []
     found: dict[str, str | None] = {}
     for line in str(errors.__doc__).splitlines():
@@ -554,7 +554,7 @@ def drawn():
 
 
 def made(kind):
-    """Return an error with whatever its class asks for."""
+    """Return an error with the arguments that its class requires."""
     asked = [*inspect.signature(kind).parameters.values()]
     needed = [it for it in asked if it.default is it.empty and it.kind is not it.VAR_KEYWORD]
     last = [it for it in needed if it.kind is it.KEYWORD_ONLY]

@@ -1,4 +1,4 @@
-"""How the tables of a recipe go together."""
+"""The tables of a recipe in combination."""
 
 import tomllib
 
@@ -63,7 +63,7 @@ def problems(text):
 
 
 def with_(text, header, *lines):
-    """Add lines below a header that is there, or add both."""
+    """Add lines below an existing header, or add both."""
     body = "\n".join(lines)
     if f"{header}\n" in text:
         return text.replace(f"{header}\n", f"{header}\n{body}\n")

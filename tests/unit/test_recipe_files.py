@@ -1,4 +1,4 @@
-"""Recipe files: how they are read, and what is said about keys that are wrong."""
+"""Recipe files: their reading, and the messages about wrong keys."""
 
 import copy
 import hashlib
@@ -54,7 +54,7 @@ def without(key):
 
 @pytest.fixture
 def problems(tmp_path):
-    """Writes a recipe and returns what is wrong in it, by path."""
+    """Writes a recipe and returns its faults, by path."""
 
     def look(text):
         path = tmp_path / "recipe.toml"

@@ -1,4 +1,4 @@
-"""What a recipe asks for: what a controller cannot do, what nobody can answer, what is proposed."""
+"""Requests of a recipe: unsupported by a controller, unanswerable, and the proposed values."""
 
 import re
 import tomllib
@@ -21,7 +21,7 @@ from robolink.model import Pose, ToolOffset
 from robolink.recipe import Answers, LoadedRecipe, Recipe, beyond, load_recipe, require_answers
 from robolink.recipe._loading import _checked
 
-# What a recipe asks for and a kind of controller cannot do: not offered, and refused at once.
+# Requests of a recipe that a kind of controller does not support: not offered, and refused at once.
 
 RECIPES = Path(__file__).parents[2] / "examples" / "recipes"
 KINDS = ("epson", "softmotion", "plc")
@@ -97,7 +97,7 @@ def test_a_copy_with_simulated_numbers_is_refused_by_a_real_controller():
     with SimpleController() as controller:
         with pytest.raises(ConfigError, match=r"numbers in a\.toml are for a simulated cell"):
             run_of(controller, copied()).preflight()
-        # Whoever has put in their own deletes the line; what is refused then is something else.
+        # A user who has put in their own deletes the line; something else is refused then.
         with pytest.raises(LimitError):
             run_of(controller, replace(copied(), recipe=written("scara-pin"))).preflight()
 
@@ -190,7 +190,7 @@ def test_what_nobody_answered_is_named(z, more, answers, missing):
     assert refused.value.remedy.count("Answers(") == 1
 
 
-# What a recipe proposes of a measurement that shows more than X and Y.
+# A recipe's proposal from a measurement that shows more than X and Y.
 
 PIVOT = Path(__file__).parents[2] / "examples" / "recipes" / "five-axes-pivot.toml"
 
@@ -200,7 +200,7 @@ NOW = ToolOffset(12.5, -3.9, -19.9, 30.0, 5.0, 0.0)
 
 
 def proposal_of(basis, z, typed=None):
-    """Return what the pivot recipe with other rules makes of a tip found at NOW."""
+    """Return the pivot recipe's proposal, with other rules, for a tip found at NOW."""
     text = PIVOT.read_text().replace('"absolute"', f'"{basis}"').replace('"measured"', f'"{z}"')
     recipe, problems = _checked(tomllib.loads(text))
     assert recipe, problems
@@ -244,7 +244,7 @@ def test_a_difference_names_the_components_that_it_moved():
 
 
 def test_the_next_needle_is_compared_with_the_touch_that_stood_upright():
-    """Where the value that was written puts the pin depends on how the tool stood there."""
+    """The written value puts the pin at a place that depends on the tool's orientation there."""
     kept = proposal_of("absolute", "kept")
     tilted = Pose(0.0, 0.0, 0.0, -60.0, 20.0, 0.0)
     upright = Pose(0.0, 0.0, 0.0, 90.0)

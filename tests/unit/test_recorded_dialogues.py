@@ -1,4 +1,4 @@
-"""Dialogues on record: as text, replayed, and bounded."""
+"""Recorded dialogues: as text, replayed, and bounded."""
 
 import pytest
 from hypothesis import given, settings
@@ -108,7 +108,7 @@ RECORDED = Dialogue(
 
 
 def played(*pieces, dialogue=RECORDED):
-    """Return the device and what it answered to each piece; stop when it closes."""
+    """Return the device and its answer to each piece; stop when it closes."""
     device = ReplayDevice((dialogue,))
     link = device.connect(0)
     answers = [link.outgoing()]
@@ -204,7 +204,7 @@ def test_a_recording_of_a_plc_is_served_by_no_epson(tmp_path):
         read_recording(path)
 
 
-# The record of what crossed the wire: bounded, numbered, and each text held once.
+# The record of the wire traffic: bounded, numbered, and each text stored once.
 
 
 def text(number):

@@ -1,4 +1,4 @@
-"""The report: a page that is whole by itself, and the pictures in it."""
+"""The report: a self-contained page, and its pictures."""
 
 import math
 import re
@@ -29,7 +29,7 @@ from robolink.report.pictures.drawing import dot_names, step_down, step_up
 from robolink.report.pictures.plans import pose_drawings
 from robolink.report.pictures.residuals import fit_drawings, interval_ellipse, order_drawings
 
-# The report as a page: well formed, escaped, whole by itself, and equal to its numbers.
+# The report as a page: well formed, escaped, self-contained, and equal to its numbers.
 
 OLD = ToolOffset(12.0, -3.5, -20.0)
 NEW = ToolOffset(12.3, -3.9, -20.0)
@@ -64,7 +64,7 @@ def report(points=None, *, new=NEW, **more):
 
 
 class Page(HTMLParser):
-    """Reads a page strictly: every element is closed, in its turn."""
+    """Reads a page strictly: every element is closed, in order."""
 
     def __init__(self, text):
         super().__init__(convert_charrefs=True)
@@ -196,7 +196,7 @@ def test_arrows_are_as_long_as_the_stated_factor_says_and_stay_on_the_paper(name
 
 
 def scale_of(text):
-    """Return paper per mm, as the ruler of the picture says."""
+    """Return the paper units per mm, by the picture's ruler."""
     length = re.findall(r'class="bar" x1="0.00" y1="[^"]*" x2="([^"]*)"', text)[0]
     (millimetres,) = re.findall(r"points: ([\d.]+) mm", text)
     return float(length) / float(millimetres)

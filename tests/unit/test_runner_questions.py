@@ -1,4 +1,4 @@
-"""Questions of a procedure: what a person may answer or type, when they come, what ends them."""
+"""Questions of a procedure: possible answers, their timing, and what ends them."""
 
 import os
 import re
@@ -41,13 +41,13 @@ from robolink.runner import (
 )
 from robolink.runner._jog_steps import typed_pose
 
-# What a person may answer, how a jog step may be typed, and that no question is for ever.
+# Possible answers of a person, the forms of a jog step, and an end to every question.
 
 _names = count()
 
 
 class Typist:
-    """Types lines, the last one for ever, and keeps what was shown."""
+    """Types lines, the last one for ever, and keeps the output."""
 
     def __init__(self, *lines):
         self.lines, self.shown, self.asked, self.polled = list(lines), [], [], 0
@@ -244,7 +244,7 @@ def shown_to(controller, *thinks_s):
 
 
 def touched():
-    """Ask for a place on which something rests."""
+    """Ask for a place on which a measurement rests."""
     return (yield Ask("Jog the tip onto the pin."))
 
 
@@ -266,7 +266,7 @@ def test_a_jog_for_its_own_sake_needs_no_time(controller):
     runner_with(controller, Hasty(controller.clock, 0.0)).run(ask_for_pose("Jog."))
 
 
-# What ends a procedure while a person is asked.
+# Events that end a procedure while a person is asked.
 
 ON = ControllerStatus(remote=True, ready=True)
 
@@ -334,14 +334,14 @@ def test_a_typed_pose_is_about_where_the_frame_is_and_in_its_box(text):
         typed_pose(text, HERE, settings)
 
 
-# What a recipe asks and switches between the phases of a change comes at its place, once.
+# A recipe's prompts and outputs between the phases of a change come in their place, once.
 
 OLD = ToolOffset(12, -3.5, -20)
 TOUCHES = [Pose(298, 99, -60, 0), Pose(322, 91, -60, 180)]
 
 
 class Noting(Listener):
-    """Keeps each moment with what the tool holds then; may refuse at one."""
+    """Records each moment with the tool's value then; may refuse at one."""
 
     def __init__(self, machine, *, refuses=None):
         self.machine, self.refuses, self.seen = machine, refuses, []
@@ -390,7 +390,7 @@ def test_who_refuses_at_a_moment_before_the_write_keeps_the_old_value(refuses):
     assert machine.read(1) == OLD
 
 
-# What of a proposal counts as its change: the lengths that were measured.
+# The part of a proposal that counts as its change: the measured lengths.
 
 BEFORE = ToolOffset(12.0, -3.5, -20.0)
 XY, XYZ = ("x_mm", "y_mm"), ("x_mm", "y_mm", "z_mm")

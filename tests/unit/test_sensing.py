@@ -1,4 +1,4 @@
-"""Cameras by name, and what is made of their pictures."""
+"""Cameras by name, and the evaluation of their pictures."""
 
 import math
 import random
@@ -17,7 +17,7 @@ from tests.contract._sensor_cell import miss_mm
 
 
 class Pictures:
-    """Implements :class:`robolink.model.TipSensor` with pictures that are known in advance."""
+    """Implements :class:`robolink.model.TipSensor` with pictures known in advance."""
 
     identity = "bench"
     unit = SpotUnit.PIXEL
@@ -61,7 +61,7 @@ def test_the_scatter_of_pictures_leaves_a_false_find_out():
 
 @pytest.fixture
 def plug_in(monkeypatch):
-    """Bring a camera under a name, as an installed package does."""
+    """Register a camera under a name, as an installed package does."""
     known = metadata.entry_points
 
     def bring(name, opener):
@@ -176,7 +176,7 @@ def test_one_false_picture_among_two_tips_is_refused_at_once():
 
 
 class MetricCamera(Pictures):
-    """A camera of its own maker's calibration: looks through a simulated one, answers in mm."""
+    """A camera with its maker's calibration: looks through a simulated one, answers in mm."""
 
     unit = SpotUnit.BASE_MM
 

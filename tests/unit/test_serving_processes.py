@@ -1,4 +1,4 @@
-"""What a process that serves does beside its work: garbage, sockets that are ready, late making."""
+"""Background work of a serving process: garbage, ready sockets, deferred creation."""
 
 import gc
 import json
@@ -24,7 +24,7 @@ from robolink_simulators.hosting.streams.serving_loop import (
 import robolink
 from robolink.errors import ConfigError
 
-# A process that serves collects garbage so that what has survived once is hardly ever seen.
+# A serving process collects garbage so that old objects are hardly ever examined.
 
 COLLECTED = """
 import gc
@@ -79,13 +79,13 @@ assert gc.get_freeze_count() == count
 
 
 def collector():
-    """What is set; of what is set aside some may go by itself."""
+    """The collector's settings; frozen objects may go by themselves."""
     return list(gc.callbacks), gc.get_threshold(), gc.isenabled()
 
 
 @pytest.fixture
 def nothing_set_aside():
-    """As in a process that nobody has told anything; this one has."""
+    """As in a process that has frozen nothing; this one has."""
     enabled = gc.isenabled()
     gc.disable()
     gc.unfreeze()
@@ -96,7 +96,7 @@ def nothing_set_aside():
 
 
 def test_what_survives_is_set_aside_and_looked_at_again_once_it_has_doubled():
-    # In a process of its own: this one holds all the tests.
+    # In a separate process: this one holds all the tests.
     subprocess.run([sys.executable, "-c", COLLECTED], check=True, timeout=60)
 
 
@@ -116,7 +116,7 @@ def test_a_cell_inside_of_a_program_leaves_its_collector_alone(nothing_set_aside
 def test_commands_that_serve_set_aside_while_they_serve(
     of_a_file, nothing_set_aside, monkeypatch, tmp_path
 ):
-    """The first line is printed once all is served."""
+    """The first line is printed once everything is served."""
     looks = []
 
     class Looking:
@@ -146,7 +146,7 @@ def test_commands_that_serve_set_aside_while_they_serve(
     assert gc.get_freeze_count() == 0
 
 
-# What tells which sockets are ready: nobody misses a turn, by whichever of the system's means.
+# Readiness of sockets: nobody misses a turn, whichever means of the system is used.
 
 EPOLL = pytest.mark.skipif(not hasattr(select, "epoll"), reason="this system has no epoll")
 MANY = 100
@@ -236,7 +236,7 @@ def test_who_asks_a_moment_after_the_others_waits_for_one_round_and_not_for_two(
     assert waited < 1.5 * MANY
 
 
-# A simulated controller that is made when it is first used is the one that was made at once.
+# A simulated controller created at its first use equals one created at once.
 
 
 def test_nothing_of_a_controller_is_made_before_somebody_uses_it():

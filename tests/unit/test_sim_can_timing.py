@@ -1,4 +1,4 @@
-"""When a simulated CANopen node says that it is there, on a computer that is slow."""
+"""The boot-up time of a simulated CANopen node on a slow computer."""
 
 from itertools import pairwise
 
@@ -12,7 +12,7 @@ LOOK_NS = round(LOOK_S * NS_PER_S)
 
 
 def due_at(looks_ns):
-    """Return when it was due, for somebody who looks at these times."""
+    """Return the time at which it was due, for a client that looks at these times."""
     timer = EventTimer(0)
     return [now_ns for now_ns in looks_ns if timer.due(now_ns)]
 

@@ -1,4 +1,4 @@
-"""Sessions with a simulated EPSON controller: who is logged in, its variables, its options."""
+"""Sessions with a simulated EPSON controller: its login, its variables, its options."""
 
 from dataclasses import fields
 
@@ -10,7 +10,7 @@ from robolink.errors import ConfigError
 from robolink.model import Secret
 from robolink.protocols.epson_text import VariableType
 
-# Who is logged in, for how long, and what a log shows of it.
+# The login and its duration, and the log's part of it.
 
 CANARY = "k4nar1e"
 

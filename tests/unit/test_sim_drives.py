@@ -1,4 +1,4 @@
-"""Drives that are simulated: torques, ranges, settings (docs/reference/spel.md 6.3, 7.2, 7.4)."""
+"""Simulated drives: torques, ranges, settings (docs/reference/spel.md 6.3, 7.2, 7.4)."""
 
 import math
 import random
@@ -125,7 +125,7 @@ def took_s(cell, statement):
 
 
 def test_a_smaller_fine_waits_longer_for_a_servo_with_a_lag():
-    """P. 329: Fine changes when a motion counts as done, not how it brakes."""
+    """P. 329: Fine changes when a motion counts as done, not the braking."""
     exact, late = Cell(), Cell(servo_lag_ms=20.0)
     for cell in (exact, late):
         cell.run("P1 = Here; P2 = Here -X(1)")
@@ -136,7 +136,7 @@ def test_a_smaller_fine_waits_longer_for_a_servo_with_a_lag():
         waits.append(took_s(late, way) - plain_s)
     assert waits[0] == pytest.approx(0, abs=1e-6)
     assert waits[0] <= waits[1] < waits[2] < waits[3] < 0.5
-    # A tenth of the way takes a lag's ln(10) longer.
+    # A tenth of the distance takes a lag's ln(10) longer.
     assert waits[3] - waits[2] == pytest.approx(0.020 * math.log(10), rel=0.05)
 
 
@@ -175,7 +175,7 @@ def test_ptpboost_shortens_short_motions_alone():
     assert (short, long) == ("-1", "0")
     cell.run("PTPBoost 100")
     *_, after_s, far_after_s = cell.run(told).split()
-    # Twice the acceleration over one way: the root of a half.
+    # Twice the acceleration over one distance: the root of a half.
     assert float(after_s) / float(before_s) == pytest.approx(math.sqrt(0.5), rel=0.01)
     assert far_after_s == far_s
     assert took_s(cell, "Go P2") == pytest.approx(float(after_s), abs=1e-5)
@@ -214,7 +214,7 @@ def test_torque_values_are_listed_two_a_row():
 
 @pytest.mark.parametrize("power", ["High", "Low"])
 def test_a_torque_is_told_as_a_share_of_its_limit_and_never_above(power):
-    """Help on the torque restriction: the limit counts as 1 for what is measured after it."""
+    """Help on the torque restriction: the limit counts as 1 for later measurements."""
     cell = Cell()
     word = "LimitTorque" if power == "High" else "LimitTorqueLP"
     other = "LimitTorqueLP" if power == "High" else "LimitTorque"

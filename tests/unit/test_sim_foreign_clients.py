@@ -1,4 +1,4 @@
-"""Clients by others: what they send, and what real controllers answered them."""
+"""Third-party clients: their requests, and the answers of real controllers."""
 
 import pytest
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
@@ -16,8 +16,7 @@ from robolink.protocols.epson_text import (
     parse_preferences,
 )
 
-# What clients written by others send, and what real controllers answered them.
-#
+# Requests of third-party clients, and the answers of real controllers.
 # The requests are those of public clients and transcripts (docs/reference/epson.md 1.10, 5).
 
 READY = "00100000001"
@@ -34,7 +33,7 @@ def client(simulator, login):
 
 
 def test_a_client_that_sends_no_line_end_at_all(simulator, connect):
-    """The transcript of an RC700-A: the literal word stands where a line end belongs."""
+    """The transcript of an RC700-A: the literal word is in the place of a line end."""
     client = connect(simulator)
 
     def said(request):
@@ -258,13 +257,13 @@ def test_what_clearing_the_tool_in_force_does(login, tmp_path, habit):
         assert reborn.machine.offset is None
 
 
-# Requests as clients by others send them: a blank first, a letter of no manual.
+# Requests as third-party clients send them: a blank first, a letter of no manual.
 
 NS = 1_000_000_000
 
 
 class Line:
-    """A line into a simulated controller, whose time a test steps."""
+    """A line to a simulated controller whose time the test steps."""
 
     def __init__(self, *, serial=False, **options):
         self.simulator = EpsonSimulator(options=options_from_text(options))
@@ -272,7 +271,7 @@ class Line:
         self.link, self.now_ns = connect(0), 0
 
     def say(self, data):
-        """Send bytes; return what came within a fifth of a second."""
+        """Send bytes; return those received within a fifth of a second."""
         self.link.receive(data, self.now_ns)
         self.now_ns += NS // 5
         self.simulator.advance(self.now_ns)

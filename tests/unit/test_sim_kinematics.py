@@ -1,4 +1,4 @@
-"""Kinematics of simulated arms, and kinematics of one's own."""
+"""Kinematics of simulated arms, and user-defined kinematics."""
 
 import sys
 from math import atan2, degrees
@@ -188,7 +188,7 @@ def test_the_pulse_ranges_of_the_t_series_are_those_of_the_data_sheet():
         assert model.ranges[1].high * model.pulses_per_unit[1] == pytest.approx(j2, abs=1.5)
 
 
-# Kinematics of one's own: what is known of a flange, and classes that are loaded by name.
+# User-defined kinematics: the known part of a flange, and classes loaded by name.
 
 HERE = __name__
 EXAMPLE = "double_scara:DoubleScara"
@@ -306,7 +306,7 @@ def test_the_example_is_a_machine_alone_and_with_a_c_axis(example):
 
 
 class Rail:
-    """A rail whose flange leans with its only turn, about X."""
+    """A rail whose flange tilts with its only turn, about X."""
 
     kinds = (AxisKind.LINEAR, AxisKind.ROTARY)
 
@@ -318,14 +318,14 @@ class Rail:
 
 
 class BoastingRail(Rail):
-    """It says that its flange never turns: any tool would be accepted, and be elsewhere."""
+    """It claims that its flange never turns: any tool would be accepted, and be elsewhere."""
 
     def get_flange_orientation_image(self, r_flange):
         return OrientationSpace.known(NO_TURN)
 
 
 class MissingRail(Rail):
-    """Its inverse is a tenth of a millimetre off."""
+    """A rail with an inverse that is a tenth of a millimetre off."""
 
     def get_flange_orientation_image(self, r_flange):
         return OrientationSpace.directed(X_AXIS, X_AXIS)
@@ -335,11 +335,11 @@ class MissingRail(Rail):
 
 
 class Empty:
-    """Nothing at all."""
+    """A class without members."""
 
 
 class Head:
-    """A head of one's own: one axis about Z, a nozzle 40 mm aside of it."""
+    """A user-defined head: one axis about Z, with a nozzle 40 mm beside it."""
 
     kinds = (AxisKind.ROTARY,)
 

@@ -1,4 +1,4 @@
-"""Which commands the simulated mailbox program carries out, and with which options."""
+"""The commands that the simulated mailbox program carries out, by its options."""
 
 import pytest
 from hypothesis import given, settings
@@ -32,7 +32,7 @@ from robolink.protocols.mailbox import (
 )
 from tests.unit._mailbox_client import FACTORS, LINE, MCS, another, linked, owning
 
-# Which commands the simulated mailbox program carries out, and which it refuses.
+# The commands that the simulated mailbox program carries out, and those that it refuses.
 
 
 def moves_started(simulator):
@@ -101,7 +101,7 @@ def test_a_command_of_before_is_not_carried_out_again_behind_another(between):
     client.write(command)
     client.wait(0.05)
     assert client.slot(3).counter == changes
-    # What is new after that counts as ever.
+    # Later new commands count as always.
     assert client.done(Opcode.WRITE_TOOL, 4, name="next").state == CommandState.DONE
 
 
@@ -304,7 +304,7 @@ def test_the_answer_words_hold_the_set_tool_when_no_answer_stands_there():
     assert client.now().answer.pose == (0.0,) * 6
 
 
-# Options of a simulated PLC as text, and how a PLC may lay its words.
+# Options of a simulated PLC as text, and the word orders of a PLC.
 
 ORDERS = [
     WordOrder.LOW_FIRST,

@@ -1,4 +1,4 @@
-"""Ending is always possible at the simulated mailbox, and what nobody keeps going ends at once."""
+"""The simulated mailbox always accepts an end, and ends unattended movements at once."""
 
 import math
 
@@ -23,7 +23,7 @@ BACK_ALONG_X = 0b1
 
 
 def jogging(client):
-    """Jog back along X until the group goes at its full speed; return where it is then."""
+    """Jog back along X until the group has its full speed; return its place then."""
     now = client.tell(Opcode.JOG, 0, BACK_ALONG_X, MCS, dynamics=FAST)
     client.wait(0.2)
     assert client.now().bits & Bits.JOGGING
@@ -31,7 +31,7 @@ def jogging(client):
 
 
 def distance_mm(client, since):
-    """Return how far the TCP has come since it was there."""
+    """Return the distance of the TCP from an earlier place."""
     return math.dist(tcp_mm(client), since)
 
 
@@ -40,7 +40,7 @@ def tcp_mm(client):
 
 
 def pass_silently(client, simulator, seconds):
-    """Let time pass in which no client asks for anything."""
+    """Let time pass without any client's requests."""
     client.link.clock.sleep(seconds)
     simulator.advance(client.link.clock.now_ns())
 
@@ -293,7 +293,7 @@ def test_an_owner_who_leaves_has_what_is_unfinished_halted_first(what, insist):
 
 
 def refused_meanwhile(other):
-    """Let another client ask for the mailbox while it still brakes, and return the ends."""
+    """Let another client ask for the mailbox during the braking, and return the ends."""
     other.write(other.command(Opcode.OWNERSHIP, 1))
     other.link.clock.sleep(2 * CYCLE_S)
     return other.now().finished

@@ -1,4 +1,4 @@
-"""What goes wrong with a simulated PLC, who may command it, and when its client is silent."""
+"""Faults of a simulated PLC, its permitted clients, and a silent client."""
 
 import pytest
 from robolink_simulators.faults import PlcFault, PlcFaultAction
@@ -18,7 +18,7 @@ from tests.unit._mailbox_client import FACTORS, another, linked, owning
 
 pytestmark = pytest.mark.usefixtures("mailbox_program")
 
-# What can be planned to go wrong with a simulated PLC, and who is told about its exchanges.
+# The faults that can be planned for a simulated PLC, and the listeners to its exchanges.
 
 SLOW = (20.0, 200.0, 200.0, 2000.0)
 
@@ -197,7 +197,7 @@ def test_what_a_hook_raises_reaches_the_host_and_the_request_is_carried_out():
     assert client.now().tool_slot == 0
 
 
-# Who may command the simulated mailbox, and what happens when its client falls silent.
+# The permitted clients of the simulated mailbox, and the effects of a silent client.
 
 
 def test_nobody_owns_it_at_first_and_reads_need_no_owner():

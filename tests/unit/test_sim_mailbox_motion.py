@@ -171,7 +171,7 @@ def test_an_axis_error_ends_everything_with_its_class():
 
 
 def test_the_error_of_the_group_is_not_that_of_a_block_that_it_refuses():
-    """Two channels: a block in error whose number nobody knows shows none, not the group's."""
+    """Two channels: a block in error with an unknown number shows none, not the group's."""
     client, simulator = owning()
     simulator.panel.fail_axis(1, 16)
     now = client.after_a_cycle()

@@ -1,4 +1,4 @@
-"""What the simulated PLC's Modbus port answers to requests that are not quite right.
+"""Answers of the simulated PLC's Modbus port to slightly wrong requests.
 
 Codes and limits: Modbus Application Protocol V1.1b3, sections 6 and 7.
 """
@@ -13,7 +13,7 @@ from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
 @pytest.fixture(params=[None, 1], ids=["tcp", "rtu"])
 def ask(request):
-    """Ask a PLC: a request without its frame to the answer without its frame."""
+    """Send a PLC a request without its frame; return the answer without its frame."""
     device = MailboxFrames(SoftMotionSimulator(), ManualClock(), unit=request.param)
     link = device.connect(0)
 

@@ -1,4 +1,4 @@
-"""The simulated PLC answers what real Modbus clients send, and survives what they should not."""
+"""The simulated PLC answers the requests of real Modbus clients, and survives faulty ones."""
 
 from pathlib import Path
 
@@ -197,7 +197,7 @@ def test_on_a_serial_line_silence_ends_half_a_request(plc):
 
 
 def test_a_request_that_is_held_up_takes_effect_at_its_time_within_a_long_step(plc):
-    """Not when somebody next looks: its answer is due a moment after it is served."""
+    """Not at the next reading: its answer is due a moment after it is served."""
     plc.faults.add(Fault(FaultAction.STALL, 0, "fc5", seconds=2.0))
     link = plc.connect(0)
     ask(link, WriteMultipleRegistersRequest(address=100, registers=[1, 2, 3]))

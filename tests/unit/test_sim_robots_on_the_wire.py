@@ -1,4 +1,4 @@
-"""What robots of every kind print and take over Remote Ethernet."""
+"""Output and input of robots of every kind over Remote Ethernet."""
 
 import json
 import math
@@ -29,7 +29,7 @@ class Window:
         self.client = client
 
     def __call__(self, statement):
-        """Return what a statement printed, ``0`` for nothing, or the refusal."""
+        """Return the output of a statement, ``0`` for none, or the refusal."""
         reply = self.client.ask(f'$Execute,"{statement}"')
         while not reply:
             reply = self.client.wait(1.0)
@@ -38,7 +38,7 @@ class Window:
 
 @pytest.fixture
 def robot(login):
-    """Return a function from a model's name to its command window."""
+    """Returns the command window of a robot model."""
     return lambda name: Window(login(EpsonSimulator(name)))
 
 
@@ -262,7 +262,7 @@ def test_joint_2_of_gx8_c453_is_narrower_where_the_shaft_is_low(robot):
 
 
 def tip_along(robot, statement, share):
-    """Return where the tip is after a share of a movement's time, and let it end."""
+    """Return the tip's place after a share of a movement's time, and let the movement end."""
     machine = robot.client.simulator.machine
     robot.client.ask(f'$Execute,"{statement}"')
     start_ns, end_ns = robot.client.simulator.now_ns, machine.arm.next_change()
@@ -280,7 +280,7 @@ def frame_of_six(values):
 
 
 def off_line_mm(place, start, end):
-    """Return how far a place is from a line."""
+    """Return the distance of a place from a line."""
     way = [b - a for a, b in zip(start[:3], end[:3], strict=True)]
     seen = [b - a for a, b in zip(start[:3], place[:3], strict=True)]
     along = sum(a * b for a, b in zip(way, seen, strict=True)) / sum(a * a for a in way)
@@ -311,7 +311,7 @@ HELD = [
 
 @pytest.mark.parametrize(("name", "end", "mid"), HELD, ids=[case[0] for case in HELD])
 def test_a_held_workpiece_is_led_past_an_external_control_point(robot, name, end, mid):
-    """The point runs straight over the workpiece, or round it; the tip does not."""
+    """The point follows a straight line or an arc on the workpiece; the tip does not."""
     run = robot(name)
     assert run("Motor On; Tool 0; TLSet 1, XY(12, 5, 0, 20); Tool 1") == "0"
     assert run(f"P1 = Here; P2 = {end}; P3 = {mid}") == "0"
@@ -351,7 +351,7 @@ def test_arc3_is_a_circle_in_space_through_its_middle_point(robot, name, end, mi
 
 
 def off_circle_mm(place, *three):
-    """Return how far a place is from the circle through three others."""
+    """Return the distance of a place from the circle through three others."""
     at, a, b, c = (np.array(one[:3]) for one in (place, *three))
     normal = np.cross(b - a, c - a)
     rows = np.array([b - a, c - a, normal])

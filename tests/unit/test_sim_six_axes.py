@@ -1,4 +1,4 @@
-"""Six axes and folded arms, and Tool 0 of every kind of robot, as EPSON defines them."""
+"""Six-axis and folding arms, and Tool 0 of every kind of robot, as EPSON defines them."""
 
 import json
 import math
@@ -33,7 +33,7 @@ from robolink.errors import ConfigError
 from robolink.model import Elbow, Hand, Posture, ToolOffset, Wrist
 from robolink.protocols.spel import parse_point
 
-# Six axes and folded arms: EPSON's own descriptions, flags, and both ways of the kinematics.
+# Six-axis and folding arms: EPSON's own descriptions, flags, and both directions of the kinematics.
 
 SHARED = Path(__file__).parents[2].parent / "shared"
 VECTORS = SHARED / "vectors" / "epson_fk.json"
@@ -43,14 +43,14 @@ SIX_AXES = ("C8-C901S", "C8-C1401CR", "C12-C1401C", "CX4-A601SR", "CX7-A901S", "
 
 
 def turned_from(pose, rotation):
-    """Return by how much a pose's orientation differs from a matrix, in its largest entry."""
+    """Return the largest difference between the entries of a pose's orientation and a matrix."""
     seen = zyx(pose.u_deg, pose.v_deg, pose.w_deg)
     rows = zip(seen, rotation, strict=True)
     return max(abs(a - b) for row, other in rows for a, b in zip(row, other, strict=True))
 
 
 def somewhere(model, rng, margin_deg=0.0):
-    """Return joints where the arm may be, as far from the singular ones as asked for."""
+    """Return possible joints of the arm, as far from singular ones as requested."""
     while True:
         joints = Joints(*(rng.uniform(low, high) for low, high in model.ranges))
         try:
@@ -234,8 +234,7 @@ def test_the_shell_completes_the_name_of_a_robot_and_of_a_second_one():
     assert second == ["T6-602S,RS4-C351C", "T6-602S,RS4-C351S"]
 
 
-# Tool 0 of every kind of robot, and the tool that is worked out by hand, as EPSON defines them.
-#
+# Tool 0 of every kind of robot, and the tool calculated by hand, as EPSON defines them.
 # Source: docs/reference/epson-robots.md, "Frames"; docs/reference/calibration.md 2.1.
 
 
@@ -246,7 +245,7 @@ class CommandWindow:
         self.client = client
 
     def __call__(self, statement):
-        """Return what a statement printed, or ``0``."""
+        """Return the output of a statement, or ``0``."""
         reply = self.client.ask(f'$Execute,"{statement}"')
         while not reply:
             reply = self.client.wait(1.0)
@@ -311,8 +310,8 @@ def test_a_six_axis_robot_on_a_wall_is_refused():
 def test_two_poses_half_a_turn_apart_give_the_tool(robot, name, sign):
     """((x2 - x1) / 2, (y2 - y1) / 2) with U at 0 and 180.
 
-    The rule is a SCARA's. Six axes hold their flange upside down: Y of the tool counts the other
-    way there.
+    This is a SCARA's rule. A six-axis robot's flange is upside down, so the tool's Y has the other
+    sign.
     """
     run = robot(name)
     simulator = run.client.simulator

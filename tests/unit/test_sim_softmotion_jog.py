@@ -55,7 +55,7 @@ FORWARD_X = JogCommand(1, 0, CoordSystem.MCS, SLOW)
 
 @dataclass(frozen=True, slots=True)
 class SixAxes:
-    """A machine that takes up every orientation: X, Y, Z and turns about x, y', z''."""
+    """A machine with every orientation: X, Y, Z and turns about x, y', z''."""
 
     name = "custom"
     kinds = (AxisKind.LINEAR,) * 3 + (AxisKind.ROTARY,) * 3

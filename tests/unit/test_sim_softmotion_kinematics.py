@@ -184,7 +184,7 @@ def test_the_drives_of_gantries_and_rods_move_the_plate_where_documented(
 
 
 def test_x_of_a_tripod_points_away_from_the_drive_of_a0():
-    """That drive lowers its arm, and the plate gives way to it."""
+    """That drive lowers its arm, and the plate moves away from it."""
     tripod = machine_named("Kin_Tripod_Rotary").kinematics
     x_mm, y_mm, _ = tripod.flange((20.0, 0.0, 0.0)).shift_mm
     assert x_mm > 1
@@ -227,7 +227,7 @@ def test_a_stretched_wrist_keeps_its_first_axis():
 
 
 def test_what_a_wrist_of_two_axes_leaves_over_depends_on_what_carries_it():
-    """The passive freedom: on arms whose turn nobody knows only the direction of Z is known."""
+    """The passive freedom: if an arm's turn is unknown, only the direction of Z is known."""
     on_arms = image_of(Coupled(PosRRR(), Wrist2()), zyz(10, 20, 30))
     assert on_arms.dof is OrientationDof.ONE
     assert on_arms.v_rot == pytest.approx(turned(zyz(10, 20, 30), (0.0, 0.0, 1.0)))
@@ -276,7 +276,7 @@ def test_a_c_axis_refuses_an_orientation_that_points_the_other_way(name):
 
 
 def test_an_inclination_moves_the_tool_of_five_axes_to_positive_x():
-    """The sign that the vendor's page gives; the tool points along -Z."""
+    """The sign given on the vendor's page; the tool points along -Z."""
     leaning = five_axes(100).flange((10.0, 20.0, 30.0, 0.0, 30.0))
     assert leaning.shift_mm == pytest.approx((60.0, 20.0, 30.0 - 86.602540), abs=1e-6)
     turned = five_axes(100).flange((10.0, 20.0, 30.0, 90.0, 30.0))

@@ -1,4 +1,4 @@
-"""Movements of a simulated axis group: on a line, in axis space, one after another."""
+"""Movements of a simulated axis group: straight, in axis space, one after another."""
 
 import math
 from itertools import pairwise

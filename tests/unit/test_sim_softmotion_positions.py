@@ -1,4 +1,4 @@
-"""Positions of a simulated axis group, in which frame, and the truth around it."""
+"""Positions of a simulated axis group in each frame, and the true world around it."""
 
 import math
 

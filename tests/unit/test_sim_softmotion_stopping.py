@@ -1,4 +1,4 @@
-"""How movements of a simulated axis group end early: stop, halt, interrupt, an input."""
+"""Early ends of a simulated axis group's movements: stop, halt, interrupt, an input."""
 
 import math
 from itertools import pairwise

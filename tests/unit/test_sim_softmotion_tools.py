@@ -286,7 +286,8 @@ A, B = SmcBufferMode.ABORTING, SmcBufferMode.BUFFERED
 BLENDING = [mode for mode in SmcBufferMode if mode.blends]
 LINE, DIRECT_CHANGES = "line", "direct"
 
-# (movement before, movement after, tool changed between them) -> what Aborting and Blending become.
+# (movement before, movement after, tool changed between them) -> the result of Aborting and
+# Blending.
 TABLE = {
     (LINE, LINE, False): {"aborting": "aborting", "blending": "blending"},
     (LINE, LINE, True): {"aborting": "buffered", "blending": "buffered"},
@@ -304,12 +305,12 @@ def family(mode):
 
 
 def becomes(before, after, mode, *, changed):
-    """Return the family of what a mode becomes; Buffered stays what it is."""
+    """Return the family that a mode turns into; Buffered stays the same."""
     return TABLE[before, after, changed].get(family(mode), "buffered")
 
 
 def command(group, how, number, mode):
-    """Command the next movement of a row, each to a place of its own."""
+    """Command the next movement of a row, each to its own place."""
     if how == LINE:
         return moved(group, x_mm=-6.0 * (number + 1), mode=mode)
     a0, *others = group.values
@@ -321,7 +322,7 @@ def tool(number):
 
 
 def run(kinds, modes, changes):
-    """Command three movements; return what each became, its tool, and how each block ended."""
+    """Run three movements; return each one's mode and tool, and the ends of the blocks."""
     group = standing()
     group.set_tool(tool(0))
     wanted, seen, blocks = [], [], []
@@ -348,9 +349,9 @@ def require_as_by_hand(kinds, modes, changes):
         for (before, after), (mode, changed, _) in zip(pairwise(kinds), wanted[1:], strict=True)
     ]
     assert [became for became, _ in seen[1:]] == expected
-    # Each movement keeps the tool that was in force when it was commanded.
+    # Each movement keeps the tool selected when it was commanded.
     assert [z_mm for _, z_mm in seen] == [z_mm for _, _, z_mm in wanted]
-    # What is aborted is every movement before the last one that still aborts.
+    # Every movement before the last one that still aborts is aborted.
     last_abort = max((n for n, became in enumerate(expected, 1) if became == "aborting"), default=0)
     assert [block.outputs.aborted for block in blocks] == [n < last_abort for n in range(3)]
     assert blocks[-1].outputs.done
@@ -373,7 +374,7 @@ def test_every_order_of_kinds_of_movements(kinds):
 
 
 def test_between_interrupt_and_continue_the_interrupted_keep_the_old_tool():
-    """The second note, and SMC_GroupGetContinueToolOffset, which tells that tool."""
+    """The second note, and SMC_GroupGetContinueToolOffset, which reports that tool."""
     group = standing()
     group.set_tool(tool(0))
     with pytest.raises(BlockRefused) as nothing:

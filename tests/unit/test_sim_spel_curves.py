@@ -41,7 +41,7 @@ def cell():
 
 
 def way(cell, statement):
-    """Return the tips of a motion every 2 ms, bits switched on the way."""
+    """Return the tips of a motion every 2 ms, and the bits switched during it."""
     execution, tips = cell.start(statement), [cell.tip()]
     while not execution.done:
         cell.now_ns += 2 * MS
@@ -60,11 +60,11 @@ def test_a_curve_goes_smoothly_through_its_points_at_speed_s(cell):
     cell.run('Curve "My", O, 0, 4, P1, P2, On 5, P(3:4)')
     tips = way(cell, 'CVMove "MY"')
     assert cell.tip() == pytest.approx(POINTS[-1], abs=1e-9)
-    # In 2 ms it goes 0.4 mm.
+    # In 2 ms it moves 0.4 mm.
     assert all(nearest(tips, point) < 0.5 for point in POINTS)
     steps = [math.dist(a[:3], b[:3]) for a, b in pairwise(tips)]
     assert max(steps) == pytest.approx(0.4, abs=0.02)
-    # It does not stand at the points between, and does not turn there: no chord of 20 ms bends.
+    # It does not stop at the points between, and does not turn there: no chord of 20 ms bends.
     middle = range(200, len(tips) - 200, 10)
     assert min(steps[200:-200]) > 0.38
     assert all(_bend_deg(tips[i - 10], tips[i], tips[i + 10]) < 12 for i in middle)
@@ -275,7 +275,7 @@ def test_a_tool_that_turns_right_round_turns_evenly_over_the_seam():
     turns = [b[3] - a[3] for a, b in pairwise(way.places)]
     assert sum(turns) == pytest.approx(360)
     assert max(turns) < 1.2 * min(turns)
-    # Each angle runs by itself: what no point changes stays.
+    # Each angle is interpolated by itself: one that no point changes stays.
     assert all(place[4:] == pytest.approx((10, 170)) for place in way.places)
 
 
@@ -292,7 +292,7 @@ def test_past_a_control_point_the_workpiece_sees_it_go_at_speed_s(make):
     steps = [math.dist(a, b) for a, b in pairwise(seen)]
     assert max(steps) == pytest.approx(0.2, abs=0.01)
     assert min(steps[80:-80]) > 0.19
-    # The tip itself goes otherwise, and is at the taught places all the same.
+    # The tip itself takes another path, and still passes the taught places.
     own = [math.dist(a.shift_mm, b.shift_mm) for a, b in pairwise(frames)]
     assert max(abs(a - b) for a, b in zip(own[80:-80], steps[80:-80], strict=True)) > 0.05
     assert min(off(frame, point(cell, 2)) for frame in frames) < 0.5

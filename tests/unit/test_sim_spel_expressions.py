@@ -248,7 +248,7 @@ def test_a_line_that_was_parsed_is_not_parsed_again():
     assert parse.cache_info().hits == before + 1
 
 
-# Wait for a condition, times after which bits switch back, and what Sense looks at.
+# Wait for a condition, times after which bits switch back, and the input of Sense.
 
 NS_PER_S = 1_000_000_000
 
@@ -264,7 +264,7 @@ def client(simulator, login):
 
 
 def begin(client, statement):
-    """Send a statement that is not over at once."""
+    """Send a statement that does not end at once."""
     assert client.ask(f'$Execute,"{statement}"') == ""
 
 

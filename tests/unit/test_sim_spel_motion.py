@@ -15,7 +15,7 @@ S = 1_000_000_000
 
 
 class Cell:
-    """A command window with time; motors are on and the arm hangs at Z -40."""
+    """A command window with time; motors are on and the arm is at Z -40."""
 
     def __init__(self, **habits):
         self.machine = Machine(find_robot("T6-602S"), joints=Joints(45, 60, -40, -105))

@@ -19,7 +19,7 @@ from tests.unit.test_sim_spel_points import NUMBERS, Window
 # Locals by two pairs and three points, pallets beyond their edges (docs/reference/spel.md 5.4).
 
 PAIRS = "P1 = XY(0, 0, 0, 0) /1; P2 = XY(100, 0, 0, 0) /1; P11 = XY(150, 150, 10, 0); "
-"""Two places 100 mm apart in the local, which the base sees 120 mm apart along Y."""
+"""Two places 100 mm apart in the local, which are 120 mm apart along Y in the base."""
 
 
 @pytest.fixture
@@ -120,7 +120,7 @@ class Cell(Window):
         return error.number
 
     def heights(self, statement):
-        """Return how high the flange is in the middle of a movement, and at its end."""
+        """Return the height of the flange in the middle of a movement, and at its end."""
         execution, began = self._interpreter.start(statement, self.now_ns), self.now_ns
         self.now_ns = execution.next_change() or began
         self.machine.arm.advance((began + self.now_ns) // 2)
@@ -194,7 +194,7 @@ def test_locals_have_to_be_defined_anew_and_count_from_the_new_base(window_on_ba
     assert (flange(window_on_base).x_mm, flange(window_on_base).y_mm) == pytest.approx(
         (100, 210), abs=1e-6
     )
-    window_on_base("Base XY(100, 0, 0, 90)")  # the same again changes nothing
+    window_on_base("Base XY(100, 0, 0, 90)")  # repeating it changes nothing
     assert window_on_base("Print LocalDef(1)") == "-1\r\n"
     window_on_base("Base XY(0, 0, 0, 0)")
     assert window_on_base("Print LocalDef(1)") == "0\r\n"
@@ -242,7 +242,7 @@ def test_six_axes_have_a_base_that_leans_and_arcs_lie_in_its_plane():
     window = Cell("C4-A601S")
     before = flange(window)
     window("Base XY(0, 0, 0, 0, 0, 90); P0 = Here; P1 = P0 +X(20) +Y(20); P2 = P0 +X(40)")
-    # Y of this base is Z of the robot: halfway round the tip is as much higher.
+    # Y of this base is Z of the robot: halfway round the tip is higher by that much.
     for arc in ("P1, P2", "P2, -180", "P2, 20, ARC_SHORT, ARC_MINUS"):
         assert window.heights(f"Arc {arc}") == pytest.approx(
             (before.z_mm + 20, before.z_mm), abs=0.01
@@ -256,7 +256,7 @@ def test_an_external_control_point_stands_in_the_base(window_on_base):
     window_on_base("Move P1 +U(20) ROT ECP")
     plain = flange(window_on_base)
     window_on_base("Go P1; Base XY(30, 20, 0, 25); P1 = Here; ECPSet 1, P1")
-    # The same place as before, told in the other base: 50 mm along X of the robot.
+    # The same place as before, in the other base: 50 mm along X of the robot.
     window_on_base(f"ECPSet 1, P1 +X({50 * cos(radians(25))}) -Y({50 * sin(radians(25))})")
     window_on_base("Move P1 +U(20) ROT ECP")
     assert flange(window_on_base).coordinates() == pytest.approx(plain.coordinates(), abs=1e-6)
@@ -271,11 +271,11 @@ def test_a_base_outlives_power_off_and_locals_do_not(window_on_base):
     for one in (window_on_base, again):
         assert one("Print LocalDef(1)") == "0\r\n"
         assert one("Base") == "Base: 1.000, 2.000, 3.000, 4.000, 0.000, 0.000\r\n"
-    del state["base"]  # as a file of before there was any
+    del state["base"]  # as a file from before there were any
     Cell().machine.kept.restore(state)
 
 
-# Added arms are told, listed and kept, and move (docs/reference/spel.md 6.2).
+# Added arms are reported, listed, kept and moved (docs/reference/spel.md 6.2).
 
 
 @pytest.fixture

@@ -185,7 +185,7 @@ def test_an_input_that_is_switched_by_hand_latches_too(window_with_latch):
     assert window_with_latch("Print LatchState") == "-1\r\n"
     window_with_latch("Move Here :Z(-10)")
     assert height(window_with_latch) == pytest.approx(at)
-    # On already when it is enabled: no edge until it was off.
+    # On already when it is enabled: no edge until it has been off.
     window_with_latch("LatchEnable Off; LatchEnable On")
     inputs.set(25, on=True)
     assert window_with_latch("Print LatchState") == "0\r\n"
@@ -218,17 +218,17 @@ def test_a_restart_forgets_what_was_set(window_with_latch):
     assert window_with_latch.error("LatchEnable On") == NUMBERS.latch_unset
 
 
-# XYLim holds targets inside, and by XYLimMode 1 the way (docs/reference/spel.md 7.2).
+# XYLim keeps targets inside, and with XYLimMode 1 the path (docs/reference/spel.md 7.2).
 
 
 @pytest.fixture
 def cell():
-    """A robot whose tip stands at about X 159, Y 495, Z -40."""
+    """A robot whose tip is at about X 159, Y 495, Z -40."""
     return LimitedCell()
 
 
 def outcome(cell, statement):
-    """Return the number of the error of a statement that moves, 0 where it ends well."""
+    """Return the error number of a statement that moves, 0 for none."""
     execution = cell.start(statement)
     while not execution.done:
         cell.now_ns = execution.next_change()
@@ -292,7 +292,7 @@ def test_by_mode_1_the_way_of_a_go_counts(cell):
 
 def test_pulses_count_by_mode_1_alone_and_the_way_in_is_open(cell):
     cell.run("XYLim 200, 300, 0, 550; XYLimMode 1")
-    # It stands outside: it may come nearer, not go farther.
+    # It is outside: it may come nearer, not go farther.
     assert outcome(cell, "JTran 1, 5") == 4001
     assert outcome(cell, "JTran 1, -2") == 0
     assert outcome(cell, "Move Here +X(60)") == 0

@@ -1,4 +1,4 @@
-"""Simulated time: stepped, passed over, and real seconds for a silent client."""
+"""Simulated time: stepped, skipped, and real seconds for a silent client."""
 
 import random
 import threading
@@ -86,10 +86,9 @@ def test_a_factor_must_be_above_zero(factor):
         ScaledClock(factor)
 
 
-# A controller that passes over time in which nothing happens does what one does that never does.
-#
-# The shortcuts of ``stepped_controller`` rest on what was foreseen last; whatever is foreseen too
-# late, or kept too long, shows in an answer, in the truth, or in when the next change is told.
+# A controller that skips idle time behaves like one that never does.
+# The shortcuts of ``stepped_controller`` rest on the last prediction; any late prediction, or one
+# kept too long, shows in an answer, in the true world, or in the reported time of the next change.
 
 MS = 1_000_000
 REQUESTS = (
@@ -132,7 +131,7 @@ FAULTS = (
 
 
 class Plain(EpsonSimulator):
-    """Looks at all of itself at each instant."""
+    """Examines all of itself at each instant."""
 
     def _passes(self, now_ns):
         if self._begun:
@@ -151,7 +150,7 @@ class Side:
         self.simulator, self.link = simulator, simulator.connect(0)
 
     def does(self, what, now_ns):
-        """Do one thing at an instant; return all that shows."""
+        """Do one thing at an instant; return everything that shows."""
         if what in ACTS:
             getattr(self.simulator.panel, what)()
         elif what == "mend":
@@ -224,13 +223,13 @@ def really():
 
 
 def passing(simulator, clock, really, seconds):
-    """Let real seconds pass, as a host does whom nobody asks for anything."""
+    """Let real seconds pass, as a host does without any request."""
     really.advance(seconds)
     simulator.advance(clock.now_ns())
 
 
 def ended(link):
-    """Return whether the controller has ended the link, once a client has taken what was sent."""
+    """Return whether the controller has closed the link after its client took all output."""
     link.outgoing()
     return link.closed
 
@@ -283,7 +282,7 @@ def test_a_step_ages_nobody_and_a_pause_neither(really):
 
 
 def moving(clock, **options):
-    """Return a PLC whose client has begun a slow movement and beaten once."""
+    """Return a PLC whose client has begun a slow movement and sent one heartbeat."""
     plc = SoftMotionSimulator(options=PlcOptions(mailbox=MailboxOptions(**options)))
     plc.keep_time(clock)
     z = decode_response(plc.read(0, 112, clock.now_ns()).words).tcp

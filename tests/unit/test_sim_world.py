@@ -1,4 +1,4 @@
-"""The truth, and the person who looks at it: as they should, and otherwise."""
+"""The true world, and the person who looks at it: as they should, and otherwise."""
 
 import math
 from contextlib import contextmanager
@@ -30,7 +30,7 @@ from robolink.errors import ConfigError
 from robolink.model import ToolOffset, WorkBox
 from robolink.runner import Question, Runner, RunSettings, ask_for_pose
 
-# The truth, and the person who looks at it.
+# The true world, and the person who looks at it.
 
 CHOSEN = (  # one of each family and mount
     *("T6-602S", "GX4-C251S", "GX4-C351S-L", "GX8-C652SR", "RS4-C351S", "RS6-C552C", "G1-171S"),
@@ -136,7 +136,7 @@ def test_the_truth_is_plain_json():
     assert len(truth["pin_mm"]) == 3
 
 
-# What a person at a simulated cell does otherwise than they should, on both kinds of robots.
+# A simulated person's errors, on both kinds of robots.
 
 KINDS = {"epson": EpsonSimulator, "softmotion": SoftMotionSimulator}
 HOSTS = {"epson": in_process, "softmotion": plc_in_process}
@@ -146,7 +146,7 @@ SURE = {"eye_sigma_mm": 0.0}
 
 @pytest.fixture(params=KINDS)
 def make(request):
-    """Make a cell of each kind whose person may jog, and whose eye does not err."""
+    """Makes a cell of each kind whose person may jog and sees without error."""
 
     def cell(**parameters):
         world = WorldParameters(**{**SURE, **parameters})
@@ -172,19 +172,19 @@ def connected(simulator):
 
 
 def lifted(simulator, by_mm=(0.7, -0.4, 3.0)):
-    """Let the program take the tip off the pin, and beside it."""
+    """Let the program lift the tip off the pin and beside it."""
     world = simulator.world
     world.robot.carry(world.tips[1], by_mm)
 
 
 def miss(simulator):
-    """Return how far beside the pin, and above it, the tip is."""
+    """Return the tip's distance beside the pin, and above it."""
     dx, dy, dz = simulator.world.gap_mm()
     return -dx, -dy, -dz
 
 
 def touched(simulator, count):
-    """Touch so often, with the tip lifted between, and return where the tip was each time."""
+    """Touch this often, with lifts between; return the tip's place each time."""
     misses = []
     for _ in range(count):
         lifted(simulator)

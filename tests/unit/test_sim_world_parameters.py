@@ -1,4 +1,4 @@
-"""What goes wrong in a simulated cell, by name, for both kinds of robots; and its camera."""
+"""Faults of a simulated cell, by name, for both kinds of robots; and its camera."""
 
 import math
 import random
@@ -36,7 +36,7 @@ def make(request):
 
 
 def jogged(simulator, by_mm, axis=0):
-    """Jog the robot along one axis, and return how far its tip really went."""
+    """Jog the robot along one axis, and return the distance that its tip really moved."""
     world = simulator.world
     before, step = world.tip_mm(), [0.0, 0.0, 0.0]
     step[axis] = by_mm
@@ -326,12 +326,12 @@ def test_a_finder_takes_a_spot_that_stands_still_for_the_tip(make):
     faults = {"camera_still_share": 1, "camera_still_beside_px": 30, "camera_still_toward_deg": 90}
     perform(simulator, {"do": "set_world", **faults, "camera_still_from_picture": 3})
     assert [see(simulator)["seen"] for _ in range(4)] == [[true], [true], [fleck], [fleck]]
-    # Only where no tip is in the picture.
+    # Only with no tip in the picture.
     perform(simulator, {"do": "set_world", **faults, "camera_still_unseen": 1})
     assert see(simulator, 3)["seen"] == [true]
     jogged(simulator, 10.0, axis=2)
     assert see(simulator, 3)["seen"] == [fleck]
-    # Now and then, and never with the fault taken away.
+    # Now and then, and never without the fault.
     perform(simulator, {"do": "set_world", "camera_still_share": 0.5, "camera_still_unseen": 0})
     assert {len(see(simulator)["seen"]) for _ in range(20)} == {0, 1}
     perform(simulator, {"do": "set_world", "camera_still_share": 0})

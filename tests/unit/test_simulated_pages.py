@@ -1,4 +1,4 @@
-"""What comes from a simulator says so on every page, and nothing is called real."""
+"""Every page marks simulated data, and nothing simulated is called real."""
 
 import contextlib
 from dataclasses import replace
@@ -99,7 +99,7 @@ def test_a_simulator_says_what_it_is_and_a_controller_that_says_nothing_is_not_o
 
 @pytest.fixture(params=["softmotion", "plc", "plc of another address"])
 def changed_by_hand(request):
-    """Return what is on record after a value was typed, and whether that was simulated."""
+    """Return the entries after a value was typed, and whether they are simulated."""
     kind = request.param
     log = memory_journal(f"typed-{kind}").log(f"typed-{kind}")
     with contextlib.ExitStack() as open_things:

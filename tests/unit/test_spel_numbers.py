@@ -1,4 +1,4 @@
-"""Numbers: strict in both directions."""
+"""Numbers are strict in both directions."""
 
 import math
 

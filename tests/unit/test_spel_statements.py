@@ -1,6 +1,4 @@
-"""Typed statements of SPEL+: what is written, what is refused, their shapes, and the page that
-lists them.
-"""
+"""Typed statements of SPEL+: text sent, refusals, shapes, and the page that lists them."""
 
 import math
 import re
@@ -37,7 +35,7 @@ from robolink.model import Hand, Pose, ToolOffset
 from robolink.protocols import Role, spel
 from robolink.protocols.epson_text import EpsonTextCodec, Request
 
-# Typed statements: what is written, and what is refused before it is.
+# Typed statements: the text sent, and refusals before it is sent.
 
 TOOL = ToolOffset(12.0, -3.25, -0.0001, 45.0)
 POSE = Pose(350.0, -100.0, -20.0004, 90.0)
@@ -162,7 +160,7 @@ def test_two_bytes_carry_the_number_of_a_bit(query):
             query(bit)
 
 
-# docs/reference/spel_statements.md says what is so: its rows are sent, and the answers compared.
+# docs/reference/spel_statements.md is true: its rows are sent, and the answers compared.
 
 PAGE = Path(__file__).parents[2] / "docs/reference/spel_statements.md"
 _ROW = re.compile(r"^\| `(?P<statement>[^|]+)` \| (?P<who>[^|]+) \| (?P<answer>[^|]+) \|$")
@@ -182,7 +180,7 @@ def before():
 
 
 def answer(client, statement):
-    """Send a statement and wait for its end; return what was printed, 0, or the error number."""
+    """Send a statement and wait for its end; return its output, 0, or the error number."""
     said = client.ask(f'$Execute,"{statement}"')
     waited = 0
     while not said and waited < _LONGEST_S:
@@ -232,7 +230,7 @@ def test_an_assigned_variable_is_read_over_the_wire_and_back(login):
 
 
 def refused_words():
-    """Return the statements and the functions that a program may hold and that are refused."""
+    """Return the statements and functions that a program may contain and the simulator refuses."""
     known = {"pdef", *PLAIN_FUNCTIONS, *MACHINE_FUNCTIONS, *POINT_FUNCTIONS, *STATE_FUNCTIONS}
     known |= {*TASK_FUNCTIONS, *FUNCTIONS_OF_ARRAYS, *OF_POINT_NUMBERS}
     return UNSIMULATED - WINDOW_ONLY, UNSIMULATED_FUNCTIONS - known
@@ -247,7 +245,7 @@ def test_what_is_refused_is_listed_by_name():
     assert listed == [*refused_words(), families]
 
 
-# Lines that differ in their numbers alone: what is filled is what would have been read.
+# Lines that differ only in their numbers: filling a shape gives the text that would be parsed.
 
 LINES = [
     "Go XY(172.331, -477.810, -96.529, 0.000) /R /0",

@@ -1,4 +1,4 @@
-"""What a controller prints of Where, of its tools and of taught points."""
+"""A controller's output for Where, for its tools and for taught points."""
 
 import pytest
 from hypothesis import given, settings

@@ -1,4 +1,4 @@
-"""Stations: what the cell file declares, what the journal has learnt, when a check is due."""
+"""Stations: declared in the cell file, learnt in the journal, and due for a check."""
 
 from datetime import UTC, datetime, timedelta
 
@@ -131,7 +131,7 @@ def test_a_cell_file_that_was_corrected_by_hand_is_not_passed_over_in_silence(fi
     assert "8.5 mm from where it was learnt" in found.remark()
     assert "learn it again if it was moved, else correct the cell file" in found.remark()
     assert find_stations(cell, record(near))["PLATE"].remark() == ""
-    # A beam is a line: where along it somebody stated a point does not matter.
+    # A beam is a line: the stated point's place along it does not matter.
     assert find_stations(cell, entries)["BEAMS"].apart_mm == 0.5
 
 
@@ -237,7 +237,7 @@ def test_the_calibration_of_a_gauge_holds_up_to_its_last_day(file, day, overdue)
     assert ("gauge G-1 at station PIN ran out on 2999-05-31" in pin.remark(noon)) is overdue
 
 
-# Stations of kind camera: what the cell file may say, and what a calibration adds.
+# Stations of kind camera: the cell file's keys, and the data that a calibration adds.
 
 CAMERA_CELL = """
 [cells.a]

@@ -1,4 +1,4 @@
-"""A stop: what its latch lets through, the note that it leaves, what counts as rest on EPSON."""
+"""A stop: requests that its latch lets through, its note, and the stopped state on EPSON."""
 
 import json
 import threading
@@ -32,7 +32,7 @@ from robolink.stop_latch import CommandClass, StopLatch
 from robolink.stopping import clear_note, find_note, leave_note
 from robolink.timing import NS_PER_S
 
-# What a stop lets through, and to whom.
+# The requests that a stop lets through, and from whom.
 
 LOOK, CALM, RESET, RESTORE, WRITE, ACT = CommandClass
 HELD_BACK = (RESTORE, WRITE, ACT)
@@ -44,7 +44,7 @@ def latch():
 
 
 def admitted(latch):
-    """Return what passes in this thread."""
+    """Return the requests that pass in this thread."""
     passed = set()
     for kind in CommandClass:
         try:
@@ -234,7 +234,7 @@ def test_checkpoints_are_seen_while_somebody_looks_and_cost_nothing_else():
     assert seen == [(Checkpoint.STEP, "meanwhile"), (Checkpoint.LOCK, "")]
 
 
-# The note that a stop leaves: in doubt it stands, and it hangs on its own controller.
+# The note that a stop leaves: in doubt it stays, and it belongs to its own controller.
 
 URL = "epson+tcp://192.168.0.1:5000"
 HERE = {"192.168.0.1:5000"}
@@ -268,7 +268,7 @@ def test_rest_is_believed_only_where_the_note_says_so(confirmed):
 
 @pytest.mark.usefixtures("robolink_state")
 def test_a_note_of_another_controller_hides_none_of_this_one_and_stays():
-    """They were met at one address, one after the other."""
+    """Both were met at one address, one after the other."""
     leave_note(HERE, URL, "mei", confirmed=True, controller="SN-1")
     leave_note({"cable"}, URL, "jan", confirmed=True, controller="SN-2")
     both = {*HERE, "cable"}
@@ -290,15 +290,14 @@ def test_a_record_of_a_holder_that_is_damaged_names_nobody(record):
     assert LeaseView(holder=record).who() == LeaseHolder()
 
 
-# What counts as rest on an EPSON controller, and what a stop takes for its answer.
-#
-# Against one that answers as it is told.
+# The stopped state of an EPSON controller, and the answers that a stop accepts.
+# On a controller that answers as instructed.
 
 READY, RUNNING = "00100000001", "00100000010"
 
 
 class Robot:
-    """Moves until it was aborted so many times; refuses a Stop meanwhile, or not."""
+    """Moves until it was aborted this often; refuses a Stop meanwhile, or accepts it."""
 
     def __init__(self, *, aborts=1, shown=RUNNING, stop_refusal=21, abort_refusal=0):
         self.clock = ManualClock()
@@ -372,7 +371,7 @@ def test_a_stop_that_is_not_allowed_is_an_error_at_once():
 
 
 class Wire:
-    """Says one thing whatever is sent, and then nothing."""
+    """Gives one answer to anything sent, and then nothing."""
 
     url = identity = place = "robot"
     durable = False

@@ -1,4 +1,4 @@
-"""The tests' own machinery: processes and signals, the watch over passwords, defects put in."""
+"""The tests' own machinery: processes and signals, the search for passwords, injected defects."""
 
 import logging
 import os
@@ -17,13 +17,13 @@ from tests.conftest import CANARIES, hear_signals
 from tests.mutants.changes import Kind, mutants_of
 from tests.mutants.places import drawn
 
-# A run of the tests: what it starts hears signals, and processes share it.
+# A run of the tests: started programs get signals, and processes share the run.
 
 HEARD = (signal.SIGINT, signal.SIGHUP)
 
 
 def ignored_by_what_is_started():
-    """Which of the signals a program ignores that this process starts."""
+    """The signals that a program started by this process ignores."""
     told = subprocess.run(["cat", "/proc/self/status"], capture_output=True, text=True, check=True)
     (line,) = (line for line in told.stdout.splitlines() if line.startswith("SigIgn:"))
     mask = int(line.split()[1], 16)
@@ -105,7 +105,7 @@ def test_processes_that_share_the_tests_tell_how_each_ended(tmp_path, asked, cod
     assert (done.returncode, told in done.stdout) == (code, True), done.stdout
 
 
-# The watch over passwords finds one wherever it is put.
+# The search for passwords finds one wherever it is.
 
 CANARY = "canary-5af1"
 
@@ -167,11 +167,11 @@ def test_it_is_found_in_an_error_that_nobody_sees(leaks):
     assert leaks() == ["ConfigError", "RemoteProtocolError", "RemoteProtocolError"]
 
 
-# Which small defects ``python -m tests.mutants`` puts into a module, and which it leaves out.
+# The small defects that ``python -m tests.mutants`` puts into a module, and those it leaves out.
 
 
 def changes(text, kind):
-    """Return the changes of one kind in a module of some lines."""
+    """Return the changes of one kind in a module with the given lines."""
     found = mutants_of("module.py", dedent(text).encode())
     return [one.change for one in found if one.kind is kind]
 

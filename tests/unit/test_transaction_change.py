@@ -1,6 +1,4 @@
-"""A tool change is done as a whole, or never was: what is read before it, and Ctrl-C at each
-point.
-"""
+"""A tool change is complete or undone: the reading before it, and Ctrl-C at each point."""
 
 import signal
 from itertools import count
@@ -27,7 +25,7 @@ from robolink.protocols import spel
 from robolink.transaction import ToolChange, Wanted, change_tools, recover
 from tests.unit._transaction_cell import NEW, OLD, OTHER, UNDEFINED, tool_cell, wanted
 
-# A tool change is done as a whole, or never was; what became of it is on record.
+# A tool change is complete or undone; the record has its end.
 
 ONE_WRITE = ["intent", "write", "read back", "done"]
 
@@ -208,7 +206,7 @@ def test_a_change_that_another_recovered_meanwhile_is_neither_kept_nor_taken_bac
         with pytest.raises(LeaseLostError, match=r"Bob .* took over"):
             with ToolChange(controller, wanted(1), verify=True) as change:
                 change.write()
-                # He is silent for so long that another may do his work.
+                # He is silent for so long that another may take over.
                 cell.clock.advance(11)
                 cell.simulator._slot.free()
                 with cell.connected(cell.log("Bob")) as other:
@@ -250,12 +248,12 @@ def test_an_end_that_cannot_be_recorded_leaves_the_change_open(cell, controller,
             broken.setattr(controller.outcomes, "clear", full)
             with pytest.raises(JournalError):
                 change.keep("verified")
-    # Not kept, so taken back.
+    # Not kept, so undone.
     assert cell.tools == OLD
     assert cell.journal.open_markers() == ()
 
 
-# Ctrl-C at each point of a tool change: all of it is kept, or all of it is taken back.
+# Ctrl-C at each point of a tool change: all of it is kept, or all of it is undone.
 
 
 def verified(controller, kept):
@@ -314,7 +312,7 @@ def test_ctrl_c_leaves_all_or_nothing_of_a_change(program):
             assert cell.tools in (OLD, NEW), at
             assert (cell.tools == NEW) is (kept == [True] or "done" in cell.story()), at
             assert cell.journal.open_markers() == (), at
-            # One write there and one back, at most.
+            # At most one write, and one to undo it.
             assert cell.writes in (0, 2, 4), at
     assert cell.tools == NEW
     assert at > 30
@@ -340,7 +338,7 @@ def test_ctrl_c_while_an_output_is_switched_leaves_nothing_in_doubt():
     assert at > 10
 
 
-# What an EPSON controller is asked before a tool is written, and what that may miss.
+# The requests to an EPSON controller before a tool is written, and possible gaps.
 
 
 @pytest.fixture
@@ -350,7 +348,7 @@ def controller_as_asked(cell):
 
 
 def asked(cell):
-    """Return the exchanges that changed nothing but the login, in short."""
+    """Return the exchanges that changed nothing but the login, in short form."""
     texts = [
         text.strip('"').rpartition('"')[2] for _, way, text in cell.simulator.log if way == ">"
     ]

@@ -1,6 +1,4 @@
-"""What is on record of a tool change: its history, its turn tests, and how one left open is
-settled.
-"""
+"""The record of a tool change: its history, its turn tests, and the recovery of an open one."""
 
 import json
 import math
@@ -59,7 +57,7 @@ from robolink.transaction import (
 from robolink.transaction._put_back import Step, put_back
 from tests.unit._transaction_cell import NEW, OLD, OTHER, UNDEFINED, tool_cell, wanted
 
-# What is left open is judged by reading the controller, and settled with what that says.
+# An open job is judged by reading the controller, and finished or undone accordingly.
 
 
 @pytest.fixture
@@ -75,7 +73,7 @@ def controller(cell):
 
 
 def leave_open(cell, kind=MarkerKind.CHANGE, **details):
-    """Let a process that is gone have begun something."""
+    """Leave a job that a vanished process had begun."""
     values = {
         str(tool): {"before": plain_offset(OLD[tool]), "requested": plain_offset(NEW[tool])}
         for tool in OLD
@@ -142,7 +140,7 @@ def test_what_is_not_finished_is_put_back(cell, controller, verify, there):
 
 
 def swapped(look, text):
-    """Let the first two of some bytes that are printed of tool 2 change places on the way."""
+    """Swap the first two of some bytes printed for tool 2 on their way."""
     printed = '#Execute," X:  -12.000 Y:   -3.500 Z:  -21.000'
     at = printed.index(text)
     return Fault(FaultAction.SWAP_BYTES, look, match="TLSet(2)", position=at)
@@ -150,7 +148,7 @@ def swapped(look, text):
 
 @pytest.mark.fault("F08")
 def test_a_look_that_was_bent_on_its_way_is_no_conflict(cell, controller):
-    """A checksum by XOR does not notice it: -21.000 is read as -12.000."""
+    """A checksum by XOR does not detect it: -21.000 is read as -12.000."""
     marker = leave_open(cell)
     cell.simulator.faults.add(swapped(0, "21.000"))
     assert Settler(controller).examine(marker).verdict is Verdict.NOT_APPLIED
@@ -168,7 +166,7 @@ def test_looks_that_never_agree_settle_nothing(cell, controller):
 
 
 def test_a_bent_look_does_not_leave_a_new_value_behind(cell, controller):
-    """A roll-back that misreads the new value puts the old one back all the same."""
+    """A roll-back that misreads the new value restores the old one all the same."""
     cell.put(2, NEW[2])
     cell.simulator.faults.add(swapped(0, "21.000"))
     (done,) = put_back(controller, [Step(2, OLD[2], NEW[2])])
@@ -188,7 +186,7 @@ def test_what_is_neither_old_nor_new_is_a_conflict_that_takes_a_person(cell, con
     assert "Tool 2 holds X 1.000 Y 2.000 Z 3.000 U 0.000; before the change" in finding.sentence
     assert cell.journal.open_markers() == ((controller.outcomes.identity, marker),)
     assert cell.writes == 0
-    # A person who has looked says that it may stay.
+    # A person who has looked confirms that it may stay.
     Settler(controller).settle(finding)
     assert cell.story(2)[-1] == "conflict"
     assert cell.journal.open_markers() == ()
@@ -257,7 +255,7 @@ def test_a_movement_is_not_settled_while_the_robot_moves(cell, controller):
     assert [left.operation for _, left in cell.journal.open_markers()] == [marker.operation]
 
 
-# What the record says about a tool before it is written again.
+# The record's data about a tool before it is written again.
 
 
 @pytest.fixture
@@ -274,7 +272,7 @@ def test_a_tool_that_was_never_written_here_has_not_changed(controller_on_record
 def test_a_tool_that_holds_what_was_proved_last_has_not_changed(cell, controller_on_record):
     change_tools(controller_on_record, wanted(1))
     assert changed_since(controller_on_record, 1, cell.tools[1]) is None
-    # The other tool has a history of its own.
+    # The other tool has its own history.
     assert changed_since(controller_on_record, 2, OTHER) is None
 
 
@@ -321,7 +319,7 @@ def test_an_entry_that_proves_nothing_is_passed_over(controller_on_record):
 
 
 def correct(controller, *steps_mm):
-    """Move tool 1's tip along X by so much, one change after another."""
+    """Move tool 1's tip along X by this much, one change after another."""
     for step_mm in steps_mm:
         before = controller.tools.read(1)
         after = ToolOffset(before.x_mm + step_mm, before.y_mm, before.z_mm)
@@ -359,7 +357,7 @@ def test_a_correction_that_was_taken_back_does_not_count(controller_on_record):
         pytest.raises(KeyboardInterrupt),
         ToolChange(controller_on_record, wanted_from(controller_on_record)) as change,
     ):
-        change.write()  # done, as one tool is that nobody verifies
+        change.write()  # done, like one tool without verification
         raise KeyboardInterrupt
     assert earlier_corrections(controller_on_record, 1) == pytest.approx((0.4,))
 
@@ -375,18 +373,18 @@ def test_the_first_definition_of_a_tool_is_no_correction(controller_on_record):
     assert earlier_corrections(controller_on_record, UNDEFINED) == pytest.approx((0.25 * 2**0.5,))
 
 
-# What the marker of a change keeps of its turn tests, and what is read back from it.
+# A change's marker keeps its turn tests; their data are read back from it.
 
 START = Pose(300.0, 100.0, 20.0, 0.0, tool=0)
 FOUND = ToolOffset(12.3, -3.9, -20.0)
 WRITTEN = ToolOffset(13.8, -4.4, -20.0)
-"""Another one than was found: a difference to a reference."""
+"""It differs from the found value: a difference to a reference."""
 
 LIMITS = Limits(speed_mm_s=15.0)
 
 
 def proposals(*tools, verify=True):
-    """Return what is to be written to some tools, each measured by two poses."""
+    """Return the values to write to some tools, each measured by two poses."""
     cell = PaperCell(START, FOUND, (310.0, 95.0, -40.0))
     result = cell.run(measure_two_pose(TouchPlan(), stored=FOUND))
     criteria = AcceptanceCriteria(drift_tolerance_mm=0.35)
@@ -401,7 +399,7 @@ def proposals(*tools, verify=True):
 
 
 def marked(*tools, limits=LIMITS, verify=True) -> Mapping[str, Any]:
-    """Return what a marker keeps, after it was a line of the record."""
+    """Return the data of a marker after it was a line of the record."""
     nobody: Any = None
     context = MeasurementContext(SimpleController(), nobody, start=START, settings=limits.settings)
     kept = marking.marked_turn_tests(context, limits, proposals(*tools, verify=verify))
@@ -435,7 +433,7 @@ def test_a_change_whose_tools_are_not_all_tested_by_it_has_no_test(tools, kind):
 
 
 def test_touches_are_gone_back_to_where_one_tool_was_measured_and_no_other():
-    """The others were measured already, with what was mounted then."""
+    """The others were measured already, with the nozzles then mounted."""
     assert offer_of(proposals(1))
     assert offer_of(proposals(1, 2)) is None
 

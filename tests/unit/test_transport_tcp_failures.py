@@ -1,4 +1,4 @@
-"""How TCP failures are put into words, on sockets that are not there."""
+"""The wording of TCP failures, on fake sockets."""
 
 import errno
 import os
@@ -26,7 +26,7 @@ ADDRESSES = [
 
 
 class FakeClock:
-    """Advances by itself a little with every look, so that every wait ends."""
+    """Advances a little at every reading, so that every wait ends."""
 
     def __init__(self):
         self.time_ns = 0
@@ -40,7 +40,7 @@ class FakeClock:
 
 
 class UnpluggedSocket:
-    """A socket whose every use ends in the error it was made with."""
+    """A socket whose every use ends in the given error."""
 
     def __init__(self, error=None, descriptor=-1):
         self.error = error

@@ -1,4 +1,4 @@
-"""What a trace holds, and what it never holds."""
+"""The contents of a trace, and the data that it never has."""
 
 import pytest
 
@@ -20,7 +20,7 @@ class SteppedClock:
 
 
 class ScriptedTransport:
-    """Gives what it was told to give and keeps what it was sent."""
+    """Returns the given data and keeps the data sent."""
 
     url = "epson+desk://cell-a?seed=1"
     identity = "epson+desk://cell-a"

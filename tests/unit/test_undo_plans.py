@@ -1,4 +1,4 @@
-"""An undo is a change of its own: it expects what was proved, and writes all tools or none."""
+"""An undo is a change of its own: it expects the tested values, and writes all tools or none."""
 
 import pytest
 

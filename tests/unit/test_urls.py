@@ -1,4 +1,4 @@
-"""URLs of controllers and transports: what they may say, and who opens them."""
+"""URLs of controllers and transports: their parts, and their openers."""
 
 from importlib import metadata
 from importlib.metadata import EntryPoint, EntryPoints
@@ -98,7 +98,7 @@ def test_any_text_is_a_url_or_a_config_error(text):
 
 
 class DeskLine(ScriptedTransport):
-    """A transport that says how it was opened."""
+    """A transport that reports its opening."""
 
     def __init__(self, url, timeout_s, clock):
         super().__init__()
@@ -123,7 +123,7 @@ opened: list[DeskLine] = []
 
 
 class DeskEntryPoint(EntryPoint):
-    """One whose package is this module, which cannot be imported by name."""
+    """An entry point whose package is this module, which cannot be imported by name."""
 
     def load(self):
         return opener

@@ -1,4 +1,4 @@
-"""``make versions``: the runs by name, all of them without one; a table of how each ended."""
+"""``make versions``: the named runs, or all of them; a table with the end of each."""
 
 import shutil
 import sys
@@ -8,7 +8,7 @@ from tests.versions._runs import FOLDER, Run, keep, runs
 
 
 def main() -> int:
-    """Return 0 where every run that was asked for passed; one that was not run did not pass."""
+    """Return 0 if every requested run passed; a run that did not take place has not passed."""
     asked = sys.argv[1:]
     known = list(runs())
     if unknown := set(asked) - {run.name for run in known}:
@@ -19,7 +19,7 @@ def main() -> int:
 
 
 def end(run: Run) -> bool:
-    """Carry a run out, print how it ended, keep what it showed; return whether it passed."""
+    """Carry out a run, print its end, keep its output; return whether it passed."""
     folder = FOLDER / run.name
     try:
         result = run.carry_out(folder)

@@ -1,4 +1,4 @@
-"""Why no lower version of a dependency is declared: the release beneath fails, or a reason."""
+"""Why no lower version of a dependency is declared: the release below fails, or a reason."""
 
 from collections.abc import Mapping
 from typing import Final
@@ -8,7 +8,7 @@ FAILING: Final[Mapping[str, tuple[str, str]]] = {
     "click": ("8.4.2", "tests/cli/test_command_names.py"),
     "pydantic": ("2.8.2", "tests/unit/test_recipe_files.py"),
 }
-"""The release beneath the lowest, and tests that do not pass with it."""
+"""The release below the lowest, and tests that do not pass with it."""
 
 _OLDER: Final = "the releases beneath are older than Python 3.11"
 
@@ -28,8 +28,8 @@ REASONS: Final[Mapping[str, str]] = {
     "python-can": "4.2 imports pkg_resources, which an environment of today need not have",
     "rich": _OLDER,
 }
-"""Why a lower one was not asked for where the tests might pass with it.
+"""Why a lower one was not tried although the tests might pass with it.
 
-A release that is older than Python 3.11 (24 October 2022) was never tried by its authors on any
-Python that robolink runs on.
+The authors of a release older than Python 3.11 (24 October 2022) never tried it on any Python that
+robolink runs on.
 """

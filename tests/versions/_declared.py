@@ -1,4 +1,4 @@
-"""What pyproject.toml declares, and what was tried."""
+"""The declarations of pyproject.toml, and the tried versions."""
 
 import json
 import tomllib
@@ -12,7 +12,7 @@ ROOT: Final = Path(__file__).parents[2]
 TRIED: Final = Path(__file__).with_name("tried.json")
 
 NEVER: Final = ("dev", "docs")
-"""Extras for people who work on robolink; nothing of them is needed to use it."""
+"""Extras for people who work on robolink; using it needs none of them."""
 
 PYTHONS: Final = ("3.11", "3.12", "3.13", "3.14")
 """The versions of Python that ``make versions`` looks for, the lowest first."""
@@ -28,7 +28,7 @@ def project() -> dict[str, Any]:
 
 
 def run_time_dependencies() -> list[Requirement]:
-    """Return what a user installs, extras included."""
+    """Return the packages that a user installs, extras included."""
     declared = project()
     lines = [*declared["dependencies"]]
     for extra, wanted in declared["optional-dependencies"].items():
@@ -52,6 +52,6 @@ def pythons() -> list[str]:
 
 
 def tried() -> dict[str, Any]:
-    """Return what ``make versions`` wrote when a run of it passed."""
+    """Return the results that ``make versions`` wrote for a passed run."""
     found: dict[str, Any] = json.loads(TRIED.read_text(encoding="utf-8"))
     return found

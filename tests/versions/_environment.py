@@ -1,4 +1,4 @@
-"""A Python of a version with packages of versions, and the chosen tests in it."""
+"""A Python of a given version with given package versions, and the chosen tests in it."""
 
 import os
 import re
@@ -47,11 +47,11 @@ CHOSEN: Final = (
     "tests/unit/test_sim_kinematics.py",
     "tests/unit/test_sim_spel_expressions.py",
 )
-"""What uses each dependency: files, prompts, tables, grammars, numbers, buses, the database."""
+"""Tests of each dependency: files, prompts, tables, grammars, numbers, buses, the database."""
 
 
 class NotRunError(Exception):
-    """This machine lacks what a run needs; the message says what."""
+    """This machine lacks something that a run needs; the message names it."""
 
 
 def python_of(version: str) -> Path:
@@ -83,8 +83,8 @@ class Environment:
     """A virtual environment that runs robolink from its sources.
 
     Args:
-        folder: Where it is made; what stood there is removed.
-        version: Of Python, such as ``3.12``.
+        folder: Its folder; existing files are removed.
+        version: The version of Python, such as ``3.12``.
 
     Raises:
         NotRunError: There is no such Python here.
@@ -100,14 +100,14 @@ class Environment:
     def run(
         self, command: Sequence[str], *, ahead: Path | None = None
     ) -> subprocess.CompletedProcess[str]:
-        """Carry a command out; what it said is in what is returned.
+        """Run a command; the result has its output.
 
         Args:
             command: The words.
             ahead: A folder whose packages come before those of the environment.
 
         Raises:
-            NotRunError: It is one of pip, and pip cannot get a package here.
+            NotRunError: It is a pip command, and pip cannot get a package here.
         """
         variables = {
             name: value
@@ -133,10 +133,10 @@ class Environment:
         return done
 
     def install(self, packages: Iterable[str], *, into: Path | None = None) -> None:
-        """Install packages, robolink itself from its sources where it is one of them.
+        """Install packages; robolink itself is installed from its sources.
 
         Args:
-            packages: As pip takes them.
+            packages: Requirements for pip.
             into: A folder beside the environment.
         """
         target = ["--target", str(into)] if into else []
@@ -144,12 +144,12 @@ class Environment:
         self.run([*pip, *target, *packages])
 
     def install_sources(self) -> None:
-        """Install robolink from its sources, and nothing that it asks for."""
+        """Install robolink from its sources without its dependencies."""
         pip = [self.python, "-m", "pip", "install", "--quiet", "--no-deps"]
         self.run([*pip, "--no-build-isolation", "--editable", str(ROOT)])
 
     def versions(self, names: Sequence[str]) -> dict[str, str]:
-        """Return the versions that are installed, by name; ``python`` is the first."""
+        """Return the installed versions, by name; ``python`` is the first."""
         program = (
             "import importlib.metadata as m, platform, sys;"
             "print(platform.python_version(), *map(m.version, sys.argv[1:]))"
@@ -161,7 +161,7 @@ class Environment:
         """Run tests; return pytest's last line.
 
         Raises:
-            AssertionError: Not all passed; what pytest said.
+            AssertionError: Not all passed; with pytest's output.
         """
         done = self._pytest(tests, ahead)
         assert done.returncode == 0, done.stdout[-5000:] + done.stderr[-5000:]
@@ -169,10 +169,10 @@ class Environment:
         return done.stdout.splitlines()[-1]
 
     def failure(self, test: str, *, ahead: Path) -> str:
-        """Run a test file; return why its first test fails, empty where all pass.
+        """Run a test file; return why its first test fails, empty if all pass.
 
         Raises:
-            AssertionError: It ended in another way than with a test that fails.
+            AssertionError: It ended in another way than with a failing test.
         """
         done = self._pytest(["--maxfail=1", test], ahead)
         if done.returncode == 0:
@@ -191,7 +191,7 @@ class Environment:
         """Run the demonstration.
 
         Raises:
-            AssertionError: It did not end well; what it said.
+            AssertionError: It did not end well; with its output.
         """
         done = self.run([self.python, "-m", "robolink_cli", "demo", "--speed", "20"])
         assert done.returncode == 0, done.stdout[-5000:] + done.stderr[-5000:]

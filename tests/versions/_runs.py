@@ -1,4 +1,4 @@
-"""The runs of ``make versions``: each with its Python, its packages and what it has to show."""
+"""The runs of ``make versions``: each with its Python, its packages and its purpose."""
 
 import json
 from collections.abc import Callable, Iterator
@@ -31,8 +31,8 @@ class Run:
     """One line of the table.
 
     Attributes:
-        name: What it is called on the command line and in ``tried.json``.
-        carry_out: Takes the folder of its environment; returns what is kept of it.
+        name: Its name on the command line and in ``tried.json``.
+        carry_out: Takes the folder of its environment; returns the result to keep.
     """
 
     name: str
@@ -40,7 +40,7 @@ class Run:
 
 
 def runs() -> Iterator[Run]:
-    """Yield all runs: the lowest versions, what lies beneath them, the newest on each Python."""
+    """Yield all runs: the lowest versions, the releases below them, the newest on each Python."""
     first, *_ = PYTHONS
     yield Run(f"lowest-{first}", partial(with_the_lowest, first))
     for name in FAILING:
@@ -50,7 +50,7 @@ def runs() -> Iterator[Run]:
 
 
 def pins() -> list[str]:
-    """Return each dependency at its lowest version, as pip takes it."""
+    """Return each dependency at its lowest version, as a pip requirement."""
     return [
         f"{wanted.name}{'[binary]' if wanted.extras else ''}=={lowest(wanted)}"
         for wanted in run_time_dependencies()
@@ -83,7 +83,7 @@ def lowest_environment(python: str, folder: Path) -> Environment:
 
 
 def beneath(name: str, python: str, folder: Path) -> dict[str, Any]:
-    """Show that the release beneath the lowest of one dependency does not serve.
+    """Show that the release below the lowest of one dependency does not work.
 
     Raises:
         NotRunError: This machine lacks a Python or a package.
@@ -100,7 +100,7 @@ def beneath(name: str, python: str, folder: Path) -> dict[str, Any]:
 
 
 def with_the_newest(python: str, folder: Path) -> dict[str, Any]:
-    """Run the demonstration and the chosen tests with the newest versions that are allowed.
+    """Run the demonstration and the chosen tests with the newest allowed versions.
 
     Raises:
         NotRunError: This machine lacks a Python or a package.
@@ -115,7 +115,7 @@ def with_the_newest(python: str, folder: Path) -> dict[str, Any]:
 
 
 def keep(name: str, result: dict[str, Any]) -> None:
-    """Write what a run showed, with the date, into ``tried.json``."""
+    """Write the result of a run, with the date, into ``tried.json``."""
     kept = tried() if TRIED.exists() else {}
     kept[name] = {"date": datetime.now(UTC).date().isoformat(), **result}
     ordered = {run.name: kept[run.name] for run in runs() if run.name in kept}

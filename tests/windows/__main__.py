@@ -1,4 +1,4 @@
-"""``make windows``: run what is named here under wine, or say what the machine lacks."""
+"""``make windows``: run the judges named here under wine, or say what the machine lacks."""
 
 import sys
 from pathlib import Path
@@ -9,7 +9,7 @@ from tests.windows._windows_python import missing
 
 
 def main() -> int:
-    """Return the exit code of the judges; 1 where the machine lacks what they need."""
+    """Return the exit code of the judges; 1 if the machine lacks something that they need."""
     if lacks := missing():
         print("Windows was not tried: this machine lacks", *lacks, sep="\n  ")  # noqa: T201
         return 1

@@ -1,4 +1,4 @@
-"""Consoles of Windows on terminals of this machine, and a hand at their keys."""
+"""Windows consoles on terminals of this machine, and a simulated hand at their keys."""
 
 import fcntl
 import os
@@ -24,24 +24,24 @@ from tests.windows._windows_python import WindowsPython
 
 Way = Literal["calls", "sequences"]
 PATIENCE_S: Final = 300.0
-"""Long, because the judges go beside other work, and a console that wine draws is slow."""
+"""Long, because the judges run beside other work, and a console that wine draws is slow."""
 
 _SCRIPT: Final = Path(__file__).with_name("_windows_console.py")
 
 
 class WindowsConsole(HandAtScreen):
-    """``robolink`` in a console of Windows, as ``_windows_console`` makes of wine's what it lacks.
+    """``robolink`` in a Windows console, made by ``_windows_console`` from wine's console.
 
     Args:
         python: The Windows Python.
         way: How the program draws and reads: by calls of the console or by escape sequences.
         words: The command line.
-        environment: What the program finds in its environment, besides the usual.
-        folder: Where it runs.
-        simulator: Whose tip the hand looks at.
+        environment: Additional environment variables of the program.
+        folder: Its working folder.
+        simulator: The simulator whose tip the hand sees.
         columns: Width of the console.
         rows: Height of the console.
-        redirected: What would stand behind the command line in cmd.exe, ``> file``.
+        redirected: The redirection after the command line in cmd.exe, ``> file``.
     """
 
     longest_s = PATIENCE_S
@@ -82,7 +82,7 @@ class WindowsConsole(HandAtScreen):
         self._over = False
 
     def read(self, seconds: float = 0.05) -> bool:
-        """Take what was drawn; return whether the program is still there."""
+        """Read new output; return whether the program is still there."""
         ends = [end for end in (self._terminal, self._keys) if end is not None]
         ready, _, _ = select.select(ends, [], [], 0 if self._over else seconds)
         for end in ready:
@@ -99,9 +99,10 @@ class WindowsConsole(HandAtScreen):
 
     @property
     def text(self) -> str:
-        """Return what stands there.
+        """Return the text on the screen.
 
-        Of a wide character over whose first half another was drawn, the second is a blank.
+        If another character was drawn over the first half of a wide one, the second half is a
+        blank.
         """
         for row in self.screen.buffer.values():
             for column in range(self.screen.columns):
@@ -111,11 +112,11 @@ class WindowsConsole(HandAtScreen):
         return "\n".join(self.screen.display)
 
     def send(self, key: str) -> None:
-        """Have a key pressed and released."""
+        """Press and release a key."""
         self._keys.sendall(f"{key}\n".encode())
 
     def scanned(self, how: str) -> bool:
-        """Have keys pressed faster than a hand does; return whether they came so fast."""
+        """Press keys faster than a hand does; return whether they arrived that fast."""
         self._gap.unlink(missing_ok=True)
         self.send(how)
         end_s = time.monotonic() + PATIENCE_S
@@ -125,7 +126,7 @@ class WindowsConsole(HandAtScreen):
         return float(self._gap.read_text(encoding="utf-8")) < ALONE_S / 2
 
     def type(self, text: str, *, later_s: float = 1.0) -> None:
-        """Write to the terminal, for wine's own console to make keys of; a person types later."""
+        """Write to the terminal, from which wine's own console makes keys; a person types later."""
         self.rest(later_s)
         os.write(self._terminal, text.encode())
 

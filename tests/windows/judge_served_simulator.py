@@ -1,4 +1,4 @@
-"""A simulator that runs on Windows, and a client on Linux that works with it over TCP."""
+"""A simulator that runs on Windows, and a client on Linux that uses it over TCP."""
 
 import json
 import subprocess
@@ -15,7 +15,7 @@ Client = Callable[..., "subprocess.CompletedProcess[str]"]
 
 @pytest.fixture
 def served(windows: WindowsPython, state: dict[str, str]) -> Iterator[dict[str, Any]]:
-    """A simulated EPSON controller on Windows; what it said of itself."""
+    """A simulated EPSON controller on Windows, with its printed output."""
     command = ("-m", "robolink_cli", "--json", "sim", "epson", "--tcp", "127.0.0.1:0")
     process = windows.start(*command, "--seed", "7", **state)
     try:
@@ -28,7 +28,7 @@ def served(windows: WindowsPython, state: dict[str, str]) -> Iterator[dict[str, 
 
 @pytest.fixture
 def client(served, tmp_path, monkeypatch) -> Client:
-    """The command line of this machine, at the simulator on Windows."""
+    """The command line of this machine, for the simulator on Windows."""
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path / "linux"))
 
     def run(*arguments: str) -> "subprocess.CompletedProcess[str]":

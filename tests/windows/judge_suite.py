@@ -1,4 +1,4 @@
-"""Files of the suite as they are, under a Windows Python with the wheel."""
+"""Unchanged files of the suite, under a Windows Python with the wheel."""
 
 import re
 import subprocess

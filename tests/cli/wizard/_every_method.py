@@ -1,8 +1,8 @@
-"""A whole change through the flow, by every method that moves: a hand, and what breaks it off.
+"""A whole change through the wizard's flow, by every method that moves, with interruptions.
 
-The work runs in its thread against a simulated cell in virtual time, and asks at a desk; here its
-questions go through the flow, and a simulated person's answers come back as keys and lines. No
-terminal: what is drawn is looked at by the program.
+The work runs in its own thread on a simulated cell in virtual time, and asks at a desk; here its
+questions go through the flow, and a simulated person's answers come back as keys and lines. There
+is no terminal: the program checks the screens.
 """
 
 import time
@@ -45,16 +45,16 @@ TOOL = 1
 HEADER = Header("line3", "Change needle", command="robolink -c line3 change a.toml")
 
 ABORTS = ("check", "touch", "second touch", "moving", "write", "turn test")
-"""At which moments a change is broken off."""
+"""The moments at which a change is interrupted."""
 
 NEVER_TOUCHED = ("camera", "camera-affine", "runout-table", "board", "beams", "z-touch")
-"""Methods in which nobody touches anything."""
+"""Methods without touches by a person."""
 
 LONGEST_S = 60.0
 
 
 def moments_of(method: str) -> tuple[str, ...]:
-    """Return those of :data:`ABORTS` that come in a change by a method."""
+    """Return the moments of :data:`ABORTS` that occur in a change by a method."""
     touched = ("touch", "second touch", "turn test")
     if method in NEVER_TOUCHED:
         return tuple(one for one in ABORTS if one not in touched)
@@ -63,19 +63,19 @@ def moments_of(method: str) -> tuple[str, ...]:
 
 @dataclass
 class FlowHand:
-    """Goes through a change.
+    """Goes through a change at the screens or lines, as a hand does.
 
     Attributes:
         cell: The simulated cell.
-        desk: Where the work asks.
-        lines: Whether it types lines, and does not press keys.
+        desk: The desk at which the work asks.
+        lines: Whether it types lines instead of pressing keys.
         break_at: The moment at which it does something else.
-        breaks: What it does then.
-        broken: Whether it has.
-        seen: The moments that came, in their order.
-        state: What the screens are drawn from.
-        sent: How many answers or commands were sent.
-        error: What ended the work.
+        breaks: The other action.
+        broken: Whether it has done that.
+        seen: The moments so far, in order.
+        state: The state from which the screens are drawn.
+        sent: The number of answers or commands sent.
+        error: The error that ended the work.
     """
 
     cell: Any
@@ -111,7 +111,7 @@ class FlowHand:
         self.happens(LineTyped(line, time.monotonic() + 0.35))
 
     def idle(self) -> None:
-        """Do what never answers anything: ENTER, blanks, a scanner."""
+        """Send input that never answers a question: ENTER, blanks, a scanner."""
         before = self.sent
         self.happens(TooFast())
         if self.lines:
@@ -122,7 +122,7 @@ class FlowHand:
         assert self.sent == before, (self.state.question, self.state.subject)
 
     def take_in(self) -> None:
-        """Take what happened, and answer what is waited for."""
+        """Handle the events so far, and answer the open question."""
         for one in self.desk.happened():
             self.happens(one)
             if isinstance(one, WaitsForAnswer):
@@ -133,14 +133,14 @@ class FlowHand:
                 self.press("stop")
 
     def has_to_do(self) -> bool:
-        """Return whether the list says by now that something has to be done first."""
+        """Return whether the list already says that something must be done first."""
         subject = self.state.subject
         if self.state.ending or not isinstance(subject, CheckSubject):
             return False
         return any(point.mark is Mark.TO_DO for point in subject.points)
 
     def meet(self, moment: str) -> bool:
-        """Note a moment; tell whether it is the one at which something else is done."""
+        """Note a moment; return whether it is the one for the other action."""
         self.seen.append(moment)
         if moment != self.break_at or self.broken:
             return self.broken
@@ -183,7 +183,7 @@ class FlowHand:
         return "write" if isinstance(state.subject, WriteSubject) else "other"
 
     def at_place(self) -> None:
-        """Type the steps of a person who sees the tip; take it by a key or a word."""
+        """Type the steps of a person who sees the tip; accept by a key or a word."""
         word = None
         while word is None:
             word = self.person.poll(0.05)
@@ -203,7 +203,7 @@ class FlowHand:
 
 
 def look_at(state: WizardState) -> None:
-    """Look at a screen: it fits a terminal, and names a way out."""
+    """Check a screen: it fits a terminal and names a way out."""
     screen = screen_of(state, time.monotonic())
     rows = screen.rows()
     assert len(rows) <= 24
@@ -215,7 +215,7 @@ def look_at(state: WizardState) -> None:
 
 @contextmanager
 def changing(method: str, *, lines: bool, **breaks: Any) -> Iterator[tuple[FlowHand, Any]]:
-    """Carry a change by a method out; yields the hand, and the cell, when it has ended."""
+    """Carry out a change by a method; yield the hand and the cell after its end."""
     case = CASES[method]
     with case.cell() as cell:
         desk = Desk()
@@ -237,7 +237,7 @@ def changing(method: str, *, lines: bool, **breaks: Any) -> Iterator[tuple[FlowH
 
 
 def whole_change(cell: Any, case: Any, desk: Desk) -> None:
-    """Do what the command does, from the check list on."""
+    """Do what the command does from the check list on."""
     with robolink.connect(cell.url) as controller:
         desk.glance = ControllerGlance(controller).at_rest
         tool = ToolPlan(TOOL, case.source(cell), approach=case.approach)
@@ -251,7 +251,7 @@ def whole_change(cell: Any, case: Any, desk: Desk) -> None:
 
 
 def stored(cell: Any) -> ToolOffset | None:
-    """Return what the controller holds in the tool, by a connection of its own."""
+    """Return the stored offset, read by a separate connection."""
     cell.simulator.panel.release_estop()
     with robolink.connect(cell.url) as controller:
         if controller.status().state is not ControllerState.READY:

@@ -1,11 +1,11 @@
-"""A hand at a pseudo terminal: looks at the simulated tip and types the steps that are left."""
+"""A simulated hand at a pseudo terminal: sees the simulated tip and types the remaining steps."""
 
 import time
 
 from robolink_simulators.control.assist import InProcessEyes
 
 FINE_MM = 0.07
-"""Left for the last step, which has to be a fine one."""
+"""The distance left for the last step, which must be a fine one."""
 
 
 class LineHand:
@@ -13,8 +13,8 @@ class LineHand:
 
     Args:
         terminal: The pseudo terminal.
-        simulator: Whose tip it looks at.
-        tool: Which tip.
+        simulator: The simulator whose tip it sees.
+        tool: The tool of that tip.
     """
 
     def __init__(self, terminal, simulator, tool=1):
@@ -38,7 +38,7 @@ class LineHand:
         return seen.dx_mm, seen.dy_mm, seen.dz_mm
 
     def bring(self):
-        """Jog the tip onto the pin, and wait until a hand would have looked."""
+        """Jog the tip onto the pin, and wait as long as a person would look."""
         self.terminal.wait_for(r"stop, or help\.")
         time.sleep(0.35)
         self.jog()

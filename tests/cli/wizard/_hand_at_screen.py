@@ -1,4 +1,4 @@
-"""A hand at the keys of a full screen, which reads what stands there; whatever draws it."""
+"""A simulated hand at the keys of a full screen that reads the screen, however it is drawn."""
 
 import re
 import time
@@ -10,12 +10,12 @@ import pyte
 class HandAtScreen(ABC):
     """Reads a screen, presses keys and brings the tip of a simulated robot onto its pin.
 
-    What derives from it says how to take what was drawn (``read``) and to press a key (``send``).
+    Subclasses say how to read what was drawn (``read``) and how to press a key (``send``).
 
     Args:
-        screen: What stands on the terminal.
-        eyes: What looks at the tip, ``None`` where none is brought anywhere.
-        tool: Which tip.
+        screen: The screen's content.
+        eyes: The view of the tip, ``None`` if none is moved.
+        tool: The tool of that tip.
     """
 
     longest_s = 30.0
@@ -28,7 +28,7 @@ class HandAtScreen(ABC):
 
     @abstractmethod
     def read(self, seconds=0.05):
-        """Take what was drawn; return whether the far end is still there."""
+        """Read new output; return whether the far end is still there."""
 
     @abstractmethod
     def send(self, key):
@@ -39,7 +39,7 @@ class HandAtScreen(ABC):
         return "\n".join(self.screen.display)
 
     def see(self, pattern):
-        """Wait until something is seen on the screen."""
+        """Wait until a text is on the screen."""
         end_s = time.monotonic() + self.longest_s
         while not (found := re.search(pattern, self.text)):
             assert self.read(), f"it ended before {pattern!r}\n{self.text}"
@@ -59,7 +59,7 @@ class HandAtScreen(ABC):
             self.rest(self.pause_s)
 
     def start(self):
-        """Confirm what the list asks, and start."""
+        """Confirm the questions of the check list, and start."""
         self.see(r"Start moving \(2 open\)")
         self.rest(0.4)
         self.press(["2", "5"])
@@ -74,7 +74,7 @@ class HandAtScreen(ABC):
         return seen.dx_mm, seen.dy_mm, seen.dz_mm
 
     def jog(self):
-        """Bring the tip onto the pin: hold keys in sizes that get smaller."""
+        """Jog the tip onto the pin: hold keys, with smaller and smaller steps."""
         self.rest(0.45)
         for size in (1.0, 0.1, 0.01):
             self._size(size)
@@ -90,7 +90,7 @@ class HandAtScreen(ABC):
             self.press(["+" if now < size else "-"])
 
     def _hold(self, axis, plus, minus, size):
-        """Hold one key until what is left is less than a step; it counts as one."""
+        """Hold one key until less than a step is left; it counts as one key."""
         held = False
         for _ in range(60):
             left = self.left_mm()[axis]
@@ -122,7 +122,7 @@ class HandAtScreen(ABC):
             self.see("moving|DONE")
 
     def write_and_prove(self):
-        """Write what is proposed for the tool, and make the turn test."""
+        """Write the tool's proposal and make the turn test."""
         self.see("To write, type the tool number")
         self.rest(0.4)
         self.press([str(self.tool), "*"])

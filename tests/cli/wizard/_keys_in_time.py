@@ -1,4 +1,4 @@
-"""Keys that come at times of a clock that is stepped, to a loop that gets to them late."""
+"""Keys at times of a stepped clock, read by a loop that runs late."""
 
 from abc import ABC, abstractmethod
 
@@ -6,13 +6,13 @@ from robolink_cli.wizard.keys import KeyGate
 
 
 class KeysInTime(ABC):
-    """Sends keys, lets time pass, and tells which of them count."""
+    """Sends keys, lets time pass, and returns the keys that count."""
 
     now_s = 0.0
 
     @abstractmethod
     def look(self):
-        """Let the thread look once."""
+        """Let the reading thread look once."""
 
     @abstractmethod
     def send(self, text):
@@ -20,14 +20,14 @@ class KeysInTime(ABC):
 
     @abstractmethod
     def taken(self):
-        """Return each key that came, when, and when it surely had not."""
+        """Return each received key, its time, and the last time when it was surely not there."""
 
     @abstractmethod
     def quiet(self):
-        """Return when surely nothing was there to be read, ``None`` while that is not known."""
+        """Return the latest time without input, ``None`` if unknown."""
 
     def until(self, at_s, every_s=0.005):
-        """Let time pass, and the thread look so often; 0 for never."""
+        """Let time pass with a look at this interval; 0 for none."""
         while every_s and self.now_s + every_s <= at_s:
             self.now_s += every_s
             self.look()
@@ -38,7 +38,7 @@ class KeysInTime(ABC):
         self.send(text)
 
     def counted(self):
-        """Let the loop get to what came, late; return what counts, and whether a burst is told."""
+        """Let the late loop read; return the keys that count, and whether a burst is reported."""
         gate = KeyGate()
         found = [one.key for press in self.taken() for one in gate.press(*press)]
         quiet_s = self.quiet()

@@ -1,4 +1,4 @@
-"""States, subjects and a hand for the tests of the wizard."""
+"""States, subjects and a simulated hand for the tests of the wizard."""
 
 import time
 from dataclasses import replace
@@ -121,7 +121,7 @@ CHECK = CheckSubject(
 
 
 class Sitting:
-    """A state, and what was sent from it; time passes by hand."""
+    """A state and the input sent from it; the test advances the time."""
 
     def __init__(self, state=None, in_tool=0, *, motors=True):
         self.motors = motors
@@ -163,7 +163,7 @@ class Sitting:
         return self.happens(LineTyped(text, self.now))
 
     def jogs(self, step):
-        """The runner makes the step that was sent last."""
+        """Let the runner make the step that was sent last."""
         axis, by = step[0], float(step[1:])
         here = self.state.pose or ARRIVAL
         there = replace(here, **{f"{axis}_mm": getattr(here, f"{axis}_mm") + by})
@@ -173,7 +173,7 @@ class Sitting:
 
 
 def until(true, seconds=10.0):
-    """Wait until something is so."""
+    """Wait until a condition is true."""
     end_s = time.monotonic() + seconds
     while not true():
         assert time.monotonic() < end_s

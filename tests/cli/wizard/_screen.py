@@ -19,12 +19,12 @@ _THE_END = re.compile(r"(DONE|STOPPED|NOT STARTED) *(SIMULATED *)?$")
 
 
 class ScreenHand(HandAtScreen):
-    """The far end of a pseudo terminal, drawn by pyte; and a hand at its keys.
+    """The far end of a pseudo terminal, drawn by pyte, with a simulated hand at its keys.
 
     Args:
         words: The command line.
-        simulator: Whose tip the hand looks at.
-        tool: Which tip.
+        simulator: The simulator whose tip the hand sees.
+        tool: The tool of that tip.
     """
 
     def __init__(self, words, simulator=None, tool=1, *, columns=80, rows=24):
@@ -54,7 +54,7 @@ class ScreenHand(HandAtScreen):
         fcntl.ioctl(self.master, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
 
     def read(self, seconds=0.05):
-        """Take what was drawn; return whether the far end is still there."""
+        """Read new output; return whether the far end is still there."""
         ready, _, _ = select.select([self.master], [], [], seconds)
         if not ready:
             return True
@@ -71,7 +71,7 @@ class ScreenHand(HandAtScreen):
         os.write(self.master, key.encode() if isinstance(key, str) else key)
 
     def end(self):
-        """Leave the last screen, where there is one, and return the exit code."""
+        """Leave the last screen, if there is one, and return the exit code."""
         end_s, shown = time.monotonic() + self.longest_s, ""
         while self.read(0.2) and time.monotonic() < end_s:
             if (

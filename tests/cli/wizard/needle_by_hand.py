@@ -1,10 +1,10 @@
-"""Keys and seconds for a needle by hand: ``python -m tests.cli.wizard.needle_by_hand``.
+"""Keys and seconds for a manual needle change: ``python -m tests.cli.wizard.needle_by_hand``.
 
-A simulated controller in real time; its needle is another one than the stored offset says. A
-scripted hand brings the tip to within 0.02 mm by what it sees, at a touch and at each touch of the
-proof. A key that is held down counts once; of a line every character counts, and ENTER.
-``--lines`` is the dialogue that there was before (git worktree of the commit before the wizard, on
-PYTHONPATH); ``--pictures FOLDER`` keeps the screens.
+A simulated controller runs in real time; its needle differs from the stored offset. A scripted hand
+sees the tip and brings it to within 0.02 mm, at a touch and at each touch of the turn test. A held
+key counts once; in a line every character and ENTER count. ``--lines`` uses the earlier dialogue
+(git worktree of the commit before the wizard, on PYTHONPATH); ``--pictures FOLDER`` keeps the
+screens.
 """
 
 import argparse
@@ -31,7 +31,7 @@ LEARN = ["calibrate", "n-angle", "--tool", "1", "--station", "PIN-07", "--yes"]
 
 
 class Ahead(SystemClock):
-    """Real time, from where a faster clock has come to."""
+    """Real time, starting at the time that a faster clock reached."""
 
     def __init__(self, reached_ns):
         self.lead_ns = reached_ns - super().now_ns()
@@ -41,7 +41,7 @@ class Ahead(SystemClock):
 
 
 def prepare(simulator):
-    """Learn the pin with a simulated person, and mount another needle; return the clock now."""
+    """Learn the pin with a simulated person, and mount another needle; return the present time."""
     from robolink_cli import main
 
     clock = ScaledClock(30.0)
@@ -55,7 +55,7 @@ def prepare(simulator):
 
 
 class LineTypist:
-    """The dialogue of before: steps typed, Enter when it is on the pin."""
+    """The earlier dialogue: typed steps, Enter when the tip is on the pin."""
 
     def __init__(self, terminal, simulator):
         self.terminal, self.eyes, self.keys = terminal, InProcessEyes(simulator), 0

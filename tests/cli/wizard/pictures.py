@@ -1,7 +1,7 @@
 """The screens of the wizard as pictures for the pages, in both languages.
 
-``python -m tests.cli.wizard.pictures`` draws them anew into ``docs/pictures``. They are what a
-terminal of 80 by 24 shows, character by character: a wide one takes two columns.
+``python -m tests.cli.wizard.pictures`` draws them anew into ``docs/pictures``. They are copies of a
+terminal of 80 by 24, character by character: a wide one takes two columns.
 """
 
 from html import escape
@@ -29,7 +29,7 @@ SHOWN = {
     "stopped": "stopped",
     "recover": "recover",
 }
-"""Name of the picture, and of the screen."""
+"""The names of the pictures and of their screens."""
 
 WIDE, HIGH = 8.4, 18
 HEAD = (
@@ -41,7 +41,7 @@ HEAD = (
 
 
 def runs(row):
-    """Yield the parts of a row that have one width each, with their columns."""
+    """Yield runs of a row with characters of one width, each with its columns."""
     column = 0
     for width, part in groupby(row, key=wcwidth):
         text = "".join(part)
@@ -64,7 +64,7 @@ def svg_of(rows):
 
 
 def picture(name, language):
-    """Return the path of a picture, and what belongs into it."""
+    """Return the path of a picture, and its content."""
     before = messages._translate
     messages.install(translator("zh") if language == "zh" else None)
     try:

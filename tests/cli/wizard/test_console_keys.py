@@ -1,4 +1,4 @@
-"""Keys and lines of consoles: which count, and the time at which they came."""
+"""Keys and lines of consoles: which count, and when they arrived."""
 
 import asyncio
 import os
@@ -22,11 +22,11 @@ from robolink_cli.wizard.keys import KeyGate, name_of
 from tests.cli.wizard._keys_in_time import KeysInTime
 from tests.cli.wizard._people import until
 
-# Keys of a console that keeps them in a queue have the time at which they came.
+# Keys in a console's queue have the time at which they came.
 
 
 class Console(KeysInTime):
-    """A queue of keys, in the place of Windows' own."""
+    """A queue of keys in place of Windows' own."""
 
     def __init__(self, source):
         self.source = source
@@ -137,11 +137,11 @@ def test_the_clock_is_fine_and_stays_with_the_coarse_one():
     assert abs(found[-1] - time.monotonic()) < 0.1
 
 
-# Lines of a Windows console; what stands for ``msvcrt`` has its three functions and its keys.
+# Lines of a Windows console; the stand-in for ``msvcrt`` has its three functions and its keys.
 
 
 class KeysOfWindows:
-    """A queue of keys as ``msvcrt`` reads it, and what was written to the console."""
+    """A queue of keys as ``msvcrt`` reads it, and the text written to the console."""
 
     def __init__(self):
         self.queue: deque[str] = deque()
@@ -214,13 +214,13 @@ def test_ctrl_z_ends_the_input_where_nothing_was_typed(keys):
         lines.next(0.0)
 
 
-# Keys have the time at which they came, whenever the loop that draws gets to them.
+# Keys have the time at which they came, whenever the drawing loop reads them.
 
 SCANNED = "4006381333931\r\n"
 
 
 class Terminal(KeysInTime):
-    """A pipe on which keys come."""
+    """A pipe that delivers keys."""
 
     def __init__(self, fd, write):
         self.write = write
@@ -275,7 +275,7 @@ def test_a_scanner_counts_for_nothing_though_the_loop_is_late(terminal, gap_s):
 
 @pytest.mark.parametrize("late_s", [0.03, 0.05, 0.5])
 def test_what_nobody_saw_to_be_apart_is_dropped(terminal, late_s):
-    """The thread gets the first key of a scanner, and then no turn while the others come."""
+    """The thread gets a scanner's first key, and then does not run while the others come."""
     terminal.key("4", 1.0)
     terminal.until(1.005)
     terminal.key(SCANNED[1:], 1.01, every_s=0)
@@ -291,9 +291,9 @@ def test_a_key_does_not_count_while_another_waits_to_be_read(terminal):
     (came,) = reader.taken()
     assert gate.press("5", came.at_s, came.quiet_s) == []
     terminal.key("5", 1.01, every_s=0)
-    terminal.until(1.2, every_s=0)  # neither thread nor loop had a turn
+    terminal.until(1.2, every_s=0)  # neither thread nor loop ran
     assert reader.quiet() is None
-    assert reader.taken() == []  # it is for the thread to read, and to tell the loop of
+    assert reader.taken() == []  # the thread must read it and tell the loop
     assert reader.look()
     (came,) = reader.taken()
     assert gate.press("5", came.at_s, came.quiet_s) == []
@@ -326,7 +326,7 @@ def test_the_thread_notes_when_keys_come_while_the_loop_is_busy():
             for key in ("1", "\x1b[6~"):  # the second one is PgDn
                 source.send_text(key)
                 until(lambda: keys._reader._came and not keys._reader.watched)
-            assert found == []  # the loop had no turn
+            assert found == []  # the loop did not run
             while len(found) < 2:
                 await asyncio.sleep(0)
 
@@ -346,7 +346,7 @@ def test_the_thread_notes_when_keys_come_while_the_loop_is_busy():
 
 
 def passed(*pressed):
-    """Press keys at times; return what counted, and how often a burst was told."""
+    """Press keys at times; return those that counted, and how often a burst was reported."""
     gate, found, bursts, pending = KeyGate(), [], 0, sorted(pressed, key=lambda one: one[1])
     for tick in range(4000):
         now_s = tick / 1000
@@ -392,7 +392,7 @@ def test_a_key_that_waited_is_gone_with_a_stop(key):
 
 
 def test_after_a_burst_a_key_counts_only_where_its_end_was_seen():
-    """The thread that reads had no turn from the burst on until this key was there."""
+    """The reading thread did not run from the burst until this key."""
     for key, quiet_s, counts in (("5", 1.002, []), ("2", 1.02, []), ("5", 1.15, ["5"])):
         gate = KeyGate()
         assert gate.press("1", 1.0) == []

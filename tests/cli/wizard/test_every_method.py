@@ -1,7 +1,7 @@
-"""Every method that moves, in both languages, by keys and by lines, carried out and broken off.
+"""Every method that moves, in both languages, by keys and by lines, completed and interrupted.
 
-At every question ENTER, blanks and a scanner are tried first. What is there afterwards is read from
-the controller by a connection of its own.
+ENTER, blanks and a scanner are tried first at every question. The result is read from the
+controller by a separate connection.
 """
 
 import re
@@ -20,7 +20,7 @@ pytestmark = pytest.mark.simulator_only
 
 HAN = re.compile("[\u4e00-\u9fff]")
 EACH_TIME = "one-touch"
-"""The method of the suite; the others are left to ``make soak``."""
+"""The method of the default suite; the others run only in ``make soak``."""
 
 FACES = [("keys", "en"), ("lines", "zh"), ("keys", "zh"), ("lines", "en")]
 
@@ -43,7 +43,7 @@ def check_language(hand, language):
 
 
 def check_as_before(cell, before):
-    """The old value, the tool that was selected, nothing left open."""
+    """Check for the old value, the earlier tool selected, and nothing open."""
     assert stored(cell) == before
     with robolink.connect(cell.url) as controller:
         assert controller.tools.selected() == 1
@@ -51,7 +51,7 @@ def check_as_before(cell, before):
 
 
 def on_faces(method, moments=("",)):
-    """Return a method at each moment on each face: of the suite's, one face a moment."""
+    """Return a method at each moment in each interface: in the default suite one per moment."""
     return [
         soaked(method, moment, face, language, kept=method == EACH_TIME and (number + at) % 4 == 0)
         for number, moment in enumerate(moments)
@@ -105,13 +105,13 @@ def test_a_stop_leaves_all_as_it_was(method, moment, face, language):
 
 
 def before_of(method):
-    """Return what the tool holds in a fresh cell of a method."""
+    """Return the stored offset of the tool in a fresh cell of a method."""
     with CASES[method].cell() as cell:
         return stored(cell)
 
 
 def press_the_stop(hand):
-    """Press it, and jog on: a PLC whose drives were never seen with power shows it then."""
+    """Press the emergency stop and jog on: a PLC whose drives never had power shows it then."""
     hand.cell.simulator.panel.press_estop()
     if hand.state.at_place:
         hand.type("z+0.1")
@@ -148,7 +148,7 @@ def test_what_ends_it_from_outside_writes_nothing_new(method, moment, end, langu
 
 
 def blind(hand):
-    """Start, with a sensor whose cable has come off."""
+    """Start with a sensor whose cable has come off."""
     world = hand.cell.simulator.world
     for number in (3, 4, 5):
         world.disconnect(number)

@@ -1,4 +1,4 @@
-"""The flow of the wizard: what a key or a line does, and what it never does."""
+"""The wizard's flow: the effect of keys and lines, and effects that they never have."""
 
 from dataclasses import replace
 
@@ -163,7 +163,7 @@ def test_a_start_waits_for_every_point_of_the_list():
     done = replace(CHECK, points=CHECK.points[:3])
     hand = Sitting().asked(done, Question.YES_NO).keys("2", "5", "2", "5", "2", "5")
     assert hand.sent == ["y"]
-    # Who comes back into the cell takes the row back.
+    # A person who returns to the cell confirms the row again.
     hand = Sitting().asked(done, Question.YES_NO).keys("2", "5", "2", "5", "5", "2", "5")
     assert hand.sent == []
     assert hand.state.message == "Not yet: 1 open."
@@ -379,7 +379,7 @@ def test_a_typed_pose_is_gone_after_a_step_and_where_none_is_taken():
 
 
 def test_nothing_of_one_touch_counts_for_the_next():
-    """Neither a pose that was typed and not taken, nor the steps that were made."""
+    """Neither a pose that was typed and not accepted, nor the steps made."""
     hand = at_touch(types=True).jogs("z-0.1").line("pose 1 2 3 4")
     hand.asked(touch_subject(types=True)).keys("5")
     assert hand.sent == []
@@ -432,7 +432,7 @@ HAPPENINGS = st.one_of(
 
 
 def check_history(history, first):
-    """Nothing is taken unjogged and nothing written untyped, whatever comes in which order."""
+    """Nothing is accepted without a jog or written without typing, whatever the order of events."""
     hand, pose, moved, digits, lined, posed = Sitting(), ARRIVAL, 0.0, "", "", False
     hand.asked(*SUBJECTS[first])
     for what, of in history:

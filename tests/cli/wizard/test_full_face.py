@@ -1,4 +1,4 @@
-"""The full screen: its keys by a pipe, and the real command on a pseudo terminal."""
+"""The full screen: its keys from a pipe, and the real command on a pseudo terminal."""
 
 import os
 import signal
@@ -46,7 +46,7 @@ pytestmark = pytest.mark.simulator_only
 
 
 class Drawn:
-    """A face in a thread of the test, keys by a pipe, drawn by pyte."""
+    """An interface in a thread of the test, with keys from a pipe, drawn by pyte."""
 
     def __init__(self, desk, work, source, size=Size(rows=24, columns=80)):  # noqa: B008 - a value
         self.screen, self.paper = pyte.Screen(80, 24), StringIO()
@@ -71,7 +71,7 @@ def paste(source, text):
 
 
 def test_keys_of_a_pipe_jog_take_and_write():
-    """One face, one work: a pasted id, touch, burst, write."""
+    """One session: a pasted id, a touch, a burst, a write."""
     desk, answers, pose = Desk(), [], [ARRIVAL]
     desk.glance = lambda: Reading(time.monotonic(), "ready", pose=pose[0])
 
@@ -108,7 +108,7 @@ def test_keys_of_a_pipe_jog_take_and_write():
             time.sleep(0.35)
             paste(source, "5")
             time.sleep(0.1)
-            source.send_text("6\x1b[200~813\r\x1b[201~")  # as a console hands a scan on
+            source.send_text("6\x1b[200~813\r\x1b[201~")  # as a console delivers a scan
             time.sleep(0.1)
             assert answers == ["N-7"]
             source.send_text("4006381333931\r\n")
@@ -141,7 +141,7 @@ def test_keys_of_a_pipe_jog_take_and_write():
 
 @pytest.mark.parametrize("small_first", [False, True], ids=["became small", "begun small"])
 def test_the_screen_comes_when_a_small_window_grew(monkeypatch, small_first):
-    """What is asked goes on in lines meanwhile, and no key counts that was on its way."""
+    """Until then questions are asked in lines, and no key already on its way counts."""
     monkeypatch.setattr(lines, "_STEADY_S", 0.1)
     monkeypatch.setattr(lines, "open_lines", NoLines)
     desk, shown = Desk(), []
@@ -179,7 +179,7 @@ def test_the_screen_comes_when_a_small_window_grew(monkeypatch, small_first):
 
 
 class NoLines:
-    """Lines of a person who types none."""
+    """The lines of a person who types none."""
 
     def next(self, wait_s):
         time.sleep(wait_s)
@@ -189,7 +189,7 @@ class NoLines:
 
 
 def test_two_keys_of_a_hand_count_though_the_screen_was_drawn_for_longer():
-    """Both are taken by the loop at once; when they came their reader noted."""
+    """The loop reads both at once; the reader noted when they came."""
     hand = Sitting().asked(touch_subject())
     with create_pipe_input() as source:
         face = FullFace(source, Vt100_Output(StringIO(), lambda: Size(24, 80), term="xterm"))
@@ -200,7 +200,7 @@ def test_two_keys_of_a_hand_count_though_the_screen_was_drawn_for_longer():
 
 
 def test_a_key_that_is_still_held_down_answers_nothing_afterwards():
-    """Those that were read and not taken wait for the next question of this process."""
+    """Keys that were read and not used wait for the next question of this process."""
     with create_pipe_input() as source:
         face = FullFace(source, Vt100_Output(StringIO(), lambda: Size(24, 80), term="xterm"))
         store_typeahead(face._input, [KeyPress("y")])
@@ -211,7 +211,7 @@ def test_a_key_that_is_still_held_down_answers_nothing_afterwards():
 @pytest.mark.parametrize("keys", ["1*", "1*\r", "*"], ids=repr)
 @pytest.mark.parametrize("pasted", [False, True])
 def test_what_comes_at_once_never_writes(keys, pasted):
-    """The number stands in its field already; only a key alone writes."""
+    """The number is in its field already; only a single key writes."""
     desk, hand = Desk(), Sitting().asked(write_subject(1), Question.YES_NO).keys("1")
     with create_pipe_input() as source:
         face = FullFace(source, Vt100_Output(StringIO(), lambda: Size(24, 80), term="xterm"))
@@ -295,7 +295,7 @@ def check_terminal_is_restored(hand):
 @pytest.mark.soak
 @pytest.mark.timeout(240)
 def test_a_needle_on_the_full_screen(hand, simulator):
-    """To its end, and to the page about it."""
+    """To its end, and to its report page."""
     before = simulator.machine.tools.get(1)
     hand.start()
     hand.see("Touch 1 of 2")
@@ -400,7 +400,7 @@ def test_a_window_that_becomes_too_small_goes_on_as_lines(hand):
 
 @pytest.mark.soak
 def test_a_window_that_grew_again_shows_the_screen_and_takes_no_half_line(hand, simulator):
-    """And a second time; what stood in a line that was not ended is no key of the screen."""
+    """And a second time; an unfinished line is no key of the screen."""
     hand.start()
     hand.see("Touch 1 of 2")
     for _ in range(2):

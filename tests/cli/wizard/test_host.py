@@ -1,4 +1,4 @@
-"""What shows the work: the screen that follows the robot, and a face that is lost."""
+"""The display of the work: the screen that follows the robot, and an interface that fails."""
 
 import os
 import threading
@@ -28,14 +28,14 @@ from robolink.model import MotionProfile, Path, Pose, ToolReceipt, WorkBox
 from robolink.runner import Move, MoveSubject, Question, Runner, RunSettings
 from tests.cli.wizard._people import ARRIVAL, HEADER, Sitting, write_subject
 
-# What becomes of the work when its face cannot show it any more.
+# The end of the work when its interface can no longer show it.
 
 
 class Typist:
-    """Types a line each time the dialogue offers something at its end, and keeps what it was told.
+    """Types a line each time the dialogue offers something at its end; keeps the messages.
 
     Args:
-        lines: What is typed, in their order.
+        lines: The lines to type, in order.
     """
 
     def __init__(self, lines):
@@ -50,11 +50,11 @@ class Typist:
         return len(text)
 
     def flush(self):
-        """Nothing is held back."""
+        """Do nothing: no output is buffered."""
 
 
 def carried_out():
-    """Return what a change of one tool reports."""
+    """Return the report of a change of one tool."""
     (proposal,), ((verdict,),) = (one := write_subject(1)).proposals, one.verdicts
     receipt = ToolReceipt(1, proposal.before, proposal.offset, proposal.offset)
     return ChangeReport("7f3a5c1200", (ToolReport(proposal, receipt, None, (verdict,)),))
@@ -86,7 +86,7 @@ def test_lines_offer_the_page_and_the_next_tool_once_a_job_is_carried_out(monkey
         last = guided(HEADER, lambda: job("first"), report=page, following=lambda: job("second"))
     assert (done, last) == (["first", "second"], "second")
     assert typist.lines == []
-    # The page is written once; where it could not be, it is offered again.
+    # The page is written once; if that failed, it is offered again.
     assert pages == ["7f3a5c1200"] * (1 if taken else 2)
     said = "Report: /cell/change.html" if taken else "There is a file of that name."
     assert typist.seen.count(said) == len(pages)
@@ -95,7 +95,7 @@ def test_lines_offer_the_page_and_the_next_tool_once_a_job_is_carried_out(monkey
 
 
 class Breaking:
-    """A face that breaks once something was asked."""
+    """An interface that fails after a question."""
 
     def __init__(self, error):
         self.error = error
@@ -132,7 +132,7 @@ def test_the_work_is_ended_in_order_when_the_face_breaks(error):
     assert isinstance(work.error, DeclinedError)
 
 
-# The screen follows the robot while it moves, as far as the line can be asked meanwhile.
+# The screen follows the robot while it moves, as far as the line can be polled meanwhile.
 
 
 @pytest.mark.simulator_only
@@ -155,7 +155,7 @@ def test_what_follows_a_movement_reaches_the_screen():
 
 
 def followed(url):
-    """Move 25 mm in a second and more; return the readings that came meanwhile."""
+    """Move 25 mm in a second or more; return the readings during that time."""
     desk = Desk()
     with robolink.connect(url) as controller, sitting_at(desk), watched_at_desk(controller):
         group = controller.groups[0]

@@ -1,4 +1,4 @@
-"""A key means one thing on every screen of the wizard; the key of the language."""
+"""A key has one meaning on every screen of the wizard; the language key."""
 
 import os
 import re
@@ -29,11 +29,11 @@ from tests.cli.wizard._screen import ScreenHand
 from tests.cli.wizard.test_screens import SCREENS
 from tests.contract._terminal import Terminal
 
-# A key means one thing on every screen of the wizard, as the page about it says.
+# A key has one meaning on every screen of the wizard, as its page says.
 
 PAGE = Path(__file__).parents[3] / "docs" / "wizard.md"
-# Who jogs for its own sake has nothing to go on to, so the main key stops too; that is a command
-# of its own (docs/reference/jogging.md 2).
+# A jog for its own sake has no next step, so the main key stops too; that is a command of its own
+# (docs/reference/jogging.md 2).
 SESSION = {name: make for name, make in SCREENS.items() if name != "free jog"}
 FIGURES = "12346789"
 
@@ -52,11 +52,11 @@ SAID = {
     "the other language": r"Chinese|English",
     "close a field": r"Done",
 }
-"""What a screen says beside a key, by what that key means. A new label belongs to one of these."""
+"""The labels beside a key, by the key's meaning. A new label belongs to one of these."""
 
 
 def table_of_the_page():
-    """Return what each key means by the page, by the name that a screen shows."""
+    """Return the meaning of each key on the page, by the name that a screen shows."""
     rows = re.findall(r"^\| (.+?) \| (.+?) \| .*\|$", PAGE.read_text(encoding="utf-8"), re.M)
     meant = {}
     for keys, meaning in rows:
@@ -71,7 +71,7 @@ def table_of_the_page():
 
 
 def shown_on(screen):
-    """Yield each key of a screen with what stands beside it, wherever it stands."""
+    """Yield each key of a screen with its label, wherever it is."""
     yield from screen.actions
     for line in (*screen.lines, screen.message):
         for key, said in re.findall(r"\[([^\]\d][^\]]*|\d)\] ?((?:[^\[ ]| (?! ))*)", line):
@@ -117,7 +117,7 @@ def test_at_a_place_each_figure_is_a_step():
 
 @pytest.mark.parametrize("name", SESSION)
 def test_enter_alone_gets_past_nothing_that_moves_or_writes(name):
-    """It closes a field, takes a cell or a job, and puts an old value back; nothing else."""
+    """It closes a field, accepts a cell or a job, and restores an old value; nothing else."""
     hand = SESSION[name]()
     hand.now += 1.0
     sent = [*hand.sent]
@@ -128,14 +128,14 @@ def test_enter_alone_gets_past_nothing_that_moves_or_writes(name):
     assert hand.sent[len(sent) :] == allowed.get(name, [])
 
 
-# Whoever chooses cell or job changes the language there; what comes after is in that language.
+# The language can be changed while choosing cell or job; later texts are in that language.
 
 RECIPES = Path(__file__).parents[3] / "examples" / "recipes"
 CELLS = '[cells.a]\nurl = "epson+tcp://127.0.0.1:1"\n[cells.b]\nurl = "epson+tcp://127.0.0.1:2"\n'
 
 
 class Answering(Desk):
-    """Answers what it was told to."""
+    """Answers as instructed."""
 
     def __init__(self, *answers):
         super().__init__()
@@ -163,7 +163,7 @@ def head():
 
 
 def shown(desk):
-    """Return headers, lists and what was told."""
+    """Return headers, lists and messages."""
     happened = desk.happened()
     about = [one.subject for one in happened if isinstance(one, WasRegarded)]
     return (
@@ -189,7 +189,7 @@ def test_all_of_a_list_is_made_anew_in_the_other_language_and_so_is_what_follows
         assert jobs == ["更换胶针", "Change needle", "更换胶针"]
         assert lists[1].details[0][0].startswith("Touch a known pin once")
         assert lists[0].details == lists[2].details != lists[1].details
-        # What was said of the recipe that is wrong is said again: its screen is drawn anew.
+        # The message about the wrong recipe is repeated: its screen is drawn anew.
         assert [name for text in told for name in re.findall(r"\w\.toml(?=:)", text)] == [
             "b.toml"
         ] * 3

@@ -1,4 +1,4 @@
-"""The wizard as lines, by the real command: on a terminal, without one, without a command."""
+"""The wizard as lines, by the real command: with a terminal, without one, without a command."""
 
 import re
 import resource
@@ -188,11 +188,11 @@ def test_a_bumped_pin_is_asked_about_and_enter_alone_brings_the_old_value_back(u
     assert stored(simulator) == before
 
 
-# Lines that were typed before there was anything to answer, in the wizard of lines.
+# Lines typed before there was a question, in the wizard of lines.
 
 
 class Typed:
-    """Lines that wait in the input."""
+    """Lines already in the input."""
 
     def __init__(self, *lines):
         self.lines = list(lines)
@@ -206,7 +206,7 @@ class Typed:
 
 
 def told(face, hand, happening, line):
-    """Let a line be typed, and then something happen; return what is left of it."""
+    """Let a line be typed, and then something happen; return the remaining lines."""
     face._lines = Typed(line)
     face._tell(happening, hand.state)
     return face._lines.lines
@@ -231,10 +231,10 @@ def test_neither_a_question_nor_the_end_of_a_movement_finds_an_answer_there(
     assert not face._listen(Desk(), hand.state).waits, "one that is typed now is the answer"
 
 
-# Without a terminal nothing waits for a person who is not there, whatever is typed.
+# Without a terminal nothing waits for an absent person, whatever is typed.
 
 LONGEST_CPU_S = 4.0
-"""Imports and the first exchanges; 1.8 s at most on the machine on which it was written."""
+"""Imports and the first exchanges; 1.8 s at most on the computer where it was written."""
 
 
 def spent_s():
@@ -272,7 +272,7 @@ def test_every_entry_ends_by_itself(words, code, said):
     assert simulator.machine.arm.moves_started == 0
 
 
-# Whoever types no command, or a command and no cell, is led on; and reads whole words.
+# A person who types no command, or one without a cell, is guided in whole words.
 
 
 def test_a_sentence_on_a_terminal_is_broken_at_blanks_and_keeps_its_edge():
@@ -386,7 +386,7 @@ def test_after_a_tool_the_next_one_begins_with_the_choice_and_nothing_moves_befo
             hand.see(r"Which job\?")
             hand.rest(0.4)
             hand.press(["5"])
-            # Its needle is another one: it is asked for, and the list is gone through again.
+            # Its needle is another one: the id is asked for, and the list is gone through again.
             hand.see("Id of the new needle")
             hand.rest(0.4)
             hand.press([*"N-0418", "\r"])

@@ -1,4 +1,4 @@
-"""The page of a recovery, and the words in which it says what was begun."""
+"""The page of a recovery, and its words for the interrupted job."""
 
 import os
 import signal
@@ -22,11 +22,9 @@ from robolink.journal import open_journal
 from robolink.model import Marker, MarkerKind, begun_in_words
 from tests.cli.wizard._screen import ScreenHand
 
-# After a process that was killed between write and proof: the page of a recovery, on a terminal.
-#
-# The measurement is a process of its own, killed with SIGKILL in the first movement of its proof;
-# the
-# recovery is the real command on a pseudo terminal, with a hand at its keys.
+# A process killed between write and turn test: the page of a recovery, on a terminal.
+# The measurement is a separate process, killed with SIGKILL in the first movement of its turn test;
+# the recovery is the real command on a pseudo terminal, with a hand at its keys.
 
 FULL = ("n-angle", "--station", "PIN-07", "--count", "3")
 METHODS = {"n-angle": FULL, "one-touch": ("one-touch", "--station", "PIN-07"), "z-touch": ()}
@@ -41,7 +39,7 @@ def served():
 
 
 CONTACTS = {"n-angle": 3, "one-touch": 2, "z-touch": 0}
-"""One that shows where the tip is, and the angles of the test; none where a sensor sees it."""
+"""Touches to make: one that shows where the tip is, and the test's angles; 0 with a sensor."""
 
 
 def command(url, eyes, method):
@@ -50,7 +48,7 @@ def command(url, eyes, method):
 
 
 def with_a_plate(simulator):
-    """Put a plate beside the tip that switches an input; return the words that say where it is."""
+    """Put a plate beside the tip that switches an input; return the options with its place."""
     x_mm, y_mm, z_mm = simulator.world.tip_mm()
     plate = (x_mm - 5.0, y_mm + 5.0, z_mm - 7.0)
     simulator.world.connect(5, TouchPlate(plate[2]))
@@ -59,7 +57,7 @@ def with_a_plate(simulator):
 
 
 def killed_in_its_proof(simulator, words):
-    """Run a command in a process of its own; end it in its first movement after the write."""
+    """Run a command in a separate process; kill it in its first movement after the write."""
     seen, held = [], threading.Event()
 
     def hold(_number, request):
@@ -150,7 +148,7 @@ def test_the_new_needle_is_chosen_tested_and_kept(method, tmp_path, monkeypatch)
     assert open_journal().open_markers() == ()
 
 
-# The page of a recovery says in words what was begun; requests of the wire are for records.
+# The page of a recovery names the interrupted job in words; wire requests are for records.
 
 TARGET = [164.588, 497.136, -93.572, 90.0, 0.0, 0.0]
 WIRE = "Go XY(164.588, 497.136, -93.572, 90.000) /R /0"

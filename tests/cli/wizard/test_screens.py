@@ -70,7 +70,7 @@ from tests.cli.wizard._people import (
 STORED = Path(__file__).with_name("screens")
 LANGUAGES = ("en", "zh", "pseudo")
 SCARA = (70.0, -40.0, 0.0, 0.0)
-"""Joint angles that go with the pose below, links of 325 and 275 mm."""
+"""Joint angles for the pose below, with links of 325 and 275 mm."""
 
 
 def moving():
@@ -95,7 +95,7 @@ def touching():
 
 
 def length_seen():
-    """What touch 1 showed stands on the screen of touch 2."""
+    """The screen of touch 2 shows the result of touch 1."""
     said = tr(
         "The needle seems {mm} mm longer than the old one (touch 1 alone: +-{half} mm, if the pin "
         "is where it was).",
@@ -117,13 +117,13 @@ def touching_tilted(**more):
 
 
 def turning_tilted():
-    """The turn test of such an arm, with as much above the keys as there can be."""
+    """The turn test of such an arm, with the largest possible content above the keys."""
     earlier = tuple(AngleShown(-150.0 + 60.0 * n, 0.018, True) for n in range(5))
     return touching_tilted(number=6, total=None, limit_mm=0.1, earlier=earlier)
 
 
 def writing_tilted():
-    """New values of a tool whose tilt was measured."""
+    """New values of a tool with a measured tilt."""
     subject = write_subject(1)
     (proposal,) = subject.proposals
     old = ToolOffset(-111.998, -103.502, 220.0, -90.0, -179.9, -165.0)
@@ -133,7 +133,7 @@ def writing_tilted():
 
 
 def moving_for_long():
-    """What is done and what follows are longer than what the picture leaves."""
+    """The present and the next steps need more room than the picture leaves."""
     hand = moving()
     going = replace(
         hand.state.subject,
@@ -144,7 +144,7 @@ def moving_for_long():
 
 
 def turning_on():
-    """The third place of a turn test: one angle passed, one is touched once more."""
+    """The third place of a turn test: one angle passed, one is touched again."""
     earlier = (AngleShown(90.0, 0.008, True), AngleShown(180.0, 0.093, None))
     subject = touch_subject(
         number=3,
@@ -165,7 +165,7 @@ def choosing():
 
 
 def done():
-    """A needle that was written and proved by a test that shows large shifts only."""
+    """A written needle, verified by a test that detects large shifts only."""
     shown = VerifyResult((Drift(90.0, 0.006, 0.004), Drift(0.0, 0.002, 0.001)), 0.1)
     (proposal,) = write_subject(1).proposals
     claim = turn_claim(proposal.result, AccuracyFacts())
@@ -174,7 +174,7 @@ def done():
 
 
 def done_doubtful():
-    """A needle whose turn test contradicts its measurement; a person took a wider statement."""
+    """A needle whose turn test contradicts its measurement; a person accepted a wider statement."""
     limits = DriftLimits(repeatable_mm=0.082, accurate_mm=0.082, turn_deg=90.0)
     judgement = TurnJudgement("proof_contradicts_accuracy", (limits,), wider_mm=0.145)
     shown = VerifyResult((Drift(90.0, 0.088, 0.004),), 0.1, judgement=judgement)
@@ -226,7 +226,7 @@ def checking():
 
 
 def remarked():
-    """What was found out before the list is read on it."""
+    """A finding from before the list."""
     hand = Sitting(motors=False)
     for said in (
         tr(
@@ -240,14 +240,14 @@ def remarked():
 
 
 def unsaved():
-    """A row that is worth knowing, for which nothing waits."""
+    """A row for information, which nothing waits for."""
     missing = tr("The tools are not saved: this computer has no backup of this controller")
     points = (CheckPoint(Mark.LOOK, missing), *CHECK.points)
     return Sitting().asked(replace(CHECK, points=points), Question.YES_NO)
 
 
 def recovering():
-    """What was written and never tested; reading alone decides nothing."""
+    """A written and untested value; reading alone decides nothing."""
     options = (
         tr("The old one. Restore the old value."),
         tr("The new one. Make the turn test, then keep the new value."),
@@ -269,14 +269,14 @@ def recovering():
 
 
 def turn_test_asks():
-    """A turn test that contradicts its measurement: what is to follow."""
+    """The choices after a turn test that contradicts its measurement."""
     question, offered = contradicted()
     hand = Sitting(replace(Sitting().state, accepted=True), in_tool=1)
     return hand.asked(offered, Question.CHOICE, question)
 
 
 def taught():
-    """What the proposal does at fifteen points."""
+    """The proposal's effect at fifteen points."""
     (proposal,) = write_subject(1).proposals
     points: dict[int, Pose | None] = {n: Pose(20.0 * n, 200.0, -50.0, 0.0) for n in range(1, 16)}
     assert proposal.before is not None
@@ -371,12 +371,12 @@ def jogging():
 
 
 def other_one():
-    """Return the language that the key changes to."""
+    """Return the language to which the key changes."""
     return CHINESE if tr("Next") == "Next" else ENGLISH
 
 
 def jobs():
-    """Which job, with what is on record of each."""
+    """The choice of a job, with the record of each."""
     needle, two = "needle   (needle-one-touch.toml)", "two-nozzles   (two.toml)"
     when = "2026-11-20 16:12 (UTC+1)"
     summaries = (spoken(find_method(name).summary) for name in ("one-touch", "two-pose"))
@@ -401,7 +401,7 @@ def jobs():
 
 
 def coming_down(*, reads=True, **other):
-    """A straight way down of which a good third is left."""
+    """A straight descent with a good third left."""
     start = Pose(300.0, 400.0, -20.0, 90.0, tool=0)
     target = replace(start, z_mm=-80.0, **other)
     going = MoveSubject(
@@ -498,7 +498,7 @@ def test_a_screen_fits_a_terminal_and_its_layout_is_ascii(name, language):
 @pytest.mark.parametrize("name", SCREENS)
 @pytest.mark.parametrize("language", ["en", "zh"], indirect=True)
 def test_nothing_of_a_screen_is_too_wide_for_its_place(name, language):
-    """A screen cuts what is too wide, so what is drawn always fits: here it is what is meant to."""
+    """A screen cuts wide text, so the drawn text always fits: this checks the intended text."""
     hand = SCREENS[name]()
     screen = screen_of(hand.state, hand.now)
     left, right = screen.title
@@ -507,7 +507,7 @@ def test_nothing_of_a_screen_is_too_wide_for_its_place(name, language):
     keys = [f"[{key}] {does}" for key, does in screen.actions]
     assert sum(map(wcswidth, keys)) + 2 * (len(keys) - 1) <= 80, "a second row of keys"
     for line in screen.lines:
-        # Sentences are broken; what stands in columns would be torn.
+        # Sentences are wrapped; columns would be torn apart.
         assert "   " not in line.strip() or wcswidth(line.rstrip()) <= 80, line
 
 
@@ -540,10 +540,10 @@ def test_how_long_a_movement_takes_is_said_where_it_is_known():
         return "\n".join(screen_of(hand.state, hand.now + later_s).rows())
 
     assert "To go: 23.0 mm, about 3 s" in shown(coming_down())
-    # A controller that tells no position meanwhile: the whole way, from where it began.
+    # The controller reports no position meanwhile: the whole move, from its start.
     assert "Path:  60.0 mm in all, about 8 s" in shown(coming_down(reads=False))
     assert "Still" not in shown(coming_down(), later_s=1.5), "where it is now, nobody knows"
-    # A tool that turns on its way has a speed of its own.
+    # A tool that turns during the move has its own speed.
     for turns in ({"u_deg": 80.0}, {"v_deg": 1.0}, {"w_deg": 1.0}):
         assert "about" not in shown(coming_down(**turns))
     assert "about" not in shown(moving())
@@ -588,13 +588,13 @@ def test_the_last_row_says_what_the_main_key_does_on_the_marked_row(language):
         assert sum(row.startswith(">") for row in screen.rows()) == 1
         said.append(dict(screen.actions)["5"])
     switch, start = tr("Switch them on"), tr("Start moving ({n} open)", n=1)
-    # Both rows of the person were confirmed before, so the first arrow goes to what is open.
+    # Both rows for the person were confirmed before, so the first arrow goes to the open one.
     assert said == [switch, start, start, switch, tr("Take it back"), tr("Yes")]
 
 
 @pytest.mark.parametrize("width", range(34, 42))
 def test_keys_stand_at_least_two_blanks_apart(width):
-    """As many in a row as that leaves room for; what does not fit goes on in a second row."""
+    """A row has as many keys as that spacing allows; the others go into a second row."""
     keys = [("*", "x" * (width - 4)), ("#", "y" * 16), ("Esc", "z" * 14)]
     rows = list(key_rows(keys))
     shown = [f"[{key}] {does}" for key, does in keys]

@@ -1,4 +1,4 @@
-"""What a person at the screen reads, and what ENTER and a key that is too early do not do."""
+"""Messages to a person at the screen, and the absence of effects of ENTER and early keys."""
 
 import shutil
 from dataclasses import replace
@@ -150,7 +150,7 @@ def test_power_and_motors_are_those_of_the_controller():
 
 
 class Presser(Desk):
-    """Presses the emergency stop while the list is read, and waits for what comes of it."""
+    """Presses the emergency stop while the list is read, and waits for the effect."""
 
     def __init__(self, simulator):
         super().__init__()
@@ -274,7 +274,7 @@ def test_lines_say_of_each_job_what_it_does():
 
 
 class Chooser(Desk):
-    """Somebody who takes rows by their numbers."""
+    """A person who chooses rows by their numbers."""
 
     def __init__(self, *rows):
         super().__init__()
@@ -310,7 +310,7 @@ def test_the_next_tool_is_chosen_anew_and_takes_nothing_of_the_line_along(
     assert loaded.path.name == "a.toml"
     assert at.cell is not None
     assert at.cell.name == ("line4" if keeps else "line3")
-    # What the line says of one cell is not true of another; who works there is.
+    # The line about one cell does not apply to another; the user there has it locked.
     assert (at.timeout_s, at.operator, at.nozzle) == (9.0 if keeps else 3.0, "Lin", "")
     assert desk.header is not None
     assert desk.header.command == f"robolink -c {at.cell.name} change a.toml"
@@ -368,7 +368,7 @@ def test_a_job_is_chosen_by_what_it_does_and_when_it_did_so_last(tmp_path, monke
         details = {"touch": touch | {"changes": more}, "value": value}
         here.append(NewEntry(EntryKind.DONE, tool=1, details=details))
         assert offered()[-1] == f"A full calibration is due {said}"
-    # Somebody wrote another value since: the method would refuse, and says why itself.
+    # Another value was written since: the method would refuse, with its own reason.
     here.append(NewEntry(EntryKind.READ_BACK, tool=1, details={"value": [1.0, *value[1:]]}))
     assert "due" not in offered()[-1]
     here.close()
@@ -520,7 +520,7 @@ def test_a_screen_is_not_headed_twice_and_says_which_of_several_tools(
 
 
 class Onlooker(Desk):
-    """Keeps what the desk is told to be about."""
+    """Records the subjects given to the desk."""
 
     def __init__(self):
         super().__init__()

@@ -1,4 +1,4 @@
-"""What the tests of the journal do to it."""
+"""Acts on a journal that several tests use."""
 
 from robolink.journal import Journal
 from robolink.model import Marker, MarkerKind
@@ -10,6 +10,6 @@ def marker(operation: str = "a", kind: MarkerKind = MarkerKind.SET) -> Marker:
 
 
 def run(journal: Journal, statement: str) -> None:
-    """Change the database behind the journal's back."""
+    """Change the database without going through the journal."""
     with journal._store.write() as tables:
         tables.connection.run(statement)

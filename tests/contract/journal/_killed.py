@@ -1,9 +1,9 @@
-"""Work on a journal again and again, killed one statement later each time.
+"""Runs work on a journal repeatedly; each run is killed one statement later than the last.
 
-Arguments: where the journal is, and ``again`` to do the steps of a tool write in it or ``anew``
+Arguments: the path of the journal, and ``again`` to do the steps of a tool write in it or ``anew``
 to make a journal for each run. For each run one line on stdout says how many steps were
-acknowledged before the process was killed; the last run comes to its end. A process for each run
-is forked; where there is no fork, as on Windows, it is started, with the run's number as its third
+acknowledged before the process was killed; the last run completes. Each run is a forked process;
+where there is no fork, as on Windows, it is a started one, with the run's number as its third
 argument.
 """
 
@@ -33,7 +33,7 @@ STEPS: tuple[Callable[[JournalOutcomeLog], None], ...] = (
 
 
 def kill_at(number: int) -> None:
-    """Let this process die before its statement or its commit of that number."""
+    """Kill this process before its statement or commit of that number."""
     left = number
 
     def step(*_told: object) -> None:
@@ -55,7 +55,7 @@ def _after(step: Callable[[], None], run: Callable[..., object]) -> Callable[...
 
 
 def run_once(number: int, acknowledge: int, location: str) -> None:
-    """Do all steps, killed at statement ``number``; each step done is a byte on a pipe."""
+    """Do all steps, killed at statement ``number``; each completed step writes a byte to a pipe."""
     log = open_journal(location).log(f"cell-{number}")
     kill_at(number)
     for step in STEPS:
@@ -70,7 +70,7 @@ def make_once(number: int, location: str) -> None:
 
 
 def load_all(location: str) -> None:
-    """Let this process load and compile what every run needs, so that each begins with it."""
+    """Load and compile everything that a run needs, so that all runs begin alike."""
     log = open_journal(location).log("cell-0")
     for step in STEPS:
         step(log)
@@ -78,7 +78,7 @@ def load_all(location: str) -> None:
 
 
 def killed_in_a_fork(number: int, location: str, anew: bool) -> tuple[int, bool]:
-    """Run once in a fork; return the steps acknowledged and whether it came to its end."""
+    """Run once in a fork; return the number of acknowledged steps and whether the run completed."""
     reader, writer = os.pipe()
     child = os.fork()
     if child == 0:
@@ -97,7 +97,7 @@ def killed_in_a_fork(number: int, location: str, anew: bool) -> tuple[int, bool]
 
 
 def killed_in_a_process(number: int, location: str, anew: bool) -> tuple[int, bool]:
-    """Run once in a process of its own; return the same as :func:`killed_in_a_fork`."""
+    """Run once in a started process; return the same as :func:`killed_in_a_fork`."""
     how = "anew" if anew else "again"
     command = (sys.executable, "-m", "tests.contract.journal._killed", location, how, str(number))
     done = subprocess.run(command, stdout=subprocess.PIPE, check=False)
@@ -107,7 +107,7 @@ def killed_in_a_process(number: int, location: str, anew: bool) -> tuple[int, bo
 
 
 def main() -> None:
-    """Run until one run comes to its end, or the one run whose number is given."""
+    """Run until one run completes, or only the run whose number is given."""
     location, anew = sys.argv[1], sys.argv[2] == "anew"
     if len(sys.argv) > 3:
         once = make_once if anew else partial(run_once, acknowledge=sys.stdout.fileno())

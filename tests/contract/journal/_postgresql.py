@@ -1,4 +1,4 @@
-"""A PostgreSQL server of the tests' own, on loopback, gone with them."""
+"""A temporary PostgreSQL server on loopback for the tests."""
 
 import os
 import shutil
@@ -23,11 +23,11 @@ def is_installed() -> bool:
 
 @dataclass
 class Server:
-    """One server.
+    """A PostgreSQL server.
 
     Attributes:
-        folder: Where its data are.
-        port: Where it listens on 127.0.0.1.
+        folder: The folder of its data.
+        port: Its port on 127.0.0.1.
     """
 
     folder: Path
@@ -35,17 +35,17 @@ class Server:
     process: subprocess.Popen[bytes] | None = None
 
     def url(self, database: str = "postgres") -> str:
-        """Return where a journal is kept in one of its databases."""
+        """Return the URL of a journal in one of its databases."""
         return f"postgresql+psycopg://journal@127.0.0.1:{self.port}/{database}"
 
     def empty_place(self) -> str:
-        """Return where an empty journal can be kept: in a schema of its own."""
+        """Return the URL of an empty journal in a schema of its own."""
         name = f"j{uuid4().hex}"
         self.execute(f"CREATE SCHEMA {name}")
         return f"{self.url()}?options=-csearch_path%3D{name}"
 
     def execute(self, statement: str) -> None:
-        """Run one statement outside of any journal."""
+        """Run one statement outside any journal."""
         import psycopg
 
         url = self.url().replace("+psycopg", "")
@@ -66,7 +66,7 @@ class Server:
             time.sleep(0.02)
 
     def stop(self) -> None:
-        """End it at once, as an administrator's fast shutdown does."""
+        """Stop the server at once, as an administrator's fast shutdown does."""
         assert self.process is not None
         self.process.send_signal(2)
         self.process.wait(timeout=_START_S)
@@ -83,7 +83,7 @@ class Server:
 
 @contextmanager
 def served() -> Iterator[Server]:
-    """Run a server for the length of a block."""
+    """Run a server during the block."""
     folder = Path(tempfile.mkdtemp(prefix="robolink-postgresql-"))
     try:
         if os.geteuid() == 0:

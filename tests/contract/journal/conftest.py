@@ -1,4 +1,4 @@
-"""The two kinds of database that keep a journal, empty for each test."""
+"""Fixtures for both kinds of database that keep a journal, empty for each test."""
 
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -24,7 +24,7 @@ def server() -> Iterator[Server]:
 
 @pytest.fixture(params=["sqlite", "postgresql"])
 def location(request: pytest.FixtureRequest, tmp_path: Path) -> str:
-    """Where an empty database is."""
+    """The address of an empty database."""
     if request.param == "sqlite":
         return str(tmp_path / "journal.db")
     server: Server = request.getfixturevalue("server")
@@ -33,7 +33,7 @@ def location(request: pytest.FixtureRequest, tmp_path: Path) -> str:
 
 @pytest.fixture
 def open_anew() -> Iterator[Opener]:
-    """Open a journal with a connection of its own, as another process would."""
+    """Opens a journal on its own connection, as another process would."""
     opened: list[Store] = []
 
     def open_it(location: str, *, read_only: bool = False) -> Journal:

@@ -1,4 +1,4 @@
-"""A journal that was killed at a statement, or in which one bit is another."""
+"""Journals after a kill at any statement, and journals with one flipped bit."""
 
 import os
 import random
@@ -16,12 +16,12 @@ from robolink.model import EntryKind, NewEntry
 from tests.contract.journal._acts import marker
 from tests.contract.journal._killed import STEPS
 
-# SIGKILL before each statement and each commit: what was acknowledged is there, all else whole.
+# SIGKILL before each statement and each commit: acknowledged steps are there, all else is whole.
 
 ROOT = Path(__file__).parents[3]
 ENDED = ["intent", "write", "read back", "done"]
 
-# Open markers and entries after so many steps.
+# The numbers of open markers and entries after each step.
 STATES: tuple[tuple[list[str], list[str]], ...] = (
     ([], []),
     ([], []),
@@ -33,7 +33,7 @@ STATES: tuple[tuple[list[str], list[str]], ...] = (
 
 
 def killed(location, how):
-    """Return how many steps were acknowledged, for each place to be killed at."""
+    """Return the number of acknowledged steps for each statement at which the process is killed."""
     done = subprocess.run(
         [sys.executable, "-m", "tests.contract.journal._killed", location, how],
         cwd=ROOT,
@@ -59,7 +59,7 @@ def test_each_step_is_whole_or_was_never_begun(location, journal):
     assert runs[-1] == len(STEPS)
     for number, acknowledged in enumerate(runs, start=1):
         found = state(journal, number)
-        # A step whose commit was under way may be done without having been acknowledged.
+        # A step whose commit was under way may be done although it was not acknowledged.
         assert found in STATES[acknowledged : acknowledged + 2], number
     assert journal.verify().problems == ()
 
@@ -74,7 +74,7 @@ def test_a_journal_whose_making_was_cut_short_is_made_by_the_next(tmp_path, open
         assert journal.verify() == ChainVerification(1, ())
 
 
-# One bit of the file is another, wherever it is: refused, or told, or without a meaning (F62).
+# Any single flipped bit of the file: refused, reported, or without meaning (F62).
 
 SAMPLE = {"few": 20, "many": 2000}
 MANY = pytest.param("many", marks=[pytest.mark.soak, pytest.mark.timeout(600)])
@@ -112,7 +112,7 @@ def test_f62_no_bent_bit_is_taken_for_the_record_or_costs_it(tmp_path, open_anew
 @pytest.mark.fault("F62")
 @pytest.mark.parametrize(("was", "bent"), [("left open", "left o0en"), ("12.25", "12.75")])
 def test_f62_a_bent_marker_is_not_acted_on(tmp_path, open_anew, was, bent):
-    """Recovery writes the old value that a marker names."""
+    """Recovery would write the old value that the marker holds."""
     path = tmp_path / "journal.db"
     journal = open_anew(str(path))
     begun = marker("left open")
@@ -131,7 +131,7 @@ def test_f62_a_bent_marker_is_not_acted_on(tmp_path, open_anew, was, bent):
 
 @pytest.mark.fault("F62")
 def test_f62_a_marker_under_another_name_blocks_who_does_not_know_it(tmp_path, open_anew):
-    """Nobody would find it: the controller that it holds back has another name."""
+    """The controller that it blocks has another name, so nobody would find it."""
     path = tmp_path / "journal.db"
     journal = open_anew(str(path))
     journal.log("cell").begin(marker("left open"))
@@ -146,7 +146,7 @@ def test_f62_a_marker_under_another_name_blocks_who_does_not_know_it(tmp_path, o
 @pytest.mark.fault("F62")
 @pytest.mark.parametrize("left", ["", "INSERT INTO head VALUES (NULL, NULL)"], ids=["no", "empty"])
 def test_f62_without_the_note_of_the_last_entry_nothing_is_stored(tmp_path, open_anew, left):
-    """A disk that lied may keep the page of one table and lose that of another."""
+    """A faulty disk may keep the page of one table and lose that of another."""
     path = tmp_path / "journal.db"
     journal = open_anew(str(path))
     journal.log("cell").append(NewEntry(EntryKind.RAW, tool=2, verdict="kept"))
@@ -160,7 +160,7 @@ def test_f62_without_the_note_of_the_last_entry_nothing_is_stored(tmp_path, open
 
 @pytest.mark.fault("F62")
 def test_f62_a_name_in_the_file_that_is_no_text_any_more_is_damage(tmp_path, open_anew):
-    """SQLite complains of it by that name, which Python cannot read."""
+    """SQLite's error message contains that name, which Python cannot decode."""
     path = tmp_path / "journal.db"
     journal = open_anew(str(path))
     journal.log("cell").append(NewEntry(EntryKind.RAW, tool=2, verdict="kept"))
@@ -174,7 +174,7 @@ def test_f62_a_name_in_the_file_that_is_no_text_any_more_is_damage(tmp_path, ope
 
 
 def self_judged(path, open_anew, right):
-    """Begin to change something with a bent file; say what became of it."""
+    """Begin a change with a bent file; return the outcome."""
     journal = None
     try:
         journal = open_anew(str(path))

@@ -1,4 +1,4 @@
-"""What the journal promises of controllers and robots, the same on SQLite and PostgreSQL."""
+"""The journal's promises about controllers and robots, the same on SQLite and PostgreSQL."""
 
 from itertools import pairwise
 from typing import Any
@@ -11,7 +11,7 @@ from robolink.journal.store.migrations import MIGRATIONS
 from robolink.model import EntryKind, Identity, NewEntry, Signature
 from tests.contract.journal._acts import marker, run
 
-# What the journal promises, the same on an SQLite file and on PostgreSQL.
+# The journal's promises, the same on an SQLite file and on PostgreSQL.
 
 CELLS = ("cell-a", "cell-b")
 
@@ -114,7 +114,7 @@ def test_what_was_changed_or_removed_is_named(journal, statement, problem):
     assert found.startswith(problem)
 
 
-# A controller is on record under what it says of itself, on both databases.
+# A controller is recorded under the name that it reports, on both databases.
 
 BY_NAME = "epson+tcp://cell-5.plant:5000"
 BY_ADDRESS = "epson+tcp://192.168.0.1:5000"
@@ -192,7 +192,7 @@ def test_what_stands_under_the_text_of_an_address_belongs_to_who_answers_there(j
     log.clear("a", NewEntry(EntryKind.DECISION))
     assert journal.open_markers() == ()
     assert journal.verify().problems == ()
-    # It was claimed: who answers there later gets none of it.
+    # The entries were claimed: another controller at that address gets none of them.
     assert met(journal, ROBOT_B).names == (ROBOT_B,)
 
 
@@ -235,7 +235,7 @@ def test_who_is_too_busy_to_tell_is_taken_for_whom_it_was_and_asked_again(journa
 
 
 def told_in_turn(journal, *names):
-    """Return the log of a controller that tells these names, and the list of those untold."""
+    """Return the log of a controller that reports these names in turn, and the names left."""
     untold = [Identity(name, BY_NAME, PLACE, certain=name != PLACE) for name in names]
     log = journal.log(BY_NAME)
     log.ask(lambda: untold.pop(0))
@@ -336,7 +336,7 @@ ROBOTS = (ALONE, SECOND)
 
 
 def robots_met(journal, robot="", name=BOTH, *, robots=ROBOTS):
-    """Return the log of a controller with a robot in force."""
+    """Return the log of a controller with one of its robots selected."""
     log = journal.log(URL)
     log.ask(lambda: Identity(name, URL, PLACE, robot=robot, robots=robots if robot else ()))
     return log
@@ -357,7 +357,7 @@ def test_tool_1_of_each_robot_is_another_tool(journal):
         log = robots_met(journal, robot)
         assert (values(log), log.identity, log.robot) == ([[value]], BOTH, robot)
         assert journal.last_value(robot, 1).details["value"] == [value]
-    # The controller's own name and its address show both.
+    # The controller's own name and its address show both records.
     for name in (BOTH, URL):
         assert len(list(journal.entries(controller=name, tool=1))) == 2
     assert robots_met(journal, ALONE).remarks == ()
@@ -386,7 +386,7 @@ def test_a_robot_that_was_alone_keeps_its_record_when_another_comes(journal):
     assert values(robots_met(journal, ALONE)) == [[1]]
     second.clear("a")
     assert journal.open_markers() == ()
-    # And when that one has gone again.
+    # The same after the second robot has gone again.
     assert values(robots_met(journal, name=ALONE)) == [[1]]
 
 

@@ -1,4 +1,4 @@
-"""What can be wrong with the file: each says which file, what happened and what to do."""
+"""Faults of the journal file: each error names the file, the fault and the remedy."""
 
 import os
 import shutil
@@ -173,7 +173,7 @@ def test_a_disk_that_is_full_leaves_the_journal_as_it_was(filled, open_anew):
             log.append(NewEntry(EntryKind.RAW, verdict="x" * 500))
 
     refused(fill, filled, "the disk is full", "Free space there")
-    # The connection of before was dropped, and the limit with it.
+    # The earlier connection was dropped, and its limit with it.
     assert journal.verify().problems == ()
     log.begin(marker())
 
@@ -211,7 +211,7 @@ def test_nothing_is_sent_when_the_intent_finds_no_space(filled):
 
 @pytest.fixture
 def as_nobody():
-    """Be an ordinary user, for whom rights count."""
+    """Act as an ordinary user, to whom file permissions apply."""
     if os.geteuid() != 0:
         yield
         return
@@ -224,7 +224,7 @@ def as_nobody():
 
 @pytest.fixture
 def public(filled):
-    """The journal in a folder that every user may look into."""
+    """The journal in a folder that every user can read."""
     folder = Path(tempfile.mkdtemp(prefix="robolink-journal-"))
     yield Path(shutil.copy(filled, folder))
     folder.chmod(0o755)
@@ -327,14 +327,14 @@ def test_many_entries_do_not_slow_down_the_questions_of_every_day(path, open_ane
 def test_an_entry_that_another_process_adds_during_the_look_is_no_damage(
     filled, open_anew, monkeypatch
 ):
-    """The look for damage reads entries and head one after the other."""
+    """The check for damage reads the entries first and the head after them."""
     page = EntryRows.page
     added: list[None] = []
 
     def overtaken(rows, *args, **kwargs):
         found = page(rows, *args, **kwargs)
         if len(added) < 3:
-            added.append(None)  # before the append, which looks itself
+            added.append(None)  # before the append, which checks as well
             open_anew(str(filled)).log("another").append(NewEntry(EntryKind.DONE))
         return found
 

@@ -1,4 +1,4 @@
-"""A look opens the journal when it has something to say, and only then."""
+"""A glance opens the journal only if there is something to report."""
 
 import os
 import sqlite3
@@ -19,7 +19,7 @@ from robolink.model import EntryKind, Marker, MarkerKind, NewEntry
 
 @pytest.fixture
 def address(monkeypatch, tmp_path):
-    """An address at which a controller was met, and nothing is open."""
+    """The address of a controller that was met before, with nothing open."""
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path))
     monkeypatch.delenv("ROBOLINK_JOURNAL", raising=False)
     with serve_tcp(EpsonSimulator(seed=3)) as host:
@@ -31,7 +31,7 @@ def address(monkeypatch, tmp_path):
 
 def test_an_address_that_was_met_and_left_in_order_needs_no_journal(address):
     assert nothing_is_open(address)
-    assert not nothing_is_open(address + "0")  # not met before: it is asked who it is
+    assert not nothing_is_open(address + "0")  # not met before, so it is asked for its identity
 
 
 def test_a_marker_of_any_controller_opens_it(address):
@@ -39,7 +39,7 @@ def test_a_marker_of_any_controller_opens_it(address):
     log.begin(Marker("a", MarkerKind.MOVE, "Move", "2026-01-01T00:00:00+00:00"))
     assert not nothing_is_open(address)
     with robolink.connect(address, glance=True) as controller:
-        assert controller.outcomes.open_markers() == ()  # it is not this one's
+        assert controller.outcomes.open_markers() == ()  # it is not this controller's
         assert controller.outcomes.identity != "another"
     log.clear("a")
     assert nothing_is_open(address)
@@ -86,7 +86,7 @@ def test_a_look_at_a_journal_in_order_leaves_the_file_as_it_is(address, tmp_path
         assert controller.outcomes.trouble is None
         assert _opened == {}
         controller.outcomes.append(NewEntry(EntryKind.DECISION, verdict="kept"))
-    assert path.read_bytes() == before  # what was added is in its log
+    assert path.read_bytes() == before  # the added entry is in the write-ahead log
     (entry,) = open_journal().entries(kinds=(EntryKind.DECISION,))
     assert entry.verdict == "kept"
 
@@ -100,7 +100,7 @@ def test_who_does_not_say_that_it_only_looks_has_the_journal_open_from_the_begin
 def test_what_others_are_writing_does_not_show_so_a_look_believes_nothing(
     address, tmp_path, monkeypatch
 ):
-    """A journal that somebody keeps to himself can be read, but only without its log."""
+    """A journal that another process locks exclusively can be read only without its log."""
     for patience in ("BUSY_S", "GLANCE_S"):
         monkeypatch.setattr(f"robolink.journal.store.connection.{patience}", 0.02)
     close_files()

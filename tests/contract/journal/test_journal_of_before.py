@@ -1,4 +1,4 @@
-"""A journal that an earlier robolink made, or that was moved elsewhere."""
+"""Journals made by an earlier robolink, or moved to another place."""
 
 import sqlite3
 from contextlib import closing
@@ -11,7 +11,7 @@ from robolink.journal import ChainVerification, open_journal
 from robolink.journal.store.migrations import MIGRATIONS
 from robolink.model import EntryKind, Marker, MarkerKind, NewEntry
 
-# A file that an earlier robolink made: nothing of it is lost, whatever form its tables have.
+# A file of an earlier robolink: nothing of it is lost, whatever the form of its tables.
 
 FORM_1 = Path(__file__).with_name("journal_form_1.sql")
 LATER = {
@@ -26,12 +26,12 @@ LATER = {
         "\n\tPRIMARY KEY (name)\n)",
     ),
 }
-"""What each later form adds."""
+"""The tables and columns that each later form adds."""
 ADDRESS = "epson+tcp://192.0.2.1:5000"
 
 
 def file_of(form, folder):
-    """Return a journal of this form, with the entries that an earlier robolink wrote."""
+    """Return a journal of this form, with the entries of an earlier robolink."""
     path = folder / "journal.db"
     with closing(sqlite3.connect(path)) as file:
         file.executescript(FORM_1.read_text(encoding="utf-8"))
@@ -44,7 +44,7 @@ def file_of(form, folder):
 
 
 def held(path):
-    """What a file holds, as another program sees it."""
+    """The contents of a file, read by another program."""
     with closing(sqlite3.connect(path)) as file:
         return [*file.iterdump()]
 
@@ -104,7 +104,7 @@ def test_it_goes_on_where_it_ended(made_before, open_anew):
 
 
 def shape(journal):
-    """Columns, keys and indexes of all tables, and the version; the wording may differ."""
+    """Columns, keys and indexes of all tables, and the version; the SQL text may differ."""
     with journal._store.read() as tables:
         rows = tables.connection.rows
         found = {
@@ -122,7 +122,7 @@ def shape(journal):
     return found
 
 
-# A record that is looked for in another database than the one it is kept in.
+# A record that is looked for in a database other than its own.
 
 NOW = "2026-01-01T00:00:00+00:00"
 CHANGE = Marker("a", MarkerKind.CHANGE, "a change that is killed", NOW, {"tools": {}})
@@ -134,7 +134,7 @@ MOVE = Marker("b", MarkerKind.MOVE, "Go P1", NOW)
 def test_an_unfinished_change_in_a_file_blocks_on_a_server_too(
     server, history, tmp_path, monkeypatch
 ):
-    """A server that was used before has a history, and is not the record for that."""
+    """A server that was used before has its own history and is not the record of that file."""
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(tmp_path))
     place = server.empty_place()
     if history:

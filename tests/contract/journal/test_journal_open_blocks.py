@@ -1,4 +1,4 @@
-"""Quiet blocks on a journal, and a server that cannot be reached any more (F78)."""
+"""Idle open blocks on a journal, and a server that can no longer be reached (F78)."""
 
 import socket
 from collections.abc import Iterator
@@ -20,7 +20,7 @@ from robolink.transaction import ToolChange, Wanted, change_tools, recover
 from tests.contract._quiet_time import QuietTime
 from tests.faults._firewall import Firewall
 
-# An open block that is quiet keeps its lease, in a file and on PostgreSQL.
+# An idle open block keeps its lease, in a file and on PostgreSQL.
 
 NEW = ToolOffset(1.0, 2.0, -30.0)
 ANN = LeaseHolder(os_user="ann", host="pc-1", pid=11, boot="one")
@@ -36,7 +36,7 @@ def time():
 
 @pytest.fixture
 def connect(location, open_anew, time):
-    """Connect another computer to a controller that both reach."""
+    """Connect from another computer to a controller that both reach."""
     machine = SimpleMachine()
 
     def connected(holder):
@@ -68,7 +68,7 @@ def test_who_insists_has_it_and_the_other_keeps_nothing(connect, time):
     assert len(second.outcomes.open_markers()) == 1
 
 
-# A journal on a server that cannot be reached any more: row F78 of the catalogue.
+# A journal on a server that can no longer be reached: row F78 of the catalogue.
 
 NEW_OFFSET = ToolOffset(12.25, -3.5, -20.0)
 OLD = ToolOffset(12.0, -3.5, -20.0)
@@ -132,7 +132,7 @@ def test_f78_without_the_shared_journal_nothing_new_begins_and_what_runs_ends_sa
         assert writes(epson) == written <= 2
         assert epson.machine.tools.get(2) is None
     firewall.mend()
-    # The lease could not be given back: the next one has it when it has run out.
+    # The lease could not be released: the next client gets it when it expires.
     later = journal.log(epson.url, clock=ManualClock(round((LEASE_S + 1) * NS_PER_S)))
     with robolink.connect(epson.url, outcomes=later) as controller:
         recover(controller)
@@ -147,7 +147,7 @@ def test_f78_without_the_shared_journal_nothing_new_begins_and_what_runs_ends_sa
 
 @pytest.mark.fault("F78")
 def test_f78_a_server_that_the_network_loses_is_missed_within_seconds(server, open_anew):
-    """The kernel is told to; without that a transaction would wait for two hours."""
+    """The kernel's time-out is set; without it a transaction would wait for two hours."""
     journal = open_anew(server.empty_place())
     with journal._store.read() as tables:
         raw = tables.connection.driver

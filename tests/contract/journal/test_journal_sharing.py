@@ -23,7 +23,7 @@ def test_markers_and_entries_are_there_for_the_next_process(location, journal, o
     log.begin(marker("b"))
     log.begin(replace(marker("y", MarkerKind.CHANGE), details={"done": [3]}))
     other = open_anew(location).log(CELLS[0])
-    # The oldest comes first, whatever their names.
+    # The oldest comes first, whatever the names.
     assert [known.operation for known in other.open_markers()] == ["y", "b"]
     assert other.open_markers()[0].details == {"done": [3]}
     other.clear("y", NewEntry(EntryKind.DONE))
@@ -98,7 +98,7 @@ def test_an_empty_database_is_made_a_journal_once_however_many_open_it(location,
 
 @pytest.mark.soak
 def test_many_new_files_are_made_journals_once_however_many_open_them(tmp_path, open_anew):
-    """SQLite lets nobody wait for the log of a new file: of 150 files one was refused at 3."""
+    """SQLite does not wait for the log of a new file: of 150 files one was refused at 3."""
     for number in range(50):
         name = str(tmp_path / f"{number}.db")
         _together(

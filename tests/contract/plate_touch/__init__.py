@@ -1,4 +1,4 @@
-"""plate-touch: a calibration method that somebody brings along; a small copy of z-touch."""
+"""plate-touch: a third-party calibration method; a small copy of z-touch."""
 
 from robolink.messages import tr
 from robolink.methods import Method, Needs, Site

@@ -13,7 +13,7 @@ from robolink.methods import MM, MM_S, Check, Help, MethodParameters
 
 @dataclass(frozen=True, kw_only=True)
 class PlateTouchParameters(MethodParameters):
-    """How a tip is brought down on a plate."""
+    """How the tip is lowered onto a plate."""
 
     slow_mm_s: Annotated[
         float, Ge(0.1), Le(5), MM_S, Help(tr("Speed of one touch; the other is twice as fast."))

@@ -1,4 +1,4 @@
-"""A plate in the cell: two touches, and a third one that proves."""
+"""A plate in the cell: two touches to measure and a third one to verify."""
 
 from dataclasses import dataclass, replace
 

@@ -1,8 +1,8 @@
-"""A third kind of controller, as another package would bring it: what a new kind takes.
+"""A third-party kind of controller, and all that a new kind needs.
 
-``bench_server.py`` is the machine, which speaks a line protocol of its own on a socket. The driver
-is ``bench_link.py`` (what goes over the wire) and ``bench_controller.py`` (what it means). An entry
-point would read::
+``bench_server.py`` is the machine, which speaks its own line protocol on a socket. The driver is
+``bench_link.py`` (the exchanges) and ``bench_controller.py`` (their meaning). An entry point would
+read::
 
     [project.entry-points."robolink.controllers"]
     bench = "bench_package.bench_controller:open_bench"

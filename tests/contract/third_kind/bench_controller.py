@@ -1,4 +1,4 @@
-"""What the answers mean: a tool table, an arm that can be polled, and their controller."""
+"""The meaning of the answers: a tool table, an arm that can be polled, and their controller."""
 
 from collections.abc import Sequence
 
@@ -26,14 +26,14 @@ from tests.contract.third_kind.bench_link import BenchLink
 
 
 def open_bench(url: LinkUrl, terms: ConnectionTerms, /) -> Controller:
-    """Connect; what the entry point of the package names."""
+    """Connect; the entry point of the package names this function."""
     transport = open_transport(url, timeout_s=terms.timeout_s, clock=terms.clock)
     outcomes = terms.record_of(transport)
     return BenchController(BenchLink(transport, outcomes, timeout_s=terms.timeout_s))
 
 
 class BenchController(ControllerCore):
-    """The controller: 4 members, the rest is what all kinds share."""
+    """The controller: 4 members; all kinds share the rest."""
 
     def __init__(self, link: BenchLink) -> None:
         self._link = link

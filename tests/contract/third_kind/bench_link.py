@@ -1,4 +1,4 @@
-"""What goes over the wire: one exchange at a time, and nothing a stop forbids."""
+"""The exchanges on the wire: one at a time, and none that a stop forbids."""
 
 import threading
 
@@ -28,9 +28,9 @@ class BenchLink(DriverLink):
         """Send one line and return the numbers of the answer.
 
         Raises:
-            StoppedError: A stop forbids it; it was not sent.
-            RejectedError: The machine said no.
-            TransportError: The connection is over.
+            StoppedError: A stop forbids the exchange; nothing was sent.
+            RejectedError: The machine refused.
+            TransportError: The connection is lost.
         """
         deadline = Deadline.after(self.clock, self._timeout_s)
         with self.uninterrupted(), self._wire:

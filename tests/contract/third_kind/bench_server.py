@@ -1,4 +1,4 @@
-"""The machine of the third kind: one line in, one line out, on a socket of the loopback."""
+"""The machine of the third kind: one line in, one line out, on a loopback socket."""
 
 import socketserver
 import threading
@@ -9,16 +9,16 @@ from robolink.controllers import SimpleMachine
 from robolink.model import Pose, ToolOffset
 
 _POLLS_PER_MOVE = 2
-"""A movement has ended when it was asked about as often as this: no time passes in a test."""
+"""A movement ends after this many polls: no time passes in a test."""
 
 
 class BenchServer:
-    """Serves one machine for a block.
+    """Serves one machine during the block.
 
     Attributes:
-        machine: What is behind the socket.
-        asked: Every line that came in.
-        url: Where it is reached.
+        machine: The machine behind the socket.
+        asked: Every received line.
+        url: Its URL.
     """
 
     def __init__(self) -> None:
@@ -52,7 +52,7 @@ class BenchServer:
         self._thread.join()
 
     def answer(self, line: str) -> str:
-        """Return the answer to a line; ``NO`` and a reason for what is not done."""
+        """Return the answer to a line; ``NO`` and a reason if it is refused."""
         self.asked.append(line)
         name, *words = line.split()
         numbers = [float(word) for word in words]

@@ -1,8 +1,8 @@
-"""``make faults``: run the tests of the fault catalogue and say which rows they show.
+"""``make faults``: run the tests of the fault catalogue and print which rows they show.
 
-``python -m tests.faults.catalogue [F01 F25 ...]``; without numbers all rows. Ends with 1 when a
-row failed or the run broke off. A row that could not be shown here is told as such, with its
-reason, and never as passed.
+``python -m tests.faults.catalogue [F01 F25 ...]``; without numbers all rows. Ends with 1 if a row
+failed or the run was cut short. A row that could not be shown here is listed with its reason, and
+never as passed.
 """
 
 import platform
@@ -16,11 +16,11 @@ from tests.faults.catalogue._shown_by import showings
 from tests.faults.catalogue._verdicts import Listener, judged
 
 _TEST_S = 600
-"""A minute, as in the suite, is too little where a computer does much else besides."""
+"""A minute, as in the suite, is too little on a busy computer."""
 
 
 def main(wanted: list[str]) -> int:
-    """Run and print; return what the process ends with."""
+    """Run and print; return the exit code."""
     chosen = [row for row in rows() if row.id in wanted or not wanted]
     if unknown := set(wanted) - {row.id for row in chosen}:
         print(f"no such row: {', '.join(sorted(unknown))}", file=sys.stderr)
@@ -28,7 +28,7 @@ def main(wanted: list[str]) -> int:
     numbers = {row.id for row in chosen}
     nodes = [s.node for s in showings() if numbers & set(s.faults)]
     listener = Listener()
-    # An expression that speaks of soak brings those that take long as well (tests/conftest.py).
+    # An expression with soak in it includes the long tests (tests/conftest.py).
     everything = ["-m", "fault and (soak or not soak)", "--quiet", "--no-header", "-r", "fE"]
     everything += ["--timeout", str(_TEST_S), "--processes", "2"]
     ended = pytest.main([*everything, *nodes], plugins=[listener]) if nodes else 0

@@ -1,4 +1,4 @@
-"""The rows of the catalogue, as the files in ``rows`` have them: what can go wrong, F01 to F80.
+"""The rows of the catalogue, as the files in ``rows`` have them: possible faults, F01 to F80.
 
 A row says what the user sees and what never happens. Tests carry its number
 (``pytest.mark.fault("F01")``); the page and the table of ``make faults`` are made from both.
@@ -14,23 +14,23 @@ FOLDER = Path(__file__).parent / "rows"
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One fault; see the first row of ``rows/1_links.toml`` for the tone of each field."""
+    """One fault; the first row of ``rows/1_links.toml`` shows the style of each field."""
 
     id: str
-    """F and two digits; never used again for another fault."""
+    """F and two digits; never reused for another fault."""
     fault: str
     layer: str
-    """Which links or parts it concerns."""
+    """The links or parts concerned."""
     sees: str
-    """What a user of the library or the command line notices, and what is right afterwards."""
+    """What a user of the library or the command line notices, and the right state afterwards."""
     never: str
-    """What does not happen, however the fault falls; each test looks for it."""
+    """What never happens, at whatever instant the fault occurs; each test looks for it."""
     injected: str
-    """How tests bring the fault about."""
+    """The way in which tests cause the fault."""
     not_run: str = ""
-    """Why a plain machine cannot show this row at all. Such a row has no test."""
+    """The reason why an ordinary computer cannot show this row at all. Such a row has no test."""
     not_shown: str = ""
-    """Which part of the row its tests leave out, and why; the rest is shown."""
+    """The part of the row that its tests leave out, and why; they show the rest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class Group:
 
 @cache
 def groups() -> tuple[Group, ...]:
-    """Return all rows in the order of the files. A key that is no field is a ``TypeError``."""
+    """Return all rows in the order of the files. An unknown key is a ``TypeError``."""
     read = [tomllib.loads(f.read_text(encoding="utf-8")) for f in sorted(FOLDER.glob("*.toml"))]
     return tuple(Group(file["title"], tuple(Row(**r) for r in file["fault"])) for file in read)
 

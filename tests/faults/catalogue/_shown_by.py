@@ -1,4 +1,4 @@
-"""Which test shows which row: read from the sources, so that nothing has to be collected first."""
+"""The tests of each row, read from the sources so that no test needs to be collected first."""
 
 import ast
 from collections.abc import Iterator
@@ -11,33 +11,33 @@ ROOT = Path(__file__).parents[3]
 
 @dataclass(frozen=True, slots=True)
 class Showing:
-    """One test, and the rows that stand in its marks."""
+    """One test, and the rows in its marks."""
 
     file: str
-    """From the root of the repository."""
+    """The path from the root of the repository."""
     test: str
-    """The function or class; for all of its parameters."""
+    """The function or class, for all of its parameters."""
     faults: tuple[str, ...]
     soak: bool
-    """Whether all of it is left to ``make soak``."""
+    """Whether all of it runs only in ``make soak``."""
 
     @property
     def node(self) -> str:
-        """What pytest calls it."""
+        """Its name in pytest."""
         return f"{self.file}::{self.test}"
 
 
 @cache
 def showings() -> tuple[Showing, ...]:
-    """Return every marked test. Raises ``ValueError`` for a mark that no test bears."""
+    """Return every marked test. Raises ``ValueError`` for a mark on something else."""
     files = sorted((ROOT / "tests").rglob("test_*.py"))
     return tuple(found for file in files for found in marked(file))
 
 
 def marked(file: Path) -> Iterator[Showing]:
-    """Yield the tests of a file that bear a row's number."""
+    """Yield the tests of a file that are marked with a row."""
     source = file.read_text(encoding="utf-8")
-    # Parsing all tests takes seconds; nine in ten need none of it.
+    # Parsing all tests takes seconds; nine in ten files have no mark.
     if "mark.fault" not in source:
         return
     name = str(file.relative_to(ROOT))
@@ -69,7 +69,7 @@ def _marks(tree: ast.AST, name: str) -> Iterator[ast.Call]:
 
 
 def _is_mark(node: ast.AST, name: str) -> bool:
-    # Asked for every node of every test: what costs most is looked at last.
+    # Asked for every node of every test, so the most expensive check comes last.
     return (
         isinstance(node, ast.Attribute)
         and node.attr == name

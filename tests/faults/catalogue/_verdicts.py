@@ -1,4 +1,4 @@
-"""What a run of the marked tests says of each row. What did not run has not passed."""
+"""The verdict on each row after a run of the marked tests; a test not run has not passed."""
 
 from collections import defaultdict
 from collections.abc import Iterable
@@ -15,7 +15,7 @@ so such a column takes nothing from a row; how many there were is printed apart.
 
 @dataclass(slots=True)
 class Ends:
-    """How the parameters of one test ended."""
+    """The outcomes of the parameters of one test."""
 
     passed: int = 0
     failed: int = 0
@@ -31,9 +31,9 @@ class Verdict:
     word: str
     """``passed``, ``in part``, ``FAILED`` or ``not run``."""
     tests: int
-    """How many tests passed, each parameter counted."""
+    """The number of passed tests, each parameter counted."""
     why: str
-    """What is missing, or failed; empty where all of the row was shown."""
+    """What is missing, or failed; empty if the whole row was shown."""
 
     @property
     def line(self) -> str:
@@ -44,12 +44,12 @@ class Verdict:
 
 
 def judged(row: Row, showings: Iterable[Showing], ends: dict[str, dict[str, Ends]]) -> Verdict:
-    """Return what a run says of ``row``.
+    """Return the verdict of a run on ``row``.
 
     Args:
-        row: the row.
-        showings: the tests that bear any row's number.
-        ends: by row, by name of the test as pytest has it without parameters, how it ended.
+        row: The row.
+        showings: The tests marked with any row.
+        ends: The outcomes, by row and by the test's name in pytest without parameters.
     """
     of_row = ends.get(row.id, {})
     passed = sum(end.passed for end in of_row.values())
@@ -66,7 +66,7 @@ def judged(row: Row, showings: Iterable[Showing], ends: dict[str, dict[str, Ends
 
 
 class Listener:
-    """A pytest plug-in that hears how each marked test ended, also from other processes."""
+    """A pytest plug-in that records the outcome of each marked test, also from other processes."""
 
     def __init__(self) -> None:
         self.ends: dict[str, dict[str, Ends]] = defaultdict(lambda: defaultdict(Ends))
@@ -74,7 +74,7 @@ class Listener:
     def pytest_runtest_logreport(self, report) -> None:
         """Count one phase of one test."""
         test = report.nodeid.partition("[")[0]
-        # The rows travel with the report: in the process that prints there are no items.
+        # The rows come with the report: the process that prints has no items.
         for row in {value for key, value in report.user_properties if key == "fault"}:
             end = self.ends[row][test]
             if report.failed:

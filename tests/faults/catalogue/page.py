@@ -42,7 +42,7 @@ def page() -> str:
 
 def _line(row: Row) -> str:
     cells = (row.id, row.fault, row.sees, row.never, row.injected, _shown_by(row))
-    # A bar would end the cell.
+    # A bar would end the table cell.
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
@@ -54,7 +54,7 @@ def _shown_by(row: Row) -> str:
 
 
 def _names(tests: list[Showing]) -> Iterator[str]:
-    """Yield each file once; as soak where nothing of it is in the default suite."""
+    """Yield each file once; marked soak if none of its tests is in the default suite."""
     for file in dict.fromkeys(test.file for test in tests):
         soak = all(test.soak for test in tests if test.file == file)
         yield f"`{file}`" + (" (soak)" if soak else "")

@@ -1,4 +1,4 @@
-"""The catalogue is whole: each row has a test of its name or a reason, each mark a row."""
+"""The catalogue is complete: each row has a named test or a reason, each mark a row."""
 
 from pathlib import Path
 from types import SimpleNamespace

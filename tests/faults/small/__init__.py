@@ -1,1 +1,1 @@
-"""Every small fault of the wire, each in a whole calibration of its own."""
+"""Every small fault of the wire, each in a whole calibration."""

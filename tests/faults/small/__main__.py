@@ -1,7 +1,6 @@
 """Runs all small faults, or a part of them: ``python -m tests.faults.small --help``.
 
-Every run that ended stands as one line in a file, so that the whole can be interrupted and
-goes on where it was.
+Every completed run is one line in a file, so that the whole can be interrupted and continued.
 """
 
 import argparse

@@ -1,4 +1,4 @@
-"""Cells of both kinds whose driver talks over a wire that is looked at frame by frame."""
+"""Cells of both kinds whose driver uses a wire that is examined frame by frame."""
 
 import re
 from collections.abc import Iterator
@@ -30,7 +30,7 @@ class WiredEpsonCell(EpsonRecipeCell):
         self.wire = Wire(self.simulator, TextLines())
 
     def shape(self, request: bytes) -> str:
-        """Return a request with its numbers left out; a password is hidden."""
+        """Return a request without its numbers; a password is hidden."""
         text = request.decode("ascii").strip()
         return "$Login" if text.startswith("$Login") else _NUMBER.sub("#", text)
 
@@ -39,7 +39,7 @@ class WiredEpsonCell(EpsonRecipeCell):
         return InProcessTransport(link_url, self.wire, self.clock, self.simulator.lock)
 
     def rest(self) -> None:
-        """Let pass what a last movement takes to its end, in Power Low."""
+        """Wait as long as the last movement may take in Power Low."""
         self.clock.advance(60.0)
         self.simulator.advance(self.clock.now_ns())
 
@@ -52,7 +52,7 @@ class WiredPlcCell(PlcRecipeCell):
         self.wire = plc_wire(self.simulator, self.clock)
 
     def shape(self, request: bytes) -> str:
-        """Return what the simulator calls the request, its numbers left out."""
+        """Return the simulator's name for the request, without its numbers."""
         return _NUMBER.sub("#", _shown(request))
 
     def open(self, link_url: LinkUrl, **_: Any) -> object:
@@ -60,7 +60,7 @@ class WiredPlcCell(PlcRecipeCell):
         return open_wired(link_url, self.simulator, self.wire, self.clock)
 
     def rest(self) -> None:
-        """Let pass the half second after which a PLC halts what nobody watches, and the halt."""
+        """Wait half a second, after which a PLC halts an unwatched movement, and for the halt."""
         self.clock.advance(1.0)
         self.simulator.advance(self.clock.now_ns())
 
@@ -85,7 +85,7 @@ KINDS: Final[dict[str, type[WiredEpsonCell] | type[WiredPlcCell]]] = {
 
 @contextmanager
 def wired_cell(kind: str) -> Iterator[WiredEpsonCell | WiredPlcCell]:
-    """Serve a cell; whoever names it in this process reaches it over its wire."""
+    """Serve a cell; its name leads to its wire in this process."""
     cell = KINDS[kind]()
     scheme = cell.url.partition("://")[0]
     with pytest.MonkeyPatch.context() as patch:
@@ -98,7 +98,7 @@ def wired_cell(kind: str) -> Iterator[WiredEpsonCell | WiredPlcCell]:
 
 @dataclass
 class Steps:
-    """Where in a calibration it is: the phase, the step of the procedure, what is changed.
+    """The place in a calibration: the phase, the step of the procedure, the change.
 
     Attributes:
         now: The present step, in words.
@@ -133,6 +133,6 @@ class Steps:
 
 
 def calibrated(cell: RecipeCell, steps: Steps) -> Ended:
-    """Run one whole two-pose calibration with its write and its proof, as a script would."""
+    """Run one whole two-pose calibration with its write and its turn test, as a script would."""
     with observed(steps.see):
         return cell.run(*_WORDS, "--assist", cell.url)

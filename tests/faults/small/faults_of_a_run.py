@@ -1,4 +1,4 @@
-"""All small faults of a whole calibration: which there are, and a run with each one."""
+"""All small faults of a whole calibration: their list, and a run with each one."""
 
 import random
 import re
@@ -36,7 +36,7 @@ class Pair:
 
 @dataclass
 class Group:
-    """Faults at one place that the driver's decoder cannot tell apart: one run shows them all."""
+    """Faults at one place that the driver's decoder cannot distinguish: one run shows them all."""
 
     fault: SmallFault
     members: int = 1
@@ -74,8 +74,8 @@ def recorded(kind: str) -> Recording:
 def faults_at(kind: str, pair: Pair, reply: bytes) -> list[SmallFault]:
     """Return every small fault of one exchange.
 
-    A request that comes twice is for the mailbox, whose commands are numbered. EPSON's are not:
-    no driver could help it, and TCP delivers nothing twice.
+    A duplicated request is for the mailbox, whose commands are numbered. EPSON's are not: no driver
+    could detect it, and TCP delivers nothing twice.
     """
     acts = [Act.DROP_REQUEST, Act.DROP_REPLY, Act.DELAY, Act.DUPLICATE_REPLY]
     if kind == "PLC":
@@ -88,7 +88,7 @@ def faults_at(kind: str, pair: Pair, reply: bytes) -> list[SmallFault]:
 
 
 def groups_at(kind: str, pair: Pair, request: bytes, reply: bytes) -> list[Group]:
-    """Return the faults of one exchange, those joined that are the same to the driver."""
+    """Return the faults of one exchange, joined where they are the same to the driver."""
     groups: dict[object, Group] = {}
     for fault in faults_at(kind, pair, reply):
         key: object = fault
@@ -111,15 +111,15 @@ def _text_as_decoded(pair: Pair, _request: bytes, bent: bytes) -> object:
             events.append(_text(pair, event))
     except RobolinkError as error:
         events.append(type(error))
-    # What is left over waits for an end that never comes; where the quotes and the line end are
-    # broken, the next answer is read behind it.
+    # The rest waits for an end that never comes; if the quotes and the line end are broken, the
+    # next answer is read behind it.
     return (*events, bool(codec.bytes_held), bent.count(b'"') % 2, bent.endswith(b"\r\n"))
 
 
 def _text(pair: Pair, event: object) -> object:
-    """Return an answer as it is read: a point by its numbers, a status by its flags, for instance.
+    """Return an answer as the driver reads it, such as a point's numbers or a status's flags.
 
-    One that cannot be read is that, whatever stands in it.
+    All unreadable answers count as the same one.
     """
     if not isinstance(event, Reply) or (event.text or "").lstrip().startswith("!"):
         return repr(event)
@@ -170,7 +170,7 @@ _DECODED = {"EPSON": _text_as_decoded, "PLC": _words_as_decoded}
 
 
 def run_with(kind: str, pair: Pair, fault: SmallFault) -> str:
-    """Run a calibration that is disturbed once; return how it ended.
+    """Run a calibration with one disturbance; return how it ended.
 
     Raises:
         Wrong: It broke a promise.
@@ -191,7 +191,7 @@ def run_with(kind: str, pair: Pair, fault: SmallFault) -> str:
 
 @dataclass(frozen=True)
 class Planned:
-    """One run to make: where, with which fault, and for how many that are the same."""
+    """One planned run: its place, its fault, and the number of equivalent faults."""
 
     kind: str
     pair: Pair
@@ -213,7 +213,7 @@ def planned(kind: str) -> tuple[Planned, ...]:
 
 
 def drawn(kind: str, count: int, seed: int) -> list[Planned]:
-    """Return as many runs as are asked for, each of another pair; nothing is decoded for it."""
+    """Return the given number of runs, each of another pair; nothing is decoded for it."""
     chance, pairs = random.Random(seed), recorded(kind).replies
     return [
         Planned(kind, pair, chance.choice(faults_at(kind, pair, pairs[pair][1])), 1)

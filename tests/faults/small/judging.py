@@ -1,4 +1,4 @@
-"""What a calibration that was disturbed once may have done, and what it must have said."""
+"""The permitted results of a disturbed calibration, and its required messages."""
 
 import json
 import re
@@ -12,11 +12,12 @@ from tests._commands import Ended
 from tests.faults.small.cells import WiredEpsonCell, WiredPlcCell
 
 _PROOF_MM: Final = 0.2
-"""By how much the proof about the new tip lets it drift; half of that turn shows the error."""
+"""The limit of the turn test about the new tip; half a turn shows the error."""
 
 _NAMED: Final = frozenset({0, 2, 3, 4, 5, 6, 7, 8, 9, 10})
-"""Exit codes of a command that knows what happened (docs/commands.md); 70 is a defect of ours. A
-bent pose may lead out of the box, which is 2."""
+"""Exit codes of a command whose result is known (docs/commands.md); 70 is a defect of ours. An
+altered pose may lead out of the box, which is 2.
+"""
 
 _MOVE: Final = re.compile(r"\$Execute,\"(Move|Go) |write_command MOVE_")
 
@@ -26,10 +27,10 @@ class Wrong(AssertionError):
 
 
 def judge(cell: WiredEpsonCell | WiredPlcCell, ended: Ended) -> str:
-    """Look at what one run left and said; return how it ended.
+    """Check the results and messages of one run; return how it ended.
 
     Raises:
-        Wrong: A movement was made twice, a wrong value stands, or what was said is not so.
+        Wrong: A movement was made twice, a wrong value is stored, or a message is false.
     """
     _no_movement_twice(cell, ended)
     _require(not cell.strange(), f"asked for {cell.strange()[:3]}")
@@ -55,7 +56,7 @@ def _require(fulfilled: object, otherwise: str) -> None:
 
 
 def _no_movement_twice(cell: WiredEpsonCell | WiredPlcCell, ended: Ended) -> None:
-    """Count the movements asked for, each once however often its frame came, and those begun."""
+    """Count the requested movements, each once however often its frame came, and those begun."""
     asked = [text for text in cell.requests() if _MOVE.match(text)]
     repeated = [text for text, following in pairwise(asked) if text == following]
     if isinstance(cell, WiredEpsonCell):
@@ -68,7 +69,7 @@ def _no_movement_twice(cell: WiredEpsonCell | WiredPlcCell, ended: Ended) -> Non
 
 
 def _value_of(cell: WiredEpsonCell | WiredPlcCell) -> tuple[ToolOffset | None, bool]:
-    """Return what tool 1 holds, and whether that is the old value or the tip."""
+    """Return the value of tool 1, and whether it is the old value or the tip."""
     tools = cell.tools()
     _require(tools[2] == cell.before[2], f"tool 2 became {tools[2]}")
     value, tip = tools[1], cell.simulator.world.truth()["tips"]["1"]

@@ -19,7 +19,7 @@ from robolink.transport.modbus.tcp import TcpExchange
 from tests.faults.small.wire import ModbusFrames, Wire
 
 _TAKES_NS: Final = 20_000_000
-"""How long the server takes for an answer: two cycles of its PLC."""
+"""The server's time for an answer: two cycles of its PLC."""
 
 _BANKS: Final = {3: Bank.HOLDING, 4: Bank.INPUT}
 _WRITE: Final = 16
@@ -32,7 +32,7 @@ class ModbusFarEnd:
     def __init__(self, simulator: SoftMotionSimulator, clock: ManualClock) -> None:
         self._simulator = simulator
         self._links: list[_Connection] = []
-        # Of a clock, registers ask nothing but the time.
+        # Registers ask a clock for nothing but the time.
         self.registers = PlcRegisters(simulator, cast(ScaledClock, clock))
 
     def connect(self, now_ns: int) -> "_Connection":
@@ -48,7 +48,7 @@ class ModbusFarEnd:
             link.now_ns = now_ns
 
     def next_change(self) -> int | None:
-        """Return when an answer leaves, or the PLC does something by itself."""
+        """Return the time of the next answer, or of the PLC's next own action."""
         times = [self._simulator.next_change(), *(link.next_change() for link in self._links)]
         return min((time_ns for time_ns in times if time_ns is not None), default=None)
 
@@ -93,7 +93,7 @@ class _WiredMailbox(ModbusMailboxLink):
 def open_wired(
     link_url: LinkUrl, simulator: SoftMotionSimulator, wire: Wire, clock: ManualClock
 ) -> ModbusMailboxLink:
-    """Open a mailbox whose Modbus frames pass over ``wire``, with the real client of them."""
+    """Open a mailbox whose Modbus frames pass over ``wire``, with the real Modbus client."""
     transport = InProcessTransport(link_url, wire, clock, simulator.lock)
     identity = link_url.identity
     exchange = TcpExchange(transport, identity, TcpFraming())

@@ -1,4 +1,4 @@
-"""Runs one after the other, each told by how it ended."""
+"""Runs one after the other, each reported with its end."""
 
 import gc
 import os
@@ -16,27 +16,27 @@ from tests.faults.small.wire import SmallFault
 
 _TERMINATED: Final = "exit 143"
 _LONGEST_S: Final = 120
-"""Of one run, in real time: it hangs if it takes longer."""
+"""The longest time of one run, in real time: a longer one hangs."""
 
 
 def outcome(run: Planned) -> str:
-    """Make one run; return how it ended, or what is wrong."""
+    """Make one run; return how it ended, or its fault."""
     return _told(lambda: run_with(run.kind, run.pair, run.fault))
 
 
 def split_off(
     kind: str, runs: Iterable[Planned], tell: Callable[[Planned, str], None], *, jobs: int
 ) -> None:
-    """Make runs of one calibration: where each has its fault, a process of its own goes on.
+    """Make runs of one calibration: each continues in a process of its own from its fault on.
 
-    What comes before the fault is the same in all of them and done once. Only for a process
-    with one thread, and where there is ``fork``.
+    The part before the fault is the same in all of them and done once. Only for a process with one
+    thread, and where there is ``fork``.
 
     Args:
-        kind: Of the controller.
-        runs: What to make.
+        kind: The kind of controller.
+        runs: The runs to make.
         tell: Called in each of the processes with its run and how it ended.
-        jobs: How many of them there may be at a time.
+        jobs: The largest number of processes at a time.
     """
     waiting = defaultdict[Pair, list[Planned]](list)
     for run in runs:
@@ -58,13 +58,13 @@ def split_off(
             children.add(child)
         return None
 
-    gc.freeze()  # what stands already is no garbage; looking at it would copy it, in each process
+    gc.freeze()  # existing objects are not garbage; examining them would copy them in each process
     with wired_cell(kind) as cell:
         cell.wire.on_request = on_request
         how = _told(lambda: judge(cell, calibrated(cell, steps)), alarm=False)
         if mine:
             try:
-                if _TERMINATED not in how:  # whoever ended it did so to all; it is made again
+                if _TERMINATED not in how:  # a signal to all of them ended it; the run is repeated
                     tell(mine[0], how)
                 shutil.rmtree(os.environ["ROBOLINK_STATE_DIR"], ignore_errors=True)
             finally:
@@ -80,7 +80,7 @@ def _told(run: Callable[[], str], *, alarm: bool = True) -> str:
     signal.alarm(_LONGEST_S if alarm else 0)
     try:
         return run()
-    except Exception as error:  # whatever it is, it is told, and the next run made
+    except Exception as error:  # any error is reported, and the next run made
         return f"WRONG: {type(error).__name__}: {' '.join(str(error).split())[:400]}"
     finally:
         signal.alarm(0)
@@ -91,7 +91,7 @@ def _hangs(*_: object) -> None:
 
 
 def _take_a_folder_of_its_own() -> None:
-    """Copy what the run has left so far to where nobody else looks."""
+    """Copy the run's files so far into a folder of its own."""
     folder = tempfile.mkdtemp(prefix="robolink-small-")
     shutil.copytree(os.environ["ROBOLINK_STATE_DIR"], folder, dirs_exist_ok=True)
     os.environ["ROBOLINK_STATE_DIR"] = folder

@@ -1,7 +1,7 @@
-"""A wire between a driver and a simulated device, on which one answer goes wrong.
+"""A wire between a driver and a simulated device on which one answer is faulty.
 
-What is on it are whole frames: lines of the EPSON text protocol, or Modbus frames with their
-header. Time is the device's own, stepped by whoever waits.
+The wire carries whole frames: lines of the EPSON text protocol, or Modbus frames with their header.
+Time is the device's own, stepped by waits.
 """
 
 from collections import deque
@@ -15,11 +15,11 @@ from robolink_simulators.hosting.addresses import DeviceLink, WireDevice
 from robolink.timing import NS_PER_S
 
 LATE_S: Final = 3.2
-"""A late answer comes just after the driver has given it up (3 s), so that it may meet the next."""
+"""A late answer comes just after the driver's time-out (3 s), so that it may meet the next."""
 
 
 class Act(Enum):
-    """What goes wrong with one request, or with its answer."""
+    """The fault of one request, or of its answer."""
 
     DROP_REQUEST = "drop request"
     DROP_REPLY = "drop reply"
@@ -32,10 +32,10 @@ class Act(Enum):
 
 @dataclass(frozen=True)
 class SmallFault:
-    """One of them.
+    """One small fault.
 
     Attributes:
-        act: What goes wrong.
+        act: The kind of fault.
         at: TRUNCATE: how many bytes are left. FLIP: which bit, counted through the bytes.
     """
 
@@ -46,7 +46,7 @@ class SmallFault:
         return self.act.value + (f" {self.at}" if self.act in (Act.TRUNCATE, Act.FLIP) else "")
 
     def bent(self, reply: bytes) -> list[tuple[float, bytes]]:
-        """Return what comes instead of an answer, each with its delay in seconds."""
+        """Return the pieces that replace an answer, each with its delay in seconds."""
         match self.act:
             case Act.DROP_REPLY:
                 return []
@@ -65,13 +65,13 @@ class SmallFault:
 
 
 class Frames(Protocol):
-    """How one protocol is told apart into frames."""
+    """The division of one protocol into frames."""
 
     def request_key(self, request: bytes) -> bytes:
-        """Return what an answer to this request has in common with it."""
+        """Return the key that this request shares with its answer."""
 
     def split(self, buffer: bytearray) -> Iterator[tuple[bytes, bytes]]:
-        """Take whole answers off ``buffer``; give each with what it has in common."""
+        """Take whole answers off ``buffer``; return each with its key."""
 
 
 class TextLines:
@@ -110,15 +110,15 @@ class ModbusFrames:
 
 
 class Wire:
-    """What passes between driver and device; sees each request, and may bend one exchange.
+    """The traffic between driver and device; may alter one exchange.
 
     Attributes:
-        on_request: Called with each request; returns what goes wrong with it, if anything.
-        on_reply: Called with each request and its whole answer, before anything goes wrong.
+        on_request: Called with each request; returns its fault, if any.
+        on_reply: Called with each request and its whole answer, before any fault.
 
     Args:
         device: The far end.
-        frames: How its protocol is told apart.
+        frames: The division of its protocol into frames.
     """
 
     def __init__(self, device: WireDevice, frames: Frames) -> None:
@@ -143,13 +143,13 @@ class Wire:
             link.now_ns = now_ns
 
     def next_change(self) -> int | None:
-        """Return when something leaves, or the device does something by itself."""
+        """Return the time of the next output, or of the device's next own action."""
         times = [self._next_change(), *(link.next_change() for link in self._links)]
         return min((time_ns for time_ns in times if time_ns is not None), default=None)
 
 
 class TappedLink:
-    """One connection, with what is on its way back to the driver."""
+    """One connection, with the answers on their way back to the driver."""
 
     def __init__(self, inner: DeviceLink, wire: Wire) -> None:
         self._inner = inner
@@ -174,13 +174,13 @@ class TappedLink:
             self._inner.receive(data, now_ns)
 
     def outgoing(self) -> bytes:
-        """Take what has arrived at the driver's end."""
+        """Take the bytes that have arrived at the driver's end."""
         self._buffer += self._inner.outgoing()
         for key, reply in self._wire.frames.split(self._buffer):
             request, fault = self._asked.pop(key, (b"", None))
             self._wire.on_reply(request, reply)
             for after_s, data in [(0.0, reply)] if fault is None else fault.bent(reply):
-                # One stream: nothing overtakes what was sent before it.
+                # One stream: nothing overtakes earlier bytes.
                 last_ns = self._leaving[-1][0] if self._leaving else 0
                 at_ns = max(last_ns, self.now_ns + round(after_s * NS_PER_S))
                 self._leaving.append((at_ns, data))
@@ -191,9 +191,9 @@ class TappedLink:
 
     @property
     def closed(self) -> bool:
-        """Whether the device has ended this connection, after what is on its way."""
+        """Whether the device has closed this connection, after the bytes on their way."""
         return self._inner.closed and not self._leaving
 
     def next_change(self) -> int | None:
-        """Return when the next of what is on its way arrives."""
+        """Return the time at which the next answer on its way arrives."""
         return self._leaving[0][0] if self._leaving else None

@@ -1,10 +1,10 @@
-"""The adversary: whole cells in virtual time, disturbed at random, with the rules always checked.
+"""The adversary: whole cells in virtual time, random disturbances, rules checked throughout.
 
 One seed is one history of one cell: an EPSON controller or a PLC, its world, a PC with a disk, two
-people with habits, and what gets in their way. Driver, codec, journal, transaction and nozzle
-change are the real ones; time, chance, the disk and the order of threads come from the seed
+people with habits, and their disturbances. Driver, codec, journal, transaction and nozzle change
+are the real ones; time, chance, the disk and the order of threads come from the seed
 (docs/decisions/0026-a-machine-that-looks-for-defects.md). The same seed gives the same event log,
-byte for byte, in every process; :attr:`Story.hash` is over all of it.
+byte for byte, in every process; :attr:`Story.hash` covers all of it.
 
 ::
 
@@ -20,12 +20,12 @@ In Python, also with a defect put in on purpose::
     story.broken        # rules that did not hold, each with its name, its hour and what was seen
     print(story.told())
 
-Where things stand: :mod:`.drawn_hours` draws what happens, :mod:`.history` holds and tells it,
-:mod:`.history_run` and :mod:`.cell` run it, and shorten one that breaks a rule. :mod:`.people` act,
-:mod:`.rules` judge, reading past the driver from :mod:`.plant` and :mod:`.books`;
-:mod:`.surroundings` are the time, the chance, the locks and the turns, :mod:`.computer` the PC and
-its disk; ``seed_records`` sums up and knows what was ever run. :mod:`.line_run` runs the lines that
-:mod:`.command_lines` draws, :mod:`.call_watch` holds each call to the machine.
+The modules: :mod:`.drawn_hours` draws the events, :mod:`.history` holds and prints them,
+:mod:`.history_run` and :mod:`.cell` run a history and shorten one that breaks a rule.
+:mod:`.people` act, :mod:`.rules` judge by readings of :mod:`.plant` and :mod:`.books` that bypass
+the driver; :mod:`.surroundings` has the time, the chance, the locks and the turns, :mod:`.computer`
+the PC and its disk; ``seed_records`` keeps sums and all seeds ever run. :mod:`.line_run` runs the
+lines that :mod:`.command_lines` draws, :mod:`.call_watch` compares each call with the machine.
 """
 
 from collections.abc import Mapping
@@ -47,10 +47,10 @@ def run(
     """Run the history of a seed and return how it went.
 
     Args:
-        seed: Decides everything: the cell, its people, what gets in the way, and when.
+        seed: Decides everything: the cell, its people, the disturbances, and their times.
         hours: Virtual hours, each with one deed and one disturbance at least.
-        kind: What stands in the cell; by default the seed decides.
-        replacements: Objects to put in place of what dotted names lead to, meanwhile: defects
-            that the rules have to find.
+        kind: The kind of cell; by default the seed decides.
+        replacements: Objects to put in place of dotted names during the run: defects that the
+            rules have to find.
     """
     return live_through(drawn_history(seed, hours, kind), replacements)

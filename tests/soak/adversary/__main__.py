@@ -23,7 +23,7 @@ from tests.soak.adversary.seed_records import (
 )
 
 FRESH: Final = range(0)
-"""Stands for seeds that are drawn from the commit."""
+"""The placeholder for seeds that are drawn from the commit."""
 
 
 class SeedRange(click.ParamType[range]):
@@ -44,14 +44,14 @@ class SeedRange(click.ParamType[range]):
 
 
 class Share(click.ParamType[slice]):
-    """``1/2``: the first of two parts that are run side by side."""
+    """``1/2``: the first of two parts that run side by side."""
 
     name = "share"
 
     def convert(
         self, value: object, param: click.Parameter | None, ctx: click.Context | None
     ) -> slice:
-        """Return which seeds of a range that are."""
+        """Return the seeds of a range that belong to the part."""
         part, _, parts = str(value).partition("/")
         if not (part.isdigit() and parts.isdigit() and 0 < int(part) <= int(parts)):
             self.fail(f"{value!r} is not like 1/2", param, ctx)
@@ -121,9 +121,9 @@ def main(
 
 
 def _noted(known: SeedList, seeds: range, count: int, done: Collection[int]) -> range:
-    """Return the seeds to run, which stand on the list before the first is.
+    """Return the seeds to run, once they are on the list.
 
-    A fresh range that was not run to its end on the same sources is gone on with.
+    A fresh range that was not completed on the same sources is continued.
     """
     sources = source_digest()
     if seeds is not FRESH:

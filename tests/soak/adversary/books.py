@@ -1,4 +1,4 @@
-"""The journal as it stands on the disk, read past the library, for the rules."""
+"""The journal on the disk, read without the library, for the rules."""
 
 import json
 import sqlite3
@@ -14,13 +14,13 @@ from robolink.model import ToolOffset, read_offset
 
 @dataclass(frozen=True, slots=True)
 class BookedMarker:
-    """A marker as the tables have it.
+    """A marker as stored in the tables.
 
     Attributes:
         operation: Its id.
-        kind: What it stands for.
-        request: What was begun.
-        details: What is needed to recover it.
+        kind: Its kind.
+        request: The request that was begun.
+        details: The data needed to recover it.
     """
 
     operation: str
@@ -30,15 +30,15 @@ class BookedMarker:
 
 
 class Books:
-    """Reads the journal's tables over a connection of its own.
+    """Reads the journal's tables over its own connection.
 
     Args:
         path: The journal's file.
 
     Attributes:
         trusted: Whether nobody has damaged or deleted it lately.
-        lost: Whether it was deleted with what it knew of this controller, and nobody has looked
-            at the cell since.
+        lost: Whether it was deleted with its data about this controller, and nobody has looked at
+            the cell since.
     """
 
     def __init__(self, path: Path) -> None:
@@ -48,13 +48,13 @@ class Books:
         self._connection: sqlite3.Connection | None = None
 
     def close(self) -> None:
-        """Close the connection; the next look opens another one."""
+        """Close the connection; the next reading opens another one."""
         if self._connection is not None:
             self._connection.close()
             self._connection = None
 
     def markers(self) -> list[BookedMarker]:
-        """Return what is open, oldest first; nothing where it cannot be read."""
+        """Return the open markers, oldest first; none if they cannot be read."""
         rows = self._rows("SELECT operation, kind, request, details FROM markers ORDER BY id")
         with self._noticing_damage():
             return [
@@ -64,7 +64,7 @@ class Books:
         return []
 
     def holder(self) -> Mapping[str, Any] | None:
-        """Return who holds the lease, ``None`` for nobody."""
+        """Return the holder of the lease, ``None`` for nobody."""
         for token, holder in self._rows("SELECT token, holder FROM leases"):
             if token:
                 with self._noticing_damage():
@@ -77,14 +77,14 @@ class Books:
         return next((row[0] for row in self._rows("SELECT max(number) FROM entries") if row[0]), 0)
 
     def readable(self) -> bool:
-        """Return whether SQLite finds the file whole; a disk that lied may have left half of it."""
+        """Return whether SQLite finds the file whole; a lying disk may have left half of it."""
         return [tuple(row) for row in self._rows("PRAGMA quick_check")] == [("ok",)]
 
     def digest(self) -> str:
-        """Return a hash over all entries, the same wherever the disk lies.
+        """Return a hash over all entries that does not depend on the disk's folder.
 
         A record that was begun anew names the file of the old one, and a backup its own, so the
-        journal's own hashes are others in each folder.
+        journal's own hashes differ between folders.
         """
         rows = self._rows(
             "SELECT number, at, kind, tool, verdict, details FROM entries ORDER BY number"
@@ -93,7 +93,7 @@ class Books:
         return sha256(told.replace(str(self._path.resolve().parent), "disk").encode()).hexdigest()
 
     def value_of(self, tool: int) -> tuple[bool, ToolOffset | None]:
-        """Return whether a value of a tool is on record as proved, and the newest one."""
+        """Return whether a tool's value is recorded as tested, and the newest one."""
         rows = self._rows(
             "SELECT details FROM entries WHERE proved_tool = ? ORDER BY number DESC LIMIT 1", tool
         )
@@ -103,7 +103,7 @@ class Books:
         return False, None
 
     def verdicts(self, after: int, tool: int) -> list[tuple[str, str]]:
-        """Return kind and verdict of the entries about a tool, behind a number."""
+        """Return kind and verdict of the entries about a tool after a number."""
         return self._rows(
             "SELECT kind, verdict FROM entries WHERE number > ? AND tool = ? ORDER BY number",
             after,
@@ -112,10 +112,9 @@ class Books:
 
     @contextmanager
     def _noticing_damage(self) -> Iterator[None]:
-        """Trust a file no more whose rows are not what was written.
+        """Stop trusting a file whose rows differ from what was written.
 
-        SQLite reads such rows from a file of which a disk that lied has kept one page and lost
-        the next, and raises nothing.
+        SQLite reads such rows without an error if a lying disk has kept one page and lost the next.
         """
         try:
             yield

@@ -1,9 +1,9 @@
-"""The promises of every kind of controller, held to the machine itself after every call.
+"""The promises of every kind of controller, compared with the machine itself after every call.
 
-What :mod:`robolink.testing` asserts about a call is asserted here about each call that the people
-of a cell make, by whatever command: what it says was read is what the machine held, what it says
-was written is there, a selection is in force, a movement that arrived is where it was sent, a pose
-is where the tip is, a stop holds. The driver's own reads prove nothing here.
+:mod:`robolink.testing` makes the same checks on single calls; here they apply to each call that the
+people of a cell make, by whatever command: a value said to be read is the machine's, a value said
+to be written is there, a selection takes effect, a movement that arrived is at its target, a pose
+is that of the tip, a stop holds. The driver's own reads prove nothing here.
 """
 
 from collections.abc import Callable, Iterator, Mapping
@@ -34,9 +34,9 @@ class WatchedCall:
     """A call that has returned.
 
     Attributes:
-        this: What was called.
-        given: With what, in order.
-        named: With what, by name.
+        this: The object of the call.
+        given: The positional arguments.
+        named: The keyword arguments.
     """
 
     this: Any
@@ -46,11 +46,11 @@ class WatchedCall:
 
 @contextmanager
 def watched(judge: ContractRules, process_of_this_thread: Callable[[], object]) -> Iterator[None]:
-    """Let each call of this library pass a judge.
+    """Pass each call of this library to a judge.
 
     Args:
-        judge: Told of what a call returned.
-        process_of_this_thread: Returns whose call it is; what is no process is not judged.
+        judge: Receives the result of each call.
+        process_of_this_thread: Returns the process of a call; a call without one is not judged.
     """
 
     def judged(call: Call, tell: Tell) -> Call:
@@ -106,7 +106,7 @@ def watched(judge: ContractRules, process_of_this_thread: Callable[[], object]) 
         judge.has_reset(process, call.this)
 
     stop, release = ControllerCore.stop, ControllerCore.release_stop
-    mark = MotionGroupCore._marked  # every movement passes it, of whatever kind
+    mark = MotionGroupCore._marked  # every kind of movement passes it
     calls: tuple[tuple[type, str, Tell], ...] = (
         (ToolTableCore, "read", lambda p, found, call: judge.has_read(p, call.given[0], found)),
         (ToolTableCore, "selected", lambda p, found, _: judge.has_read_selection(p, found)),

@@ -1,4 +1,4 @@
-"""One cell through its history: people at work, what gets in the way, and the rules."""
+"""One cell through its history: people at work, disturbances, and the rules."""
 
 import gc
 import os
@@ -46,13 +46,13 @@ from tests.soak.adversary.rules import Rulebook
 from tests.soak.adversary.surroundings import Killed, SeededSurroundings, TurnTaking
 
 _TRIES: Final = 8
-"""How often people try to get a cell going again; each time they look longer."""
+"""The number of tries to get a cell going again; each time people look longer."""
 
 _TRIES_TO_TAKE_OVER_S: Final = (75.0, 30.0)
-"""How long somebody waits until a process that stands still has lost its login and its lease."""
+"""Waiting times until a stopped process has lost its login and its lease."""
 
 _PAST_THE_SYSTEM: Final = ("bent", "truncated", "lost")
-"""What happens to the journal's file while nobody has it open."""
+"""Damage to the journal's file while nobody has it open."""
 
 _ON_WIRE: Final = (
     Hindrance.WIRE,
@@ -68,11 +68,11 @@ class VirtualCell:
     """A machine, a computer, a disk and people, in virtual time.
 
     Args:
-        history: What happens to it.
-        folder: For its disk; empty.
+        history: The events.
+        folder: An empty folder for its disk.
     """
 
-    # What lives as long as :meth:`run`.
+    # Objects that live as long as :meth:`run`.
     _computer: VirtualComputer
     _books: Books
     _plant: PlantMachine
@@ -121,22 +121,22 @@ class VirtualCell:
             return ProgramPlant(self._clock, self, seed, self._turns)
         return PLANTS[kind](self._clock, self, seed)
 
-    # What the machine's wire, and the checkpoints, tell.
+    # Events of the machine's wire and of the checkpoints.
 
     def leaving(self, process: VirtualProcess, sent: SentRequest) -> None:
-        """See a request before it leaves; a dead process sends nothing."""
+        """Note and check a request before it leaves; a dead process sends nothing."""
         if not process.alive:
             raise Killed
         self._note(f"p{process.number} > {sent.text}")
         self._rules.leaving(process, sent)
 
     def given(self, tool: int, value: ToolOffset) -> None:
-        """See a value that the machine's own program is about to be given."""
+        """Note and check a value that the machine's own program is about to get."""
         self._note(f"tool {tool} is to hold {value}")
         self._rules.given(tool, value)
 
     def passed(self, process: VirtualProcess, text: str) -> None:
-        """See that something has passed on the wire."""
+        """Note a request or an answer on the wire."""
         if not process.alive:
             raise Killed
         if text.startswith("wire received"):
@@ -174,7 +174,7 @@ class VirtualCell:
     def _note_turn(self, name: str) -> None:
         self._note(f"-- {name} goes on")
 
-    # What gets in the way.
+    # Disturbances.
 
     def _happen(self, process: VirtualProcess, disturbance: Disturbance, text: str) -> None:
         self._note(f"!! {disturbance} ({text})")
@@ -205,7 +205,7 @@ class VirtualCell:
     def _cut_power(self, process: VirtualProcess) -> None:
         self._books.close()
         if self._disk.lies:
-            # The disk said that it had kept what it may not have: nobody can rely on the rest.
+            # The disk reported data as kept that it may have lost: the rest is unreliable.
             self._books.trusted = False
         process.alive = False
         self._computer.cut_power(self._clock.now_ns(), self._disk, self._rng.getrandbits(32))
@@ -231,7 +231,7 @@ class VirtualCell:
             process.stopped_ns = self._clock.now_ns()
 
     def _act_by_hand(self, disturbance: Disturbance) -> None:
-        """Let somebody do something at the pendant, while robolink asks and nothing moves."""
+        """Let somebody act at the pendant while robolink asks and nothing moves."""
         assert self._hour is not None  # for the type: an hour runs
         if disturbance.what == "select":
             chosen = self._plant.choose_by_hand(disturbance.position or 0)
@@ -242,7 +242,7 @@ class VirtualCell:
         self._rules.hand_typed(tool, self._plant.type_by_hand(tool))
 
     def _freeze(self, process: VirtualProcess) -> None:
-        """Let a process stand still, as one that is suspended, until another has been at work."""
+        """Suspend a process until another one has done its work."""
         if self._turns.current.name != "main":
             return
         other = self._computer.start("dora")
@@ -252,7 +252,7 @@ class VirtualCell:
             self._turns.wait_until(lambda: thread.over)
 
     def _take_over(self, process: VirtualProcess) -> None:
-        """Somebody else waits, settles what the process that stands still left, types a tool."""
+        """Let somebody else wait, recover the suspended process's jobs, and type a tool."""
         assert self._hour is not None  # for the type: an hour runs
         tool = next((tool for tool, _ in wish_of(self._hour).typed), TOOL)
         for wait_s in _TRIES_TO_TAKE_OVER_S:
@@ -274,7 +274,7 @@ class VirtualCell:
         process.end()
 
     def _second_person(self, process: VirtualProcess) -> None:
-        """Somebody else at another terminal changes another tool."""
+        """Let somebody at another terminal change another tool."""
         try:
             with self._connected(process) as controller:
                 held = controller.tools.read(OTHERS_TOOL)
@@ -314,7 +314,7 @@ class VirtualCell:
             self._do(hour)
             self._settle_down()
             self._rules.left(self._plant.state())
-        self._books.lost = False  # the people are told to look, and give their word
+        self._books.lost = False  # the people are told to look, and confirm
         usable, why = self._put_right(hour)
         self._rules.at_rest(self._plant.state(), usable=usable, why=why)
         if usable and not self._plant.calls_back:
@@ -340,7 +340,7 @@ class VirtualCell:
             self.story.met[disturbance.kind] += 1
             self._books.close()
             # A connection that a killed process dropped is closed when it is collected; until then
-            # it holds a lock, and whoever opens what is left of the file waits for it in real time.
+            # it holds a lock, and opening what is left of the file would wait for it in real time.
             gc.collect()
             if disturbance.what == "lost":
                 self._books.lost = self._computer.known and self._books.last_number() > 0
@@ -378,7 +378,7 @@ class VirtualCell:
         finally:
             me.owner = None
         if isinstance(error, Interrupted) and error.by is not EndedBy.OUTPUT_CLOSED:
-            raise error  # a real one: whoever runs this wants it to end
+            raise error  # a real one: the person who runs this wants it to end
         if not process.alive:
             self._end(hour, "killed")
             self._rules.killed()
@@ -394,7 +394,7 @@ class VirtualCell:
         process.end()
 
     def _type_line(self, process: VirtualProcess, hour: Hour) -> None:
-        """Let a command connect, as often as it does."""
+        """Let a command connect as often as it wants to."""
 
         def connect() -> Controller:
             outcomes = process.log(self._plant.address, self._clock)
@@ -408,7 +408,7 @@ class VirtualCell:
             self._rules.stopped()
 
     def _stop_what_goes_on(self, hour: Hour) -> None:
-        """Let whoever sees the machine move on after a process died stop it from another one."""
+        """Let a person stop, from another process, a machine that moves after a process died."""
         self._plant.advance()
         if self._plant.calls_back or not self._plant.moving:
             return
@@ -439,7 +439,7 @@ class VirtualCell:
             yield controller
 
     def _settle_down(self) -> None:
-        """Let whatever was under way on the machine come to its end."""
+        """Let everything under way on the machine end."""
         self._turns.join()
         for process in self._others:
             self._plant.hang_up(process)
@@ -449,7 +449,7 @@ class VirtualCell:
         self._plant.advance()
 
     def _put_right(self, hour: Hour) -> tuple[bool, str]:
-        """Let the people get the cell going again; return whether that came off, and why not."""
+        """Let the people get the cell going again; return whether they did, and why not."""
         why = ""
         for attempt in range(_TRIES):
             self._plant.repair()
@@ -481,7 +481,7 @@ class VirtualCell:
         return False, why
 
     def _hold_to_contract(self, hour: Hour) -> None:
-        """Hold the cell at rest to one of the shipped checks that only read, in turn."""
+        """Run one of the shipped checks that only read on the stopped cell, in turn."""
         process = self._turns.current.owner = self._computer.start(hour.habit.person)
         log = partial(process.log, self._plant.address, self._clock)
         subject = Subject(lambda: self._plant.connect(process, log()), tool=2)

@@ -1,9 +1,8 @@
-"""Lines that an operator may type: each command that acts on a controller, with options drawn.
+"""Lines that an operator may type: each command that acts on a controller, with random options.
 
-Nothing is listed here that a command can say itself: the commands are those of the program, the
-options those that each declares, within the limits that their types declare. Only words whose
-meaning no type tells (steps of a jog, names, files) stand in a table, and what is left out, with
-the reason.
+The commands and their options come from the program itself, with the limits that their types
+declare. Tables hold only words whose meaning no type declares (steps of a jog, names, files), and
+the commands left out, with reasons.
 """
 
 import random
@@ -28,16 +27,16 @@ _UNITS: Final = {
 }
 
 STOP: Final = ("stop",)
-"""The line that stops a machine, whoever moves it."""
+"""The line that stops a machine, whatever is moving it."""
 
 
 def is_stop(line: Sequence[str]) -> bool:
-    """Return whether a line stops the machine, and shows more than what it would send."""
+    """Return whether a line stops the machine instead of showing its requests."""
     return tuple(line[:1]) == STOP and "--dry-run" not in line
 
 
 def typed_components(line: Sequence[str]) -> tuple[int, dict[str, float]] | None:
-    """Return which tool a line writes, and the components that it names; ``None`` for none."""
+    """Return the tool that a line writes and the components that it names; ``None`` for none."""
     if tuple(line[:2]) != ("tool", "set") or "--dry-run" in line or not line[2].isdigit():
         return None
     named = {_UNITS[one]: float(value) for one, value in pairwise(line) if one in _UNITS}
@@ -45,26 +44,26 @@ def typed_components(line: Sequence[str]) -> tuple[int, dict[str, float]] | None
 
 
 def cleared(line: Sequence[str]) -> int | None:
-    """Return which tool a line clears; ``None`` for none."""
+    """Return the tool that a line clears; ``None`` for none."""
     clears = tuple(line[:2]) == ("tool", "clear") and "--dry-run" not in line
     return int(line[2]) if clears else None
 
 
 def selects(line: Sequence[str]) -> bool:
-    """Whether another tool may be selected on purpose when a line has been carried out."""
+    """Whether a line may leave another tool selected on purpose."""
     if line[:2] == ("tool", "select"):
         return True
     return "--then-select" in line or "--selected" in line
 
 
 def offset_of(held: ToolOffset | None, named: Mapping[str, float]) -> ToolOffset:
-    """Return what a tool is to hold when some of its components are typed."""
+    """Return a tool's expected value after some of its components are typed."""
     return replace(held if held is not None else ToolOffset(), **named)
 
 
 ASSIST: Final = "{assist}"
 FOLDER: Final = "{folder}"
-"""What stands in a line for what is only known when it is typed."""
+"""The placeholder in a line for the folder, known when it is typed."""
 
 LEFT_OUT: Final[Mapping[str, str]] = {
     "sim": "it serves simulators until it is ended",
@@ -81,7 +80,7 @@ LEFT_OUT: Final[Mapping[str, str]] = {
     "expert serve": "it serves until it is ended; cells whose program calls back have it",
     "expert spel run": "it brings a controller of its own",
 }
-"""Commands, or groups of them, that are not drawn, and why."""
+"""Commands, or groups of them, that are not drawn, with reasons."""
 
 _NOT_DRAWN: Final = frozenset(
     {
@@ -90,14 +89,14 @@ _NOT_DRAWN: Final = frozenset(
         *("--driver", "named", "--write", "--move"),
     }
 )
-"""Options of the link and of the terminal, the same for all commands, and what names a module.
+"""Options of the link and the terminal, which all commands share, and options that name a module.
 
-Checks of the contract that write or move open markers on purpose, in a record that is in memory
-only; no rule that looks past the driver can read that (``tests/cli/test_check_contract.py``).
+The checks of the contract that write or move open markers on purpose, in a record in memory, which
+the rules cannot read (``tests/cli/test_check_contract.py``).
 """
 
 _EXPERT: Final = "expert"
-"""The group of what integrators and engineers need besides; no help page lists it."""
+"""The group for integrators and engineers, which no help page lists."""
 
 _FILES: Final = (f"{FOLDER}/kept.json", f"{FOLDER}/other.json")
 _TOOLS: Final = ("1", "2", "2", "3", "3", "4", "0", "16")
@@ -128,7 +127,7 @@ _WORDS: Final[Mapping[str, tuple[str, ...]]] = {
     "--v": ("0", "1"),
     "--w": ("0",),
 }
-"""What is typed for a name; for any other, what its type allows."""
+"""Words for a named parameter; other parameters use their types."""
 
 _OFTEN: Final[Mapping[str, float]] = {
     "--yes": 0.85,
@@ -148,7 +147,9 @@ _OFTEN: Final[Mapping[str, float]] = {
     "--published": 0.1,
 }
 _SELDOM: Final = 0.08
-"""How often any other option is typed with a command that has a dozen; with more, each less."""
+"""The share of lines with an option that is not required, for a command with a dozen of them; with
+more, each is rarer.
+"""
 
 _WEIGHTS: Final[Mapping[str, float]] = {
     "tool set": 10.0,
@@ -168,7 +169,7 @@ _WEIGHTS: Final[Mapping[str, float]] = {
 }
 
 _USUAL: Final[Mapping[str, float]] = {_EXPERT: 0.5}
-"""Weight of the other commands of a group; those for integrators mostly act on files alone."""
+"""Weights of the other commands in a group; those for integrators mostly act on files alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,7 +178,7 @@ class DrawnCommand:
 
     Attributes:
         path: Its name, with those of the groups before it.
-        command: What click knows of it.
+        command: The click command.
     """
 
     path: tuple[str, ...]
@@ -185,12 +186,12 @@ class DrawnCommand:
 
     @property
     def name(self) -> str:
-        """Its whole name."""
+        """The full name."""
         return " ".join(self.path)
 
 
 def every_command() -> Iterator[DrawnCommand]:
-    """Yield each command of the program that is listed, and those for integrators."""
+    """Yield each listed command of the program, and those for integrators."""
     root = click.Context(cli, info_name="robolink")
     yield from _below(cli, (), root)
     expert = cli.get_command(root, _EXPERT)
@@ -205,14 +206,14 @@ def drawn_commands() -> tuple[DrawnCommand, ...]:
 
 
 def left_out(one: DrawnCommand) -> str:
-    """Return why a command is not drawn; empty where it is."""
+    """Return why a command is not drawn; empty if it is."""
     return next(
         (why for name, why in LEFT_OUT.items() if f"{one.name} ".startswith(f"{name} ")), ""
     )
 
 
 def drawn_line(rng: random.Random) -> tuple[str, ...]:
-    """Return a line that somebody types."""
+    """Return a random line for a command."""
     commands = drawn_commands()
     weights = [_WEIGHTS.get(one.name, _USUAL.get(one.path[0], 1.0)) for one in commands]
     chosen = rng.choices(commands, weights)[0]

@@ -1,4 +1,4 @@
-"""The computer at a virtual cell: its processes, its disk, and what becomes of both."""
+"""The computer of a virtual cell: its processes, its disk, and failures of both."""
 
 import shutil
 import tempfile
@@ -19,30 +19,30 @@ from tests.soak.adversary.surroundings import SeededSurroundings
 
 
 class Stopper(Protocol):
-    """What listens for a stop from another terminal."""
+    """Receives a stop from another terminal."""
 
     def stop(self) -> None:
-        """Bring the controller to rest."""
+        """Stop the controller."""
 
 
 _SUFFIXES: Final = ("", "-wal", "-shm")
 
 
 class VirtualProcess:
-    """One run of a command: a journal connection of its own, and an end.
+    """One run of a command, with its own journal connection, and its end.
 
     Attributes:
         number: Its process number.
-        person: Whose command it is.
+        person: The person who runs it.
         alive: Whether it runs.
         controller: The controller that it is connected to, ``None`` before and after.
-        stopped_ns: When a stop was acknowledged in it, ``None`` while none was.
-        put_back: Tools whose old value it has written since, and the one request that did it: where
-            its frame was lost it leaves again, with its number, and is carried out once.
+        stopped_ns: The time of the acknowledged stop in it, ``None`` without one.
+        put_back: Tools whose old value it has restored since, with the one request that did it: if
+            its frame was lost it is sent again, with its number, and carried out once.
         cut_off: Whether a link of it has failed.
-        overtaken: Whether another client was acknowledged in the place of a movement or write.
-        stopper: What a stop from another terminal goes to, where that is not the controller.
-        held_back: Whether a stop was begun in it, and nobody has released it since.
+        overtaken: Whether another client was acknowledged in place of a movement or write.
+        stopper: The receiver of a stop from another terminal, if not the controller.
+        held_back: Whether a stop was begun in it and not released since.
     """
 
     def __init__(self, number: int, person: str, holder: LeaseHolder, path: Path) -> None:
@@ -75,7 +75,7 @@ class VirtualProcess:
         return self.log_of(address, clock)
 
     def log_of(self, controller: str, clock: Clock) -> JournalOutcomeLog:
-        """Return the record of another controller in the journal that is open."""
+        """Return the record of another controller in the open journal."""
         assert self._journal is not None  # for the type: it was opened
         signature = Signature(
             os_user=self.person, host="cell-pc", version="soak", operator=self.person
@@ -83,7 +83,7 @@ class VirtualProcess:
         return self._journal.log(controller, signature=signature, holder=self._holder, clock=clock)
 
     def end(self) -> None:
-        """End, by itself or not: the system closes what was open."""
+        """End, voluntarily or not: the system closes everything open."""
         self.alive = False
         self.controller = None
         if self._journal is not None:
@@ -92,10 +92,10 @@ class VirtualProcess:
 
 
 class VirtualComputer:
-    """A PC with a disk; it may lose its power, and its disk may lose what it was given.
+    """A PC with a disk; its power may fail, and its disk may lose accepted data.
 
     Args:
-        folder: On which everything is kept; a new one.
+        folder: A new folder for all its files.
         surroundings: Its clocks.
 
     Attributes:
@@ -128,16 +128,16 @@ class VirtualComputer:
         return process
 
     def lives(self, pid: int) -> bool:
-        """Return whether a process of that number runs."""
+        """Return whether a process of that number is running."""
         return any(one.number == pid and one.alive for one in self._processes)
 
     def cut_power(self, now_ns: int, disk: FaultyDisk, seed: int) -> None:
-        """Switch it off and on: every process is gone, the time since the start begins anew.
+        """Switch it off and on: all processes end, and the time since the start begins anew.
 
         Args:
-            now_ns: When.
-            disk: Knows what of the journal has reached it.
-            seed: Draws which sectors of the rest have.
+            now_ns: The time.
+            disk: Knows which data of the journal have reached it.
+            seed: Draws which of the other sectors have.
         """
         with tempfile.TemporaryDirectory(dir=self.journal.parent) as kept:
             disk.after_power_cut(self.journal, Path(kept), seed=seed)
@@ -166,31 +166,31 @@ class VirtualComputer:
             self.journal.write_bytes(bytes(data))
 
     def truncate(self, share: float) -> None:
-        """Cut the journal's file off."""
+        """Truncate the journal's file."""
         data = self.journal.read_bytes()
         self.journal.write_bytes(data[: int(share * len(data))])
         self._beside("-wal").unlink(missing_ok=True)
 
     @property
     def known(self) -> bool:
-        """Whether there is a trace, beside the journal, of a controller that was changed."""
+        """Whether anything beside the journal shows that a controller was changed."""
         folder = state_folder("controllers")
         return folder.exists() and any(folder.iterdir())
 
     def lose(self) -> None:
-        """Delete the journal, as somebody may who looks for space."""
+        """Delete the journal, as somebody may who needs disk space."""
         for suffix in _SUFFIXES:
             self._beside(suffix).unlink(missing_ok=True)
 
     def set_aside(self) -> None:
-        """Move a journal that cannot be used away, as its error tells a person to."""
+        """Move an unusable journal away, as its error tells a person to."""
         for suffix in _SUFFIXES:
             path = self._beside(suffix)
             if path.exists():
                 path.replace(path.with_name(f"damaged-{self._count}{path.name}"))
 
     def files_with(self, text: str) -> Iterator[str]:
-        """Yield the names of the files that were written and hold a text."""
+        """Yield the names of the written files that contain a text."""
         for path in self._files():
             with suppress(OSError):
                 if text.encode() in path.read_bytes():
@@ -207,12 +207,12 @@ class VirtualComputer:
 
 def _holder_class(computer: VirtualComputer) -> type[LeaseHolder]:
     class VirtualHolder(LeaseHolder):
-        """A holder of a lease who knows which processes of the virtual computer live."""
+        """A lease holder that knows the running processes of the virtual computer."""
 
         here: ClassVar[VirtualComputer] = computer
 
         def proves_gone(self, other: LeaseHolder) -> bool:
-            """Whether that process has ended, seen from the same start of the computer."""
+            """Whether that process, of the same start of the computer, has ended."""
             return self.shares_clock_with(other) and not self.here.lives(other.pid)
 
     return VirtualHolder

@@ -1,7 +1,7 @@
-"""How long each deed is, counted in requests and in points: a fault is placed within it.
+"""The length of each deed in requests and in points, so that faults are placed within it.
 
-Measured: the least of three undisturbed runs of each (``python -m tests.soak.deed_lengths``).
-What is placed behind the end of a deed is never met, so a place is drawn within its length.
+Measured: the least of three undisturbed runs of each (``python -m tests.soak.deed_lengths``). A
+fault placed after the end of a deed never occurs, so places are drawn within its length.
 """
 
 import re
@@ -166,22 +166,22 @@ PROGRAM PRODUCE requests: * 14, HELLO 1, BEGIN 1, POSE 5, SOLVE 1, WROTE 1, PROO
 PROGRAM PRODUCE points: * 42, commit 14, commit after 7, wire sent 14, WELCOME 1, VALUE 1, PROVE
     1, KEEP 1
 """
-"""Cell, deed, what is counted: each text that a request or a point may hold, and how many do.
+"""Cell, deed, the counted thing: each text of a request or a point, and its number.
 
-``*`` stands for any; ``_`` for a space behind a text.
+``*`` stands for any text; ``_`` for a space after a text.
 """
 
 Places = tuple[tuple[str, int], ...]
-"""Texts, each with how many requests or points hold it; never none."""
+"""Texts, each with the number of requests or points that contain it; never zero."""
 
 
 @dataclass(frozen=True, slots=True)
 class DeedLength:
-    """How long a deed is.
+    """The length of a deed.
 
     Attributes:
-        requests: What the machine receives.
-        points: What is passed in the process: locks, commits, exchanges, questions.
+        requests: The requests that the machine receives.
+        points: The points passed in the process: locks, commits, exchanges, questions.
         commits: How often the journal is about to commit.
     """
 
@@ -191,7 +191,7 @@ class DeedLength:
 
 
 def length_of(kind: CellKind, deed: Deed) -> DeedLength:
-    """Return how long a deed is in a kind of cell."""
+    """Return the length of a deed in a kind of cell."""
     if deed is Deed.COMMAND:  # most are as short as this one
         deed = Deed.SET_TOOL
     measured = _measured()

@@ -1,4 +1,4 @@
-"""The hours of a seed: which cell, which deeds, whose habits, and what gets in the way when."""
+"""The hours of a seed: the cell, its deeds, the habits of its people, and the disturbances."""
 
 import random
 from collections.abc import Mapping
@@ -26,7 +26,7 @@ MAILBOX_KINDS: Final = frozenset(
     {CellKind.SOFTMOTION, CellKind.MODBUS_TCP, CellKind.MODBUS_RTU, CellKind.CANOPEN}
 )
 LINE_KINDS: Final = frozenset({CellKind.EPSON_SERIAL, CellKind.MODBUS_RTU, CellKind.REGISTER_MAP})
-"""Cells with a serial line, whose bytes may be lost, swapped, bent and added to."""
+"""Cells with a serial line, whose bytes may be lost, swapped, changed or added to."""
 
 _LINKS: Final = {
     CellKind.EPSON: LinkKind.EPSON_SIM,
@@ -95,12 +95,12 @@ def _wire_faults(kind: CellKind) -> tuple[str, ...]:
 MACHINE_FAULTS: Final[Mapping[CellKind, tuple[str, ...]]] = {
     kind: _machine_faults(kind) for kind in CellKind
 }
-"""What happens to the machine itself, by name."""
+"""Faults of the machine itself, by name."""
 
 WIRE_FAULTS: Final[Mapping[CellKind, tuple[str, ...]]] = {
     kind: _wire_faults(kind) for kind in CellKind
 }
-"""What happens on the wire, by name."""
+"""Faults on the wire, by name."""
 
 
 _TURNS: Final = (
@@ -122,7 +122,7 @@ _TURNS: Final = (
     CellKind.EPSON,
     CellKind.MODBUS_TCP,
 )
-"""What stands in the cells of seeds 0, 1, 2 .. 19, and so on."""
+"""The kinds of cells of seeds 0, 1, 2 .. 19, and so on."""
 
 _ANOTHER_SHARE: Final = 0.6
 _MOST: Final = 4
@@ -162,7 +162,7 @@ _FAMILIES: Final[Mapping[CellKind, str]] = {
     CellKind.EPSON_SERIAL: CellKind.EPSON.value,
     **dict.fromkeys(MAILBOX_KINDS, CellKind.SOFTMOTION.value),
 }
-"""Under which name the instants that tell are known, for kinds that have any."""
+"""The name under which a kind's significant instants are listed."""
 
 _LINE_SHARE: Final = 0.2
 _PRODUCTION_SHARE: Final = 0.1
@@ -176,22 +176,22 @@ _NO_ROBOLINK: Final = frozenset(
         Hindrance.FREEZE,
     }
 )
-"""What a program that calls back does not have: nobody is at robolink's keyboard."""
+"""Disturbances that a program with call-back lacks: nobody is at robolink's keyboard."""
 
 _JUMPS_S: Final = (-86400.0, -5.0, 3600.0, 40 * 86400.0)
-"""By how much a clock is set wrong."""
+"""Errors of the clock."""
 
 _CLOCK_SHARE: Final = 0.7
 _TAKEN_BACK_SHARE: Final = 0.1
 _FREEZE_SHARE: Final = 0.08
-"""How often what tells in one deed alone comes in it."""
+"""The share of deeds with the disturbance that is significant only for them."""
 
 _NOT_ALWAYS_ASKED: Final = 3
-"""How many of the questions that were counted in a change some seeds do not come to."""
+"""Questions counted in a change that some seeds do not reach."""
 
 _WHILE_ASKED: Final = frozenset({Hindrance.HAND, Hindrance.FREEZE})
 _QUESTION: Final = "question"
-"""What comes only while robolink asks something, and where that is."""
+"""Disturbances that occur only while robolink asks something, and their place."""
 
 _DISK_FAULTS: Final = ("FULL", "UNWRITABLE", "SYNC_FAILS", "bent", "truncated", "lost")
 _BY_REQUESTS: Final = frozenset(
@@ -203,7 +203,7 @@ _BY_REQUESTS: Final = frozenset(
         Hindrance.PRODUCTION,
     }
 )
-"""What is placed at a request that the machine receives; the rest at a point that is passed."""
+"""Disturbances placed at a request that the machine receives; others at a point passed."""
 
 
 def drawn_history(seed: int, hours: int, kind: CellKind | None = None) -> History:
@@ -211,8 +211,8 @@ def drawn_history(seed: int, hours: int, kind: CellKind | None = None) -> Histor
 
     Args:
         seed: Decides everything.
-        hours: How many hours; each has one change and one disturbance at least.
-        kind: What stands in the cell; by default the seed decides.
+        hours: The number of hours; each has one change and one disturbance at least.
+        kind: The kind of cell; by default the seed decides.
 
     Example:
         >>> from tests.soak.adversary import CellKind, drawn_history
@@ -238,7 +238,7 @@ def _hour(seed: int, number: int, kind: CellKind) -> Hour:
     if rare is not None:
         drawn.append(Disturbance(Hindrance(rare.kind), rare.what, rare.match))
     told = _of_the_deed(random.Random(f"deed {number} of {seed}"), kind, deed)
-    # What comes at a question comes alone: anything else would mostly end the deed before it.
+    # A disturbance at a question comes alone: any other would mostly end the deed before it.
     drawn = told if told and told[0].kind in _WHILE_ASKED else drawn + told
     line: tuple[str, ...] = ()
     if deed is Deed.COMMAND:
@@ -247,14 +247,14 @@ def _hour(seed: int, number: int, kind: CellKind) -> Hour:
 
 
 def _of_the_deed(rng: random.Random, kind: CellKind, deed: Deed) -> list[Disturbance]:
-    """Return what tells in one deed alone, and would hardly ever come together by chance."""
+    """Return disturbances for one deed only, which would hardly ever coincide by chance."""
     chance, at = rng.random(), rng.randrange(5)
     if deed is Deed.SET_THEN_UNDO and chance < _CLOCK_SHARE:
         jump_s = rng.choice(_JUMPS_S)
         return [Disturbance(Hindrance.CLOCK, match=_QUESTION, at=1, seconds=jump_s)]
     if deed is not Deed.CHANGE_NOZZLE:
         return []
-    if chance < _TAKEN_BACK_SHARE:  # a hand while the new value is proved, and then a stop
+    if chance < _TAKEN_BACK_SHARE:  # a hand during the turn test, and then a stop
         last = dict(length_of(kind, deed).points)[_QUESTION] - _NOT_ALWAYS_ASKED
         return [
             Disturbance(Hindrance.HAND, "type", _QUESTION, last - at % 3),
@@ -266,7 +266,7 @@ def _of_the_deed(rng: random.Random, kind: CellKind, deed: Deed) -> list[Disturb
 
 
 def deeds_of(kind: CellKind) -> Mapping[Deed, float]:
-    """Return what is set out to do in a kind of cell, and how often."""
+    """Return the deeds for a kind of cell, with their weights."""
     if kind is CellKind.PROGRAM:
         return {Deed.PRODUCE: 1.0}
     if kind is CellKind.REGISTER_MAP:
@@ -311,7 +311,7 @@ def _habit(rng: random.Random) -> Habit:
 
 
 def _told_instant(rng: random.Random, kind: CellKind, deed: Deed) -> Disturbance | None:
-    """Return a fault at an instant that tells, mostly ``None``; only what the link can have."""
+    """Return a fault at a significant instant that the link can have, mostly ``None``."""
     found = drawn_instant(rng, _FAMILIES.get(kind, ""), deed.value)
     if found is None:
         return None

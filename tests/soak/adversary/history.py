@@ -1,7 +1,7 @@
-"""What happens to a cell, hour by hour: drawn from a seed, plain data, cut shorter at will.
+"""The events in a cell, hour by hour: drawn from a seed, plain data, easily shortened.
 
 Each hour draws from the seed and its own number, so an hour, or one of its disturbances, can be
-left out and all others stay as they were.
+left out without changing the others.
 """
 
 import hashlib
@@ -15,7 +15,7 @@ from robolink.timing import NS_PER_S
 
 
 class CellKind(StrEnum):
-    """What stands in the cell."""
+    """The kind of cell."""
 
     EPSON = "epson"
     SOFTMOTION = "softmotion"
@@ -28,7 +28,7 @@ class CellKind(StrEnum):
 
 
 class Deed(StrEnum):
-    """What somebody sets out to do."""
+    """The task that somebody sets out to do."""
 
     CHANGE_NOZZLE = "change the nozzle"
     SET_TOOL = "type a tool offset"
@@ -42,7 +42,7 @@ class Deed(StrEnum):
 
 
 class Hindrance(StrEnum):
-    """What kind of thing gets in the way."""
+    """The kind of a disturbance."""
 
     WIRE = "wire"
     LINE = "line"
@@ -63,14 +63,14 @@ class Hindrance(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Disturbance:
-    """One thing that gets in the way, once.
+    """One disturbance, once.
 
     Attributes:
-        kind: What kind of thing.
-        what: Which of its kind: the name of a wire fault, of an act at the panel ...
+        kind: The kind of disturbance.
+        what: The fault itself: the name of a wire fault, of an act at the panel ...
         match: Text that a request, or a checkpoint, must contain to be counted; empty counts all.
-        at: Which of those that are counted, from 0.
-        seconds: A delay in virtual time, where it has one.
+        at: Its place among those counted, from 0.
+        seconds: A delay in virtual time, if it has one.
         position: A byte or word of an answer; ``None`` for its middle.
     """
 
@@ -89,7 +89,7 @@ class Disturbance:
 
 @dataclass(frozen=True, slots=True)
 class Habit:
-    """How the person of an hour works.
+    """The working habits of the person of an hour.
 
     Attributes:
         person: Their badge.
@@ -97,8 +97,8 @@ class Habit:
         types_ahead: They press ENTER before they are asked.
         bias_mm: How far beside the pin they always stop.
         tires_mm: By how much their aim wanders from touch to touch.
-        declines: They say no to the proposal.
-        keeps: After an accident they keep what nobody verified.
+        declines: They refuse the proposal.
+        keeps: After an accident they keep an unverified value.
         impatient: After an accident they try again before they recover anything.
     """
 
@@ -113,7 +113,7 @@ class Habit:
 
     @property
     def careful(self) -> bool:
-        """Whether each touch is made as it should be."""
+        """Whether each touch is made correctly."""
         return not (self.stays_share or self.types_ahead or self.bias_mm or self.tires_mm)
 
 
@@ -122,11 +122,11 @@ class Hour:
     """One hour of a cell.
 
     Attributes:
-        number: Which one, from 0; what is drawn in it hangs on this.
-        deed: What is set out to do.
-        habit: Who does it, and how.
-        disturbances: What gets in the way.
-        line: What is typed where the deed is a command, without the program's name.
+        number: Its number, from 0, on which its draws depend.
+        deed: The task.
+        habit: The person, and their habits.
+        disturbances: The disturbances.
+        line: The typed line if the deed is a command, without the program's name.
     """
 
     number: int
@@ -138,11 +138,11 @@ class Hour:
 
 @dataclass(frozen=True, slots=True)
 class History:
-    """What happens to one cell.
+    """The events in one cell.
 
     Attributes:
-        seed: From which it was drawn, and from which all chance in it comes.
-        kind: What stands in the cell.
+        seed: The seed of all its draws.
+        kind: The kind of cell.
         hours: Its hours; some may be left out.
     """
 
@@ -156,12 +156,12 @@ class History:
 
     @property
     def disturbances(self) -> int:
-        """How many there are."""
+        """The number of disturbances."""
         return sum(len(hour.disturbances) for hour in self.hours)
 
 
 _KEPT: Final = 4000
-"""Events that are kept for the telling; the hash is over all."""
+"""The number of events kept for printing; the hash covers all."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,8 +170,8 @@ class RuleBroken:
 
     Attributes:
         rule: Its name.
-        hour: In which hour.
-        sentence: What was seen.
+        hour: The hour.
+        sentence: The observation.
     """
 
     rule: str
@@ -184,17 +184,17 @@ class RuleBroken:
 
 @dataclass(slots=True)
 class Story:
-    """One history as it went.
+    """The course of one history.
 
     Attributes:
-        history: What was to happen.
-        broken: Rules that did not hold, in order.
-        events: How many events there were.
-        hours: How many hours were run.
-        endings: How the deeds ended, by name, and how often.
-        met: Which disturbances were met, by kind, and how often.
-        checks: How often each rule was looked at.
-        certified: Tips that were proved, and how many of those lay where they were said to.
+        history: The planned events.
+        broken: Broken rules, in order.
+        events: The number of events.
+        hours: The number of hours run.
+        endings: How the deeds ended, by name, with counts.
+        met: The disturbances that occurred, by kind, with counts.
+        checks: How often each rule was checked.
+        certified: Tested tips, and how many of them were where they were said to be.
     """
 
     history: History
@@ -226,16 +226,16 @@ class Story:
         self._told.append((self._hour, now_ns, text))
 
     def break_rule(self, rule: str, sentence: str) -> None:
-        """Note that a rule does not hold; the same of one hour is noted once."""
+        """Note a broken rule; the same one in the same hour is noted once."""
         found = RuleBroken(rule, self._hour, sentence)
         if all((one.rule, one.hour) != (rule, self._hour) for one in self.broken):
             self.broken.append(found)
 
     def lines(self, *, hour: int | None = None) -> list[str]:
-        """Return the events that are kept, as lines.
+        """Return the kept events as lines.
 
         Args:
-            hour: Of this hour only.
+            hour: Only events of this hour.
         """
         return [
             f"{at_ns / NS_PER_S:12.6f}  {text}"
@@ -244,7 +244,7 @@ class Story:
         ]
 
     def told(self) -> str:
-        """Return it in words: what was broken, what had happened, and what crossed the wire."""
+        """Return it as text: the broken rules, the events before, and the wire traffic."""
         history = self.history
         lines = [
             f"seed {history.seed}, {history.kind}: {len(history.hours)} hours, "
@@ -263,10 +263,10 @@ class Story:
 
 
 class CountedActs:
-    """Counts requests and hands out what is due.
+    """Counts requests and returns the disturbances that are due.
 
     Attributes:
-        met: How much was handed out since the last :meth:`clear`.
+        met: The number returned since the last :meth:`clear`.
     """
 
     def __init__(self) -> None:
@@ -274,11 +274,11 @@ class CountedActs:
         self._waiting: list[tuple[Disturbance, int]] = []
 
     def plan(self, disturbance: Disturbance) -> None:
-        """Let something happen at a request that is still to come."""
+        """Plan a disturbance at a coming request."""
         self._waiting.append((disturbance, disturbance.at))
 
     def due(self, text: str) -> list[Disturbance]:
-        """Count one request and return what happens with it."""
+        """Count one request and return the disturbances due at it."""
         found, waiting = [], []
         for disturbance, left in self._waiting:
             if disturbance.match not in text:
@@ -292,7 +292,7 @@ class CountedActs:
         return found
 
     def clear(self) -> int:
-        """Plan nothing any more; return how much was met."""
+        """Drop all plans; return how many occurred."""
         met, self.met = self.met, 0
         self._waiting.clear()
         return met

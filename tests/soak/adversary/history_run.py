@@ -1,4 +1,4 @@
-"""A history run on a disk in memory, the shortest that still breaks a rule, and a test of it."""
+"""Runs a history on a disk in memory, shortens one that breaks a rule, and makes a test of it."""
 
 import gc
 import os
@@ -17,12 +17,12 @@ from tests.soak.adversary.history import Disturbance, Habit, History, Hour, Stor
 
 
 def live_through(history: History, replacements: Mapping[str, object] | None = None) -> Story:
-    """Run a history on a disk in memory, where there is one; nothing of it stays.
+    """Run a history on a disk in memory, if there is one; no files remain.
 
     Args:
-        history: What happens.
-        replacements: Put in the place of what is found under a dotted name, for as long as it
-            takes: defects that the rules have to find.
+        history: The events.
+        replacements: Objects to put in place of dotted names during the run: defects that the rules
+            have to find.
     """
     memory = Path("/dev/shm")
     folder = Path(tempfile.mkdtemp(prefix="soak-", dir=memory if memory.is_dir() else None))
@@ -42,7 +42,7 @@ def live_through(history: History, replacements: Mapping[str, object] | None = N
 
 
 def _held() -> dict[str, int]:
-    """Return how many threads and open files this process has, where that can be counted."""
+    """Return the number of threads and open files of this process, where they can be counted."""
     held = {"threads": threading.active_count()}
     with suppress(OSError):
         held["open files"] = len(os.listdir("/proc/self/fd"))
@@ -50,17 +50,17 @@ def _held() -> dict[str, int]:
 
 
 def _grown(before: Mapping[str, int]) -> Iterator[tuple[str, int, int]]:
-    """Yield what there is more of than before."""
+    """Yield the counts that have grown."""
     if all(now <= before[name] for name, now in _held().items()):
         return
-    gc.collect()  # a connection that was dropped in the middle is closed when it is collected
+    gc.collect()  # a dropped connection is closed when it is collected
     for name, now in _held().items():
         if now > before[name]:
             yield name, before[name], now
 
 
 MOST_RUNS: Final = 200
-"""After so many histories it is short enough."""
+"""The number of histories after which shortening ends."""
 
 Run = Callable[[History], Story]
 
@@ -68,13 +68,13 @@ Run = Callable[[History], Story]
 def shrink(history: History, rule: str, *, run: Run = live_through) -> History:
     """Return a shorter history that still breaks a rule.
 
-    Hours are left out first, then disturbances; each draws chance of its own, so what stays is as
-    it was. A history that does not break it is returned as it is.
+    Hours are left out first, then disturbances; each draws its own chance, so the rest stays the
+    same. A history that does not break the rule is returned unchanged.
 
     Args:
-        history: The one that was found.
+        history: The history found.
         rule: Name of the rule that it breaks.
-        run: How a history is run, with the same replacements as when it was found.
+        run: Runs a history, with the same replacements as when it was found.
     """
     left = MOST_RUNS
 
@@ -101,7 +101,7 @@ def shrink(history: History, rule: str, *, run: Run = live_through) -> History:
 
 
 def _shorter(history: History) -> Iterator[History]:
-    """Yield histories that lack something, those that lack most first."""
+    """Yield shortened histories, the shortest first."""
     earlier = [hour.number for hour in history.hours[:-1]]
     size = len(earlier)
     while size:
@@ -121,7 +121,7 @@ def _shorter(history: History) -> Iterator[History]:
 
 
 def as_test(history: History, rule: str) -> str:
-    """Return a test file, in Python, that runs a history and demands that every rule holds."""
+    """Return a Python test file that runs a history and requires every rule."""
     hours = "".join(_hour(hour) for hour in history.hours)
     return f'''"""Found by the adversary under seed {history.seed}: {rule} did not hold."""
 

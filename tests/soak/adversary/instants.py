@@ -1,4 +1,4 @@
-"""Instants at which what goes wrong tells most, and how often one of them is drawn."""
+"""The instants at which faults are most significant, and the share of draws from them."""
 
 import random
 from collections.abc import Mapping, Sequence
@@ -8,15 +8,15 @@ from typing import Final
 
 @dataclass(frozen=True, slots=True)
 class Instant:
-    """A fault, and where it comes.
+    """A fault and its place.
 
     Attributes:
-        kind: Which kind of hindrance, by its value.
-        what: Which of its kind.
+        kind: The kind of disturbance, by its value.
+        what: The fault itself.
         match: Text that the request, or the checkpoint, contains.
-        count: How many of those there are to choose from.
-        deeds: The deeds in which it tells, by value; empty for each.
-        first: How many are passed over.
+        count: The number of places to choose from.
+        deeds: The deeds for which it is significant, by value; empty for all.
+        first: The number of places to skip.
     """
 
     kind: str
@@ -28,7 +28,7 @@ class Instant:
 
 
 SHARE: Final = 0.5
-"""Share of all faults that are drawn from here."""
+"""Share of all faults that are drawn from this list."""
 
 _NOZZLE: Final = ("change the nozzle",)
 _TYPED: Final = ("type a tool offset", "type two tool offsets")
@@ -37,9 +37,9 @@ _LEFT: Final = ("begin a movement and leave",)
 
 INSTANTS: Final[Mapping[str, Sequence[Instant]]] = {
     "epson": (
-        # A login that is bent on its way, and comes back in its refusal.
+        # A login that is altered on its way, and echoed in its refusal.
         Instant("wire", "GARBLE_REQUEST", "Login"),
-        # A write that is acknowledged, and not carried out.
+        # A write that is acknowledged but not carried out.
         Instant("wire", "IGNORE_WRITE", "TLSet ", 2),
         *(Instant("wire", "IGNORE_WRITE", "TLSet ", 1, _TYPED),) * 2,
         Instant("wire", "IGNORE_WRITE", "TLSet 3, XY", 1, _TWO),
@@ -48,26 +48,28 @@ INSTANTS: Final[Mapping[str, Sequence[Instant]]] = {
         # Just before a movement leaves, and at its answer.
         *(Instant("stop", "", "lock Move ", 15, _NOZZLE),) * 5,
         Instant("stop", "", "lock Go ", 3, _NOZZLE),
-        # While the arm moves: whoever stops waits for no lock then, and is told that it rests.
+        # While the arm moves: a stop waits for no lock then, and its caller is told that it has
+        # stopped.
         *(Instant("stop", "", 'wire sent $Execute,"Move ', 15, _NOZZLE),) * 3,
         *(Instant("stop", "", 'wire sent $Execute,"Move ', 1, _LEFT),) * 3,
         # Between a request and its answer.
         *(Instant("interrupt", "", 'wire sent $Execute,"TLSet ', 1, _TYPED),) * 2,
         Instant("interrupt", "", 'wire sent $Execute,"TLSet ', 1, _NOZZLE),
         Instant("interrupt", "", 'wire sent $Execute,"Move ', 15, _NOZZLE),
-        # The journal cannot be written any more, behind a write and before it is on record.
+        # The journal can no longer be written, after a write and before it is recorded.
         *(Instant("disk", "UNWRITABLE", "commit before", 2, _TYPED, first=1),) * 2,
-        # Killed while the arm moves; whoever sees it go on stops it from another terminal.
+        # Killed while the arm moves; a person who sees it move stops it from another terminal.
         Instant("kill", "", 'wire sent $Execute,"Move ', 15, _NOZZLE),
         # The controller gives up waiting for a movement, and the arm goes on.
         Instant("machine", "GIVES_UP", "Move ", 15, _NOZZLE),
-        # Somebody at the pendant, between the look and the write, and while the proof is asked for.
+        # Somebody at the pendant, between the reading and the write, and at the turn test's
+        # question.
         Instant("hand", "type", "question", 15, _NOZZLE),
         Instant("hand", "select", "question", 15, _NOZZLE),
         Instant("hand", "select", "question", 1, ("select a tool",)),
         # The clock is set between two changes.
         Instant("clock", "", "question", 3, ("type an offset twice, and take the last one back",)),
-        # Behind the last write, before it is on record.
+        # After the last write, before it is recorded.
         Instant("stop", "", "exchange Print TLSet", 3, _TYPED),
         *(Instant("stop", "", "commit ", 8, _TYPED),) * 2,
         Instant("stop", "", "commit after", 8, _NOZZLE, first=68),
@@ -76,9 +78,9 @@ INSTANTS: Final[Mapping[str, Sequence[Instant]]] = {
         *(Instant("interrupt", "", "lock TLSet 3", 1, _TWO),) * 3,
     ),
     "softmotion": (
-        # A block that is lost: nothing acknowledges it.
+        # A lost block: nothing acknowledges it.
         Instant("wire", "DROP_REQUEST", "write_command", 12),
-        # A start of the PLC just before it is told something.
+        # A restart of the PLC just before a command.
         Instant("machine", "RESTART", "write_command", 30),
         Instant("machine", "RESTART", "WRITE_TOOL", 2),
         # Another client's block in the same cycle, under the same number.
@@ -89,7 +91,7 @@ INSTANTS: Final[Mapping[str, Sequence[Instant]]] = {
         Instant("hand", "select", "question", 15, _NOZZLE),
         Instant("hand", "select", "question", 1, ("select a tool",)),
         Instant("clock", "", "question", 3, ("type an offset twice, and take the last one back",)),
-        # Just before a movement leaves; behind the last write; between two tools.
+        # Just before a movement leaves; after the last write; between two tools.
         *(Instant("stop", "", "lock 2103", 15, _NOZZLE),) * 5,
         *(Instant("stop", "", "wire sent MOVE_LINEAR", 15, _NOZZLE),) * 2,
         *(Instant("interrupt", "", "wire sent WRITE_TOOL", 1, _TYPED),) * 2,
@@ -104,11 +106,11 @@ INSTANTS: Final[Mapping[str, Sequence[Instant]]] = {
         *(Instant("interrupt", "", "lock 5205 WRITE_TOOL 3", 1, _TWO),) * 3,
     ),
 }
-"""By kind of cell."""
+"""The instants, by kind of cell."""
 
 
 def drawn_instant(rng: random.Random, cell: str, deed: str) -> tuple[Instant, int] | None:
-    """Return an instant that tells in a deed, and which of those that match; mostly ``None``."""
+    """Return a significant instant of a deed, and its place among the matches; mostly ``None``."""
     if rng.random() >= SHARE:
         return None
     fitting = [one for one in INSTANTS.get(cell, ()) if not one.deeds or deed in one.deeds]
@@ -119,28 +121,28 @@ def drawn_instant(rng: random.Random, cell: str, deed: str) -> tuple[Instant, in
 
 
 RARE_SHARE: Final = 0.15
-"""Share of hours in which one of these comes besides."""
+"""Share of hours with an additional instant from the list below."""
 
 RARE: Final[Mapping[str, Sequence[Instant]]] = {
     "epson": (
-        # Somebody who looks for space deletes the journal.
+        # Somebody who needs disk space deletes the journal.
         Instant("disk", "lost", ""),
-        # A write that takes, and whose answer is lost.
+        # A write that is carried out, and whose answer is lost.
         Instant("wire", "DROP_REPLY", "TLSet 2, XY", 1, _TYPED),
-        # A write that is acknowledged, and not carried out.
+        # A write that is acknowledged but not carried out.
         *(Instant("wire", "IGNORE_WRITE", "TLSet ", 1, _TYPED),) * 2,
     ),
     "softmotion": (
         Instant("disk", "lost", ""),
         Instant("wire", "DROP_REPLY", "WRITE_TOOL", 1, _TYPED),
-        # A start of the PLC behind the first look at a tool, before anything is written.
+        # A restart of the PLC after the first reading of a tool, before anything is written.
         Instant("machine", "RESTART", "read_slot"),
     ),
 }
-"""What the shares of the others leave out too often; drawn by itself, so that it moves no other."""
+"""Instants that other shares miss too often; drawn by themselves, so no other draw changes."""
 
 
 def drawn_rarity(rng: random.Random, cell: str, deed: str) -> Instant | None:
-    """Return something rare that tells in a deed; mostly ``None``."""
+    """Return a rare significant instant of a deed; mostly ``None``."""
     fitting = [one for one in RARE.get(cell, ()) if not one.deeds or deed in one.deeds]
     return rng.choice(fitting) if fitting and rng.random() < RARE_SHARE else None

@@ -1,4 +1,4 @@
-"""A line of the command line in a virtual cell: run in this process, over the cell's own wire."""
+"""Runs a command line in a virtual cell: in this process, over the cell's own wire."""
 
 import contextlib
 import io
@@ -36,18 +36,18 @@ def run_line(
     folder: str,
     tell: Tell,
 ) -> None:
-    """Run a line as the program does; nobody sits at a terminal.
+    """Run a line as the program does, without a terminal.
 
     Args:
         line: The line, without the program's name.
         plant: The cell's machine; its person sees what ``--assist`` shows.
-        process: In which it runs.
-        connect: Connects to its controller over the wire that is watched.
+        process: The process to run it in.
+        connect: Connects to its controller over the watched wire.
         folder: The cell's disk.
-        tell: Told of the last lines that are printed.
+        tell: Receives the last lines printed.
 
     Raises:
-        RobolinkError, click.ClickException: How it ended.
+        RobolinkError, click.ClickException: The error that ended it.
     """
     out, shown = io.StringIO(), io.StringIO()
     with ExitStack() as stack:
@@ -55,7 +55,7 @@ def run_line(
         words = [
             word.replace(ASSIST, assist).replace(FOLDER, folder) for word in (line or ("status",))
         ]
-        stack.enter_context(contextlib.chdir(folder))  # a report is written where it is asked for
+        stack.enter_context(contextlib.chdir(folder))  # a report is written to the given path
         stack.enter_context(contextlib.redirect_stdout(out))
         stack.enter_context(contextlib.redirect_stderr(shown))
         stack.enter_context(mock.patch.object(sys, "stdin", io.StringIO()))
@@ -64,7 +64,7 @@ def run_line(
             stack.enter_context(mock.patch(name, opened))
         stack.enter_context(mock.patch.dict(os.environ, ROBOLINK_PASSWORD=plant.password))
         stack.enter_context(mock.patch(f"{_PASSWORDS}.from_keyring", return_value=None))
-        # A socket of this computer, with a thread of its own, is no part of a cell.
+        # A socket of this computer, with its own thread, is no part of a cell.
         unheard = "robolink_cli.session.connection.listening_for_stop"
         stack.enter_context(mock.patch(unheard, _listening(process)))
         stack.enter_context(mock.patch.object(TrialConnections, "_listen", _heard_by(process)))
@@ -80,7 +80,7 @@ def run_line(
 
 
 def _listening(process: VirtualProcess) -> Callable[..., AbstractContextManager[None]]:
-    """Let a stop from another terminal reach the controller that a command has opened."""
+    """Pass a stop from another terminal to the controller that a command has opened."""
 
     def listening(
         controller: Controller, *_given: object, **_terms: object
@@ -92,7 +92,7 @@ def _listening(process: VirtualProcess) -> Callable[..., AbstractContextManager[
 
 
 def _heard_by(process: VirtualProcess) -> Callable[[TrialConnections], None]:
-    """Let a stop from another terminal reach what connects for each check anew."""
+    """Pass a stop from another terminal to an opener that connects anew for each check."""
 
     def listen(trials: TrialConnections) -> None:
         process.stopper = trials
@@ -109,7 +109,7 @@ def _connecting(connect: Callable[[], Controller]) -> Callable[..., Controller]:
 
 @contextmanager
 def _seen(plant: PlantMachine) -> Iterator[str]:
-    """Let the person at the machine be asked under its address for as long as a line runs."""
+    """Offer the person at the machine under its address while a line runs."""
     simulator: Any = plant.simulator
     host: Any = {"epson": epson, "softmotion": softmotion}.get(plant.kind)
     if host is None:

@@ -1,4 +1,4 @@
-"""What people at a virtual cell do: their deeds, and how they put things right afterwards."""
+"""The people of a virtual cell: their deeds, and their recovery afterwards."""
 
 import random
 from collections.abc import Callable, Mapping
@@ -30,35 +30,35 @@ from tests.soak.adversary.command_lines import cleared, offset_of, typed_compone
 from tests.soak.adversary.history import Deed, Habit, Hour
 
 Tell = Callable[[str], None]
-"""Told what a person is shown, and does."""
+"""Receives what a person is shown and does."""
 
 TOOL: Final = 1
-"""Whose nozzle is changed; the cell's own tool."""
+"""The cell's own tool, whose nozzle is changed."""
 
 OTHERS_TOOL: Final = 4
-"""What a second person writes."""
+"""The tool that a second person writes."""
 
 AGREE: Final = "agree"
-"""What a person is asked for before a value is written."""
+"""The question before a value is written."""
 
 _NOMINAL: Final = ToolOffset(12.0, -3.5, -20.0)
-"""Of the drawing of the nozzle; typed where a command has taken the cell's own tool away."""
+"""The nozzle's drawing value, typed if a command has cleared the cell's own tool."""
 
 _LIFT_MM: Final = 8.0
 
 
 @dataclass(frozen=True, slots=True)
 class Wish:
-    """What a person means to be true at the end of a deed.
+    """A person's intended state at the end of a deed.
 
     Attributes:
         typed: Offsets that they typed, by tool.
         selects: The tool that they select, ``None`` for none.
-        measures: Whether a tip is measured, and written on their yes.
-        undoes: Whether the last change is taken back.
-        meanwhile: Offsets that they typed on the way, and took back.
+        measures: Whether a tip is measured, and written when they confirm.
+        undoes: Whether the last change is undone.
+        meanwhile: Offsets that they typed on the way, and undid.
         moves: Whether a movement is begun, and left alone.
-        free: Whether it is a command of any kind, which may keep and select what it says.
+        free: Whether it is an arbitrary command, which may write and select as it says.
     """
 
     typed: tuple[tuple[int, ToolOffset | None], ...] = ()
@@ -76,12 +76,12 @@ class Wish:
 
 
 def wish_of(hour: Hour, held: Mapping[int, ToolOffset] | None = None) -> Wish:
-    """Return what the person of an hour means to be true at its end.
+    """Return the intended state of an hour's person at its end.
 
     Args:
         hour: The hour.
-        held: What the tools hold at its beginning: of a line that names some components of an
-            offset, the others stay.
+        held: The tools' values at its beginning, from which a line that names some components keeps
+            the others.
     """
     first, second = _typed(hour.number, 0), _typed(hour.number, 1)
     match hour.deed:
@@ -125,7 +125,7 @@ def _typed(number: int, which: int) -> ToolOffset:
 
 
 def habits_in(habit: Habit) -> WorldParameters:
-    """Return the world of a person."""
+    """Return the world parameters of a person."""
     return WorldParameters(
         person_stays_share=habit.stays_share,
         person_types_ahead=habit.types_ahead,
@@ -140,13 +140,13 @@ def carry_out(
     eyes: InProcessEyes | None,
     tell: Tell,
 ) -> ChangeReport | None:
-    """Do what the person of an hour set out to do; a report where a tip was measured.
+    """Carry out the deed of an hour; return the report if a tip was measured.
 
     Args:
         controller: The controller.
         hour: The hour.
-        eyes: What the person sees with; ``None`` where nothing is measured.
-        tell: Told what is shown.
+        eyes: The person's view; ``None`` if nothing is measured.
+        tell: Receives what is shown.
 
     Raises:
         RobolinkError: It did not succeed.
@@ -181,19 +181,19 @@ def carry_out(
 def _type(
     controller: Controller, typed: tuple[tuple[int, ToolOffset | None], ...], tell: Tell
 ) -> None:
-    """Write offsets as a command does: what is there is read, shown, and agreed to be replaced."""
+    """Write offsets as a command does: read and show the old values, confirm, replace."""
     wanted = [Wanted(n, offset, controller.tools.read(n)) for n, offset in typed]
     _is_asked()
     change_tools(controller, wanted, tell=tell)
 
 
 def _is_asked() -> None:
-    """Be asked for a yes; meanwhile others at the machine do what they like."""
+    """Ask for a yes; meanwhile others may act at the machine."""
     checkpoint(Checkpoint.QUESTION, AGREE)
 
 
 def _begin_a_movement(controller: Controller) -> None:
-    """Begin to raise the tip, and see to something else, as a script may that waits on nothing."""
+    """Begin to raise the tip without waiting for the end, as a script may."""
     group = controller.groups[0]
     with controller.preserved("a lift"):
         start = group.pose()
@@ -210,12 +210,12 @@ def put_right(
     *,
     moved_by_robolink: bool = True,
 ) -> bool:
-    """Do what a person does after an accident; return whether nothing is left.
+    """Recover as a person does after an accident; return whether nothing is left.
 
     Args:
         controller: The controller.
-        habit: Whose hour it is.
-        tell: Told what is shown.
+        habit: The habit of the hour's person.
+        tell: Receives what is shown.
         moved_by_robolink: Whether robolink resets it and selects its tools.
 
     Raises:
@@ -242,7 +242,7 @@ def put_right(
 
 
 def _replace_what_is_no_tool(controller: Controller, finding: Finding, tell: Tell) -> None:
-    """Type the offset of before, as a finding says, where a tool holds the values of none."""
+    """Type the earlier offset, as a finding says, if a tool holds values of no offset."""
     if finding.verdict is not Verdict.CONFLICT:
         return
     details = finding.marker.details
@@ -257,7 +257,7 @@ def _replace_what_is_no_tool(controller: Controller, finding: Finding, tell: Tel
 
 
 class _PersonWithHabits(AssistedOperator):
-    """The simulated person, who may also say no."""
+    """The simulated person, who may also refuse."""
 
     declines = False
 

@@ -1,6 +1,6 @@
-"""What was run so far: how each seed went, with sums, and which seeds were ever run.
+"""The records of all runs: the result of each seed, the sums, and the seeds ever run.
 
-A history that broke a rule was mended until it was clean: run again, its seed shows that the mend
+A history that broke a rule was fixed until it was clean: run again, its seed shows that the fix
 holds, and nothing more. So a range that counts is drawn from the commit, far from every range on
 the list, and is put on the list before its first hour.
 """
@@ -26,24 +26,24 @@ from tests.soak.adversary.history import Story
 
 @dataclass(frozen=True, slots=True)
 class SeedResult:
-    """How one seed went.
+    """The result of one seed.
 
     Attributes:
         seed: The seed.
-        kind: What stood in the cell.
+        kind: The kind of cell.
         hours: Virtual hours.
-        events: Events, over all of which the hash is.
+        events: The number of events in the hash.
         hash: SHA-256 over them.
-        disturbances: How many were drawn.
-        met: How many came to pass.
-        checks: How often a rule was looked at.
-        certified: Tips that were proved where no habit was in the way.
-        inside: How many of those lay within what was stated.
-        broken: Rules that did not hold, in words.
-        source: Which state of the code it was; see :func:`source_digest`.
-        ended_at: When, as a label.
-        cpu_s: What it took.
-        memory_kb: What the process held at its end, kB; 0 where that cannot be told.
+        disturbances: The number drawn.
+        met: The number that occurred.
+        checks: How often a rule was checked.
+        certified: Tips that were tested without a harmful habit.
+        inside: How many of those were within the stated interval.
+        broken: Broken rules, in words.
+        source: The state of the code; see :func:`source_digest`.
+        ended_at: The time, as a label.
+        cpu_s: The CPU time.
+        memory_kb: The memory of the process at its end, kB; 0 if unknown.
     """
 
     seed: int
@@ -93,7 +93,7 @@ def _memory_kb() -> int:
 
 @cache
 def source_digest() -> str:
-    """Return what tells this state of the code from another: a hash over its sources."""
+    """Return a hash over the sources, which identifies this state of the code."""
     digest = sha256()
     roots = (*(Path(str(one.__file__)).parent for one in (robolink, robolink_simulators)), _HERE)
     for root in roots:
@@ -103,17 +103,17 @@ def source_digest() -> str:
 
 
 class ResultsFile:
-    """Keeps results, a JSON document a line.
+    """Keeps results, one JSON document a line.
 
     Args:
-        path: The file; it need not be there.
+        path: The file; it need not exist.
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
 
     def results(self) -> list[SeedResult]:
-        """Return what is in it; a line that was cut short by a kill is passed over."""
+        """Return the results in it; a line cut short by a kill is skipped."""
         if not self._path.exists():
             return []
         found = []
@@ -126,7 +126,7 @@ class ResultsFile:
         return found
 
     def done(self, hours: int) -> set[int]:
-        """Return the seeds that this state of the code has run for so many hours."""
+        """Return the seeds that this state of the code has run for this many hours."""
         return {r.seed for r in self.results() if r.hours == hours and r.source == source_digest()}
 
     def add(self, result: SeedResult) -> None:
@@ -137,7 +137,7 @@ class ResultsFile:
 
 
 def summed_up(results: Iterable[SeedResult]) -> list[str]:
-    """Return the sums over results, as lines: of each state of the code, and of all."""
+    """Return the sums over results, as lines: for each state of the code, and for all."""
     by_source: dict[str, list[SeedResult]] = {}
     for result in results:
         by_source.setdefault(result.source, []).append(result)
@@ -173,9 +173,9 @@ class ListedRange:
     """Seeds that were run.
 
     Attributes:
-        seeds: Which.
-        commit: On which state of the code, or on how many.
-        sources: A hash over its sources; empty where nobody noted it.
+        seeds: The seeds.
+        commit: The state of the code, or the number of states.
+        sources: A hash over its sources; empty if nobody noted it.
     """
 
     seeds: range
@@ -187,7 +187,7 @@ class ListedRange:
         return f"{span} {self.commit} {self.sources}".rstrip()
 
     def overlaps(self, other: range) -> bool:
-        """Whether a seed is in both."""
+        """Whether both contain a seed."""
         return self.seeds.start < other.stop and other.start < self.seeds.stop
 
 
@@ -195,7 +195,7 @@ class SeedList:
     """The committed list, a range a line: first-last, commit, hash over the sources.
 
     Args:
-        path: Where it stands; lines that begin with ``#`` are remarks.
+        path: The file; lines that begin with ``#`` are remarks.
     """
 
     def __init__(self, path: Path) -> None:
@@ -206,7 +206,7 @@ class SeedList:
         return list(self._read())
 
     def note(self, seeds: range, commit: str, sources: str) -> None:
-        """Add a range, unless one that is on the list holds it."""
+        """Add a range, unless one on the list contains it."""
         known = any(
             one.seeds.start <= seeds.start and seeds.stop <= one.seeds.stop for one in self._read()
         )
@@ -215,7 +215,7 @@ class SeedList:
                 file.write(f"{ListedRange(seeds, commit, sources)}\n")
 
     def drawn(self, commit: str, count: int) -> range:
-        """Return so many seeds that are drawn from a commit and were never run.
+        """Return this many seeds, drawn from a commit and never run before.
 
         The same list and commit give the same range.
 
@@ -233,7 +233,7 @@ class SeedList:
             attempt += 1
 
     def of_sources(self, sources: str) -> range | None:
-        """Return the fresh range that these sources were last given, ``None`` for none."""
+        """Return the fresh range last given to these sources, ``None`` for none."""
         fresh = (one.seeds for one in reversed(self.ranges()) if one.sources == sources)
         return next((seeds for seeds in fresh if seeds.start >= LOWEST), None)
 
@@ -248,7 +248,7 @@ class SeedList:
 
 
 def committed(folder: Path) -> str:
-    """Return the commit that the sources in a folder are, as a full hash.
+    """Return the full hash of the commit that matches the sources in a folder.
 
     Raises:
         ConfigError: There is none, or a source differs from it.

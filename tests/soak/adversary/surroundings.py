@@ -1,4 +1,4 @@
-"""What a seed decides of the surroundings: time, chance, locks, and whose turn it is."""
+"""The surroundings that a seed decides: time, chance, locks, and the running thread."""
 
 import random
 import threading
@@ -14,21 +14,21 @@ from robolink.runtime import SystemRuntime, WaitingLock, WaitingRoom
 from robolink.timing import NS_PER_S
 
 _REAL_PATIENCE_S: Final = 300.0
-"""Nothing here waits in real time; a thread that never passes its turn on is a defect."""
+"""Nothing here waits in real time; a thread that never gives up its turn is a defect."""
 
 _LONGEST_FAVOUR: Final = 100_000
 
 _CHANGES_SHARE: Final = 0.75
-"""How often the favour changes once, of the times in which the new thread has it."""
+"""Share of the runs with a favoured new thread in which the favour changes once."""
 
 _CHANGES: Final = (2, 3, 3, 3, 8, 11)
-"""At the end of which exchange it changes: an EPSON stop has three, one of a PLC eleven."""
+"""The exchange at whose end it changes: an EPSON stop has three, one of a PLC eleven."""
 
 _CATCHING_UP: Final = 12
-"""For how many points at most whoever stood still until then is favoured."""
+"""The most points for which the thread that waited until then is favoured."""
 
 _SHORT_FAVOUR: Final = 40
-"""For how many points at most whoever began a thread is favoured."""
+"""The most points for which the thread that started another one is favoured."""
 
 
 class Killed(BaseException):
@@ -40,7 +40,7 @@ class DeadlockError(RuntimeError):
 
 
 class Mortal(Protocol):
-    """What a thread belongs to."""
+    """The owner of a thread."""
 
     @property
     def alive(self) -> bool:
@@ -51,13 +51,13 @@ class SteppedThread:
     """One thread of a history.
 
     Args:
-        name: Of the thread, in the event log.
+        name: The thread's name in the event log.
         owner: The process it belongs to; ``None`` for the outer one.
 
     Attributes:
-        error: What ended it, ``None`` for nothing.
+        error: The error that ended it, ``None`` for none.
         over: Whether it has ended.
-        suspended: Whether its whole process stands still.
+        suspended: Whether its whole process is suspended.
     """
 
     def __init__(self, name: str, owner: Mortal | None) -> None:
@@ -71,7 +71,7 @@ class SteppedThread:
         self.turn = threading.Semaphore(0)
 
     def can_go_on(self, now_ns: int) -> bool:
-        """Return whether what it waits for is there, its time has come, or its process is dead."""
+        """Return whether its condition holds, its time has come, or its process is dead."""
         if self.over or self.suspended:
             return False
         if self.ready is None or self.ready() or (self.owner is not None and not self.owner.alive):
@@ -80,12 +80,12 @@ class SteppedThread:
 
 
 class TurnTaking:
-    """Decides whose turn it is.
+    """Decides which thread runs.
 
     Args:
         clock: The virtual time.
-        rng: Draws who goes on.
-        note: Told when the turn passes to another thread, with its name.
+        rng: Draws the next thread.
+        note: Receives the name of the next thread when the turn changes.
     """
 
     def __init__(
@@ -107,7 +107,7 @@ class TurnTaking:
 
     @property
     def current(self) -> SteppedThread:
-        """The thread that runs."""
+        """The running thread."""
         return self._by_ident[threading.get_ident()]
 
     @property
@@ -121,16 +121,16 @@ class TurnTaking:
         """Begin another thread; it runs when its turn comes.
 
         Args:
-            name: Of the thread, in the event log.
+            name: The thread's name in the event log.
             owner: The process it belongs to.
-            work: What it does.
-            favoured: Whether it may be favoured, as below; not one that does something regularly.
+            work: Its work.
+            favoured: Whether it may be favoured, as below; not for periodic work.
 
-        Mostly it is favoured, or whoever began it: then the other one stands still at one point
-        for as long as that can go on, which a fair draw at each point never shows. At times the
-        favour changes once, at the end of one of the first exchanges: who stood still goes on
-        while the other one is nearly done (a priority change point, as in Burckhardt et al., "A
-        randomized scheduler with probabilistic guarantees of finding bugs", ASPLOS 2010).
+        Mostly either it or the thread that started it is favoured: then the other one waits at one
+        point as long as possible, which a fair draw at each point never shows. At times the favour
+        changes once, at the end of one of the first exchanges: the waiting thread goes on while the
+        other one is nearly done (a priority change point, as in Burckhardt et al., "A randomized
+        scheduler with probabilistic guarantees of finding bugs", ASPLOS 2010).
         """
         thread = SteppedThread(name, owner)
 
@@ -162,7 +162,7 @@ class TurnTaking:
         self._exchanges_left = self.rng.choice(_CHANGES)
 
     def pass_on(self, *, exchanged: bool = False) -> None:
-        """Let the seed say who goes on: this thread, or another one.
+        """Let the seed choose the next thread: this one, or another.
 
         Args:
             exchanged: Whether the thread has ended an exchange, and holds no lock of one.
@@ -186,7 +186,8 @@ class TurnTaking:
         me = self.current
         me.ready = ready
         if timeout_s is not None:
-            # Less than a nanosecond is one: who waits for it over and over would wait for ever.
+            # Less than a nanosecond counts as one: a thread that repeats such waits would wait for
+            # ever.
             me.until_ns = self._clock.now_ns() + ceil(timeout_s * NS_PER_S)
         try:
             while not me.can_go_on(self._clock.now_ns()):
@@ -199,7 +200,7 @@ class TurnTaking:
 
     @contextmanager
     def suspended(self, owner: Mortal) -> Iterator[None]:
-        """Let every other thread of a process stand still within the block, as this one does."""
+        """Suspend every other thread of a process during the block."""
         others = [one for one in self._threads if one.owner is owner and one is not self.current]
         for thread in others:
             thread.suspended = True
@@ -210,7 +211,7 @@ class TurnTaking:
                 thread.suspended = False
 
     def join(self) -> None:
-        """Let every other thread run to its end."""
+        """Run every other thread to its end."""
         me = self.current
         self.wait_until(lambda: all(other.over for other in self._threads if other is not me))
         self._threads, self._favoured, self._then = [me], None, None
@@ -244,17 +245,17 @@ class TurnTaking:
 
     def _end(self, thread: SteppedThread) -> None:
         thread.over = True
-        # Whoever waits for the last thread is the main one; somebody always can go on.
+        # The main thread waits for the last one; some thread can always go on.
         following = self._drawn()
         self._note(following.name)
         following.turn.release()
 
 
 class SteppedLock:
-    """A lock at which the turn passes on.
+    """A lock at which another thread may get the turn.
 
     Args:
-        turns: Decides who goes on.
+        turns: Decides which thread runs.
         reentrant: Whether its holder may take it again.
     """
 
@@ -298,7 +299,7 @@ class SteppedLock:
 
 
 class SteppedRoom:
-    """A condition variable in which waiting takes virtual time only."""
+    """A condition variable whose waits take virtual time only."""
 
     def __init__(self, turns: TurnTaking) -> None:
         self._turns = turns
@@ -342,23 +343,23 @@ class SteppedRoom:
 
 
 _FIRST_DAY_S: Final = 1_767_603_600.0
-"""2026-01-05 09:00 UTC, a Monday: when every history begins."""
+"""2026-01-05 09:00 UTC, a Monday: the beginning of every history."""
 
 
 class SeededSurroundings(SystemRuntime):
-    """What a cell's computers draw and see, in place of the real world.
+    """The surroundings of a cell's computers, in place of the real world.
 
-    Time passes where it is stepped, and for everybody.
+    Time passes when it is stepped, for all of them.
 
     Args:
         clock: The virtual time.
-        turns: Decides who goes on at a lock.
-        rng: From which everything is drawn.
+        turns: Decides which thread runs at a lock.
+        rng: The source of all draws.
 
     Attributes:
-        wall_jump_s: By how much the computer's wall clock is wrong.
-        booted_ns: When the computer was switched on, in virtual time.
-        rng: From which everything is drawn; replaced for each hour, whose draws are its own.
+        wall_jump_s: The error of the computer's wall clock.
+        booted_ns: The time at which the computer was switched on, in virtual time.
+        rng: The source of all draws; replaced for each hour, which has its own draws.
     """
 
     steps_time = True
@@ -371,11 +372,11 @@ class SeededSurroundings(SystemRuntime):
         self._turns = turns
 
     def random_bytes(self, count: int) -> bytes:
-        """Return bytes that the seed decides."""
+        """Return bytes drawn from the seed."""
         return self.rng.randbytes(count)
 
     def wall_s(self) -> float:
-        """Return the virtual time of day, wrong by as much as the clock was set wrong."""
+        """Return the virtual time of day, with the error of the clock."""
         return _FIRST_DAY_S + self._clock.now_ns() / NS_PER_S + self.wall_jump_s
 
     def monotonic_ns(self) -> int:
@@ -387,20 +388,20 @@ class SeededSurroundings(SystemRuntime):
         return self._clock.now_ns() - self.booted_ns
 
     def sleep(self, seconds: float) -> None:
-        """Let others run, then let the time pass."""
+        """Let others run, then advance the time."""
         self._turns.pass_on()
         self._clock.sleep(seconds)
 
     def lock(self) -> WaitingLock:
-        """Return a lock at which the turn passes on."""
+        """Return a lock at which another thread may get the turn."""
         return SteppedLock(self._turns, reentrant=False)
 
     def reentrant_lock(self) -> WaitingLock:
-        """Return one that its holder may take again."""
+        """Return a reentrant lock of that kind."""
         return SteppedLock(self._turns, reentrant=True)
 
     def regularly(self, every_s: float, act: Callable[[], None], name: str) -> Callable[[], None]:
-        """Have ``act`` called by a thread of the same process, in virtual time."""
+        """Call ``act`` periodically in a thread of the same process, in virtual time."""
         room, ending = SteppedRoom(self._turns), [False]
 
         def run() -> None:

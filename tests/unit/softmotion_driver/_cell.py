@@ -1,4 +1,4 @@
-"""A link to a PLC mailbox that can be made to fail, and a record beside it."""
+"""A link to a PLC mailbox that can fail on demand, and a record beside it."""
 
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -28,7 +28,7 @@ class PlcLink:
     Attributes:
         reachable: Whether another link can be opened when this one has ended.
         recovers: Whether it can be used after a lost answer, like a serial line.
-        sent: Every command block that was written, as it was written.
+        sent: Every command block, as written.
         beats: Every heartbeat word that was written alone.
         response: Changes every response block that is read.
         command: Changes every command block on its way.
@@ -51,13 +51,13 @@ class PlcLink:
         self._mishaps: dict[str, list[Mishap]] = {}
 
     def plan(self, method: str, mishap: Mishap, *, nth: int = 1) -> None:
-        """Let something happen at the nth call of a method from now on, once."""
+        """Plan an event at the nth call of a method from now on, once."""
         planned = self._mishaps.setdefault(method, [])
         planned.extend([_no_mishap] * (nth - 1))
         planned.append(mishap)
 
     def lose_answer(self, method: str, *, nth: int = 1) -> None:
-        """Let the nth request arrive, and its answer get lost."""
+        """Let the nth request arrive, and lose its answer."""
 
         def mishap(deliver: Callable[[], T]) -> T:
             deliver()
@@ -66,7 +66,7 @@ class PlcLink:
         self.plan(method, mishap, nth=nth)
 
     def lose_request(self, method: str, *, nth: int = 1) -> None:
-        """Let the nth request get lost."""
+        """Lose the nth request."""
 
         def mishap(_deliver: Callable[[], T]) -> T:
             raise self.silence()
@@ -74,7 +74,7 @@ class PlcLink:
         self.plan(method, mishap, nth=nth)
 
     def before(self, method: str, act: Callable[[], object], *, nth: int = 1) -> None:
-        """Do something just before the nth request arrives."""
+        """Run something just before the nth request arrives."""
 
         def mishap(deliver: Callable[[], T]) -> T:
             act()
@@ -83,11 +83,11 @@ class PlcLink:
         self.plan(method, mishap, nth=nth)
 
     def lay_high_first(self) -> None:
-        """Let the PLC lay values of several words high word first from now on."""
+        """Let the PLC store the high word of multi-word values first from now on."""
         self._order = WordOrder.HIGH_FIRST
 
     def silence(self) -> RobolinkError:
-        """Return the error of a time-out, after which most links are closed."""
+        """Return the error of a time-out, which closes most links."""
         self.closed = not self.recovers
         return TransportTimeoutError("no answer", remedy="look")
 
@@ -171,16 +171,16 @@ class Cell:
         return self.met()
 
     def met(self) -> SoftMotionController:
-        """Meet the mailbox over the present link."""
+        """Open a session over the present link."""
         controller = open_softmotion(self.link, outcomes=self.outcomes, timeout_s=0.5)
-        # Without a word to the PLC: whatever the test planned for it is over.
+        # Without a command to the PLC: the events that the test planned are over.
         self._open.callback(controller._mailbox.wire.close)
         return controller
 
     def close(self) -> None:
-        """Close what was opened here."""
+        """Close everything opened here."""
         self._open.close()
 
     def open_requests(self) -> list[str]:
-        """Return what is unsettled."""
+        """Return the requests of open markers."""
         return [marker.request for marker in self.outcomes.open_markers()]

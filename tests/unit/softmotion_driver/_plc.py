@@ -1,7 +1,7 @@
 """A PLC mailbox in its documented DEVICE role.
 
-It plays docs/reference/mailbox.md with the codec and nothing else: no kinematics, no path. A
-movement takes half a second and arrives where it was sent.
+It follows docs/reference/mailbox.md with the codec and nothing else: no kinematics, no path. A
+movement takes half a second and ends at its target.
 """
 
 from collections.abc import Callable, Sequence
@@ -48,16 +48,16 @@ class Plc:
     """The mailbox program.
 
     Attributes:
-        now: What it shows, but for time, ends and tools.
+        now: The shown state, except time, ends and tools.
         slots: The tool slots.
         answers: Whether it acknowledges commands at all.
-        frozen: Whether its heartbeat stands still.
-        takes_tools: Whether the axis group really takes over a tool that is written.
-        refusals: Opcodes that are refused, and how.
-        refuses: Refuses single commands: it returns how, 0 for none.
-        overhears: Which commands it never takes note of.
-        device: Its device block, which says which PLC it is.
-        edge: Where the input switches on a movement that waits for it.
+        frozen: Whether its heartbeat has stopped.
+        takes_tools: Whether the axis group really uses a written tool.
+        refusals: Opcodes that are refused, with their error.
+        refuses: Refuses single commands: returns the error, 0 for none.
+        overhears: The commands that it never notices.
+        device: Its device block, which identifies the PLC.
+        edge: The place where the input switches during a movement that waits for it.
         executed: Every command that it accepted, in order.
     """
 
@@ -97,11 +97,11 @@ class Plc:
         self._rejected: set[tuple[int, int]] = set()
 
     def opcodes(self) -> list[Opcode]:
-        """Return what was executed."""
+        """Return the opcodes of the executed commands."""
         return [Opcode(command.opcode) for command in self.executed]
 
     def restart(self) -> None:
-        """Switch the PLC off and on: the owner is gone, the epoch and the slots are not."""
+        """Switch the PLC off and on: the owner is gone, the epoch and the slots remain."""
         self.owner, self.set_tool, self._last = 0, IDENTITY, None
         self._queue.clear()
         self.now = Response(
@@ -147,14 +147,14 @@ class Plc:
         )
 
     def take_beat(self, word: int) -> None:
-        """Take the client's heartbeat; one that comes too late wakes nothing up."""
+        """Take the client's heartbeat; a late one restarts nothing."""
         self.advance()
         if beats_for(word, self.epoch) and word != self._beat[0]:
             self._beat = (word, self.clock.now_ns())
             self._sign_ns = self.clock.now_ns()
 
     def advance(self) -> None:
-        """Let movements end, by arriving or because nobody beats."""
+        """End movements, by arrival or for lack of heartbeats."""
         now_ns = self.clock.now_ns()
         silent_at = self._beat[1] + WATCHDOG_NS
         while self._queue:
@@ -171,7 +171,7 @@ class Plc:
         self._show()
 
     def end_all(self, error: int = ErrorClass.NONE) -> None:
-        """End every movement before it arrived."""
+        """End every movement before its arrival."""
         for sequence, _end_ns, _command in self._queue:
             self._finish(Finished(sequence, CommandState.ABORTED, error))
         self._queue.clear()

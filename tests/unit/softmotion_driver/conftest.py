@@ -1,4 +1,4 @@
-"""The driver of a PLC mailbox, met over a scripted link: the set-up that its tests share."""
+"""Fixtures for the driver of a PLC mailbox over a scripted link."""
 
 from collections.abc import Iterator
 
@@ -12,7 +12,7 @@ from tests.unit.softmotion_driver._plc import Plc
 
 @pytest.fixture
 def cell() -> Iterator[Cell]:
-    """A PLC, the link to it and the record of what is open; closed at the end."""
+    """A PLC, the link to it and the record of open markers; closed at the end."""
     cell = Cell()
     yield cell
     cell.close()
@@ -26,7 +26,7 @@ def plc(cell: Cell) -> Plc:
 
 @pytest.fixture
 def controller(cell: Cell) -> SoftMotionController:
-    """The controller, owned by the driver, with nothing on record of how that came about."""
+    """The controller, owned by the driver, with an empty record."""
     controller = cell.met()
     controller.take()
     cell.plc.executed.clear()

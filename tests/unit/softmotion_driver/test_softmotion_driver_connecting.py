@@ -1,4 +1,4 @@
-"""Meeting a PLC mailbox, and a PLC behind the interfaces of procedures and tool changes."""
+"""Connecting to a PLC mailbox, and a PLC behind the interfaces of procedures and tool changes."""
 
 import re
 from dataclasses import replace
@@ -22,7 +22,8 @@ from robolink.protocols.mailbox import Bits, Capability, ErrorClass, GroupState,
 from robolink.runner import Question, Runner, RunSettings
 from robolink.transaction import ToolChange, Wanted, change_tools, look, recover
 
-# Meeting a PLC mailbox: version, probe, heartbeat, whole snapshots (docs/reference/mailbox.md).
+# Connecting to a PLC mailbox: version, probe, heartbeat, whole snapshots
+# (docs/reference/mailbox.md).
 
 
 def resealed(words):
@@ -164,7 +165,7 @@ def test_a_plc_that_started_anew_ends_the_session(cell):
 
 
 def cut_by(cell, *, restarted):
-    """Let the link be cut, as TCP is by a start of the PLC, or for another reason."""
+    """Cut the link, by a restart of the PLC as over TCP, or for another reason."""
 
     def mishap(_deliver):
         if restarted:
@@ -263,14 +264,14 @@ class Nobody:
     """An operator who is never asked."""
 
     def tell(self, text: str) -> None:
-        """Hear nothing."""
+        """Ignore a message."""
 
     def ask(self, question: str, kind: Question) -> None:
-        """Be asked nothing."""
+        """Ignore a question."""
         raise AssertionError(question)
 
     def poll(self, wait_s: float) -> str | None:
-        """Say nothing."""
+        """Answer nothing."""
         return None
 
 
@@ -318,7 +319,7 @@ def test_a_change_cut_off_in_the_middle_is_recovered(cell, controller):
 
 
 def held_up(cell, controller):
-    """Let a write of tool 3 be given up; what is returned lets it arrive."""
+    """Let a write of tool 3 be given up; return a function that lets it arrive."""
     held = []
 
     def mishap(deliver):
@@ -357,7 +358,7 @@ def test_nothing_is_settled_while_another_client_has_the_mailbox(cell, controlle
         recover(later)
     assert 10 < (clock.now_ns() - began_ns) / 1e9 < 15
     assert len(cell.open_requests()) == 1
-    assert len(cell.link.sent) == 2  # it asks twice, and does not stand in that client's way
+    assert len(cell.link.sent) == 2  # it asks twice, and does not get in that client's way
 
 
 def test_a_recovery_waits_for_what_the_plc_is_at_work_on(cell, controller, monkeypatch):

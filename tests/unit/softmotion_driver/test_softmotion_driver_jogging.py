@@ -1,4 +1,4 @@
-"""How a jog ends at a PLC that does not take its end, or that ended it before."""
+"""The end of a jog on a PLC that does not accept the end, or has ended the jog before."""
 
 from dataclasses import replace
 
@@ -55,7 +55,7 @@ def test_a_jog_whose_end_is_not_acknowledged_is_halted(cell, plc, controller):
         jog(controller)
     assert plc.opcodes() == [Opcode.JOG, Opcode.HALT]
     assert moves_nothing(plc)
-    # The session goes on, and what became of the jog was seen.
+    # The session goes on, and the end of the jog was read.
     assert not controller.status().running
     assert cell.open_requests() == []
 
@@ -81,11 +81,11 @@ def test_a_jog_that_nothing_ends_is_unknown_and_no_beat_follows(cell, plc, contr
     with pytest.raises(TransportClosedError):
         controller.status()
     plc.advance()
-    assert moves_nothing(plc)  # its own watch has ended it
+    assert moves_nothing(plc)  # its own watchdog has ended it
 
 
 def ended_by_plc(plc, state, error, *, seen="head"):
-    """Let the PLC end the jog by itself, shown in the head or among the last ends only."""
+    """Let the PLC end the jog by itself, shown in the head or only among the last ends."""
 
     def end():
         (command,) = plc.executed
@@ -150,7 +150,7 @@ OTHERS = 0x0BAD_CAFE
 
 
 def seized(plc, *, moves_on=True, tells=True):
-    """Let another client take the mailbox; what moves from then on is his."""
+    """Let another client take the mailbox; later movements are that client's."""
 
     def seize():
         (command,) = plc.executed

@@ -1,4 +1,4 @@
-"""Movements of an axis group: marked, sent once, kept alive by whoever waits.
+"""Movements of an axis group: marked, sent once, kept alive while they are waited for.
 
 Source: docs/reference/mailbox.md, "Movements".
 """
@@ -218,7 +218,7 @@ def test_a_stop_from_another_thread_ends_the_wait(cell, plc, controller, group):
 
 
 def test_a_stop_that_another_one_ended_is_told_when_the_axes_stand(cell, plc, controller):
-    """Its block is done while the group still brakes for the other one."""
+    """Its block is done while the group still brakes for the other stop."""
     begun_ns, rests_ns = plc.clock.now_ns(), 400_000_000
 
     def braking(words):
@@ -272,7 +272,7 @@ def test_a_movement_without_an_answer_is_unknown_and_blocks_the_next(cell, plc, 
     later = cell.connect()
     with pytest.raises(OutcomeUnknownError, match="did not finish"):
         move(later.groups[0])
-    plc.clock.sleep(1.0)  # what may be under way is not looked into before it stands
+    plc.clock.sleep(1.0)  # a possible movement is not examined before the group has stopped
     (marker,) = cell.outcomes.open_markers()
     finding = later.resolver.examine(marker)
     assert finding.verdict is Verdict.LOOK

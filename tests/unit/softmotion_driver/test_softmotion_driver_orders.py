@@ -215,7 +215,7 @@ def test_an_end_is_noticed_soon_and_a_long_wait_costs_few_questions(
 
 @pytest.mark.parametrize("wait_s", [0.05, 0.12, 0.21, 0.3])
 def test_a_wait_without_news_ends_when_it_is_over(plc, controller, wait_s):
-    # A jog is released then, however long the pause between two looks.
+    # A jog is released then, however long the pause between two readings.
     snapshots = controller._mailbox.snapshots
     now, begun_ns = snapshots.take(), plc.clock.now_ns()
     snapshots.news(now, wait_s=wait_s)
@@ -270,7 +270,7 @@ def test_a_stop_that_is_refused_because_one_holds_already_is_a_stop(plc, control
 
 
 def test_a_group_whose_axes_go_on_after_its_stop_was_not_stopped(cell, plc, controller):
-    """The PLC says that a stop holds already, and five seconds later the axes still turn."""
+    """The PLC reports that a stop is active, and five seconds later the axes still turn."""
     plc.refusals[Opcode.STOP] = ErrorClass.STOPPING
     read, turned_deg = cell.link.read_response, count()
 

@@ -380,7 +380,7 @@ def test_a_slot_in_the_middle_of_a_change_is_read_again(cell, plc, controller):
 
 
 NO_TOOL = (-1.5e-27, 1.6e-314, 1.6e-314, 0.0, 0.0, 0.0)
-"""5.012, -1 and -10 whose words somebody has swapped."""
+"""5.012, -1 and -10 with swapped words."""
 
 
 def test_a_slot_with_the_values_of_no_tool_is_named_and_never_worked_with(plc, controller):
@@ -423,7 +423,7 @@ def test_a_write_that_left_the_values_of_no_tool_is_settled_with_a_way_out(cell,
 
 
 STILL_A_TOOL = ToolOffset(3.080040797, -1.730152027, -9.87097183, -9.8303)
-"""Read high word first, no number of it is one that no tool can have (1e-79, say)."""
+"""Read high word first, none of its numbers is impossible for a tool (1e-79, say)."""
 
 
 @pytest.mark.fault("F33")

@@ -1,4 +1,4 @@
-"""Programs that run in a simulated controller whose time a test steps."""
+"""Programs in a simulated controller whose time the test steps."""
 
 from pathlib import Path
 
@@ -21,7 +21,7 @@ class Cell:
         self.runner: ProgramRunner
 
     def load(self, text, *, files=None, points=(), ports=None):
-        """Load a main.prg and what lies beside it."""
+        """Load a main.prg and the files beside it."""
         for name, content in (files or {}).items():
             data = content if isinstance(content, bytes) else content.encode()
             (self.folder / name).write_bytes(data)
@@ -33,7 +33,7 @@ class Cell:
         return self
 
     def run(self, function="main", *, most_s=1000.0):
-        """Start a function and let time pass until all tasks are over; return what was printed."""
+        """Start a function and let time pass until all tasks have ended; return the output."""
         before = len(self.runner.console)
         self.runner.start(function, self.simulator.now_ns)
         end_ns = self.simulator.now_ns + round(most_s * NS)
@@ -52,7 +52,7 @@ class Cell:
 
 @pytest.fixture
 def cell(tmp_path):
-    """Return a maker of cells; options are those of the controller."""
+    """Makes cells; options are those of the controller."""
 
     cells = []
 
@@ -72,7 +72,7 @@ def cell(tmp_path):
 
 @pytest.fixture
 def printed(cell):
-    """Return what a function main of some lines prints."""
+    """Returns the output of a function main with the given lines."""
 
     def run(*lines, **options):
         made = cell("\n".join(["Function main", *lines, "Fend"]), **options)
@@ -85,7 +85,7 @@ def printed(cell):
 
 @pytest.fixture
 def failure(cell):
-    """Return how a function main of some lines fails."""
+    """Returns the error of a function main with the given lines."""
 
     def run(*lines, **options):
         made = cell("\n".join(["Function main", *lines, "Fend"]), **options)
@@ -98,7 +98,7 @@ def failure(cell):
 
 @pytest.fixture
 def faults(cell):
-    """Return what is wrong with a program's text."""
+    """Return the faults in a program's text."""
 
     def look(text, **options):
         try:

@@ -1,4 +1,4 @@
-"""What programs read and write: files, serial lines, the operator's window."""
+"""Input and output of programs: files, serial lines, the operator's window."""
 
 import os
 import tty
@@ -8,7 +8,7 @@ import pytest
 from robolink_simulators.epson.spel.file_commands import read_points
 from robolink_simulators.epson.spel.file_folder import FileFolder
 
-# Files of a program, in a folder that nothing leads out of (docs/reference/spel.md 18).
+# Files of a program, in a folder that it cannot leave (docs/reference/spel.md 18).
 
 
 @pytest.fixture
@@ -21,7 +21,7 @@ def folder(tmp_path):
 
 @pytest.fixture
 def run(cell, folder):
-    """Return what a main with a String a$ and an Integer n prints, its files lying in a folder."""
+    """Returns the output of a main with a String a$ and an Integer n; its files are in a folder."""
 
     def ran(*lines, **options):
         text = ["Function main", "String a$", "Integer n", "Byte z(3)", *lines, "Fend"]
@@ -179,12 +179,12 @@ def test_a_folder_of_its_own_is_gone_at_the_end():
     assert not root.exists()
 
 
-# SetCom, OpenCom, ChkCom: a program talks over a serial line that was named for it.
+# SetCom, OpenCom, ChkCom: a program uses a serial line assigned to it.
 
 
 @contextmanager
 def line():
-    """A pseudo terminal: its far end, and the name of its near one."""
+    """A pseudo terminal: its far end, and the name of its near end."""
     far, near = os.openpty()
     tty.setraw(near)
     os.set_blocking(far, False)

@@ -55,7 +55,7 @@ def test_select_takes_texts_conditions_and_comparisons(printed):
 
 
 def test_a_statement_may_follow_a_case_without_a_semicolon(printed):
-    """A public program has four such lines, ``Case 1 MemOn 3; Wait MemSw(3)`` alike."""
+    """A public program has four such lines, such as ``Case 1 MemOn 3; Wait MemSw(3)``."""
     lines = ("Select 1", "Case 1 MemOn 3; Print MemSw(3)", "Case 2 MemOff 3", "Send")
     signed = ("Select 0", 'Case < 1 Print "under"', "Send")
     assert printed(*lines, *signed) == ["1", "under"]
@@ -110,7 +110,7 @@ def test_arrays_and_their_elements_are_given_by_reference(cell):
 
 
 def test_a_function_is_called_in_every_way_that_programs_write(cell):
-    """P. 184; bare names and own results that are read stand in public programs."""
+    """P. 184; public programs have bare names, and read their own results."""
     shown = cell(
         "Function main\nCall say(1)\nsay(2)\nsay 3\nPrint twice(twice(3)) + seven\n"
         "If twice(2) = 4 Then Print fact(5)\nFend\n"
@@ -201,7 +201,7 @@ def test_subroutines_return_to_where_they_were_called(printed, failure):
 
 
 def test_directives_choose_and_replace(cell):
-    """P. 58 to 63; a macro with a semicolon stands in EPSON's library (check 19 of programs)."""
+    """P. 58 to 63; EPSON's library has a macro with a semicolon (check 19 of programs)."""
     made = cell(
         '#include "d.inc"\n#ifdef LOUD\n#define WORD "loud"\n#else\n#define WORD "quiet"\n#endif\n'
         "Function main\nInteger f\nPrint WORD ' WORD\nIf 0 Then SET(f, 3)\nPrint f\n"
@@ -276,7 +276,7 @@ def test_options_of_the_controller_build_and_are_refused_when_they_are_come_to(f
 
 
 def test_one_project_is_read_in_one_code_page(cell):
-    """GBK bytes that are also code page 932: in both files the same label, or it is not found."""
+    """GBK bytes that are also code page 932: the label is the same in both files, or not found."""
     label = "\u5de5\u4f4d"
     told = "\u8bf7\u68c0\u67e5".encode("gbk")
     label.encode("gbk").decode("cp932")

@@ -125,7 +125,7 @@ def test_a_named_point_takes_modifiers_and_starts_motions(cell):
 
 
 def test_an_output_switches_half_way(printed):
-    """P. 55 to 57; ambiguity 3: what stands between ! and ! belongs to the motion."""
+    """P. 55 to 57; ambiguity 3: the text between ! and ! belongs to the motion."""
     lines = (
         "Real way",
         "Xqt follow",
@@ -151,7 +151,7 @@ def test_what_outlasts_a_motion_holds_the_next_statement(printed):
 
 
 def test_d0_of_a_jump_comes_after_its_rise(printed):
-    """P. 57: the part of the way leaves out what is vertical."""
+    """P. 57: the fraction of the path does not count the vertical part."""
     lines = ("Go Here +Z(-50)", "P1 = Here -X(60)", "Print Int(Agl(3) + .5) < -49")
     rest = ("Jump P1 !D0; Print Int(Agl(3) + .5)!", "Print Int(Agl(3) + .5) < -49")
     assert printed(*lines, *rest) == ["-1", "0", "-1"]
@@ -238,7 +238,7 @@ def test_virtual_inputs_are_set_where_they_are_virtual(printed, failure):
     assert failure("SetSw 3, 1").number == 2350
 
 
-# Labels of points, errors and message boxes, as projects by others use them.
+# Labels of points, errors and message boxes, as in other people's projects.
 
 POINTS = """ENVT0100
 sVersion="2.0.0"
@@ -333,7 +333,7 @@ def test_what_is_divided_by_a_flag_or_a_number_stays_a_quotient(printed):
 
 @pytest.mark.parametrize("point", ["origin", "P7", "P(7)"])
 def test_the_local_of_a_point_may_be_computed(printed, point):
-    """A public program turns a table and names the local of each nest by a variable."""
+    """A public program turns a table and computes the local of each nest from a variable."""
     lines = ("Integer n", "n = 1", f"P9 = {point} /(n + 1)", "Print P9")
     assert printed(*lines, **PROJECT) == printed(f"P9 = {point} /2", "Print P9", **PROJECT)
 
@@ -380,7 +380,7 @@ def test_errors_of_a_project_have_labels_and_texts(printed, faults):
     lines = ("OnErr GoTo failed", "Error HopperEmpty", "failed:", "Print Err, ErrMsg$(Err)")
     files = {"files": {"UserErrors.dat": ERRORS}}
     assert printed(*lines, **files) == ["8003The hopper is empty"]
-    # Only 8000 to 8999 are a project's.
+    # Only 8000 to 8999 belong to a project.
     text = "Function main\n  Error OutOfRange\nFend\n"
     known = {"files": {"UserErrors.dat": ERRORS, "robot1.pts": POINTS}, "points": ("robot1.pts",)}
     assert "outofrange" in faults(text, **known)[0]

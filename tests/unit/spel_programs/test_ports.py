@@ -8,7 +8,7 @@ from robolink_simulators.epson.spel.tasks.runner import run_to_end
 
 
 def drive(cell, most_s=20.0):
-    """Run main with a partner on a socket; return what was printed."""
+    """Run main with a partner on a socket; return the output."""
     cell.runner.start("main", 0)
     ended = run_to_end(
         cell.runner, cell.simulator.advance, cell.simulator.next_change, most_s=most_s
@@ -19,7 +19,7 @@ def drive(cell, most_s=20.0):
 
 @pytest.fixture
 def partner():
-    """Return a maker of servers: each talks to one client as a function says."""
+    """Makes servers that serve one client each by a function."""
     threads, listeners = [], []
 
     def serve(talk):
@@ -46,7 +46,7 @@ def partner():
 
 
 def client(port, *lines):
-    """Return a main that connects first."""
+    """Returns a main that connects first."""
     begin = (
         "Function main",
         f'SetNet #201, "127.0.0.1", {port}, CRLF, NONE, 5',
@@ -92,7 +92,7 @@ def test_a_program_asks_and_reads_the_answer(cell, partner):
 
 
 def test_a_controller_is_a_server_too(cell):
-    """Bytes both ways, as programs speak Modbus."""
+    """Bytes both ways, as in programs with Modbus."""
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     made = cell(
@@ -125,7 +125,7 @@ def test_a_controller_is_a_server_too(cell):
 
 
 def test_an_end_that_came_between_two_looks_is_seen_at_the_next(cell):
-    """Time that stands still for a controller passes outside."""
+    """Time passes outside while it stands still for the controller."""
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     made = cell(

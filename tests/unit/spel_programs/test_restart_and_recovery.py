@@ -13,7 +13,8 @@ from robolink_simulators.epson.spel.tasks.task import TaskKind
 from robolink.errors import ConfigError
 from robolink.protocols.epson_text import Preference
 
-# Background tasks, and what only they or no normal task may (docs/reference/spel.md 4.5).
+# Background tasks, and statements allowed to them alone, or not to normal tasks
+# (docs/reference/spel.md 4.5).
 
 WATCHING = """
 Global Integer g_passes
@@ -292,7 +293,7 @@ Fend
 
 @pytest.mark.parametrize("word", ["pressed", "aborted"])
 def test_the_trap_of_a_stop_runs_once_and_to_its_end(cell, word):
-    """P. 855; before, it was ended and begun anew whenever time went on."""
+    """P. 855; it used to be ended and begun anew whenever time went on."""
     made = cell(STOPPING)
     made.runner.start("main", 0)
     made.simulator.advance(200_000_000)
@@ -335,7 +336,7 @@ def place(made, joints):
 
 
 def ends_after(made, number):
-    """Return where the motions end that came after so many."""
+    """Return the ends of the motions after the given number."""
     return [motion.flange_mm for motion in made.simulator.motions(number)]
 
 
@@ -347,7 +348,7 @@ def broken_off(cell, recover):
 
 
 def broken_off_of(cell, program):
-    """Start a motion, open the safeguard on the way, move the arm by hand, close it."""
+    """Start a motion, open the safeguard during it, move the arm by hand, close the safeguard."""
     made = cell(program)
     made.runner.start("main", 0)
     advanced(made, 0.5)

@@ -10,7 +10,7 @@ from robolink_simulators.epson.spel.source_text import ProgramRefused
 # Box and Plane watch the tip, in the middle of motions too (docs/reference/spel.md 5.5).
 
 HERE = "P1 = XY(0, 492, -100, 0)"
-"""In the middle of the way that the tests take along X."""
+"""The middle of the tests' move along X."""
 
 
 def numbers(lines):
@@ -173,7 +173,7 @@ NS = 1_000_000_000
 
 @pytest.fixture
 def travelled(cell):
-    """Return where the tip was on the way of one motion, from Here at (x, y, z) on."""
+    """Return the tip's path during one motion, from Here at (x, y, z) on."""
 
     def run(motion):
         made = cell(f"Function main\nP0 = Here\n{motion}\nFend\n")
@@ -193,7 +193,7 @@ def travelled(cell):
 @pytest.mark.parametrize(
     ("motion", "centre", "farthest"),
     [
-        # From (0, 0): the chord is 20 mm toward -X. Which side the way bulges to tells its sense.
+        # From (0, 0): the chord is 20 mm toward -X. The side of the bulge shows the sense.
         ("Arc P0 -X(10) +Y(10), P0 -X(20)", (-10, 0), (-10, 10)),
         ("Arc P0 -X(20), 180", (-10, 0), (-10, 10)),
         ("Arc P0 -X(20), -180", (-10, 0), (-10, -10)),
@@ -236,7 +236,7 @@ def test_an_arc_of_six_axes_by_its_angle(login):
     client = login(simulator)
     for statement in ("P0 = Here", "Arc P0 -X(20), 180", "Arc3 P0, P0 -X(10), ARC_LONG"):
         reply = client.ask(f'$Execute,"{statement}"') or client.wait(60)
-        # Opposite ends tell no plane: which way round is not said.
+        # Opposite ends define no plane: the way round is not given.
         assert reply == ("!Execute,99" if "Arc3" in statement else "#Execute,0")
     assert client.ask('$Execute,"Print Dist(P0, Here)"').startswith(("!", "#"))
 
@@ -344,7 +344,7 @@ def test_two_arms_go_to_one_point(printed):
         "Go P1",
         "Print Dist(Here, P1) < 0.001",
     )
-    # With 250 mm of its own the added arm comes to 575 mm, the robot's to 600 mm.
+    # With its own 250 mm the added arm reaches 575 mm, the robot's 600 mm.
     assert shown == ["1 -1 -1", "-1 0", "-1", "-1"]
 
 

@@ -11,7 +11,7 @@ def test_an_error_is_dealt_with_and_the_next_statement_follows(printed):
 
 
 def test_the_failed_statement_is_tried_again(printed):
-    """P. 306: with the call that failed, where the error arose deeper."""
+    """P. 306: with the failed call, if the error occurred deeper."""
     lines = ("OnErr GoTo h", "Integer n", "Print CX(P900)", "Exit Function", "h:", "n = n + 1")
     assert printed(*lines, "If n = 2 Then P900 = XY(7, 0, 0, 0)", "EResume") == ["7"]
 
@@ -26,14 +26,14 @@ def test_a_handler_takes_the_errors_of_functions_that_were_called(cell):
 
 
 def test_a_handler_may_stand_in_the_loop_that_it_serves(printed):
-    """P. 306; so a public program reconnects."""
+    """P. 306; a public program reconnects like that."""
     lines = ("OnErr GoTo again", "Integer n", "Do", "again:", "If Err Then EResume go", "go:")
     rest = ("n = n + 1", "If n < 3 Then Error 8000 + n", "Exit Do", "Loop", "Print n")
     assert printed(*lines, *rest) == ["3"]
 
 
 def test_an_error_in_the_handler_ends_the_task(failure):
-    """Else a program that fails while it deals with a failure would never end."""
+    """Otherwise a program that fails in its error handling would never end."""
     told = failure("OnErr GoTo h", "Error 8001", "h:", "Error 8002", "EResume")
     assert (told.number, told.line) == (8002, 5)
 
@@ -103,7 +103,7 @@ def test_waiting_for_a_task_and_its_number(cell):
 
 
 def test_a_wait_for_a_condition_tells_by_tw_how_it_ended(printed):
-    """Check 33: p. 859, 881; variables that nobody changes too (check 13 of programs)."""
+    """Check 33: p. 859, 881; also with variables that do not change (check 13 of programs)."""
     lines = ("Wait MemSw(9) = On, 0.5", "Print TW, Tmr(0) >= 0.5", "MemOn 9")
     assert printed(*lines, "Wait MemSw(9) = On, 0.5", "Print TW") == ["-1 -1", "0"]
 
@@ -252,7 +252,7 @@ def test_a_pause_holds_motion_and_time_and_continue_ends_both(cell):
     ("line", "number"), [("WaitSig 3", 2281), ("SyncLock 5", 2281), ("WaitNet #201", 2282)]
 )
 def test_tmout_bounds_what_has_no_time_of_its_own(cell, line, number):
-    """Help, 2281 and 2282; a time of its own is told by TW, and is no error."""
+    """Help, 2281 and 2282; a statement's own time-out is reported by TW, and is no error."""
     made = cell(
         'Function main\nSetNet #201, "127.0.0.1", 1, CRLF, NONE, 0\nOpenNet #201 As Client\n'
         f"Xqt holder\nWait 0.1\nTMOut 2\n{line}, 1\nPrint TW\nTmReset 1\nOnErr GoTo late\n"

@@ -12,7 +12,7 @@ from robolink_simulators.epson.spel import Interpreter
 
 @pytest.fixture
 def plate(cell):
-    """Return a maker of cells with a plate some mm below the nozzle."""
+    """Makes cells with a plate some mm below the nozzle."""
 
     def make(*lines, weight_kg=2.0):
         made = cell("\n".join(["Function main", *lines, "Fend"]))
@@ -25,12 +25,12 @@ def plate(cell):
 
 
 def inside_mm(made):
-    """Return how deep the nozzle's tip is in the plate; negative above it."""
+    """Return the depth of the nozzle's tip in the plate; negative above it."""
     world = made.simulator.world
     return -world.surface.height_mm(world.tip_mm())
 
 
-# A way of taking parts up that a public program goes: down in steps until the torque tells.
+# A public program's way to pick parts: down in steps until the torque rises.
 PRESSING = (
     "Real most",
     "PTCLR (3)",
@@ -76,7 +76,7 @@ TOUCHING = (
 
 
 def test_torque_control_presses_with_its_limit_waits_and_comes_off(plate):
-    """P. 817 to 825: the statement ends where the limit is met; the torque stays."""
+    """P. 817 to 825: the statement ends when the limit is reached; the torque stays."""
     assert plate(*TOUCHING).run() == ["-1 -1", "-1"]
 
 
@@ -186,7 +186,7 @@ def test_tcspeed_holds_the_speed_under_torque_control_alone(plate):
     ],
 )
 def test_a_limit_of_the_torque_stops_the_motion_by_its_number(plate, power, limit, stop, number):
-    """P. 498, 500: each power has a limit and a switch of its own."""
+    """P. 498, 500: each power mode has its own limit and switch."""
     made = plate(f"Power {power}", limit, f"{stop} On", "Go Here -Z(12)", "Print 1")
     shown = made.run()
     failure = made.runner.failure
@@ -265,7 +265,7 @@ def test_a_heavier_load_at_more_acceleration_needs_more_torque(printed):
         "Next",
     )
     first, second, third = map(float, shown)
-    # The arm is 2 kg of its own: 3, 4 and 5 kg at once, twice and three times the acceleration.
+    # The arm's own mass is 2 kg: 3, 4 and 5 kg at once, twice and three times the acceleration.
     assert second / first == pytest.approx(2 * 4 / 3, rel=0.1)
     assert third / first == pytest.approx(3 * 5 / 3, rel=0.1)
 

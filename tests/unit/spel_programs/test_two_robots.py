@@ -60,7 +60,7 @@ Fend
 
 
 def run(simulator, runner):
-    """Run a program to its end; tell which robots moved at one time, at each instant."""
+    """Run a program to its end; return which robots moved at each instant."""
     moved = set()
     runner.start("main", simulator.now_ns)
     while runner.tasks:
@@ -71,7 +71,7 @@ def run(simulator, runner):
 
 @pytest.fixture
 def loaded(tmp_path):
-    """Return a maker of controllers with a SCARA, six axes and a program."""
+    """Makes controllers with a SCARA, a six-axis arm and a program."""
 
     def make(text):
         (tmp_path / "main.prg").write_text(text)
@@ -92,7 +92,7 @@ def test_each_task_moves_the_robot_that_it_chose(loaded):
     assert six.tip().z_mm == pytest.approx(before[1].z_mm - 60)
     shown = sorted("".join(runner.console).splitlines())
     assert shown == ["1 1", "1 1", "1 3", "2 5"], shown
-    # What a task chooses is its own affair: the command window keeps its robot.
+    # A task's choice applies to itself: the command window keeps its robot.
     assert simulator.machine.robot_number == 1
 
 
@@ -131,7 +131,7 @@ def test_an_execute_is_refused_while_a_task_moves_the_other_robot(loaded):
     while not (scara.arm.moving and six.arm.moving):
         simulator.advance(simulator.next_change())
     assert ask('$Execute,"Move Here +X(5)"') == "!Execute,20"
-    # Stop is for all of them.
+    # Stop applies to all of them.
     assert ask("$Stop") == "#Stop,0"
     simulator.advance(simulator.now_ns + 10_000_000)
     assert not scara.arm.moving
@@ -170,7 +170,7 @@ Fend
 
 
 class Pair:
-    """A controller with a SCARA and six axes, and a program."""
+    """A controller with a SCARA and a six-axis arm, and a program."""
 
     def __init__(self, folder, text):
         (folder / "main.prg").write_text(text)
@@ -178,7 +178,7 @@ class Pair:
         self.runner = self.simulator.load([folder / "main.prg"])
 
     def run(self, until_s=100):
-        """Start main and let time pass; return what was printed."""
+        """Start main and let time pass; return the output."""
         self.runner.start("main", self.simulator.now_ns)
         return self.go_on(until_s)
 
@@ -193,7 +193,7 @@ class Pair:
 
     @property
     def began(self):
-        """When each robot began to move."""
+        """Return the time at which each robot began to move."""
         motions = [*self.simulator.motions()][::-1]  # so that the first of each robot stays
         return {motion.robot: motion.at_ns for motion in motions}
 

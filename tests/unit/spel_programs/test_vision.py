@@ -21,7 +21,7 @@ CALC = "\nFunction main\n  Tool 1\n  Print {name}, Tool, CX(TLSet(1)), CU(TLSet(
 
 
 def flange_over(world, place: ToolOffset, u_deg: float, *, beside=(0.0, 0.0)) -> Pose:
-    """Return the flange pose that brings a place on the flange before the lens."""
+    """Return the flange pose that brings a place on the flange to the lens."""
     x_mm, y_mm, z_mm = world.camera.middle_mm
     cos, sin = math.cos(math.radians(u_deg)), math.sin(math.radians(u_deg))
     dx, dy = place.x_mm * cos - place.y_mm * sin, place.x_mm * sin + place.y_mm * cos
@@ -59,7 +59,7 @@ class VisionCell:
         return vision
 
     def calc(self, program: str, name: str, **files):
-        """Run one of the two programs; return what it says, and tool 1 afterwards."""
+        """Run one of the two programs; return its output, and tool 1 afterwards."""
         text = (COMPANIONS / program).read_text(encoding="utf-8")
         self.load(text + CALC.format(name=name), **files)
         printed = self.run()
@@ -71,7 +71,7 @@ class VisionCell:
         return printed
 
     def stand(self, flange: Pose) -> None:
-        """Put the arm there."""
+        """Move the arm there."""
         self.move_by(f"Go XY({flange.x_mm!r}, {flange.y_mm!r}, {flange.z_mm!r}, {flange.u_deg!r})")
 
     def move_by(self, line: str) -> None:
@@ -79,7 +79,7 @@ class VisionCell:
         self.run()
 
     def sighting(self, mark: int = TIP) -> Sighting:
-        """Return what `camera` and `board` would be told of a picture taken now."""
+        """Return the sighting that `camera` and `board` would get from a picture taken now."""
         ((px, py),) = self.world.see(mark)
         truth = self.world.truth()["camera"]
         (a, b), (c, d) = truth["mm_per_px"]
@@ -91,7 +91,7 @@ class VisionCell:
 
 @pytest.fixture
 def vision_cell(cell):
-    """A cell whose stored tool 1 is not where its tip is."""
+    """A cell whose stored tool 1 differs from its tip."""
     return VisionCell(cell())
 
 
@@ -104,11 +104,11 @@ def test_calc_tool_finds_what_camera_finds(vision_cell, u_deg):
     assert astuple(tool) == pytest.approx(astuple(solved), abs=1e-6)
     assert astuple(tool)[:2] == pytest.approx((tip.x_mm, tip.y_mm), abs=1e-6)
     assert (tool.z_mm, tool.u_deg) == (BEFORE.z_mm, BEFORE.u_deg)
-    assert printed[0].split()[:2] == ["-1", "1"]  # and tool 1 is in force again
+    assert printed[0].split()[:2] == ["-1", "1"]  # and tool 1 is selected again
 
 
 def board_cell(vision_cell, *, swapped=False):
-    """Let the nozzle hold a board; return where its fiducials are taught."""
+    """Let the nozzle hold a board; return the taught places of its fiducials."""
     world = vision_cell.world
     drawing = ((18.0, 2.0), (-22.0, 1.0))
     vision_cell.furnish(board_held=True)
@@ -174,7 +174,7 @@ def test_without_tool_0_the_board_is_wrong_by_the_tool_that_taught_the_points(vi
     board_cell(vision_cell)
     _, right = vision_cell.calc("calc_board_tool.prg", "CalcBoardTool")
     vision_cell.tools.set(1, BEFORE)
-    # The pendant notes the same places as those of tool 1; the manual's program keeps to it.
+    # The pendant notes the same places as those of tool 1; the manual's program uses them.
     noted = "  ".join(
         f"Tool 0\n  Go P{n}\n  Tool 1\n  P{n} = XY(CX(Here), CY(Here), CZ(Here), CU(Here))\n"
         for n in (1, 2)
@@ -204,13 +204,13 @@ Fend
 
 
 def looked(vision_cell, *lines, **calibration):
-    """Run lines in which the usual variables are declared; return the vision system and prints."""
+    """Run lines with the usual variables declared; return the vision system and the output."""
     vision = vision_cell.load(LOOK.format(lines="\n  ".join(lines)), **calibration)
     return vision, vision_cell.made.run()
 
 
 def at_camera(vision_cell, u_deg=30.0, beside=(1.0, -0.5)):
-    """Bring the tip before the lens."""
+    """Bring the tip to the lens."""
     world = vision_cell.world
     vision_cell.stand(flange_over(world, world.tips[1], u_deg, beside=beside))
 
@@ -388,7 +388,7 @@ Fend
 
 
 def saved(vision_cell, before="VRun findTip", folder="none", suffix=".bmp"):
-    """Save the picture of a tip before the camera; return what the program prints."""
+    """Save the picture of a tip at the camera; return the program's output."""
     tip = vision_cell.world.tips[1]
     vision_cell.stand(flange_over(vision_cell.world, tip, 30.0, beside=(1.5, -0.7)))
     vision_cell.load(SAVING.format(before=before, folder=folder, suffix=suffix))
@@ -396,7 +396,7 @@ def saved(vision_cell, before="VRun findTip", folder="none", suffix=".bmp"):
 
 
 def test_a_saved_picture_shows_the_tip_where_it_was_found(vision_cell):
-    """A public program saves its pictures so."""
+    """A public program saves its pictures like that."""
     made = 'MkDir "C:\\images"; VRun findTip'
     assert saved(vision_cell, made, "images") == ["-1"]
     files = vision_cell.made.runner.session.files

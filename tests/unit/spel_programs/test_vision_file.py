@@ -1,4 +1,4 @@
-"""A vision project in a file, VCal, VxCalib, and the project kept and taken again."""
+"""A vision project in a file, VCal, VxCalib, and a project that is saved and loaded."""
 
 import math
 from dataclasses import replace
@@ -44,7 +44,7 @@ IN_THE_PICTURE_MM = (-3.0, 0.0, 3.0)
 
 
 class CameraCell:
-    """A controller before whose camera the tip stands, its tool 1 as true as is wanted."""
+    """A controller with the tip at its camera, and tool 1 as accurate as wanted."""
 
     def __init__(self, cell, tmp_path) -> None:
         self.made = cell()
@@ -69,7 +69,7 @@ class CameraCell:
         return install_vision(self.simulator, self.path)
 
     def nine_poses(self):
-        """Poses of the selected tool about where it stands now: TL, TC, TR, CR, C, CL and so on."""
+        """Return poses of the selected tool about its present place: TL, TC, TR, CR, C, CL ..."""
         at = self.simulator.machine.tip()
         rows = [IN_THE_PICTURE_MM, IN_THE_PICTURE_MM[::-1], IN_THE_PICTURE_MM]
         places = zip((3.0, 0.0, -3.0), rows, strict=True)
@@ -99,7 +99,7 @@ def test_a_calibration_that_was_not_taken_is_an_error_until_vcal(camera):
 
 
 def test_a_calibration_with_a_wrong_tool_is_displaced_by_its_error(camera):
-    """P. 874, and docs/reference/vision.md 3: not noticed with the tool that took it."""
+    """P. 874, and docs/reference/vision.md 3: not noticed with the tool used for it."""
     program = LOOK.replace("VRun", "VCal taught\nVRun").replace(
         "Fend", "Tool 0\nPrint Sqr((x - CX(Here)) ** 2 + (y - CY(Here)) ** 2)\nFend"
     )

@@ -1,7 +1,7 @@
 """The sixteen conformance behaviours over the wire (docs/reference/softmotion.md 5).
 
-Each talks to a mailbox and takes down its words; who serves it, the model or the program, it does
-not know.
+Each uses a mailbox and records its words, without knowing whether the model or the program serves
+it.
 """
 
 import json
@@ -50,13 +50,13 @@ READ_MODES = ("CURRENT", "ACTIVE", "LAST")
 
 
 def sources(kinematics="", profile=ExportProfile.FULL, change=lambda text: text):
-    """Return the exported texts, changed by ``change``."""
+    """Return the exported texts, altered by ``change``."""
     texts = program_texts(profile, kinematics=kinematics, read_modes=READ_MODES)
     return [SourceText(name, change(texts[name]), kind) for name, kind in PROGRAM_SOURCES]
 
 
 def of_program(texts=None):
-    """Return what makes a PLC that executes the exported program."""
+    """Return a maker of PLCs that execute the exported program."""
 
     def make(model, parameters, options):
         name = model.kinematics.name
@@ -67,7 +67,7 @@ def of_program(texts=None):
 
 
 class Bench:
-    """One PLC that has just been switched on, a client that owns it, and what it took down."""
+    """One PLC just after power-on, a client that owns it, and the recorded words."""
 
     def __init__(self, folder, make_plc=Plc, kinematics="Kin_Scara3_Z", options=OPTIONS, bus="sim"):
         state = folder / f"{len(list(folder.iterdir()))}.json"
@@ -88,7 +88,7 @@ class Bench:
         self._served.close()
 
     def _connected(self, bus):
-        """Meet the PLC in this process or over TCP, in either case on a clock that stands still."""
+        """Connect to the PLC in this process or over TCP, in either case on a stopped clock."""
         if bus == "sim":
             return linked(self.plc)
         clock = ManualClock()
@@ -99,7 +99,7 @@ class Bench:
         return MailboxClient(link)
 
     def note(self, seconds=0.05):
-        """Take the words down once all is still: heartbeat and checksum apart."""
+        """Record the words once everything has stopped, except heartbeat and checksum."""
         self.client.wait(seconds)
         words = list(self.client.link.read_response())
         assert crc16(words[:CRC]) == words[CRC]
@@ -131,7 +131,7 @@ class Bench:
         self.taken.append(list(self.client.link.read_slot(2)))
 
     def states(self, count):
-        """Take down the state of the group in the middle of each cycle."""
+        """Record the state of the group in the middle of each cycle."""
         clock = self.client.link.clock
         for _ in range(count):
             clock.sleep(1.5 * CYCLE_S - clock.now_ns() / 1e9 % CYCLE_S)
@@ -194,7 +194,7 @@ def b08_set_kinematics(bench):
 
 
 def reads_of_no_movement(bench):
-    """Not one of the sixteen: what is read that is not there, before and after what is."""
+    """Not one of the sixteen: reads of a missing movement, before and after an existing one."""
     bench.enable()
     for mode in (1, 0, 2, 0, 1):
         assert bench.tell(Opcode.READ_TOOL, mode) == ([15, 206] if mode else [10, 0])
@@ -204,7 +204,7 @@ def reads_of_no_movement(bench):
 
 
 def read_of_what_was_interrupted(bench):
-    """Not one of the sixteen: what is interrupted goes on with the tool of before."""
+    """Not one of the sixteen: an interrupted movement goes on with its earlier tool."""
     bench.enable()
     bench.set_tool(0.0, 0.0, 20.0)
     bench.client.move(z=-40.0, dynamics=LINE)
@@ -217,11 +217,11 @@ def read_of_what_was_interrupted(bench):
     bench.tell(Opcode.STOP, 0, seconds=0.2)
     bench.tell(Opcode.STOP, 1)
     assert bench.tell(Opcode.READ_TOOL, 1) == [15, 206]
-    bench.taken = [words[:12] + words[88:] for words in bench.taken[3:]]  # where it is apart
+    bench.taken = [words[:12] + words[88:] for words in bench.taken[3:]]  # where it differs
 
 
 def refused_kinematics(bench):
-    """Not one of the sixteen: codes that nothing has, and those of another machine."""
+    """Not one of the sixteen: unknown codes, and codes of another machine."""
     for codes, error_class in ((18, 0), 111), ((2, 300), 111), ((-1, 0), 111), ((0, 0), 303):
         assert bench.tell(Opcode.SET_KINEMATICS, *codes) == [15, error_class]
     assert bench.tell(Opcode.SET_KINEMATICS, 2, 255) == [15, 303]
@@ -320,7 +320,7 @@ def block_of_an_epoch_of_before(bench):
     for refusal, takes in ((107, client.take), (106, lambda: taken_over(bench))):
         late = client.command(Opcode.WRITE_TOOL, 3, pose=(1.0, 2.0, 3.0, 0.0, 0.0, 0.0))
         takes()
-        client.write(replace(late, sequence=late.sequence + 9))  # ahead of all that were sent
+        client.write(replace(late, sequence=late.sequence + 9))  # ahead of all sent commands
         bench.note()
         assert bench.taken[-1][2:4] == [CommandState.ERROR, refusal]
     assert client.slot(3).counter == 0
@@ -333,20 +333,20 @@ BACK_ALONG_X = 0b1
 
 
 def taken_over(bench):
-    """Let another client take the mailbox, because a person insists; return it."""
+    """Let another client take the mailbox by a person's decision; return it."""
     other = MailboxClient(bench.client.link, STRANGER)
     other.take(insist=1)
     return other
 
 
 def moved_mm(client, since):
-    """Return how far the TCP comes from there while a client beats on."""
+    """Return the distance that the TCP moves while a client sends heartbeats."""
     client.wait(2.0)
     return math.dist(client.now().tcp[:3], since)
 
 
 def without_places(bench):
-    """Compare no positions: a block's answer comes a cycle later in the program."""
+    """Compare no positions: in the program the answer to a block comes a cycle later."""
     bench.taken = [words[:12] + words[88:] for words in bench.taken]
 
 
@@ -400,7 +400,7 @@ def interrupted_movement_of_an_owner_who_lost_it(bench):
 
 
 def jog_that_another_client_ends(bench):
-    """Not one of the sixteen: to end a jog takes no ownership, and its owner is told."""
+    """Not one of the sixteen: a client without ownership may end a jog, and its owner is told."""
     bench.enable()
     dynamics = {"dynamics": AT_SPEED}
     jog = bench.client.tell(Opcode.JOG, 0, BACK_ALONG_X, CoordinateSystem.MCS, **dynamics)
@@ -415,7 +415,7 @@ def jog_that_another_client_ends(bench):
 
 
 def owner_who_leaves_and_insists(bench):
-    """Not one of the sixteen: whatever i1 is, what is unfinished is halted before."""
+    """Not one of the sixteen: whatever i1 is, an unfinished movement is halted first."""
     bench.enable()
     move = bench.client.move(z=-150.0, dynamics=AT_SPEED).ack_head
     bench.client.wait(0.3)
@@ -428,7 +428,7 @@ def owner_who_leaves_and_insists(bench):
 
 
 def high_first(text):
-    """Return a text whose author laid the words of an LREAL the other way round."""
+    """Return a text whose author stored the words of an LREAL in the other order."""
     return text.replace("* 65536.0;\n    part := TRUNC(mant);\n    w0 := DINT_TO_WORD(part);", SWAP)
 
 
@@ -442,7 +442,7 @@ SWAP = """* 65536.0;
 
 
 def b16_words_the_other_way_round(folder, make_plc):
-    """Require that the driver finds it and writes nothing."""
+    """Check that the driver detects it and writes nothing."""
     with Bench(folder, make_plc) as bench:
         probe = find_probe(bench.client.link.read_response())
         assert probe is not None
@@ -462,7 +462,7 @@ def _writes(plc):
 
 
 def without_image(model):
-    """Return a machine whose kinematics does not tell its orientations."""
+    """Return a machine whose kinematics has no orientation image."""
     kinematics = type("Untold", (type(model.kinematics),), {"orientation_image": lambda *_: None})
     untold: Any = object.__new__(kinematics)
     for name in getattr(model.kinematics, "__slots__", ()) or vars(model.kinematics):
@@ -504,16 +504,16 @@ RUNS = [
     (jog_that_another_client_ends, "Kin_Scara3_Z"),
     (owner_who_leaves_and_insists, "Kin_Scara3_Z"),
 ]
-"""Each behaviour with each kinematics that it names; the sixteenth is of its own kind."""
+"""Each behaviour with each kinematics that it names; the sixteenth is of another kind."""
 
 
 def named(value):
-    """Return what stands for a behaviour, or a kinematics, in the name of a test."""
+    """Return the part of a test's name for a behaviour or a kinematics."""
     return getattr(value, "__name__", value)
 
 
 def taken(folder, behaviour, kinematics, make_plc, **served):
-    """Return the words that a behaviour takes down from a PLC of its own."""
+    """Return the words that a behaviour records on a PLC of its own."""
     if behaviour is b09_no_orientation_image:
         make_plc = untold(make_plc)
     with Bench(folder, make_plc, kinematics, **served) as bench:
@@ -522,5 +522,5 @@ def taken(folder, behaviour, kinematics, make_plc, **served):
 
 
 def untold(make_plc):
-    """Return what makes the same PLC for a kinematics that does not tell its orientations."""
+    """Return a maker of the same PLC for a kinematics without an orientation image."""
     return lambda model, parameters, options: make_plc(without_image(model), parameters, options)

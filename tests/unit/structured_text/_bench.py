@@ -1,4 +1,4 @@
-"""Small programs for the interpreter, and where the recorded verdicts of two compilers lie."""
+"""Small programs for the interpreter, and the place of the recorded results of two compilers."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ needs_judges = pytest.mark.skipif(
 
 
 def program(body, declared="r : INT;", before=""):
-    """Return a program of a few variables and one body."""
+    """Return a program with a few variables and one body."""
     text = f"{before}PROGRAM Main\nVAR\n{declared}\nEND_VAR\n{body}\nEND_PROGRAM\n"
     return StructuredProgram([SourceText("main.st", text)], "Main")
 

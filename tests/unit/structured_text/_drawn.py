@@ -1,4 +1,4 @@
-"""What is drawn at random, commands and owners, and what a mailbox makes of it."""
+"""Random commands and owners for a mailbox."""
 
 import random
 from typing import Any
@@ -21,12 +21,12 @@ HEARTBEAT, ANSWER, AFTER_PLACES = 9, 12, 88
 NUMBERS = (0, 0, 1, 1, 2, 3, 15, 16, -1, 31, 32, 255)
 LENGTHS = (0.0, 1.5, -20.0, 9999.0, 10001.0, 1e300, float("inf"), float("nan"), 5e-324, -0.0)
 TELLING = (2, 3, 4, 5, 11, 15, 19, 48, 49, 56, 57, 58, 59, 60)
-"""Words that decide: group, version, operands, the highest of a length, name, owner to reserve."""
+"""Significant words: group, version, operands, the highest of a length, name, owner to reserve."""
 WEIGHTED = [*Opcode, Opcode.WRITE_TOOL, Opcode.SELECT_TOOL, Opcode.READ_TOOL, Opcode.CLEAR_TOOL]
 
 
 def drawn_words(draw: random.Random, client, now):
-    """Return one block: mostly a command that the mailbox might carry out."""
+    """Return one block: usually a command that the mailbox could carry out."""
     opcode = draw.choice(WEIGHTED)
     operands = [draw.choice(NUMBERS) for _ in range(draw.choice((0, 1, 1, 2, 4)))]
     pose = list(shifted(now.tcp, z=draw.choice((-1.0, -2.0, 1.0))))
@@ -36,7 +36,7 @@ def drawn_words(draw: random.Random, client, now):
         pose[draw.randrange(6)] = draw.choice(LENGTHS)
     if opcode in (Opcode.MOVE_LINEAR, Opcode.MOVE_DIRECT, Opcode.MOVE_UNTIL_INPUT):
         operands = [draw.choice((0, 3, 40)), 0, draw.choice((1, 1, 0, 6)), draw.choice((0, 1, 6))]
-    if opcode is Opcode.SET_KINEMATICS:  # no other: the model takes all that its drives fit
+    if opcode is Opcode.SET_KINEMATICS:  # the model accepts all that fit its drives
         operands = list(draw.choice(((2, 0), (2, 32), (2, 255), (0, 0), (200, 0), (-1, 0))))
     if opcode is Opcode.JOG:
         operands = [draw.choice((0, 64, -1)), 0, draw.choice((1, 6))]  # presses no button
@@ -53,7 +53,7 @@ def drawn_words(draw: random.Random, client, now):
     if draw.random() < 0.4:
         place = draw.choice((*TELLING, draw.randrange(6, CRC)))
         if opcode is Opcode.JOG and place in (4, 5):
-            place = 3  # no button: how far a jog gets is another matter
+            place = 3  # no button: the distance of a jog is tested elsewhere
         words[place] = draw.choice((0, 1, 0x7F41, 0x417F, 0x7FF0, 0x40C3, draw.randrange(0x10000)))
         if draw.random() < 0.7:
             words[CRC] = crc16(words[:CRC])
@@ -64,7 +64,7 @@ def drawn_words(draw: random.Random, client, now):
 
 
 def drawn_commands(seed: int, commands: int):
-    """Return a behaviour: each command of a seed, and all words once nothing goes on."""
+    """Return a behaviour: each command of a seed, and all words once nothing is under way."""
 
     def behaviour(bench):
         draw = random.Random(seed)
@@ -87,7 +87,7 @@ def drawn_commands(seed: int, commands: int):
             bench.plc.panel.give_permit()
             words = bench.taken[-1]
             if words[RAW + 1] == 0xFFFF:
-                words[RAW : RAW + 2] = 0, 0  # a number that nobody knows (error_numbers.py)
+                words[RAW : RAW + 2] = 0, 0  # an unknown number (error_numbers.py)
             bench.taken.append(bench.plc.panel.tool_changed)
             bench.plc.panel.take_change_back()
             bench.taken.append([list(client.link.read_slot(n)) for n in (1, 2, 3, 15)])
@@ -98,9 +98,9 @@ def drawn_commands(seed: int, commands: int):
 
 
 def _back_to(client, axes):
-    """End a movement that goes on and on, and return to where it began.
+    """End an endless movement, and return to its start.
 
-    Where it is at any moment hangs on the cycle in which it began, which is not what is compared.
+    Its place at any moment depends on the cycle in which it began, which is not compared.
     """
     client.settled(client.tell(Opcode.HALT))
     began = (0, 0, CoordinateSystem.ACS, 0)
@@ -109,7 +109,7 @@ def _back_to(client, axes):
 
 
 def _bring_back(bench):
-    """Have the group in Standby again, and the mailbox owned, for what comes next."""
+    """Bring the group into Standby again, with the mailbox owned, for the next command."""
     bench.client.after_a_cycle()
     bench.client.take(insist=1)
     if bench.client.now().group_state == GroupState.STANDBY:
@@ -125,9 +125,9 @@ BACK_ALONG_X = 0b1
 
 
 def drawn_owners(seed: int, acts: int):
-    """Return a behaviour: three clients who take the mailbox from each other while things move.
+    """Return a behaviour: three clients who take the mailbox from each other during movements.
 
-    Each act is mostly one of the owner, and else of a client drawn; whoever owns it then beats.
+    Each act is usually the owner's, otherwise a random client's; the owner then sends a heartbeat.
     """
 
     def behaviour(bench):
@@ -152,7 +152,7 @@ def drawn_owners(seed: int, acts: int):
             beating = next((one for one in clients if one.owner == holder), client)
             beating.wait(draw.choice((0.2, 0.4)))
             words = list(client.link.read_response())
-            words[RAW : RAW + 2] = 0, 0  # a number that nobody knows (error_numbers.py)
+            words[RAW : RAW + 2] = 0, 0  # an unknown number (error_numbers.py)
             words[HEARTBEAT] = 0
             bench.taken.append(words[:ANSWER] + words[AFTER_PLACES:-2])  # without the checksum
 

@@ -1,4 +1,4 @@
-"""Model and program answer with the same words, by table and whatever is drawn."""
+"""Model and program answer with the same words, for the table and for random commands."""
 
 from itertools import count
 
@@ -73,7 +73,7 @@ def test_a_program_that_was_exported_for_no_kinematics_sets_none(tmp_path):
 
 
 def cycles_in(bench, seconds):
-    """Let time pass on the link and return how many cycles of the program were executed."""
+    """Let time pass on the link and return the number of executed program cycles."""
     before = bench.plc.plc._executed.cycles
     bench.client.link.clock.sleep(seconds)
     bench.plc.advance(bench.client.link.clock.now_ns())
@@ -100,7 +100,7 @@ def test_a_slow_computer_executes_fewer_cycles_and_keeps_up(tmp_path, took_ms, m
         assert least <= cycles_in(bench, 0.1) <= most
 
 
-# Model and program make the same of what is drawn: commands, right or wrong, and owners.
+# Model and program treat random commands alike, right or wrong, and owners.
 
 SCARA = "Kin_Scara3_Z"
 
@@ -118,9 +118,9 @@ def test_drawn_commands_give_the_same_words(tmp_path, seed, commands):
 
 
 HANDED_ON = (100, 101, 102, 104, 105, 107, 108, 109, 110, 111, 114, 115, 118, 119, 120, 122)
-"""Seeds of which a take-over ends something."""
+"""Seeds in which a take-over ends something."""
 END_CLASSES = [ANSWER + 8 + 2 + 3 * end for end in range(4)]
-"""Where the error classes of the last ends stand in what was taken down."""
+"""The places of the last ends' error classes in the recorded words."""
 
 
 @pytest.mark.timeout(200)
@@ -140,7 +140,7 @@ SLOWLY = (20.0, 200.0, 200.0, 2000.0)
 
 
 def begun_meanwhile(bench):
-    """One movement is interrupted, once on a line and once until an input; others are begun."""
+    """One movement is interrupted, once straight and once until an input; others are begun."""
     bench.enable()
     client = bench.client
     client.tell(Opcode.OWNERSHIP, 1, 1)
@@ -179,5 +179,5 @@ def test_what_is_begun_while_a_movement_is_interrupted_shows_the_same(tmp_path):
     assert program == model
     interrupted = [words for words in model[1:] if len(words) == 4 and words[2] & Bits.INTERRUPTED]
     assert len(interrupted) > 6
-    assert len({words[0] for words in interrupted}) == 2  # each of the two, and none of the others
+    assert len({words[0] for words in interrupted}) == 2  # both of them, and none of the others
     assert [CommandState.ERROR, ErrorClass.MOVING] in model[11:]

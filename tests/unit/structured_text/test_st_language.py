@@ -1,4 +1,4 @@
-"""The subset of Structured Text: what it means, what is refused, and what two compilers say."""
+"""The subset of Structured Text: its meaning, refusals, and the results of two compilers."""
 
 import json
 
@@ -13,7 +13,7 @@ from robolink_simulators.structured_text.parse import INSTRUCTION_WORDS, RESERVE
 
 from tests.unit.structured_text._bench import JUDGES, needs_judges, program, result
 
-# The subset of Structured Text: what it means, what is refused, and where.
+# The subset of Structured Text: its meaning, and what is refused where.
 
 PAIR = "TYPE PAIR : STRUCT a : UINT; b : LREAL; END_STRUCT; END_TYPE"
 ADDER = """
@@ -242,7 +242,7 @@ def test_members_do_not_begin_with_values_in_the_common_subset():
         StructuredProgram([SourceText("main.st", text)], "Main")
 
 
-# Names that CODESYS, TwinCAT or IEC 61131-3 keep (docs/reference/structured_text.md 1.1).
+# Names that CODESYS, TwinCAT or IEC 61131-3 reserve (docs/reference/structured_text.md 1.1).
 
 COMMON, CODESYS = TextDialect.COMMON, TextDialect.CODESYS
 DECLARED = {

@@ -1,4 +1,4 @@
-"""The service that a program calls, and the line to it, in virtual time and without a socket."""
+"""The service that a program calls, and its line, in virtual time and without a socket."""
 
 import errno
 from collections.abc import Callable
@@ -28,18 +28,18 @@ class ProgramService:
 
     Args:
         clock: The virtual time.
-        turns: Knows whose process runs.
-        note: Told what passes.
-        on_record: Name under which the controller is on record.
+        turns: Knows the running process.
+        note: Receives the traffic.
+        on_record: Name under which the controller is recorded.
 
     Attributes:
-        acts: What is planned to happen to an exchange.
-        process: Who serves; ``None`` for nobody.
-        on_record: The name that the controller has on record where a PC asks it, as a person gives
-            it to ``robolink expert serve``.
-        on_question: Told of each question of the program.
-        on_value: Told of each value that the program is given.
-        on_refusal: Told of each refusal as the screen shows it: its code, and the error.
+        acts: Disturbances planned for the exchanges.
+        process: The serving process; ``None`` for none.
+        on_record: The controller's name in the record of a PC, as a person gives it to
+            ``robolink expert serve``.
+        on_question: Receives each question of the program.
+        on_value: Receives each value given to the program.
+        on_refusal: Receives each refusal as the screen shows it: its code, and the error.
     """
 
     def __init__(
@@ -63,17 +63,17 @@ class ProgramService:
         self._beaten_ns = 0
 
     def begin(self, process: VirtualProcess) -> None:
-        """Let a process serve from now on; its journal is open."""
+        """Let a process serve from now on, with its open journal."""
         self.process = process
 
     def end(self) -> None:
-        """Let nobody serve any more; the system closes the line."""
+        """Stop serving; the system closes the line."""
         if self._line is not None:
             self._line.cut()
         self._line = self.process = None
 
     def dial(self, _address: tuple[str, int]) -> "ProgramLine":
-        """Connect a program; nobody is there while no process serves."""
+        """Connect a program; nothing listens while no process serves."""
         if self._line is not None:
             self._line.cut()
         self._line = ProgramLine(self, there=self._serving)
@@ -84,7 +84,7 @@ class ProgramService:
         return self.process is not None and self.process.alive
 
     def conversation(self) -> CallbackConversation:
-        """Begin to talk with a program, with the journal of the process."""
+        """Begin a conversation with a program, with the journal of the process."""
         journal = cast(Journal, _OpenJournal(self))
         return CallbackConversation(
             journal,
@@ -95,17 +95,17 @@ class ProgramService:
         )
 
     def log(self, controller: str) -> JournalOutcomeLog:
-        """Return the record of a controller, kept by the process that serves."""
+        """Return the record of a controller, kept by the serving process."""
         assert self.process is not None  # for the type: who talks is served
         return self.process.log_of(controller, self._clock)
 
     def lacks_record(self) -> bool:
-        """Whether the record of the controller is missing, until a person has looked."""
+        """Whether the controller's record is missing and no person has looked yet."""
         open_markers = self.log(self._on_record).open_markers()
         return any(marker.kind is MarkerKind.HISTORY for marker in open_markers)
 
     def within(self, work: Callable[[], bytes]) -> bytes | None:
-        """Do something in the process that serves; ``None`` where it died of it."""
+        """Run something in the serving process; ``None`` if the process died of it."""
         process, me = self.process, self._turns.current
         if process is None or not process.alive:
             return None
@@ -118,7 +118,7 @@ class ProgramService:
             me.owner = outer
 
     def asked(self, line: bytes) -> bytes | None:
-        """Return what becomes of a question: its answer, nothing, or ``None`` for the end."""
+        """Return the outcome of a question: its answer, nothing, or ``None`` for the end."""
         text = line.decode("ascii", "replace")
         self.on_question(text)
         acts = {disturbance.what for disturbance in self.acts.due(text)}
@@ -135,7 +135,7 @@ class ProgramService:
         return _bent(answer) if "BEND_ANSWERED" in acts else answer
 
     def beat(self) -> None:
-        """Let others see, once a second, that a change is under way."""
+        """Show others, once a second, that a change is under way."""
         now_ns = self._clock.now_ns()
         if self._line is not None and now_ns - self._beaten_ns >= _BEAT_NS:
             self._beaten_ns = now_ns
@@ -152,7 +152,7 @@ class ProgramService:
 
 
 class _OpenJournal:
-    """What a conversation asks of a journal."""
+    """The journal functions that a conversation needs."""
 
     def __init__(self, service: ProgramService) -> None:
         self._service = service
@@ -165,8 +165,8 @@ class ProgramLine:
     """A program's connection; see ``epson.spel.tasks.ports.PortLink``.
 
     Args:
-        service: Who answers.
-        there: Whether anybody does.
+        service: The service that answers.
+        there: Whether it is running.
     """
 
     def __init__(self, service: ProgramService, *, there: bool) -> None:
@@ -179,23 +179,23 @@ class ProgramLine:
         self._conversation = service.conversation()
 
     def setblocking(self, flag: bool, /) -> None:
-        """Nothing here blocks."""
+        """Do nothing: no call blocks."""
 
     def settimeout(self, value: float | None, /) -> None:
-        """Nothing here waits."""
+        """Do nothing: no call waits."""
 
     def getsockopt(self, _level: int, _name: int, /) -> int:
-        """Return why there is no connection, 0 where there is one."""
+        """Return the reason for a failed connection, 0 for an open one."""
         return 0 if self._there else errno.ECONNREFUSED
 
     def getpeername(self) -> object:
-        """Return who is at the other end."""
+        """Return the address of the other end."""
         if not self._there:
             raise ConnectionRefusedError
         return _PEER
 
     def sendall(self, data: bytes, /) -> None:
-        """Ask; the answer is there at once."""
+        """Send a question; the answer is there at once."""
         if self._ended:
             raise BrokenPipeError
         self._asked += data
@@ -208,7 +208,7 @@ class ProgramLine:
                 self._received += answer
 
     def recv(self, most: int, /) -> bytes:
-        """Take what has come."""
+        """Return what has arrived."""
         taken, self._received = self._received[:most], self._received[most:]
         if not taken and not self._ended:
             raise BlockingIOError
@@ -225,7 +225,7 @@ class ProgramLine:
             self._service.within(self._closed)
 
     def answered(self, line: bytes) -> bytes:
-        """Have a question answered; nothing where it makes no sense."""
+        """Have a question answered; nothing if it is malformed."""
         self._codec.receive(line + b"\r\n")
         try:
             event = self._codec.next_event()
@@ -240,7 +240,7 @@ class ProgramLine:
             return b""
 
     def beaten(self) -> bytes:
-        """Beat."""
+        """Send a sign of life."""
         try:
             self._conversation.beat()
         except RobolinkError:

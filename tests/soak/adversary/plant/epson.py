@@ -1,4 +1,4 @@
-"""An EPSON controller in a virtual cell, and the link that leads to it."""
+"""An EPSON controller in a virtual cell, and its link."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -40,7 +40,7 @@ from tests.soak.adversary.plant.machine import (
 )
 
 PASSWORD: Final = "canary-7413-remote"
-"""The controller's; it must turn up nowhere."""
+"""The controller's password, which must not appear anywhere."""
 
 _MOVES: Final = re.compile(r'\$Execute,"(?:Move|Go|Jump3?|BGo|BMove|TGo|TMove|Arc3?) ')
 _WRITES: Final = re.compile(r'\$Execute,"(?:TLSet (\d+), |TLClr (\d+))')
@@ -58,7 +58,7 @@ class EpsonPlant(PlantWithWorld):
 
     Args:
         clock: The virtual time.
-        tap: Told of everything on the wire.
+        tap: Receives all wire traffic.
         seed: Decides its world.
     """
 
@@ -66,7 +66,7 @@ class EpsonPlant(PlantWithWorld):
     address = "epson+sim://cell"
     password = PASSWORD
     models = "T6-602S,GX4-C351S"
-    """The first is the cell's own; the other one never moves, and nobody chooses it."""
+    """The first is the cell's own; the other one never moves and is never selected."""
 
     world = WorldParameters()
 
@@ -112,7 +112,7 @@ class EpsonPlant(PlantWithWorld):
         def opened(_url: object, **_terms: object) -> EpsonLine:
             return self.line_of(process)
 
-        # In this order: what imports the other one must not meet its stand-in.
+        # The order matters: a module that imports the other must not get its stand-in.
         package = "robolink.controllers.epson"
         return {f"{package}.verify.run.open_line": opened, f"{package}.line.open_line": opened}
 
@@ -133,12 +133,12 @@ class EpsonPlant(PlantWithWorld):
         return MachineState(dict(tools.defined()), selected, settings, machine.robot_number)
 
     def flange(self) -> Frame:
-        """Return where the flange of the current robot is commanded to be."""
+        """Return the commanded flange pose of the current robot."""
         self._simulator.advance(self.clock.now_ns())
         return frame_of(self._simulator.machine.arm.flange())
 
     def tip(self) -> Frame:
-        """Return where the tip of the selected tool is commanded to be."""
+        """Return the commanded pose of the selected tool's tip."""
         self._simulator.advance(self.clock.now_ns())
         return frame_of(self._simulator.machine.robot.tip())
 
@@ -159,11 +159,11 @@ class EpsonPlant(PlantWithWorld):
 
     @property
     def movements(self) -> int:
-        """How many statements of movement have come in, but for those that the wire repeated."""
+        """The number of movement statements received, without repetitions by the wire."""
         return self._moves
 
     def arm(self, disturbance: Disturbance) -> None:
-        """Plan a fault of the wire, or what somebody does at the controller."""
+        """Plan a fault of the wire, or an act at the controller."""
         if disturbance.kind is Hindrance.PENDANT:
             self.acts.plan(disturbance)
             return
@@ -182,7 +182,7 @@ class EpsonPlant(PlantWithWorld):
         )
 
     def disarm(self) -> int:
-        """Forget what was planned; return how much was met."""
+        """Drop the plans; return how many occurred."""
         faults = self._simulator.faults
         met = len(faults.fired)
         faults.clear()
@@ -190,7 +190,7 @@ class EpsonPlant(PlantWithWorld):
         return met + self.acts.clear() + self.impatience.clear()
 
     def select_by_hand(self, tool: int) -> None:
-        """Put a tool in force at the pendant."""
+        """Select a tool at the pendant."""
         self._simulator.machine.tools.select(tool)
 
     def write_by_hand(self, tool: int, offset: ToolOffset) -> None:
@@ -199,7 +199,7 @@ class EpsonPlant(PlantWithWorld):
         self.note_hand(tool, offset)
 
     def repair(self) -> None:
-        """Release, close, switch back to automatic; restart after a serious error."""
+        """Release, close the guard, switch back to automatic; restart after a serious error."""
         panel, condition = self._simulator.panel, self._simulator.condition
         panel.release_estop()
         panel.close_guard()
@@ -217,14 +217,14 @@ class EpsonPlant(PlantWithWorld):
 
 
 class TappedTransport(BentTransport):
-    """A process's connection, on which the adversary sees everything.
+    """A process's connection, on which the adversary sees all traffic.
 
     Args:
         simulator: The controller.
-        device: Where it leads: the controller's network, or its serial line.
+        device: The far end: the controller's network, or its serial line.
         clock: The virtual time.
-        process: Whose it is.
-        tap: Told of everything.
+        process: The process of the connection.
+        tap: Receives the traffic.
         address: Its URL.
 
     Attributes:
@@ -249,7 +249,7 @@ class TappedTransport(BentTransport):
         super().__init__(parse_url(address), device, clock, simulator.lock, durable=True)
 
     def told(self, data: bytes, *, secret: bool) -> str:
-        """Return a request in words."""
+        """Return a request as text."""
         return "$Login" if secret else data.decode("ascii", "replace").strip()
 
     def send(self, data: bytes, *, deadline: Deadline, secret: bool = False) -> None:
@@ -273,12 +273,12 @@ class TappedTransport(BentTransport):
         try:
             data = super().receive(deadline=deadline)
         except TransportError:
-            # Whatever answers come later stand in the place of another one's.
+            # Any later answers would be taken for the wrong requests.
             self._process.cut_off = True
             self._given_up = f"the answer to {self._last} was given up"
             raise
         self._process.cut_off |= not data
-        # What a bent login brings back is the driver's to hide, not ours to write down.
+        # The echo of an altered login is the driver's to hide, not ours to write down.
         shown = repr(data).replace(PASSWORD, "***")
         self._tap.passed(self._process, f"wire received {shown}")
         return data
@@ -288,7 +288,7 @@ class TappedTransport(BentTransport):
         return self._early or super().wait_readable(deadline=deadline)
 
     def _taken(self) -> bytes | None:
-        """Return what has arrived; the end of a movement that was given up arrives no more."""
+        """Return what has arrived; the end of a movement that was given up never does."""
         if self._early:
             self._early, self._swallows = False, True
             return b"!Execute,19\r\n"
@@ -313,7 +313,7 @@ def _classified(text: str) -> SentRequest:
 
 
 class EpsonSerialPlant(EpsonPlant):
-    """An EPSON SCARA on Remote RS232; made from what :class:`EpsonPlant` is made from."""
+    """An EPSON SCARA on Remote RS232, built from the same parts as :class:`EpsonPlant`."""
 
     def __init__(self, clock: ManualClock, tap: WireTap, seed: int) -> None:
         super().__init__(clock, tap, seed)
@@ -322,7 +322,7 @@ class EpsonSerialPlant(EpsonPlant):
         self._dialect = serial_dialect(self.simulator.options)
 
     def line_of(self, process: VirtualProcess) -> EpsonLine:
-        """Open the port and turn the line on."""
+        """Open the port and activate the line."""
         link = TappedLine(self.simulator, self._port, self.clock, process, self.tap, self.address)
         link.line = self._line
         self._links[process.number] = link
@@ -335,7 +335,7 @@ class EpsonSerialPlant(EpsonPlant):
         return EpsonLine(link, codec, outlives_sessions=True)
 
     def arm(self, disturbance: Disturbance) -> None:
-        """See :meth:`EpsonPlant.arm`; a line bends bytes, too."""
+        """See :meth:`EpsonPlant.arm`; a line also alters bytes."""
         if disturbance.kind is Hindrance.LINE:
             self._line.acts.plan(disturbance)
         else:
@@ -347,18 +347,18 @@ class EpsonSerialPlant(EpsonPlant):
 
     @property
     def bent(self) -> bool:
-        """See ``PlantMachine.bent``; the line may have bent something, too."""
+        """See ``PlantMachine.bent``; the line may have altered something, too."""
         return super().bent or bool(self._line.acts.met)
 
 
 class TappedLine(TappedTransport):
-    """A process's time at the line, on which the adversary reads the frames.
+    """A process's session on the line, whose frames the adversary reads.
 
-    A line that is turned on anew is another link: what is forbidden over one is not over the next.
+    A reactivated line is another link: a request forbidden over one is not over the next.
     """
 
     def told(self, data: bytes, *, secret: bool) -> str:
-        """Return a request in words, as the same one is written on a network."""
+        """Return a request as text, written as on a network."""
         if secret:
             return "$Login"
         codec = EpsonBinaryCodec(Role.DEVICE)

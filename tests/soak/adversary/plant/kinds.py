@@ -1,4 +1,4 @@
-"""Which machine stands in which kind of cell, where robolink is the one that acts."""
+"""The machine of each kind of cell in which robolink acts."""
 
 from collections.abc import Callable, Mapping
 from typing import Final
@@ -25,4 +25,4 @@ PLANTS: Final[Mapping[CellKind, Callable[[ManualClock, WireTap, int], PlantMachi
     CellKind.CANOPEN: CanopenPlant,
     CellKind.REGISTER_MAP: RegisterMapPlant,
 }
-"""A machine whose own program calls back needs to know whose turn it is, and stands elsewhere."""
+"""The machines by kind. One whose own program calls back must know the turns, and is elsewhere."""

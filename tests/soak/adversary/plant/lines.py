@@ -1,4 +1,4 @@
-"""What carries bytes to the machines of virtual cells and bends them: serial and Modbus lines."""
+"""Serial and Modbus lines of virtual cells, which carry bytes and alter them."""
 
 from enum import StrEnum
 from typing import Final
@@ -12,7 +12,7 @@ from tests.soak.adversary.history import CountedActs, Disturbance
 
 
 class LineBend(StrEnum):
-    """What becomes of one frame on a line, and in which direction."""
+    """The alteration of one frame on a line, and its direction."""
 
     DROP_ASKED = "a byte of the request is lost"
     SWAP_ASKED = "two bytes of the request change places"
@@ -29,10 +29,10 @@ _NOISE: Final = b"\x55"
 
 
 class BentLine:
-    """Bends frames as planned.
+    """Alters frames as planned.
 
     Attributes:
-        acts: What is planned.
+        acts: The plans.
     """
 
     def __init__(self) -> None:
@@ -47,14 +47,14 @@ class BentLine:
             bends.append(disturbance)
 
     def asked(self, data: bytes) -> bytes:
-        """Return what arrives of a request."""
+        """Return the part of a request that arrives."""
         due, self._of_request = self._of_request, []
         for disturbance in due:
             data = _bent(data, disturbance)
         return data
 
     def answered(self, data: bytes) -> bytes:
-        """Return what arrives of an answer."""
+        """Return the part of an answer that arrives."""
         due, self._of_answer = self._of_answer, []
         for disturbance in due:
             data = _bent(data, disturbance)
@@ -79,10 +79,10 @@ def _bent(data: bytes, disturbance: Disturbance) -> bytes:
 
 
 class BentTransport(InProcessTransport):
-    """A transport over a line that bends what passes.
+    """A transport over a line that alters the traffic.
 
     Attributes:
-        line: Bends it; a transport without one carries everything as it is.
+        line: Alters the traffic; a transport without one carries everything unchanged.
     """
 
     line: BentLine | None = None
@@ -106,11 +106,11 @@ _SILENCE: Final = 3.5
 """Characters of silence that end a frame (Modbus over serial line 1.02, 2.5.1.1)."""
 
 _TURN_S: Final = 0.008
-"""How long the server takes for an answer: two cycles of its PLC."""
+"""The server's time for an answer: two cycles of its PLC."""
 
 
 class TimedFrames(MailboxFrames):
-    """The registers of a PLC, whose own time is passed too.
+    """The registers of a PLC, which need the PLC's own time for an exchange.
 
     Args:
         simulator: The PLC.
@@ -128,7 +128,7 @@ class TimedFrames(MailboxFrames):
 
     @property
     def silence_ns(self) -> int:
-        """How long the line is silent between frames."""
+        """The silence of the line between frames."""
         return self._carried_ns(_SILENCE)
 
     def advance(self, now_ns: int) -> None:
@@ -137,12 +137,12 @@ class TimedFrames(MailboxFrames):
         super().advance(now_ns)
 
     def next_change(self) -> int | None:
-        """Return when something leaves, or the PLC does something by itself."""
+        """Return the time of the next output, or of the PLC's next own action."""
         times = (self._simulator.next_change(), super().next_change())
         return min((time_ns for time_ns in times if time_ns is not None), default=None)
 
     def takes_ns(self, delay_s: float, characters: float) -> int:
-        """Return how long the PLC and its line take for an exchange."""
+        """Return the time of the PLC and its line for an exchange."""
         return round((_TURN_S + delay_s) * NS_PER_S) + self._carried_ns(characters + 2 * _SILENCE)
 
     def _carried_ns(self, characters: float) -> int:

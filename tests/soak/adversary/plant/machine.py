@@ -1,4 +1,4 @@
-"""What a machine in a virtual cell is to the adversary, whatever its kind."""
+"""The adversary's view of a machine in a virtual cell, whatever its kind."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
@@ -21,17 +21,17 @@ from tests.soak.adversary.history import CountedActs, Disturbance, Habit, Hour
 from tests.soak.adversary.people import Tell, carry_out, put_right
 
 _ALIKE: Final = 0.0006
-"""Half of the last of three decimals, and room for rounding: mm and degrees."""
+"""Half of the last of three decimals, with room for rounding: mm and degrees."""
 
 USUAL_TOOL: Final = ToolOffset(4.5, -0.75, -9.25)
-"""What tool 2 holds when nobody has typed anything yet."""
+"""The value of tool 2 before anybody has typed one."""
 
 HANDS_VALUES: Final = (ToolOffset(13.257, -4.125, -21.503), ToolOffset(11.406, -2.871, -19.642))
-"""What somebody types at the machine's own panel; the one that is not there yet."""
+"""Values typed at the machine's own panel; the one that differs from the stored value is used."""
 
 
 class SentKind(StrEnum):
-    """What a request on the wire does to the machine."""
+    """The effect of a request on the machine."""
 
     MOVE = "move"
     WRITE = "write"
@@ -45,10 +45,10 @@ class SentRequest:
     """A request as it leaves a process.
 
     Attributes:
-        kind: What it does.
-        text: As it stands on the wire, or in words.
-        tool: Which tool, where it is about one.
-        forbidden: Why it must not leave over this link, empty where it may.
+        kind: Its effect.
+        text: The request as sent, or in words.
+        tool: The tool, if it is about one.
+        forbidden: Why it must not leave over this link, empty if it may.
     """
 
     kind: SentKind
@@ -59,13 +59,13 @@ class SentRequest:
 
 @dataclass(frozen=True, slots=True)
 class MachineState:
-    """What a machine keeps.
+    """The stored state of a machine.
 
     Attributes:
-        tools: Every tool that is defined.
+        tools: Every defined tool.
         selected: The selected tool, 0 for none.
-        settings: Power and speeds that a procedure has to leave as they were, where it has any.
-        robot: The current robot, where a controller has several.
+        settings: Power and speeds that a procedure has to restore, if there are any.
+        robot: The current robot, if a controller has several.
     """
 
     tools: Mapping[int, ToolOffset]
@@ -75,20 +75,20 @@ class MachineState:
 
 
 class WireTap(Protocol):
-    """Who is told of all that crosses the wire."""
+    """Receives all wire traffic."""
 
     def leaving(self, process: VirtualProcess, sent: SentRequest) -> None:
-        """See a request before it leaves.
+        """Handle a request before it leaves.
 
         Raises:
             Killed: The process is dead, so nothing leaves.
         """
 
     def given(self, tool: int, value: ToolOffset) -> None:
-        """See a value that the machine's own program is about to be given."""
+        """Handle a value that the machine's own program is about to get."""
 
     def passed(self, process: VirtualProcess, text: str) -> None:
-        """See that a request or an answer has passed; the process may be killed here."""
+        """Handle a request or an answer that has passed; may kill the process."""
 
 
 class PlantMachine(ABC):
@@ -96,19 +96,19 @@ class PlantMachine(ABC):
 
     Args:
         clock: The virtual time.
-        tap: Told of everything on the wire.
+        tap: Receives all wire traffic.
 
     Attributes:
         moved_by_robolink: Whether robolink moves it, resets it and selects its tools.
-        password: Its remote password; empty where it has none.
+        password: Its remote password; empty without one.
         calls_back: Whether its own program changes the tool, and calls robolink back.
-        numbered: Whether its commands have numbers, so that one that comes twice counts once.
-        touched: Tools that somebody past this computer has written since the last look.
-        by_hand: What they wrote last, by tool.
-        moved_itself: Whether the selected tool was changed past this computer since then.
-        acts: What is planned to happen past the wire, counted by requests.
-        values: Values that its own program was given since the last look.
-        settings_reset: Whether the machine has put power and speeds to its own since then.
+        numbered: Whether its commands have numbers, so that a repeated one counts once.
+        touched: Tools that somebody has written since the last check, not through this computer.
+        by_hand: Their last values, by tool.
+        moved_itself: Whether the selected tool was changed since then, not through this computer.
+        acts: Events planned outside the wire, counted by requests.
+        values: Values given to its own program since the last check.
+        settings_reset: Whether the machine has reset power and speeds to its own since then.
     """
 
     kind: str
@@ -135,24 +135,24 @@ class PlantMachine(ABC):
 
     @property
     def bent(self) -> bool:
-        """Whether something on the wire has gone wrong in this deed, so that answers may lie."""
+        """Whether the wire had a fault in this deed, so that answers may be wrong."""
         return bool(self.simulator.faults.fired)
 
     @property
     def eyes(self) -> InProcessEyes | None:
-        """What the person at the machine sees with; ``None`` where robolink moves nothing."""
+        """The view of the person at the machine; ``None`` if robolink moves nothing."""
         return None
 
     def tip_of(self, tool: int) -> ToolOffset | None:  # the form of those that know
-        """Return where a tool's tip really is, as far as the machine has a world."""
+        """Return the real place of a tool's tip, as far as the machine has a world."""
         return None
 
     @abstractmethod
     def prepare(self, person: WorldParameters) -> None:
-        """Let a person begin an hour, with another nozzle where the machine has a world."""
+        """Let a person begin an hour, with another nozzle if the machine has a world."""
 
     def carry_out(self, controller: Controller, hour: Hour, tell: Tell) -> ChangeReport | None:
-        """Do what the person of an hour set out to do; a report where a tip was measured.
+        """Carry out the deed of an hour; return the report if a tip was measured.
 
         Raises:
             RobolinkError: It did not succeed.
@@ -160,7 +160,7 @@ class PlantMachine(ABC):
         return carry_out(controller, hour, self.eyes, tell)
 
     def put_right(self, controller: Controller, habit: Habit, tell: Tell) -> bool:
-        """Do what a person does after an accident; return whether nothing is left.
+        """Recover as a person does after an accident; return whether nothing is left.
 
         Raises:
             RobolinkError: It does not work yet.
@@ -168,7 +168,7 @@ class PlantMachine(ABC):
         return put_right(controller, habit, tell, moved_by_robolink=self.moved_by_robolink)
 
     def advance(self) -> None:
-        """Let the machine follow the time."""
+        """Advance the machine to the present time."""
         self.simulator.advance(self.clock.now_ns())
 
     @abstractmethod
@@ -176,35 +176,34 @@ class PlantMachine(ABC):
         """Connect a process to it.
 
         Raises:
-            RobolinkError: That fails.
+            RobolinkError: The connection failed.
         """
 
     def openings(self, process: VirtualProcess) -> Mapping[str, Callable[..., object]]:  # as above
-        """Return what opens the wire for what needs no record, by dotted name.
+        """Return the openers, by dotted name, of links that need no record.
 
-        A stop and a look at what a controller does open it by themselves. They get the wire that is
-        watched.
+        A stop and a reading of its effect open a link of their own. They get the watched wire.
         """
         return {}
 
     def shown(self, tool: int) -> ToolOffset | None:
-        """Return what it shows of a tool, which may be written already and not be in force."""
+        """Return the displayed value of a tool, which may be written and not yet in use."""
         return self.state().tools.get(tool)
 
     @abstractmethod
     def hang_up(self, process: VirtualProcess) -> None:
-        """Close what a process that died had open."""
+        """Close everything that a dead process had open."""
 
     @abstractmethod
     def state(self) -> MachineState:
-        """Return what it keeps now."""
+        """Return the present stored state."""
 
     def mistook(self, asked: ToolOffset, held: ToolOffset) -> bool:  # as above
-        """Return whether it took an offset for the one that it holds."""
+        """Return whether it mistook an offset for the one that it holds."""
         return False
 
     def staged(self) -> Mapping[int, ToolOffset]:
-        """Return values that stand where robolink reads them, and are not in force yet."""
+        """Return values that robolink can read and that are not yet in use."""
         return {}
 
     @property
@@ -213,17 +212,17 @@ class PlantMachine(ABC):
         """Whether something moves."""
 
     def flange(self) -> Frame | None:
-        """Return where its flange is, ``None`` where robolink moves nothing."""
+        """Return the flange pose, ``None`` if robolink moves nothing."""
         return None
 
     def tip(self) -> Frame | None:
-        """Return where the tip of the selected tool is, ``None`` where robolink moves nothing."""
+        """Return the pose of the selected tool's tip, ``None`` if robolink moves nothing."""
         return None
 
     @property
     @abstractmethod
     def movements(self) -> int:
-        """How many movements it has begun, ever."""
+        """The number of movements begun so far."""
 
     @abstractmethod
     def arm(self, disturbance: Disturbance) -> None:
@@ -231,10 +230,10 @@ class PlantMachine(ABC):
 
     @abstractmethod
     def disarm(self) -> int:
-        """Forget what was planned and was not met; return how much was met."""
+        """Drop the plans that did not occur; return how many did."""
 
     def note_hand(self, tool: int, offset: ToolOffset) -> None:
-        """Note that somebody past this computer has written a tool."""
+        """Note that somebody has written a tool, not through this computer."""
         self.touched.add(tool)
         self.by_hand[tool] = offset
 
@@ -243,13 +242,13 @@ class PlantMachine(ABC):
         """Let somebody write a tool at the machine's own panel."""
 
     def type_by_hand(self, tool: int) -> ToolOffset:
-        """Let somebody type another value there; return what the machine holds then."""
+        """Let somebody type another value there; return the value then stored."""
         held = self.state().tools.get(tool)
         self.write_by_hand(tool, next(one for one in HANDS_VALUES if not self.same(one, held)))
         return self.state().tools[tool]
 
     def choose_by_hand(self, which: int) -> int | None:
-        """Let somebody put another tool in force there; return which, ``None`` without another."""
+        """Let somebody select another tool there; return it, ``None`` without another."""
         state = self.state()
         others = sorted({*state.tools} - {state.selected})
         if not others:
@@ -260,28 +259,28 @@ class PlantMachine(ABC):
 
     @abstractmethod
     def select_by_hand(self, tool: int) -> None:
-        """Let somebody put a tool in force at the machine's own panel."""
+        """Let somebody select a tool at the machine's own panel."""
 
     @abstractmethod
     def repair(self) -> None:
-        """Let a person at the machine do what is to be done there: buttons, doors, switches."""
+        """Let a person operate the machine's buttons, doors and switches as needed."""
 
     def same(self, one: ToolOffset | None, other: ToolOffset | None) -> bool:
-        """Whether it stores two offsets alike."""
+        """Whether it stores two offsets as the same value."""
         if one is None or other is None:
             return one is other
         pairs = zip(one.components(), other.components(), strict=True)
         return all(abs(a - b) <= _ALIKE for a, b in pairs)
 
     def holds(self, asked: ToolOffset | None, held: ToolOffset | None) -> bool:
-        """Whether it holds what was asked for, with every digit that it can hold."""
+        """Whether it holds the requested value with every digit that it can store."""
         if asked is None or held is None:
             return asked is held
         pairs = zip(asked.components(), held.components(), strict=True)
         return all(abs(a - b) <= self.finest(a) for a, b in pairs)
 
     def finest(self, value: float) -> float:  # the form of those that round
-        """Return how far a number may be from the one asked for; three decimals are printed."""
+        """Return the tolerance of a stored number; three decimals are printed."""
         return 0.00051
 
 

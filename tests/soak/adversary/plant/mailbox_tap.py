@@ -1,4 +1,4 @@
-"""A link to a PLC's mailbox on which the adversary sees everything, whatever carries it."""
+"""A link to a PLC's mailbox on which the adversary sees all traffic, on any carrier."""
 
 import threading
 from collections.abc import Iterator, Sequence
@@ -30,16 +30,16 @@ _ACK: Final = RESPONSE["ack_head"].word
 _TAKEN_OVER: Final = 0x00A5_0000
 _ENDED: Final = (CommandState.DONE, CommandState.ABORTED, CommandState.ERROR)
 _FOLLOWED: Final = (Opcode.MOVE_DIRECT, Opcode.MOVE_LINEAR, Opcode.MOVE_UNTIL_INPUT, Opcode.JOG)
-"""Their ends stand elsewhere than behind the acknowledgement."""
+"""Commands that end later than their acknowledgement."""
 
 
 class SeenSession:
-    """Follows the blocks of a session; knows nothing of the driver.
+    """Follows the blocks of a session, without the driver's knowledge.
 
-    The rules are those of docs/reference/mailbox.md, "When a command counts": a session ends with
-    the start of the PLC that it met, and with an acknowledgement of another client in place of its
-    own; a block is written again only after the PLC has counted a damaged one. Who has seen that is
-    one thread: another one may be about to write, and learns it with its own next look.
+    The rules are those of docs/reference/mailbox.md, "When a command counts": a session ends with a
+    restart of the PLC that it met, and with an acknowledgement of another client in place of its
+    own; a block is written again only after the PLC has counted a damaged one. One thread sees that
+    first: another may be about to write, and learns it at its own next reading.
 
     Attributes:
         overtaken: Whether another client was acknowledged in the place of its last command.
@@ -54,11 +54,11 @@ class SeenSession:
         self.overtaken = False
 
     def written(self, words: Sequence[int], rejected: int) -> str:
-        """Note a command block before it leaves, and return why it must not; empty where it may.
+        """Note a command block before it leaves; return why it must not, empty if it may.
 
         Args:
             words: The block.
-            rejected: How many damaged blocks the PLC has counted by now.
+            rejected: The number of damaged blocks that the PLC has counted so far.
         """
         block = tuple(words[: _CRC + 1])
         again = block == self._written and rejected == self._rejected
@@ -83,10 +83,10 @@ class SeenSession:
         if not acknowledged or self._proved:
             return
         ours = decode_command((*self._written, 0, self._written[0]))
-        # What comes after the answer to it, under the same number, takes nobody's place.
+        # A later answer under the same number does not replace another client's.
         ended = now.state in _ENDED or ours.opcode in _FOLLOWED
         self._proved = now.ack_owner == ours.owner and ended
-        # A take may have succeeded although somebody else was answered since; it names the holder.
+        # A take may have succeeded although another client was answered since; it names the holder.
         took = ours.opcode == Opcode.OWNERSHIP and now.answer.holder == ours.owner
         self.overtaken = now.ack_owner != ours.owner and not took
         if self.overtaken:
@@ -94,7 +94,7 @@ class SeenSession:
 
 
 def another_clients(words: Sequence[int]) -> Words:
-    """Return the block of another client that chose the same number for the same opcode."""
+    """Return the block of another client with the same number and opcode."""
     command = decode_command(words)
     return encode_command(replace(command, owner=command.owner ^ _TAKEN_OVER), heartbeat=0)
 
@@ -118,24 +118,24 @@ _CHANGING: Final = (SentKind.MOVE, SentKind.WRITE)
 
 
 class WatchedMailbox(Protocol):
-    """The machine behind a link, as the link tells it what passes."""
+    """The machine behind a link, which receives the link's traffic."""
 
     @property
     def rejected(self) -> int:
-        """How many damaged blocks the mailbox has counted."""
+        """The number of damaged blocks that the mailbox has counted."""
 
     def announce(self, text: str, words: Sequence[int] = ()) -> None:
-        """See a request before it leaves, in words; with the block where it is one."""
+        """Handle a request before it leaves, as text, with the block if it is one."""
 
 
 class TappedMailboxLink(MailboxLinkAround):
     """Implements :class:`robolink.transport.MailboxLink` around another one.
 
     Args:
-        inner: Carries it all.
-        process: Whose link it is.
-        tap: Told of everything.
-        plant: Told of each request before it leaves.
+        inner: The link that carries the traffic.
+        process: The process of the link.
+        tap: Receives the traffic.
+        plant: Receives each request before it leaves.
     """
 
     def __init__(

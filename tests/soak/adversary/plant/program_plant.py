@@ -1,4 +1,4 @@
-"""An EPSON controller whose own program measures and changes a needle, and asks for a verdict."""
+"""An EPSON controller whose own program measures, changes a needle, and asks for a verdict."""
 
 import math
 import random
@@ -34,7 +34,7 @@ FIRST_MEASURED, FIRST_PROVED = 11, 21
 _NOISE_MM: Final = 0.003
 _LONGEST_S: Final = 1200
 _STATEMENTS: Final = 40
-"""Within so many statements of a question the power goes."""
+"""The power fails within this many statements of a question."""
 
 _MAIN: Final = f"""\
 Function main
@@ -83,16 +83,16 @@ class _PowerGone(BaseException):
 
 
 class Production:
-    """A controller's program, and what happens to the controller while it runs.
+    """A controller's program, and the controller's faults while it runs.
 
     Args:
         simulator: The controller.
         clock: The virtual time.
         service: Answers the program.
-        rng: Of the needle's touches.
+        rng: Draws the needle's touches.
 
     Attributes:
-        acts: What happens to the controller, counted by questions.
+        acts: The controller's planned faults, counted by questions.
     """
 
     def __init__(
@@ -122,13 +122,13 @@ class Production:
         return runner
 
     def teach(self, *, proof_only: bool = False) -> None:
-        """Put points where the tip is on the pin, as the program's own search finds them."""
+        """Teach points with the tip on the pin, as the program's own search finds them."""
         if not proof_only:
             self._teach(FIRST_MEASURED, MEASURED_DEG)
         self._teach(FIRST_PROVED, PROVED_DEG)
 
     def teach_beside(self, which: int, off_mm: float) -> None:
-        """Let one touch find the pin beside where it is."""
+        """Let one touch find the pin at a wrong place."""
         angles = (*MEASURED_DEG, *PROVED_DEG)
         index = which % len(angles)
         first = FIRST_MEASURED + index
@@ -137,7 +137,7 @@ class Production:
         self._teach(first, angles[index : index + 1], off_mm=off_mm)
 
     def run(self) -> str:
-        """Let the program run to its end; return the last that it prints."""
+        """Run the program to its end; return the last text that it prints."""
         self._runner.console.clear()
         self._simulator.panel.start_production()
         self._go_on()
@@ -145,17 +145,17 @@ class Production:
         return printed[0] if printed else ""
 
     def restore(self) -> None:
-        """Let the program put back what was not proved, and do nothing else."""
+        """Let the program restore the untested value, and do nothing else."""
         self._simulator.advance(self._clock.now_ns())
         self._runner.start("main2", self._simulator.now_ns)
         self._go_on()
 
     def switch_on(self) -> None:
-        """Switch the motors on, after whatever happened."""
+        """Switch the motors on again."""
         self._simulator.machine.switch_all_motors(True)
 
     def disarm(self) -> int:
-        """Plan nothing any more; return how much was met."""
+        """Drop all plans; return how many occurred."""
         self._statements_left, self._stopping = None, False
         return self.acts.clear()
 
@@ -197,7 +197,7 @@ class Production:
 
     def _lose_power(self) -> None:
         self._runner.on_statement = None
-        self._runner.forget()  # not one statement more, whatever the switch lets pass before it
+        self._runner.forget()  # not one statement more, whatever the switch still allows
         self._simulator.restart()
         self.switch_on()
 
@@ -227,13 +227,13 @@ _BESIDE_MM: Final = 0.8
 
 
 class ProgramPlant(EpsonPlant):
-    """An EPSON SCARA in whose cell nobody but its own program moves and writes.
+    """An EPSON SCARA whose own program alone moves and writes.
 
     Args:
         clock: The virtual time.
-        tap: Told of everything on the wire.
+        tap: Receives all wire traffic.
         seed: Decides its world.
-        turns: Knows whose process runs.
+        turns: Knows the running process.
     """
 
     kind = "epson"
@@ -245,7 +245,7 @@ class ProgramPlant(EpsonPlant):
     def __init__(self, clock: ManualClock, tap: WireTap, seed: int, turns: TurnTaking) -> None:
         super().__init__(clock, tap, seed)
         self._rng = random.Random(f"needles {seed}")
-        # What a PC finds that recovers, as docs/spel-callback.md has the service told.
+        # The findings of a PC that recovers, set up as docs/spel-callback.md says.
         serial = f"SOAK{seed:06d}"
         on_record = f"epson:C-{serial}/{serial}"
         self._service = ProgramService(clock, turns, tap.passed, on_record=on_record)
@@ -260,13 +260,13 @@ class ProgramPlant(EpsonPlant):
         self.tap.given(1, value)
 
     def _refused(self, _code: str, error: RobolinkError) -> None:
-        """Note what the screen of the service shows, as far as it is about the journal."""
+        """Note the service's messages about the journal."""
         if isinstance(error, JournalError):
             self._shown = error
 
     def prepare(self, person: WorldParameters) -> None:
-        """Put another needle on, and teach where it touches the pin."""
-        del person  # nobody is asked anything
+        """Mount another needle, and teach the places where it touches the pin."""
+        del person  # nobody is asked
         world = self.simulator.world
         world.pin_mm = self._nominal_pin
         world.tips[1] = exchanged(_NOMINAL, self._rng)
@@ -284,7 +284,7 @@ class ProgramPlant(EpsonPlant):
         return None
 
     def put_right(self, controller: Controller, habit: Habit, tell: Tell) -> bool:
-        """Let the program put its tool back, and measure once more, undisturbed."""
+        """Let the program restore its tool, and measure once more, undisturbed."""
         world = self.simulator.world
         world.pin_mm = self._nominal_pin
         self._production.teach()
@@ -313,17 +313,17 @@ class ProgramPlant(EpsonPlant):
             super().hang_up(process)
 
     def hang_up(self, process: VirtualProcess) -> None:
-        """The line of a service that died is closed by the system."""
+        """Stop serving, as the system closes the line of a service that died."""
         if self._service.process is process:
             self._service.end()
 
     @property
     def movements(self) -> int:
-        """None is begun by robolink."""
+        """Zero: robolink begins no movement."""
         return 0
 
     def arm(self, disturbance: Disturbance) -> None:
-        """Plan what happens to the line, to the controller, or to the pin."""
+        """Plan a fault of the line, the controller or the pin."""
         if disturbance.kind is Hindrance.WIRE:
             self._service.acts.plan(disturbance)
             return
@@ -340,7 +340,7 @@ class ProgramPlant(EpsonPlant):
                 self._production.acts.plan(disturbance)
 
     def disarm(self) -> int:
-        """Forget what was planned; return how much was met."""
+        """Drop the plans; return how many occurred."""
         return self._service.acts.clear() + self._production.disarm()
 
     def repair(self) -> None:
@@ -350,7 +350,7 @@ class ProgramPlant(EpsonPlant):
 
 
 class _Served:
-    """What stands where a controller stands in other cells: a service that runs."""
+    """A running service, in the place of another cell's controller."""
 
     def __init__(self, service: ProgramService, outcomes: OutcomeLog) -> None:
         self._service = service

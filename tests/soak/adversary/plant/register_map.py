@@ -1,4 +1,4 @@
-"""A PLC with registers of the machine builder's own in a virtual cell, and the line to it."""
+"""A PLC with the machine builder's own registers in a virtual cell, and its line."""
 
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -95,11 +95,11 @@ def _register_map() -> RegisterMap:
 
 
 class RegisterMapPlant(PlantMachine):
-    """A PLC that is reached by a map, over Modbus RTU.
+    """A PLC accessed by a map over Modbus RTU.
 
     Args:
         clock: The virtual time.
-        tap: Told of everything on the wire.
+        tap: Receives all wire traffic.
         seed: Decides its tools.
     """
 
@@ -120,10 +120,10 @@ class RegisterMapPlant(PlantMachine):
         return self._simulator
 
     def prepare(self, person: WorldParameters) -> None:
-        """Robolink measures nothing here: a person types what was measured elsewhere."""
+        """Do nothing: robolink does not measure here; people type values measured elsewhere."""
 
     def connect(self, process: VirtualProcess, outcomes: OutcomeLog) -> Controller:
-        """Open the port, get in step with the unit and compare the probe."""
+        """Open the port, synchronize with the unit and compare the probe."""
         transport = BentTransport(
             parse_url(self.address), self._port, self.clock, self._simulator.lock, durable=True
         )
@@ -138,7 +138,7 @@ class RegisterMapPlant(PlantMachine):
             tapped = TappedRegisters(self, client, process)
             controller = PlcMapController(tapped, _register_map(), outcomes)
             controller.require_probe()
-            # Whoever installed the cell compared each value with the screen of the machine.
+            # The installer of the cell compared each value with the screen of the machine.
             if confirmation_of(controller.who().name, controller.register_map) is None:
                 confirm_whole_map(controller)
         except BaseException:
@@ -147,24 +147,24 @@ class RegisterMapPlant(PlantMachine):
         return controller
 
     def hang_up(self, process: VirtualProcess) -> None:
-        """The system closes the port of a process that died."""
+        """Close the port of a process that died, as the system does."""
         client = self._open.pop(process.number, None)
         if client is not None:
             client.close()
 
     def state(self) -> MachineState:
-        """Return what the machine works with."""
+        """Return the values that the machine uses."""
         self.advance()
         return MachineState(_offsets(self._simulator.program.in_force), 1)
 
     def staged(self) -> Mapping[int, ToolOffset]:
-        """Return what its registers show and it does not work with."""
+        """Return the register values that the machine does not use yet."""
         program = self._simulator.program
         shown = _offsets(program.shown())
         return {n: one for n, one in shown.items() if one != _offsets(program.in_force)[n]}
 
     def shown(self, tool: int) -> ToolOffset | None:
-        """Return what stands in the registers, whether the machine works with it or not."""
+        """Return the register values, whether the machine uses them or not."""
         numbers, memory = _register_map().slots[tool].components, self._simulator.program.memory
         x, y, z, u = (
             decode(numbers[name], memory.read(numbers[name].table, numbers[name].registers))
@@ -174,16 +174,16 @@ class RegisterMapPlant(PlantMachine):
 
     @property
     def moving(self) -> bool:
-        """It moves without robolink, and while nobody looks."""
+        """False: the machine moves without robolink, and unobserved."""
         return False
 
     @property
     def movements(self) -> int:
-        """None is begun by robolink."""
+        """Zero: robolink begins no movement."""
         return 0
 
     def arm(self, disturbance: Disturbance) -> None:
-        """Plan a fault of the line, or what happens to the PLC."""
+        """Plan a fault of the line or the PLC."""
         if disturbance.kind is Hindrance.WIRE:
             self._simulator.faults.add(
                 Fault(
@@ -200,7 +200,7 @@ class RegisterMapPlant(PlantMachine):
             self.acts.plan(disturbance)
 
     def disarm(self) -> int:
-        """Forget what was planned; return how much was met."""
+        """Drop the plans; return how many occurred."""
         faults = self._simulator.faults
         met = len(faults.fired) + self.acts.clear() + self._line.acts.clear()
         faults.clear()
@@ -209,7 +209,7 @@ class RegisterMapPlant(PlantMachine):
 
     @property
     def bent(self) -> bool:
-        """See ``PlantMachine.bent``; the line may have bent something, too."""
+        """See ``PlantMachine.bent``; the line may have altered something, too."""
         return super().bent or bool(self._line.acts.met)
 
     def write_by_hand(self, tool: int, offset: ToolOffset) -> None:
@@ -227,13 +227,13 @@ class RegisterMapPlant(PlantMachine):
         return max(1e-7, abs(value) * 2e-7)
 
     def repair(self) -> None:
-        """Permit, let the program answer again, show at the HMI what the machine works with."""
+        """Permit, let the program answer again, and show the values in use on the HMI."""
         program = self._simulator.program
         program.permit(True)
         program.silent, program.refuse_with = False, None
 
     def leaves(self, process: VirtualProcess, sent: SentRequest) -> None:
-        """See a request before it leaves, and let happen what was planned for it."""
+        """Note a request before it leaves, and run the events planned for it."""
         self.tap.leaving(process, sent)
         self._line.announce(sent.text)
         for disturbance in self.acts.due(sent.text):
@@ -261,12 +261,12 @@ def _offsets(tools: Mapping[int, Mapping[str, float]]) -> dict[int, ToolOffset]:
 
 
 class TappedRegisters:
-    """A Modbus client on which the adversary sees everything.
+    """A Modbus client on which the adversary sees all traffic.
 
     Args:
-        plant: Told of everything.
-        client: Carries it all.
-        process: Whose it is.
+        plant: Receives the traffic.
+        client: Carries it.
+        process: The process of the client.
     """
 
     def __init__(

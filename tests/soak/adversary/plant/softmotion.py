@@ -1,4 +1,4 @@
-"""A SoftMotion PLC in a virtual cell, and what leads to its mailbox: blocks, Modbus, CANopen."""
+"""A SoftMotion PLC in a virtual cell, and the links to its mailbox: blocks, Modbus, CANopen."""
 
 import struct
 from collections.abc import Callable, Mapping, Sequence
@@ -42,7 +42,7 @@ from tests.soak.adversary.plant.stepped_can import SteppedCan
 
 _TOKEN: Final = 0x50C0_0001
 _PATIENCE_NS: Final = 60_000_000
-"""After this long a command has been looked at."""
+"""A command has been read after this long."""
 
 
 class _Stage(Enum):
@@ -52,10 +52,10 @@ class _Stage(Enum):
 
 
 class MailboxProduction:
-    """A client that asks for the mailbox politely, holds it for a while and releases it.
+    """A client that requests the mailbox politely, keeps it for a while and releases it.
 
-    Its blocks go where robolink's go, so an acknowledgement that robolink waits for may be
-    overwritten by one of this program's.
+    Its blocks go where robolink's go, so one of its acknowledgements may overwrite one that
+    robolink waits for.
 
     Args:
         simulator: The PLC.
@@ -69,14 +69,14 @@ class MailboxProduction:
         self._holds_ns = 0
 
     def begin(self, seconds: float, now_ns: int) -> None:
-        """Ask for the mailbox, and hold it for so long where it is given."""
+        """Request the mailbox, and keep it for this long if it is granted."""
         if self._stage is _Stage.IDLE:
             self._holds_ns = round(seconds * NS_PER_S)
             self._send(Opcode.OWNERSHIP, 1, now_ns)
             self._go_on(_Stage.TAKING, now_ns + _PATIENCE_NS)
 
     def look(self, now_ns: int) -> None:
-        """Do what is due."""
+        """Do the next due step."""
         if self._stage is _Stage.IDLE or now_ns < self._due_ns:
             return
         if self._plc.program.holder != _TOKEN:
@@ -105,7 +105,7 @@ class MailboxProduction:
 
 _TIMEOUT_S: Final = 3.0
 _WATCHDOGS_MS: Final = (0, 2000, 0, 500)
-"""Of the fieldbus, by seed: silence after which it zeroes what clients write; 0 never."""
+"""Watchdogs of the fieldbus, by seed: silence after which it zeroes what clients write; 0 never."""
 
 _ORDERS: Final[tuple[Order, ...]] = ("high_first", "pairs_swapped", "halves_swapped")
 _NEEDS_RESTART: Final = frozenset(
@@ -118,7 +118,7 @@ class SoftMotionPlant(PlantWithWorld):
 
     Args:
         clock: The virtual time.
-        tap: Told of everything on the wire.
+        tap: Receives all wire traffic.
         seed: Decides its world.
     """
 
@@ -152,7 +152,7 @@ class SoftMotionPlant(PlantWithWorld):
         return self._simulator
 
     def connect(self, process: VirtualProcess, outcomes: OutcomeLog) -> Controller:
-        """Meet the mailbox."""
+        """Open a session with the mailbox."""
         return open_softmotion(self.tapped(self.link(), process), outcomes=outcomes)
 
     def link(self) -> MailboxLink:
@@ -160,7 +160,7 @@ class SoftMotionPlant(PlantWithWorld):
         return InProcessMailboxLink(self.address, self._simulator, self.clock, _TIMEOUT_S)
 
     def tapped(self, link: MailboxLink, process: VirtualProcess) -> MailboxLink:
-        """Let the adversary see what passes on a link."""
+        """Let the adversary see the traffic of a link."""
         return TappedMailboxLink(link, process, self.tap, self)
 
     def openings(self, process: VirtualProcess) -> Mapping[str, Callable[..., object]]:
@@ -172,11 +172,11 @@ class SoftMotionPlant(PlantWithWorld):
         return {"robolink.transport.open_mailbox_link": opened}
 
     def announce(self, text: str, words: Sequence[int] = ()) -> None:
-        """Count a request before it leaves; a rival's block may take the place of this one."""
+        """Count a request before it leaves; another client's block may take its place."""
         self._taken_over = another_clients(words) if self._rivals.due(text) and words else ()
 
     def hang_up(self, process: VirtualProcess) -> None:
-        """A mailbox does not see that a client is gone; it hears no beat any more."""
+        """Do nothing: a mailbox notices only that the heartbeat has ended."""
 
     def state(self) -> MachineState:
         """Return its slots and the selected one."""
@@ -188,17 +188,17 @@ class SoftMotionPlant(PlantWithWorld):
         return MachineState(tools, plc.tools.selected)
 
     def mistook(self, asked: ToolOffset, held: ToolOffset) -> bool:
-        """Return whether it read an offset in an order of words that a fault let it take on."""
+        """Return whether it read an offset in a word order that a fault made it accept."""
         pairs = list(zip(asked.components(), held.components(), strict=True))
         return any(all(b in _readings(a, order) for a, b in pairs) for order in self._laid)
 
     def flange(self) -> Frame:
-        """Return where the flange is."""
+        """Return the flange pose."""
         self._simulator.advance(self.clock.now_ns())
         return self._simulator.plc.group.flange()
 
     def tip(self) -> Frame:
-        """Return where the tip of the slot in force is."""
+        """Return the pose of the selected slot's tip."""
         self._simulator.advance(self.clock.now_ns())
         return self._simulator.plc.group.tcp()
 
@@ -210,11 +210,11 @@ class SoftMotionPlant(PlantWithWorld):
 
     @property
     def movements(self) -> int:
-        """How many movements the group has begun."""
+        """The number of movements that the group has begun."""
         return self._simulator.plc.group.movements_started
 
     def arm(self, disturbance: Disturbance) -> None:
-        """Plan a fault of the fieldbus, or what happens to the PLC."""
+        """Plan a fault of the fieldbus or the PLC."""
         if disturbance.kind in (Hindrance.PENDANT, Hindrance.PRODUCTION):
             self.acts.plan(disturbance)
             return
@@ -233,7 +233,7 @@ class SoftMotionPlant(PlantWithWorld):
         )
 
     def disarm(self) -> int:
-        """Forget what was planned; return how much was met."""
+        """Drop the plans; return how many occurred."""
         faults = self._simulator.faults
         met = len(faults.fired)
         self._laid |= {
@@ -248,7 +248,7 @@ class SoftMotionPlant(PlantWithWorld):
 
     @property
     def rejected(self) -> int:
-        """How many damaged blocks the mailbox has counted."""
+        """The number of damaged blocks that the mailbox has counted."""
         return self._simulator.plc.program.inbox.rejected
 
     def write_by_hand(self, tool: int, offset: ToolOffset) -> None:
@@ -260,11 +260,11 @@ class SoftMotionPlant(PlantWithWorld):
         self.note_hand(tool, offset)
 
     def choose_by_hand(self, which: int) -> int | None:
-        """Let somebody put another slot in force, unless the program stands that would do it."""
+        """Let somebody select another slot, unless the program that would do it has stopped."""
         return None if self._simulator.plc.frozen else super().choose_by_hand(which)
 
     def select_by_hand(self, tool: int) -> None:
-        """Let the machine's own program put a slot in force."""
+        """Let the machine's own program select a slot."""
         self._simulator.advance(self.clock.now_ns())
         self._simulator.plc.tools.preselect(tool)
 
@@ -273,12 +273,12 @@ class SoftMotionPlant(PlantWithWorld):
         return 2e-9
 
     def advance(self) -> None:
-        """Let time pass; the machine's own program goes on, too."""
+        """Advance the time, and with it the machine's own program."""
         super().advance()
         self._production.look(self.clock.now_ns())
 
     def repair(self) -> None:
-        """Release, permit, let the program go on."""
+        """Release, permit, restart the program."""
         panel = self._simulator.panel
         panel.release_estop()
         panel.give_permit()
@@ -309,7 +309,7 @@ class SoftMotionPlant(PlantWithWorld):
 
 
 def _readings(value: float, order: WordOrder) -> list[float]:
-    """Return how a value reads in another order of its words; a zero may have either sign."""
+    """Return the values that another word order gives; a zero may have either sign."""
     meant = (value,) if value else (0.0, -0.0)
     words = [struct.unpack("<4H", struct.pack("<d", one)) for one in meant]
     return [struct.unpack("<d", struct.pack("<4H", *order.arrange(one)))[0] for one in words]
@@ -324,7 +324,7 @@ _NODE: Final = 5
 
 
 class CanopenPlant(SoftMotionPlant):
-    """A PLC with its mailbox on CANopen; made from what :class:`SoftMotionPlant` is."""
+    """A PLC with its mailbox on CANopen, built from the same parts as :class:`SoftMotionPlant`."""
 
     def __init__(self, clock: ManualClock, tap: WireTap, seed: int) -> None:
         super().__init__(clock, tap, seed)
@@ -332,7 +332,7 @@ class CanopenPlant(SoftMotionPlant):
         self._open: dict[int, MailboxLink] = {}
 
     def link(self) -> MailboxLink:
-        """Plug an adapter in, and meet the node."""
+        """Attach an adapter and open a session with the node."""
         return self._met(start=True)
 
     def tapped(self, link: MailboxLink, process: VirtualProcess) -> MailboxLink:
@@ -341,7 +341,7 @@ class CanopenPlant(SoftMotionPlant):
         return super().tapped(link, process)
 
     def hang_up(self, process: VirtualProcess) -> None:
-        """The system closes the adapter of a process that died."""
+        """Close the adapter of a process that died, as the system does."""
         link = self._open.pop(process.number, None)
         if link is not None:
             link.close()
@@ -380,7 +380,7 @@ RTU_LINE: Final = RtuLine(
 
 
 class ModbusTcpPlant(SoftMotionPlant):
-    """A PLC with its mailbox on Modbus TCP; made from what :class:`SoftMotionPlant` is."""
+    """A PLC with its mailbox on Modbus TCP, built like :class:`SoftMotionPlant`."""
 
     baud = 0
 
@@ -389,7 +389,7 @@ class ModbusTcpPlant(SoftMotionPlant):
         self._device = TimedFrames(self.simulator, clock, unit=_UNIT, baud=self.baud)
 
     def link(self) -> MailboxLink:
-        """Open a connection of one's own."""
+        """Open a separate connection."""
         transport = BentTransport(
             parse_url(self.address), self._device, self.clock, self.simulator.lock, durable=True
         )
@@ -408,7 +408,7 @@ class ModbusTcpPlant(SoftMotionPlant):
 
 
 class ModbusRtuPlant(ModbusTcpPlant):
-    """A PLC with its mailbox on Modbus RTU; made from what :class:`SoftMotionPlant` is."""
+    """A PLC with its mailbox on Modbus RTU, built like :class:`SoftMotionPlant`."""
 
     baud = BAUD
 
@@ -419,7 +419,7 @@ class ModbusRtuPlant(ModbusTcpPlant):
         self._open: dict[int, MailboxLink] = {}
 
     def link(self) -> MailboxLink:
-        """Open the port, and get in step with the unit."""
+        """Open the port, and synchronize with the unit."""
         transport = BentTransport(
             parse_url(self.address), self._port, self.clock, self.simulator.lock, durable=True
         )
@@ -438,18 +438,18 @@ class ModbusRtuPlant(ModbusTcpPlant):
         return super().tapped(link, process)
 
     def announce(self, text: str, words: Sequence[int] = ()) -> None:
-        """See :meth:`SoftMotionPlant.announce`; the line is told what is asked, too."""
+        """See :meth:`SoftMotionPlant.announce`; the line gets the request, too."""
         super().announce(text, words)
         self._line.announce(text)
 
     def hang_up(self, process: VirtualProcess) -> None:
-        """The system closes the port of a process that died."""
+        """Close the port of a process that died, as the system does."""
         link = self._open.pop(process.number, None)
         if link is not None:
             link.close()
 
     def arm(self, disturbance: Disturbance) -> None:
-        """See :meth:`SoftMotionPlant.arm`; a line bends bytes, too."""
+        """See :meth:`SoftMotionPlant.arm`; a line also alters bytes."""
         if disturbance.kind is Hindrance.LINE:
             self._line.acts.plan(disturbance)
         else:
@@ -461,5 +461,5 @@ class ModbusRtuPlant(ModbusTcpPlant):
 
     @property
     def bent(self) -> bool:
-        """See ``PlantMachine.bent``; the line may have bent something, too."""
+        """See ``PlantMachine.bent``; the line may have altered something, too."""
         return super().bent or bool(self._line.acts.met)

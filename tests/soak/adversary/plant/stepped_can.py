@@ -1,4 +1,4 @@
-"""A CAN bus of this process in stepped time, with a simulated PLC as a CANopen node on it."""
+"""A CAN bus in this process in stepped time, with a simulated PLC as a CANopen node on it."""
 
 from collections import deque
 from typing import Any, Final, cast
@@ -12,7 +12,7 @@ from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 from robolink.timing import NS_PER_S
 
 _FRAME_NS: Final = 250_000
-"""What a frame takes at 500 kbit/s with its gaps, and the stack behind it."""
+"""The time of a frame at 500 kbit/s with its gaps, and of the stack behind it."""
 _MOST_KEPT: Final = 512
 """Frames that an adapter keeps for a program that does not read; later ones are lost."""
 _LOOK_NS: Final = round(LOOK_S * NS_PER_S)
@@ -21,7 +21,7 @@ _SYNC_BITS: Final = 0x780
 
 
 class SteppedCan:
-    """The bus and its node. Time passes while somebody sends, or waits for a frame.
+    """The bus and its node. Time passes while a client sends, or waits for a frame.
 
     Args:
         simulator: The PLC.
@@ -43,17 +43,17 @@ class SteppedCan:
         self._face.boot()
 
     def attach(self) -> "SteppedCanBus":
-        """Plug an adapter in."""
+        """Attach an adapter."""
         end = SteppedCanBus(self)
         self._ends.append(end)
         return end
 
     def detach(self, end: "SteppedCanBus") -> None:
-        """Unplug one."""
+        """Detach an adapter."""
         self._ends = [one for one in self._ends if one is not end]
 
     def take_from_client(self, message: can.Message) -> None:
-        """Carry a client's frame to the node, and what the node answers to everybody."""
+        """Carry a client's frame to the node, and the node's answers to all adapters."""
         with self._simulator.lock:
             self.clock.advance(_FRAME_NS / NS_PER_S)
             self.catch_up()
@@ -62,13 +62,13 @@ class SteppedCan:
             self._late_ns = 0
 
     def take_from_node(self, message: can.Message) -> None:
-        """Carry a frame of the node to everybody; after what it was told to wait."""
+        """Carry a frame of the node to all adapters, after its planned delay."""
         at_ns = self.clock.now_ns() + self._late_ns + _FRAME_NS
         for end in self._ends:
             end.post(at_ns, message)
 
     def catch_up(self) -> None:
-        """Let the node do what was due by now. Long ago nobody listened: one look stands for it."""
+        """Run the node's overdue work. Long ago nobody listened: one look replaces many."""
         now_ns = self.clock.now_ns()
         if now_ns - self._looked_ns > _ROUNDS * _LOOK_NS:
             self._looked_ns, self._looks = now_ns, -1
@@ -82,17 +82,17 @@ class SteppedCan:
 
     @property
     def next_look_ns(self) -> int:
-        """When the node next looks whether there is something to send."""
+        """The time of the node's next check for frames to send."""
         return self._looked_ns + _LOOK_NS
 
     def _held(self, seconds: float) -> float:
-        """Let what the node sends now leave later; nobody waits here."""
+        """Delay the frames that the node sends now; nobody waits here."""
         self._late_ns = round(seconds * NS_PER_S)
         return 0.0
 
 
 class _NodeEnd:
-    """What canopen takes for its bus."""
+    """The bus as canopen sees it."""
 
     channel_info = "stepped"
 
@@ -101,7 +101,7 @@ class _NodeEnd:
 
 
 class SteppedCanBus(can.BusABC):
-    """A client's adapter: python-can's interface, in which waiting lets simulated time pass."""
+    """A client's adapter: python-can's interface, in which waiting advances simulated time."""
 
     def __init__(self, wire: SteppedCan) -> None:
         super().__init__(channel="stepped")
@@ -110,7 +110,7 @@ class SteppedCanBus(can.BusABC):
         self._shut = False
 
     def post(self, at_ns: int, message: can.Message) -> None:
-        """Let a frame arrive at an instant, if it is for whoever listens here."""
+        """Deliver a frame at a time, if it is for this listener."""
         own = message.arbitration_id & 0x7F == self._wire.node
         heard = message.arbitration_id & _SYNC_BITS in (0x180, 0x580, 0x700)
         if own and heard and len(self._waiting) < _MOST_KEPT:
@@ -124,7 +124,7 @@ class SteppedCanBus(can.BusABC):
         self._wire.take_from_client(msg)
 
     def recv(self, timeout: float | None = None) -> can.Message | None:
-        """Return the next frame; ``None`` when none came in time."""
+        """Return the next frame; ``None`` if none came in time."""
         self._require_open()
         clock = self._wire.clock
         end_ns = clock.now_ns() + round((timeout or 0.0) * NS_PER_S)
@@ -144,7 +144,7 @@ class SteppedCanBus(can.BusABC):
         return self.recv(timeout), True
 
     def shutdown(self) -> None:
-        """Unplug it."""
+        """Detach it."""
         if not self._shut:
             self._shut = True
             self._wire.detach(self)

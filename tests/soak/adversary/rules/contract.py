@@ -1,4 +1,4 @@
-"""The contract of every controller, held to the machine: after every event, call, and at rest."""
+"""The contract of every controller, compared with the machine after every event and call."""
 
 import math
 import weakref
@@ -15,16 +15,16 @@ from tests.soak.adversary.rules.grounds import Grounds
 
 _NEAR_MM: Final = 0.05
 _NEAR_DEG: Final = 0.05
-"""Room for three decimals, for the noise of a measured position, and for an arm's resolution."""
+"""Tolerance for three decimals, the noise of a measured position, and an arm's resolution."""
 
 _MOVED_MM: Final = 1e-6
 
 
 class PlaceRules:
-    """Compares poses and targets with where the machine's tip is.
+    """Compares poses and targets with the place of the machine's tip.
 
     Args:
-        grounds: What the rules rest on.
+        grounds: The data of the rules.
     """
 
     def __init__(self, grounds: Grounds) -> None:
@@ -39,13 +39,13 @@ class PlaceRules:
         self._sent.clear()
 
     def begins(self, process: VirtualProcess) -> None:
-        """Note where the tip is when a call of a process begins; nothing while it moves."""
+        """Note the tip's place when a process begins a call; nothing while it moves."""
         self._before[process.number] = self._standing()
 
     def begun(
         self, process: VirtualProcess, motion: Motion, target: Pose, box: WorkBox
     ) -> tuple[bool, str]:
-        """Return whether a movement goes where it was sent, in its box; and what was seen."""
+        """Return whether a movement goes to its target, in its box; and the observation."""
         self._sent[process.number] = weakref.ref(motion), self._value_of(target.tool)
         limits = (
             (box.x_min_mm, target.x_mm, box.x_max_mm),
@@ -59,7 +59,7 @@ class PlaceRules:
         )
 
     def arrived(self, process: VirtualProcess, motion: Motion) -> tuple[bool, str]:
-        """Return whether a movement that arrived is where it was sent; and what was seen."""
+        """Return whether a movement that arrived is at its target; and the observation."""
         tip, target = self._standing(), motion.target
         sent, value = self._sent.get(process.number, (None, None))
         if sent is None or sent() is not motion or tip is None:
@@ -69,7 +69,7 @@ class PlaceRules:
         return _alike(tip, frame_of(target)), f"it arrived at {tip}, sent to {target}"
 
     def read(self, process: VirtualProcess, pose: Pose) -> tuple[bool, str]:
-        """Return whether a pose that was read is where the tip stands; and what was seen."""
+        """Return whether a pose that was read is that of the tip; and the observation."""
         before, now = self._before.get(process.number), self._standing()
         if before is None or now is None or math.dist(before.shift_mm, now.shift_mm) > _MOVED_MM:
             return True, ""  # it was somewhere on the way
@@ -92,10 +92,10 @@ _STILL_MM: Final = 0.01
 
 
 class StopRules:
-    """Looks at what leaves and what moves once somebody stops.
+    """Checks requests and movements after a stop.
 
     Args:
-        grounds: What the rules rest on.
+        grounds: The data of the rules.
     """
 
     def __init__(self, grounds: Grounds) -> None:
@@ -118,7 +118,7 @@ class StopRules:
         )
 
     def acknowledged(self) -> None:
-        """Check the machine when a stop is acknowledged; from now on it stands there."""
+        """Check the machine when a stop is acknowledged; from now on it has stopped there."""
         self._on.hold("AtRestWhenStopped", not self._on.plant.moving, "it still moves")
         if not self._on.plant.calls_back:
             self._rest = self._on.plant.flange()
@@ -132,9 +132,9 @@ class StopRules:
         )
 
     def passed(self) -> None:
-        """Check, after an event, that what was acknowledged as stopped stands where it stood."""
+        """Check, after an event, that a machine acknowledged as stopped is still at its place."""
         if self._rest is None or (self._on.plant.bent and not self._on.plant.numbered):
-            return  # a request that the wire held up cannot be told apart where it has no number
+            return  # a request delayed by the wire looks the same if it has no number
         now = self._on.plant.flange()
         self._on.hold(
             "AtRestWhenStopped",
@@ -144,27 +144,27 @@ class StopRules:
 
 
 class SeenStates:
-    """What the machine has held since each call began, event by event."""
+    """The machine's states since each call began, event by event."""
 
     def __init__(self) -> None:
         self._seen: list[MachineState] = []
         self._since: dict[int, int] = {}
 
     def note(self, state: MachineState) -> None:
-        """Note what it holds, where that is something else than before."""
+        """Note the present state, if it differs from the last one."""
         if not self._seen or self._seen[-1] != state:
             self._seen.append(state)
 
     def begin(self, process: VirtualProcess) -> None:
-        """Let a call of a process begin now."""
+        """Note that a process begins a call now."""
         self._since[process.number] = max(0, len(self._seen) - 1)
 
     def since(self, process: VirtualProcess) -> list[MachineState]:
-        """Return what it has held since the last call of a process began."""
+        """Return the states since the last call of a process began."""
         return self._seen[self._since.get(process.number, 0) :]
 
     def forget(self) -> None:
-        """Begin anew."""
+        """Start again."""
         self._seen.clear()
         self._since.clear()
 
@@ -173,13 +173,13 @@ _RULE: Final = "ContractHolds"
 
 
 class ContractRules:
-    """Judges what a call has returned; :mod:`tests.soak.adversary.call_watch` tells it.
+    """Judges the results of calls; :mod:`tests.soak.adversary.call_watch` supplies them.
 
     Args:
-        grounds: What the rules rest on.
+        grounds: The data of the rules.
 
     Attributes:
-        stops: What a stop promises.
+        stops: The promises of a stop.
     """
 
     def __init__(self, grounds: Grounds) -> None:
@@ -193,7 +193,7 @@ class ContractRules:
         self._previews = False
 
     def begin(self, state: MachineState, *, previews: bool) -> None:
-        """Begin an hour; ``previews`` where its line only shows what it would send."""
+        """Begin an hour; ``previews`` if its line only shows its requests."""
         self._previews = previews
         self._states.forget()
         self._states.note(state)
@@ -204,7 +204,7 @@ class ContractRules:
         self._selects, self._last = False, state
 
     def left(self) -> None:
-        """Check what a deed has left; what people do from here on, they do."""
+        """Check the results of a deed; from here on people act freely."""
         self.passed()
         self._previews = False
 
@@ -230,7 +230,7 @@ class ContractRules:
         )
 
     def passed(self) -> None:
-        """Check what has changed since the last event: nothing that nobody asked for."""
+        """Check the changes since the last event: each was asked for."""
         state, last = self._on.plant.state(), self._last
         self.stops.passed()
         self._states.note(state)
@@ -265,17 +265,17 @@ class ContractRules:
     # After every call.
 
     def begins(self, process: VirtualProcess) -> None:
-        """A call begins."""
+        """Note that a call begins."""
         self.passed()
         self._states.begin(process)
         self._places.begins(process)
 
     def aims(self, process: VirtualProcess, tool: int | None) -> None:
-        """A movement is about to leave that is meant for a tool."""
+        """Note that a movement meant for a tool is about to leave."""
         self._aims[process.number] = tool
 
     def has_read(self, process: VirtualProcess, tool: int, offset: ToolOffset | None) -> None:
-        """Check what was read of a tool."""
+        """Check a tool's value that was read."""
         if tool == 0:
             self._promise(offset == ToolOffset(), "tool 0 reads as zeros")
             return
@@ -287,12 +287,12 @@ class ContractRules:
         )
 
     def has_read_selection(self, process: VirtualProcess, tool: int | None) -> None:
-        """Check which tool was read to be in force."""
+        """Check the selected tool that was read."""
         held = [state.selected for state in self._since(process)]
         self._promise(tool is None or tool in held, f"tool {tool} was read as selected: {held}")
 
     def has_written(self, process: VirtualProcess, receipt: ToolReceipt) -> None:
-        """Check the receipt of a write: what was there, and what is there."""
+        """Check the receipt of a write: the old value and the stored one."""
         held = [state.tools.get(receipt.tool) for state in self._since(process)]
         held += [self._on.staged[receipt.tool]] if receipt.tool in self._on.staged else []
         for what, value in (("before", receipt.before), ("now", receipt.read_back)):
@@ -306,41 +306,41 @@ class ContractRules:
         )
 
     def has_selected(self, process: VirtualProcess, tool: int) -> None:
-        """Check that a tool that was selected was in force."""
+        """Check that a tool that was selected took effect."""
         held = [state.selected for state in self._since(process)]
         self._promise(tool in held, f"tool {tool} was selected, in force were {held}")
 
     def has_begun(
         self, process: VirtualProcess, motion: Motion, target: Pose, box: WorkBox
     ) -> None:
-        """Check where a movement goes that was begun."""
+        """Check the target of a movement that was begun."""
         self._promise(*self._places.begun(process, motion, target, box))
 
     def has_arrived(self, process: VirtualProcess, motion: Motion) -> None:
-        """Check that a movement that arrived is over, where it was sent."""
+        """Check that a movement that arrived is over, at its target."""
         self._promise(not self._on.plant.moving, "a movement arrived, and the arm moves")
         self._promise(*self._places.arrived(process, motion))
 
     def has_read_pose(self, process: VirtualProcess, pose: Pose) -> None:
-        """Check a pose that was read: whose tip it is, and where that is."""
+        """Check a pose that was read: its tool, and its place."""
         held = [state.selected for state in self._since(process)]
         self._promise(pose.tool in held, f"{pose} names its tool, in force were {held}")
         self._promise(*self._places.read(process, pose))
 
     def has_read_robot(self, process: VirtualProcess, robot: int) -> None:
-        """Check which robot was read to be in force."""
+        """Check the current robot that was read."""
         held = [state.robot for state in self._since(process)]
         self._promise(robot in held, f"robot {robot} was read, in force were {held}")
 
     def stopping(self, process: VirtualProcess) -> None:
-        """A stop begins."""
+        """Note that a stop begins."""
         self.passed()
         process.held_back = True
 
     def has_stopped(
         self, process: VirtualProcess, controller: ControllerCore, *, acknowledged: bool
     ) -> None:
-        """Check the latch when a stop has ended, and the machine where it was acknowledged."""
+        """Check the latch when a stop has ended, and the machine if it was acknowledged."""
         self.stops.held(process, controller, "stop()")
         if acknowledged:
             self.stops.acknowledged()
@@ -350,7 +350,7 @@ class ContractRules:
         self.stops.held(process, controller, "reset_fault()")
 
     def releasing(self, process: VirtualProcess) -> None:
-        """A person lets things move again."""
+        """Note that a person releases the stop."""
         process.held_back = False
 
     def _since(self, process: VirtualProcess) -> list[MachineState]:
@@ -358,5 +358,5 @@ class ContractRules:
         return self._states.since(process)
 
     def _promise(self, kept: bool, sentence: str) -> None:
-        # What a bent frame tells cannot be told apart from the truth where it has no checksum.
+        # Without a checksum an altered frame looks like the truth.
         self._on.hold(_RULE, kept or self._on.plant.bent, sentence)

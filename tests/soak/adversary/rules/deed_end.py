@@ -1,4 +1,4 @@
-"""How a deed ends: what it says, against what is so; and what it leaves behind."""
+"""The end of a deed: its report compared with the facts, and its leftovers."""
 
 import math
 import re
@@ -33,17 +33,17 @@ _OUT_OF_REACH: Final = (
     LeaseLostError,
     ConfigError,
 )
-"""After these nothing can be restored: the link is gone, or the right to write, or the record."""
+"""After these nothing can be restored: link, right to write, or record is gone."""
 
 _TRIED: Final = {"rolled back", "not applied", "conflict", "unknown"}
-"""What the journal says of a tool that was, or could not be, put back."""
+"""The journal's words for a tool that was, or could not be, restored."""
 
 
 class EndRules:
-    """Looks at a deed when it has ended by itself.
+    """Checks a deed that has ended by itself.
 
     Args:
-        grounds: What the rules rest on.
+        grounds: The data of the rules.
     """
 
     def __init__(self, grounds: Grounds) -> None:
@@ -52,7 +52,7 @@ class EndRules:
     def ended(
         self, process: VirtualProcess, error: BaseException | None, state: MachineState
     ) -> None:
-        """Check how a deed ended, against what the machine keeps now."""
+        """Check the reported end of a deed against the machine's present state."""
         if error is None:
             self._succeeded(process, state)
         code = 0 if error is None else exit_code(error)
@@ -65,7 +65,7 @@ class EndRules:
             f"it ends with {code}, and another client was answered in place of it",
         )
         unsure = any(one.what == "SYNC_FAILS" for one in self._on.now.hour.disturbances)
-        # A program that calls back tells what it left open when it calls again.
+        # A program that calls back reports its leftovers when it calls again.
         if self._on.books.trusted and code != UNKNOWN and not self._on.plant.calls_back:
             begun = [
                 m.request
@@ -83,7 +83,7 @@ class EndRules:
     def _unsent(self, marker: BookedMarker) -> bool:
         """Return whether nothing has left under a marker.
 
-        Where its sync failed it counted as not stored, and the disk may have it nevertheless.
+        If its sync failed it counted as not stored, and yet the disk may have it.
         """
         now = self._on.now
         if marker.kind == "change":
@@ -93,7 +93,7 @@ class EndRules:
     def _taken_back(
         self, process: VirtualProcess, error: BaseException | None, state: MachineState
     ) -> None:
-        """Check that a change that failed tried to put the old values back, where it could."""
+        """Check that a failed change tried to restore the old values where it could."""
         hour = self._on.now.hour
         harmed = any(one.kind in _HARM_THE_JOURNAL for one in hour.disturbances)
         gone = process.cut_off or any(isinstance(one, _OUT_OF_REACH) for one in chain(error))
@@ -168,7 +168,7 @@ class EndRules:
             )
 
     def _told(self, error: BaseException | None, code: int, state: MachineState) -> None:
-        """Check what the end says of the controller."""
+        """Check the report's statements about the controller."""
         if error is None:
             return
         outcome = outcome_after(error)
@@ -177,7 +177,7 @@ class EndRules:
             if not stands.known or tool in foreign:
                 continue
             holds = None if stands.holds is None else ToolOffset(*stands.holds)
-            # Registers are all that can be read; of these a person was told that they may wait.
+            # Only registers can be read; a person was told that these may be waiting.
             waits = tool in self._on.doubted and self._on.from_a_lost_write(tool, holds)
             self._on.hold(
                 "StateIsTold",
@@ -214,17 +214,17 @@ class EndRules:
 
 
 _PROOFS: Final = ("verified", "tested, and kept by the program")
-"""What the record says of a value that was proved: by robolink, and by a program's touches."""
+"""The record's words for a tested value: by robolink, and by a program's touches."""
 
 _DOUBT: Final = re.compile(r"The registers of tool (\d+) hold ")
-"""The beginning of a sentence of robolink's (docs/plc-maps.md)."""
+"""The beginning of one of robolink's sentences (docs/plc-maps.md)."""
 
 
 class RestRules:
-    """Looks at machine and journal while nothing is under way.
+    """Checks machine and journal while nothing is under way.
 
     Args:
-        grounds: What the rules rest on.
+        grounds: The data of the rules.
     """
 
     def __init__(self, grounds: Grounds) -> None:
@@ -232,12 +232,12 @@ class RestRules:
         self._by_others: dict[int, ToolOffset | None] = {}
 
     def said(self, text: str) -> None:
-        """Note what a person was told: of which tools the registers are not on record."""
+        """Note the tools whose registers a person was told are not recorded."""
         self._on.doubted |= {int(tool) for tool in _DOUBT.findall(text)}
 
     def left(self, state: MachineState) -> None:
-        """Check what a deed left behind, however it ended, killed or not, before anybody acts."""
-        # A program that is stopped leaves what it had selected; it begins with its own tool again.
+        """Check the leftovers of a deed, however it ended, killed or not, before anybody acts."""
+        # A stopped program leaves the tool that it had selected; it begins with its own tool again.
         own = self._on.plant.moved_itself or self._on.plant.calls_back
         if state.selected != self._on.now.before.selected and not own:
             self._on.hold(
@@ -265,7 +265,7 @@ class RestRules:
             self._agrees(tool, holds, named)
 
     def _all_or_none(self, state: MachineState, markers: Sequence[BookedMarker]) -> None:
-        """Check that of several tools all hold what was typed, or none: or something is open."""
+        """Check that of several tools all hold the typed values, or none: or something is open."""
         typed = self._on.now.wish.typed
         others = self._on.plant.touched | {tool for tool, _ in self._on.now.typed_by_others}
         if len(typed) < 2 or markers or any(tool in others for tool, _ in typed):
@@ -275,9 +275,9 @@ class RestRules:
         self._on.hold("AllOrNone", all(new) or not any(new), f"half of {typed} stands: {held}")
 
     def _note_what_others_changed(self, state: MachineState) -> None:
-        """Note values that no journal can be right about, until they are written again.
+        """Note values that no journal can know, until they are written again.
 
-        A hand at the pendant wrote them, or the disk has lost what it said that it had kept.
+        A hand at the pendant wrote them, or the disk has lost data that it reported as kept.
         """
         for tool in {*self._on.now.first.tools, *state.tools}:
             if tool in self._on.plant.touched or not self._on.books.trusted:
@@ -286,10 +286,10 @@ class RestRules:
             self._on.staged |= self._on.plant.staged()
 
     def _came_from_a_lost_write(self, tool: int, holds: ToolOffset | None) -> bool:
-        """Return whether a request brought into force what nobody could know to wait for one.
+        """Return whether a request activated a value that nobody could know to be waiting.
 
-        A write had ended between its registers and its request, and the disk lost the record of
-        it. A person has to have been told, where the record could show it.
+        A write had ended between its registers and its request, and the disk lost the record of it.
+        A person must have been told, if the record could show it.
         """
         known, _ = self._on.books.value_of(tool)
         return self._on.from_a_lost_write(tool, holds) and (tool in self._on.doubted or not known)
@@ -313,7 +313,7 @@ class RestRules:
         )
 
     def at_rest(self, state: MachineState, *, usable: bool, why: str) -> None:
-        """Check the cell after its people have put it right."""
+        """Check the cell after its people have recovered it."""
         self._on.hold("UsableAgain", usable, f"nobody gets it going again: {why}")
         if not usable:
             return
@@ -341,7 +341,7 @@ class RestRules:
                 self._certified_by_program(holds)
 
     def _certified_by_program(self, kept: ToolOffset) -> None:
-        """Compare a value that the machine's own program keeps with where the tip is."""
+        """Compare a value that the machine's own program keeps with the tip's place."""
         truth = self._on.plant.tip_of(TOOL)
         if truth is None:
             return
@@ -354,7 +354,7 @@ class RestRules:
         )
 
     def _proved(self, tool: int, holds: ToolOffset | None) -> bool:
-        """Return whether a new value rests on a proof, or on a person's word."""
+        """Return whether a new value rests on a test, or on a person's confirmation."""
         typed = (*self._on.now.wish.asked, *self._on.now.typed_by_others)
         if any(n == tool and self._on.plant.same(offset, holds) for n, offset in typed):
             return True

@@ -1,4 +1,4 @@
-"""What the rules know of the hour that runs, and how they are held."""
+"""The rules' data about the present hour, and their evaluation."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -46,34 +46,34 @@ NAMES: Final = (
 """Every rule, in the order in which they are listed."""
 
 SURELY_MM: Final = 0.5
-"""A tip that was certified and lies farther off than this is a wrong certificate in any case."""
+"""A certified tip farther away than this is a wrong certificate in any case."""
 
 TOLERANCE_MM: Final = 0.1
-"""What the touches of a program's proof are held to."""
+"""The tolerance for the touches of a program's turn test."""
 
 
 @dataclass(slots=True)
 class HourSoFar:
-    """What the rules know of the hour that runs.
+    """The rules' data about the present hour.
 
     Attributes:
         hour: The hour.
-        wish: What its person means to be true at its end.
-        first: What the machine kept at its beginning.
-        before: What it kept at the beginning of the last try.
-        agreed: What it kept when its person last agreed to a change: one deed may make several.
+        wish: The state that its person intends at its end.
+        first: The machine's state at its beginning.
+        before: The state at the beginning of the last try.
+        agreed: The state when its person last agreed to a change: one deed may make several.
         entries: The newest entry at its beginning.
-        old_markers: What was open before the last try, by operation.
-        moves: Operations under which a movement has left, with how often.
-        movements: How many the machine had begun.
-        wanted: What each tool may hold.
-        report: Of a tip that was measured and proved.
+        old_markers: The markers open before the last try, by operation.
+        moves: Operations under which a movement has left, with counts.
+        movements: The number of movements that the machine had begun.
+        wanted: The values that each tool may hold.
+        report: The report about a tip that was measured and tested.
         last_move: The last movement that has left.
         writes: The first write that has left under each marker, by operation.
         crowded: Whether a second person was at work.
-        typed_by_others: What they typed, by tool.
-        settled_by_others: Tools of what was open when a second person began to recover.
-        chosen_by_hand: Tools that somebody put in force at the machine.
+        typed_by_others: Their typed values, by tool.
+        settled_by_others: Tools of open jobs when a second person began to recover.
+        chosen_by_hand: Tools that somebody selected at the machine.
     """
 
     hour: Hour
@@ -96,22 +96,22 @@ class HourSoFar:
 
 
 class Grounds:
-    """What every rule rests on: the machine and the journal as they are, the hour so far.
+    """The data of every rule: the machine and the journal as they are, the hour so far.
 
     Args:
-        story: Where a broken rule is noted.
+        story: Receives broken rules.
         plant: The machine.
         books: The journal on the disk.
 
     Attributes:
         plant: The machine.
         books: The journal on the disk.
-        now: The hour that runs.
-        story: Where a broken rule is noted.
+        now: The present hour.
+        story: Receives broken rules.
         staged: Values in registers that wait for a request, left by a write whose record the disk
-            has lost: the next request may bring them into force.
-        doubted: Tools of which a person was told that their registers are not on record, and that
-            only the machine's screen shows what it uses.
+            has lost: the next request may activate them.
+        doubted: Tools for which a person was told that their registers are not recorded, and that
+            only the machine's screen shows the value in use.
     """
 
     now: HourSoFar
@@ -129,20 +129,20 @@ class Grounds:
         return staged is not None and self.plant.same(staged, holds)
 
     def hold(self, rule: str, holds: bool, sentence: str) -> None:
-        """Look at a rule; ``sentence`` says what was seen where it does not hold."""
+        """Check a rule; ``sentence`` is the observation if it is broken."""
         self.story.checks[rule] += 1
         if not holds:
             self.story.break_rule(rule, sentence)
 
     def open_selection(self) -> list[BookedMarker]:
-        """Return the markers that say that another tool may be selected than the cell's own."""
+        """Return the markers by which a tool other than the cell's own may be selected."""
         if not self.books.trusted:
             return [BookedMarker("", "selection", "", {})]
         return [m for m in self.books.markers() if m.kind == "selection" or "select" in m.details]
 
 
 def chain(error: BaseException | None) -> Iterator[BaseException]:
-    """Yield an error and what led to it."""
+    """Yield an error and its causes."""
     seen: list[BaseException] = []
     while error is not None and not any(error is one for one in seen):  # it may be its own cause
         seen.append(error)

@@ -1,14 +1,13 @@
-"""What was asked for is there; what was there before, or was set by hand, stays.
+"""Requested values are stored; earlier values, and values set by hand, stay.
 
-The markers and the entries of the driver say what it believed that it was asked for. A driver that
-loses a digit before it stores its marker is right by its own record; not by :class:`AskedRules`,
-which judges by what people typed.
+The driver's markers and entries say what it believed was requested. A driver that loses a digit
+before it stores its marker is right by its own record; not by :class:`AskedRules`, which judges by
+the typed values.
 
-What somebody does at the pendant stays, and is noticed, while robolink asks a question. Only then:
-what a hand does between a look and the request that follows it can be seen by nobody.
-What is typed by hand later takes the place of what was typed before; where that is what was there
-when the deed began, nobody can tell. A second person who has read a value and then types another
-one replaces it on purpose.
+An act at the pendant while robolink asks a question stays, and is noticed. Only then: an act
+between a reading and the request after it is invisible to everybody. A later value typed by hand
+replaces an earlier one; if it equals the value at the beginning of the deed, nobody can tell. A
+second person who has read a value and then types another one replaces it on purpose.
 """
 
 from collections.abc import Mapping, Sequence
@@ -25,10 +24,10 @@ _Values = Mapping[int, ToolOffset | None]
 
 
 class AskedRules:
-    """Compares what the machine holds with what people have typed, hour after hour.
+    """Compares the machine's values with the typed ones, hour after hour.
 
     Args:
-        grounds: What the rules rest on.
+        grounds: The data of the rules.
     """
 
     def __init__(self, grounds: Grounds) -> None:
@@ -41,11 +40,11 @@ class AskedRules:
         self._sure = True
 
     def doubt(self) -> None:
-        """Note that something happens after which nobody can tell what the last change was."""
+        """Note an event after which nobody can tell what the last change was."""
         self._sure = False
 
     def succeeded(self, wish: Wish, state: MachineState) -> None:
-        """Check what a deed that ended well has left."""
+        """Check the results of a deed that ended well."""
         for tool, offset in wish.typed:
             self._hold(tool, offset, state, "was typed")
         report = self._on.now.report
@@ -57,7 +56,7 @@ class AskedRules:
                 self._hold(tool, offset, state, "was there before the last change")
 
     def left(self, state: MachineState) -> None:
-        """Check what a deed has left, however it ended: nothing but what somebody asked for."""
+        """Check the results of a deed, however it ended: every value was asked for."""
         now, plant = self._on.now, self._on.plant
         for tool in {tool for tool, _ in now.wish.asked}:
             holds, first = state.tools.get(tool), now.first.tools.get(tool)
@@ -76,7 +75,7 @@ class AskedRules:
     def _mistaken(
         self, tool: int, asked: Sequence[ToolOffset | None], holds: ToolOffset | None
     ) -> bool:
-        """Return whether the machine took an offset for another one, and the record is open."""
+        """Return whether the machine mistook an offset for another one, and the record is open."""
         books = self._on.books
         told = not books.trusted or any(
             m.details.get("tool") == tool or str(tool) in m.details.get("tools", {})
@@ -87,7 +86,7 @@ class AskedRules:
         )
 
     def at_rest(self, state: MachineState) -> None:
-        """Note what the hour has changed, for an undo that comes later."""
+        """Note the changes of the hour, for a later undo."""
         now, plant = self._on.now, self._on.plant
         if (
             not self._sure
@@ -122,14 +121,14 @@ _AFTER_A_RESET: Final = (
     (0.0, 5.0, 5.0, 5.0, 50.0, 50.0, 50.0),
     (0.0, 5.0, 5.0, 5.0, 20.0, 20.0, 20.0),
 )
-"""What the machine itself sets, and what the driver holds it to before anything moves."""
+"""Settings of the machine itself, which the driver also requires before anything moves."""
 
 
 class BeforeRules:
-    """Looks at what a deed has to leave as it was.
+    """Checks the things that a deed must leave unchanged.
 
     Args:
-        grounds: What the rules rest on.
+        grounds: The data of the rules.
     """
 
     def __init__(self, grounds: Grounds) -> None:
@@ -145,10 +144,10 @@ class BeforeRules:
             )
 
     def ended(self, process: VirtualProcess, error: BaseException | None) -> None:
-        """Check a deed that ended by itself, with a link that answered to its end."""
+        """Check a deed that ended by itself, with a link that answered to the end."""
         if process.cut_off or self._on.plant.calls_back:
             return
-        # Whoever is told that nobody knows what a movement did looks at the robot.
+        # A person who is told that the end of a movement is unknown looks at the robot.
         told = any(isinstance(one, OutcomeUnknownError) for one in chain(error))
         self._on.hold(
             "NothingMovesOn",
@@ -164,7 +163,7 @@ class BeforeRules:
             self._on.hold("NothingOutlives", not left, f"it ended well, and {left} is open")
 
     def left(self, state: MachineState) -> None:
-        """Check what a deed left, before anybody acts."""
+        """Check the results of a deed before anybody acts."""
         plant, before = self._on.plant, self._on.now.before.settings
         robot = self._on.now.before.robot
         self._on.hold("AsBefore", state.robot == robot, f"robot {state.robot}, not {robot}")
@@ -179,7 +178,7 @@ class BeforeRules:
         )
 
     def at_rest(self, state: MachineState) -> None:
-        """Check the cell after its people have put it right: their reset may have changed it."""
+        """Check the cell after its people have recovered it: their reset may have changed it."""
         first = self._on.now.first.settings
         if self._on.plant.calls_back or not self._on.books.trusted:
             return
@@ -192,10 +191,10 @@ class BeforeRules:
 
 
 class HandRules:
-    """Looks at what becomes of what was typed by hand.
+    """Checks that values typed by hand stay.
 
     Args:
-        grounds: What the rules rest on.
+        grounds: The data of the rules.
     """
 
     def __init__(self, grounds: Grounds) -> None:
@@ -204,12 +203,12 @@ class HandRules:
         self._replacing: dict[int, tuple[VirtualProcess, ToolOffset]] = {}
 
     def begin(self) -> None:
-        """Begin a deed: whoever sets out to it sees what is there."""
+        """Begin a deed: the person who begins it sees the present values."""
         self._typed.clear()
         self._replacing.clear()
 
     def typed(self, tool: int, offset: ToolOffset) -> None:
-        """Note what was typed, unless whoever is at work saw the same when they began."""
+        """Note a typed value, unless the person at work saw the same at the beginning."""
         if self._on.plant.same(offset, self._on.now.before.tools.get(tool)):
             self._typed.pop(tool, None)
             return
@@ -217,7 +216,7 @@ class HandRules:
         self._replacing.pop(tool, None)
 
     def replaces(self, process: VirtualProcess, tool: int, offset: ToolOffset) -> None:
-        """Note that somebody has read what a tool holds now, and is about to type another value."""
+        """Note that somebody has read a tool's value and is about to type another."""
         self._replacing[tool] = (process, offset)
 
     def leaving(self, process: VirtualProcess, sent: SentRequest, state: MachineState) -> None:
@@ -233,7 +232,7 @@ class HandRules:
             )
 
     def at_rest(self, state: MachineState) -> None:
-        """Check that what was typed by hand is there still, when the people have recovered."""
+        """Check that values typed by hand are still there when the people have recovered."""
         for tool, first in self._typed.items():
             offset, holds = self._on.plant.by_hand.get(tool, first), state.tools.get(tool)
             replaced = self._replacing.get(tool)

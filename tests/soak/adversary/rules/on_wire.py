@@ -1,4 +1,4 @@
-"""What may leave a process, and when."""
+"""The requests that may leave a process, and when."""
 
 from collections.abc import Sequence
 
@@ -10,10 +10,10 @@ from tests.soak.adversary.rules.grounds import Grounds
 
 
 class WireRules:
-    """Looks at each request before it leaves.
+    """Checks each request before it leaves.
 
     Args:
-        grounds: What the rules rest on.
+        grounds: The data of the rules.
     """
 
     def __init__(self, grounds: Grounds) -> None:
@@ -49,7 +49,7 @@ class WireRules:
     ) -> None:
         if self._on.plant.numbered and sent.text == self._on.now.last_move:
             # The very same block, because it arrived damaged: its number keeps it from counting
-            # twice, which the count of the machine's own movements shows.
+            # twice, as the count of the machine's own movements shows.
             return
         self._on.now.last_move = sent.text
         mine = [m for m in markers if m.kind == "move" and m.operation not in self._on.now.moves]
@@ -93,12 +93,12 @@ class WireRules:
             wanted.append(read_offset(marker.details.get("before")))
 
     def _not_again(self, sent: SentRequest, ours: Sequence[BookedMarker]) -> None:
-        """Check that a value is not written that is there already: a write wears the memory."""
+        """Check that a stored value is not written again: a write wears the memory."""
         tool, plant = sent.tool or 0, self._on.plant
-        # The mark under which an earlier write left stays where nothing can be stored any more.
+        # The mark of an earlier write stays if nothing can be stored any more.
         ours = [m for m in ours if self._on.now.writes[m.operation] == sent.text]
         if not ours or tool in plant.touched or self._on.now.crowded or plant.bent:
-            return  # somebody else may have written it since it was looked at
+            return  # somebody else may have written it since it was read
         new, holds = read_offset(ours[-1].details.get("requested")), plant.shown(tool)
         self._on.hold(
             "ContractHolds",
@@ -107,7 +107,7 @@ class WireRules:
         )
 
     def given(self, tool: int, value: ToolOffset) -> None:
-        """Check a value that the machine's own program is about to be given, and to write."""
+        """Check a value that the machine's own program is about to get and write."""
         if not self._on.books.trusted:
             return
         whole = [
@@ -139,7 +139,7 @@ class WireRules:
         )
 
     def _puts_back(self, sent: SentRequest, markers: Sequence[BookedMarker]) -> bool:
-        """Return whether the write that is marked brings back what was there before."""
+        """Return whether the marked write restores the earlier value."""
         if not self._on.books.trusted:
             return True
         tool = sent.tool or 0
@@ -152,10 +152,10 @@ class WireRules:
             self._on.now.agreed.tools.get(tool),  # a deed's second change begins with its first
             self._on.plant.by_hand.get(tool),  # it was there before the change, if not at first
         ]
-        # A marker that could not be stored any more: the change around it says what it was.
+        # A marker that could no longer be stored: the change around it has its data.
         return not ours or any(self._on.plant.same(one, wanted) for one in before)
 
 
 def _of_tool(tool: int | None, markers: Sequence[BookedMarker]) -> list[BookedMarker]:
-    """Return the marks of writes of a tool."""
+    """Return the markers of writes of a tool."""
     return [m for m in markers if m.kind == "set" and m.details.get("tool") == tool]

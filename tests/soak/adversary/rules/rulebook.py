@@ -18,19 +18,19 @@ from tests.soak.adversary.rules.kept_values import AskedRules, BeforeRules, Hand
 from tests.soak.adversary.rules.on_wire import WireRules
 
 Typed = tuple[int, ToolOffset]
-"""A tool, and the offset that was typed for it."""
+"""A tool, and the offset typed for it."""
 
 
 class Rulebook(Grounds):
     """Checks the rules of one cell.
 
     Args:
-        story: Where a broken rule is noted.
+        story: Receives broken rules.
         plant: The machine.
         books: The journal on the disk.
 
     Attributes:
-        contract: What every call has to keep.
+        contract: The rules for every call.
 
     Example:
         >>> from pathlib import Path
@@ -95,7 +95,7 @@ class Rulebook(Grounds):
         self.contract.begin(state, previews="--dry-run" in hour.line)
 
     def begin_again(self) -> None:
-        """Begin another try in the same hour; what is open by now is of before."""
+        """Begin another try in the same hour; all open markers count as old."""
         self.now.before = self.plant.state()
         self.now.old_markers = frozenset(m.operation for m in self.books.markers())
         self.now.report = None
@@ -103,29 +103,29 @@ class Rulebook(Grounds):
         self._by_hand.begin()
 
     def hand_typed(self, tool: int, offset: ToolOffset) -> None:
-        """Note what somebody types at the machine while robolink asks a question."""
+        """Note a value that somebody types at the machine while robolink asks a question."""
         self._by_hand.typed(tool, offset)
 
     def hand_chose(self, tool: int) -> None:
-        """Note which tool somebody puts in force at the machine meanwhile."""
+        """Note a tool that somebody selects at the machine meanwhile."""
         self.now.chosen_by_hand.append(tool)
 
     def agreed(self) -> None:
-        """Note what the machine keeps while a person agrees to a change of it."""
+        """Note the machine's state while a person agrees to a change of it."""
         self.now.agreed = self.plant.state()
 
     def said(self, text: str) -> None:
-        """Note what a person is told."""
+        """Note a message to a person."""
         self._at_rest.said(text)
 
     def word_on(self, finding: Finding) -> bool:
-        """Note that somebody was shown a finding and has looked; return their word."""
+        """Note that somebody was shown a finding and has looked; return their answer."""
         if finding.marker.kind is MarkerKind.HISTORY:
             self.books.lost = False
         return True
 
     def others_settle(self) -> None:
-        """Note that a second person is about to settle what is open, whoever left it."""
+        """Note that a second person is about to recover open jobs, whoever left them."""
         self.now.crowded = True
         for marker in self.books.markers():
             named = (marker.details.get("tool"), *marker.details.get("tools", {}))
@@ -150,7 +150,7 @@ class Rulebook(Grounds):
             self._by_hand.leaving(process, sent, self.plant.state())
 
     def given(self, tool: int, value: ToolOffset) -> None:
-        """Check a value before the machine's own program is given it."""
+        """Check a value before the machine's own program gets it."""
         self._on_wire.given(tool, value)
 
     def stopped(self) -> None:
@@ -160,12 +160,12 @@ class Rulebook(Grounds):
     def ended(
         self, process: VirtualProcess, error: BaseException | None, state: MachineState
     ) -> None:
-        """Check how a deed ended, against what the machine keeps now.
+        """Check the reported end of a deed against the machine's present state.
 
         Args:
-            process: Who did it.
-            error: What ended it, ``None`` where it ended well.
-            state: What the machine keeps now.
+            process: The process of the deed.
+            error: The error that ended it, ``None`` for none.
+            state: The machine's present state.
 
         Example:
             >>> from pathlib import Path
@@ -201,19 +201,19 @@ class Rulebook(Grounds):
         self._asked.doubt()
 
     def left(self, state: MachineState) -> None:
-        """Check what a deed left behind, before anybody acts."""
+        """Check the leftovers of a deed before anybody acts."""
         self.contract.left()
         self._at_rest.left(state)
         self._before.left(state)
         self._asked.left(state)
 
     def at_rest(self, state: MachineState, *, usable: bool, why: str) -> None:
-        """Check the cell after its people have put it right.
+        """Check the cell after its people have recovered it.
 
         Args:
-            state: What the machine keeps now.
+            state: The machine's present state.
             usable: Whether they got it going again.
-            why: Why not, empty where they did.
+            why: The reason if not; empty if they did.
 
         Example:
             >>> from pathlib import Path

@@ -23,22 +23,22 @@ if TYPE_CHECKING:
     from robolink_simulators.testkit.served import OwnFolder, SimulatedCell
 
 _STATE: Final = ("ROBOLINK_STATE_DIR", "ROBOLINK_JOURNAL")
-"""What says where the journal, the backups and the like are kept."""
+"""Variables that name the places of the journal, the backups and other state."""
 
 _OF_THE_DEVELOPER: Final = {name: os.environ.get(name) for name in _STATE}
 
 _BEFORE: Final = {name: os.environ[name] for name in os.environ if name.startswith("ROBOLINK_")}
-"""What robolink was told before pytest began."""
+"""robolink's environment variables as they were before pytest started."""
 
 _MARKER: Final = "robolink"
 _CELLS: Final = pytest.StashKey[list["SimulatedCell"]]()
-"""The simulated cells of a test."""
+"""Key of a test's simulated cells."""
 
 _NOT_PASSED: Final = pytest.StashKey[bool]()
-"""Of a test that has failed already, or was skipped."""
+"""Key of a flag: the test has already failed or been skipped."""
 
 Factory = Callable[..., "SimulatedCell"]
-"""Makes one more cell: takes what the marker takes, and ``medium``."""
+"""Makes one more cell. Takes the marker's arguments and ``medium``."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -199,4 +199,4 @@ class Frame:
 
 
 ORIGIN: Final = Frame()
-"""The frame that is where the outer one is."""
+"""The identity frame, which coincides with the frame around it."""

@@ -75,7 +75,7 @@ class Taken:
                 lowest, highest = self.whole_limits
                 fits = type(value) is int and lowest <= value <= highest
             case "number":
-                # A JSON integer may have hundreds of digits, so it is compared before it becomes a float.
+                # A JSON integer may have hundreds of digits: compare before conversion to float.
                 number = isinstance(value, (int, float)) and not isinstance(value, bool)
                 fits = number and self.least <= value <= self.most  # type: ignore[operator]
             case "flag":

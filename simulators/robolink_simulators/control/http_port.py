@@ -108,7 +108,7 @@ class HttpPort(ThreadingHTTPServer):
     def server_bind(self) -> None:
         """Bind without looking up this machine's name, which may take seconds."""
         if os.name == "posix":
-            # Without it nobody can listen here for a minute if a client was connected at the end. On
+            # Without it nobody can listen here for a minute if a client was connected last. On
             # Windows it would let two programs share the port.
             self.socket.setsockopt(SOL_SOCKET, SO_REUSEADDR, 1)
         self.socket.bind(self.server_address)

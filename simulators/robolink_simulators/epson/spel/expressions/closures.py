@@ -165,7 +165,7 @@ class Surroundings(Protocol):
 
 
 Run = Callable[[Surroundings], Value]
-"""What works an expression out."""
+"""Evaluates an expression."""
 
 _WHOLE: Final[dict[str, Callable[[int, int], int]]] = {
     "+": operator.add,
@@ -174,7 +174,7 @@ _WHOLE: Final[dict[str, Callable[[int, int], int]]] = {
     **_BITS,
 }
 _OF_ANY_ROBOT: Final = frozenset({"insidebox", "insideplane"})
-"""Functions that take All for the number of a robot."""
+"""Functions that accept All as a robot number."""
 
 
 class Scope(Protocol):

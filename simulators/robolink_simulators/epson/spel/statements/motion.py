@@ -119,11 +119,11 @@ def _sync(evaluator: Evaluator, command: KeywordStatement) -> str:
 SYNC_STATEMENTS: Final[dict[str, Callable[[Evaluator, KeywordStatement], str]]] = {
     "syncrobots": _sync
 }
-"""Keyword to what carries it out."""
+"""Statement handlers by keyword."""
 
 
 DESCENT = 2
-"""Which leg of a Jump is the descent; Sense is looked at just before it (documented)."""
+"""Index of the leg of a Jump that is the descent. Sense is checked just before it (documented)."""
 
 
 def jump(

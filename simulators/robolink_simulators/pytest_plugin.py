@@ -315,7 +315,7 @@ def epson_replay(
 
 def _seed(text: str) -> int:
     seed = int(text)
-    if seed < 0:  # for chance, -3 would be 3 once more
+    if seed < 0:  # the generator gives the same values for -3 as for 3
         raise ValueError(text)
     return seed
 
@@ -336,7 +336,7 @@ def _asked(
         if marker.args:
             raise pytest.UsageError("the marker robolink takes names: robolink(seed=3)")
         asked |= marker.kwargs
-        # The marker of a module or a class may be meant for the cells of other tests in it.
+        # A module's or class's marker may be for the cells of its other tests.
         of_test |= marker.kwargs if node is request.node else {}
     wanted = CellRequest.of(asked | given)
     require_time_of_its_own(medium, given)

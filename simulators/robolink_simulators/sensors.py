@@ -107,5 +107,5 @@ def open_served(url: str) -> SimulatedCamera:
 
 def _identity(url: str) -> str:
     parts = urlsplit(url)
-    # Not what lets one in at the assist port: this goes into sentences and records.
+    # Without the token of the assist port: this text goes into messages and records.
     return f"{parts.scheme}://{parts.netloc.rpartition('@')[2]}"

@@ -149,7 +149,7 @@ class InProcessMailboxLink:
                 )
             if served.delay_s:
                 self._pass(served.delay_s)
-            # What comes due in this half is done, at its own instant, before the next request.
+            # Events due in this half happen, each at its time, before the next request.
             self._clock.advance(self._exchange_s / 2)
             return served.words
 

@@ -9,7 +9,7 @@ import os
 import platform
 import sys
 
-# Before numpy is loaded: on small systems a second thread of its library only waits, and where
+# Before numpy is loaded: on small systems a second thread of its library only waits, and if
 # other work has the second processor a floor takes seven times as long as with one thread.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 

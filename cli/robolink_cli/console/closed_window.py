@@ -14,7 +14,7 @@ from typing import Final
 from robolink.interrupts import window_closed
 
 _KINDS: Final = frozenset({2, 5, 6})
-"""The window was closed, the user logs off, the computer is shut down."""
+"""Console events: the window is closed, the user logs off, the computer shuts down."""
 
 _PATIENCE_S: Final = 4.5
 

@@ -158,7 +158,7 @@ class ReportDraft:
             return noted
         from robolink.report import Outcome
 
-        # That nobody could be asked is on no record.
+        # No record shows that nobody could be asked.
         open_end = recorded.outcome is Outcome.PROPOSED
         return replace(
             recorded,

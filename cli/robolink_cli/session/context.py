@@ -87,7 +87,7 @@ class CliContext(NamedTuple):
 
 
 Command = Callable[..., int | None]
-"""What click calls; it returns the exit code, ``None`` for 0."""
+"""The function that click calls. Returns the exit code, ``None`` for 0."""
 
 
 def stop_request() -> StopRequest:

@@ -19,7 +19,7 @@ from robolink_cli.wizard.state import Header, WizardState
 from robolink_cli.wizard.work import Desk, Face, Work
 
 _POOR: Final = frozenset({"", "dumb", "unknown"})
-"""Terminals that obey nothing."""
+"""Values of TERM for terminals that support no control sequences."""
 
 
 def face_here() -> "Face":
@@ -52,7 +52,7 @@ def draws_whole_screens() -> bool:
         size = os.get_terminal_size(sys.stderr.fileno())
     except (OSError, ValueError, AttributeError):
         return False
-    return min(size.columns, size.lines) > 0  # where nobody knows the size, none is assumed
+    return min(size.columns, size.lines) > 0  # an unknown size is not guessed
 
 
 T = TypeVar("T")

@@ -43,7 +43,7 @@ def serial_ports() -> list[SerialPort]:
             port.description if port.description != "n/a" else "",
             port.hwid if port.hwid != "n/a" else "",
             _group_of(port.device),
-            # Windows keeps no rights on ports.
+            # Windows has no access rights on ports.
             os.name != "posix" or os.access(port.device, os.R_OK | os.W_OK),
         )
         for port in sorted(list_ports.comports())

@@ -391,7 +391,7 @@ class Recalibration:
         self, controller: Controller, run: RecipeRun, report: ChangeReport
     ) -> dict[str, object]:
         """Show a person what was done; return its document."""
-        # Now, because Ctrl-C may come before the logout is answered.
+        # Now, because Ctrl-C may come before the logout is confirmed.
         desk = current_desk()
         if desk is not None:
             desk.regard(report)

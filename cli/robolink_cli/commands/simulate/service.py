@@ -65,7 +65,7 @@ class ParentWatch:
             except ProcessLookupError:
                 self._gone = True
             except PermissionError:
-                return False  # it lives, and is somebody else's
+                return False  # it is running, under another user
         return self._gone
 
     def close(self) -> None:

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 _TURN_S: Final = 0.03
 _REPAINT_S: Final = 0.4
-"""So often the age of the reading is drawn anew while nothing happens."""
+"""Interval in seconds at which the age of the reading is redrawn while nothing happens."""
 
 
 class FullFace:
@@ -123,7 +123,7 @@ class FullFace:
     def _shows_the_end(self) -> bool:
         """Show how the work ended, if there is a screen for it, until a person leaves it."""
         if ended_by() is EndedBy.HUNG_UP:
-            return False  # nobody is there to leave it
+            return False  # nobody is there to close it
         if self._state.ended is None:
             ended = ended_of(self._state, self._work.error, time.monotonic())
             if ended is None:
@@ -166,7 +166,7 @@ class FullFace:
         """
         line, ends, more = press.data.replace("\r", "\n").partition("\n")
         if not self._state.has_field or self._state.writing is not None or more.strip("\n"):
-            # A key just before it is the beginning of the same burst.
+            # A key just before it is the start of the same burst.
             for one in self._gate.burst(*_when(press)):
                 self._happens(self._pressed(one))
             return

@@ -166,7 +166,7 @@ def _calibrate(
         else:
             done = _carry_out(controller, frame, given, listener, order=order, describe=document)
             payload = document(done)
-            # Now, because Ctrl-C may come before the logout is answered.
+            # Now, because Ctrl-C may come before the logout is confirmed.
             _show_end(done.tools[0])
     return {**payload, "report": draft.saved}
 

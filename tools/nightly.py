@@ -62,7 +62,7 @@ PARTS: Final = (
     Part("windows", 0.08, ("make", "windows")),
     Part("versions", 0.13, ("make", "versions")),
     # The pages are a separate part: otherwise, broken pages would stop the rest of soak.
-    # So are the faults, and theirs that take long are not run twice a night.
+    # So are the faults, so that their long tests do not run twice a night.
     Part("soak", 0.2, ("make", "-o", "docs", "soak", "MARKS=soak and not fault")),
     Part("fresh seeds", 0.15, ("make", "soak", "SEEDS=fresh"), endless=True),
     Part("mutants", 0.2, (".venv/bin/python", "-m", "tests.mutants", "--minutes", "{minutes}")),
@@ -168,7 +168,7 @@ def _commit() -> str:
         )
         return done.stdout.strip()
 
-    # Seeds that were run and versions that were tried are records: a night itself adds to them.
+    # Lists of seeds and versions that were run are records: a night adds to them.
     records = (":!tests/soak/seeds_run.txt", ":!tests/versions/tried.json")
     seen = ("--untracked-files=no", "--", ".", *records)
     changed = " with changes" if asked("status", "--porcelain", *seen) else ""

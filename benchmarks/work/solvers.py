@@ -115,7 +115,7 @@ def _robust(count: int, peer: bool) -> Iterator[Figure]:
     matrices[:, :3, :3], matrices[:, :3, 3] = turned, positions
 
     def theirs() -> Floats:
-        with redirect_stdout(None), warnings.catch_warnings(action="ignore"):  # it talks
+        with redirect_stdout(None), warnings.catch_warnings(action="ignore"):  # it prints
             tip: Floats = pivot_calibration_with_ransac(matrices, 100, THRESHOLD_MM, 0.25)[0]
         return tip
 

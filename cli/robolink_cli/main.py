@@ -56,7 +56,7 @@ def cli(context: click.Context) -> object:
     if not may_be_guided() or json_is_on():
         context.fail(gettext("Missing command."))  # in click's own words
     guided = cli.get_command(context, "change")
-    assert guided is not None  # noqa: S101 - it stands in the map
+    assert guided is not None  # noqa: S101 - it is in the map
     with guided.make_context("change", [], parent=context) as sub:
         return guided.invoke(sub)
 

@@ -45,6 +45,6 @@ def closing_in_order() -> Iterator[None]:
     finally:
         over.set()
         if not closed.is_set():
-            # Else Windows waits for that handler, and is not to be waited for here: it may keep
+            # Otherwise Windows waits for that handler. Do not wait for Windows here: it may keep
             # the list of handlers locked meanwhile.
             console.SetConsoleCtrlHandler(handler, False)

@@ -139,7 +139,7 @@ MEANINGS: Final[dict[int, str]] = {
 
 # The first class that fits decides. A tool number that does not exist is a mistake in the
 # command (2). A tool that was changed meanwhile, is undefined, or did not keep what was
-# written is the controller's no (5): nothing was rolled back, so it cannot be 8.
+# written is a refusal by the controller (5): nothing was rolled back, so it cannot be 8.
 EXIT_CODES: Final[tuple[tuple[type[errors.RobolinkError], int], ...]] = (
     (errors.DeclinedError, 9),
     (errors.VerifyError, 8),

@@ -176,7 +176,7 @@ def draw(text: str, *, beside: bool = False) -> None:
         text: One line or several.
         beside: On stderr, beside the result.
     """
-    import click  # not above: doctor shows its findings where click cannot be imported
+    import click  # not above: doctor shows its findings even if click cannot be imported
 
     # The stream is given, because click considers an ASCII console a mistake and
     # would send it UTF-8.
@@ -236,7 +236,7 @@ class _Watched(io.FileIO):
         try:
             return super().write(data)
         except OSError:
-            # EPIPE of a pipe, EIO of a terminal that hung up, ENOSPC of a file: in each case
+            # EPIPE of a pipe, EIO of a closed terminal, ENOSPC of a file: in each case
             # nobody will ever see it.
             send_nowhere(self.fileno())
             output_closed()

@@ -195,7 +195,7 @@ def _table(title: str, heads: Row, rows: Sequence[Row], widths: Sequence[int]) -
             Text(_folded(head, width)), width=width, justify="right" if right else "left"
         )
     for row in rows:
-        # rich breaks between words alone, and Chinese has no blanks between them.
+        # rich breaks lines only between words, and Chinese has no blanks between them.
         shown.add_row(*map(Text, map(_folded, row, widths)))
     return shown
 

@@ -192,7 +192,7 @@ class ReportDraft:
         receipt = self._receipt
         if isinstance(error, VerifyError):
             return Outcome.VERIFY_FAILED
-        # After a write these two words would claim that nothing was written.
+        # After a write, these two words would state that nothing was written.
         if receipt is None and isinstance(error, DeclinedError):
             return Outcome.DECLINED
         if receipt is None and isinstance(error, CalibrationError):

@@ -180,7 +180,7 @@ class TerminalLines:
             # And the text in a line that was not ended with ENTER.
             self._termios.tcflush(self._descriptor, self._termios.TCIFLUSH)
         except (OSError, self._termios.error):
-            return []  # the terminal is gone; the next read says so
+            return []  # the terminal is gone; the next read reports it
         return [_text(line) for line in dropped.split(b"\n")[:-1]]
 
     def _read(self, wait_s: float) -> bytes | None:

@@ -315,7 +315,7 @@ def _typed_again(context: CliContext, chosen: tuple[str, ...], *, anew: bool) ->
         return shlex.join(words)
     import subprocess
 
-    # cmd.exe and PowerShell both know double quotes; single ones are letters to cmd.exe.
+    # cmd.exe and PowerShell both accept double quotes; cmd.exe reads single ones as text.
     return subprocess.list2cmdline(words)
 
 

@@ -229,7 +229,7 @@ def _stop(state: WizardState) -> Advanced:
         return replace(ending, waits=False), [SendAnswer(question.number, word)]
     if state.writing is not None or confirms(state) is not None:
         return ending, [SendAnswer(question.number, "n")]
-    return ending, [WizardCommand.END_WORK]  # a no would go on
+    return ending, [WizardCommand.END_WORK]  # the answer no would continue
 
 
 def armed_anew(state: WizardState, at_s: float) -> WizardState:

@@ -46,8 +46,8 @@ def draws_whole_screens() -> bool:
         return False
     try:
         if os.name == "nt":
-            # What prompt_toolkit calls on Windows are functions of stdout's console, whatever it
-            # is told to draw on; with stdout in a file there is none, and it breaks off.
+            # On Windows prompt_toolkit calls functions of stdout's console, whatever stream it
+            # draws on; with stdout in a file there is no console, and it fails.
             os.get_terminal_size(sys.stdout.fileno())
         size = os.get_terminal_size(sys.stderr.fileno())
     except (OSError, ValueError, AttributeError):
@@ -108,7 +108,7 @@ def _shown(face: Face, desk: Desk, state: WizardState, work: "Work[T]") -> Wizar
     """
     try:
         return face.run(desk, state, work)
-    except (EOFError, OSError):  # the window was closed, or the line to it is gone
+    except (EOFError, OSError):  # the window was closed, or its connection was lost
         _ends_alone(desk, work)
         return state
     except BaseException:

@@ -128,8 +128,8 @@ class LightBeam:
         to_beam, across = subtract(self.through_mm, tip_mm), cross(shaft, beam)
         area = dot(across, across)
         if area < _PARALLEL * dot(shaft, shaft):
-            return False  # a shaft along the beam hides its own tip only
-        # Where along the shaft the two are closest: behind the tip there is no shaft.
+            return False  # a shaft along the beam covers only its tip
+        # The point of the shaft closest to the beam: below the tip there is no shaft.
         if dot(cross(to_beam, beam), across) < 0:
             return False
         beside_mm = abs(dot(to_beam, across)) / math.sqrt(area)

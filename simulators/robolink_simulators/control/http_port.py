@@ -286,7 +286,7 @@ class _Served(BaseHTTPRequestHandler):
         """Print nothing: the URL holds the token."""
 
     def _refuse(self, status: HTTPStatus, what: str, remedy: str) -> None:
-        self.close_connection = True  # what follows is not read
+        self.close_connection = True  # the rest of the request is not read
         self._send(ApiReply(status, error_document(what, remedy)))
 
     def _answer(self, method: str, body: bytes) -> None:

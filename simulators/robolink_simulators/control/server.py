@@ -205,7 +205,7 @@ def _given(method: str, query: str, body: bytes) -> dict[str, Any]:
         )
     try:
         given = json.loads(body, object_pairs_hook=_each_once) if body else {}
-    except ConfigError:  # which is a ValueError too
+    except ConfigError:  # also a ValueError
         raise
     except (ValueError, RecursionError):
         given = None

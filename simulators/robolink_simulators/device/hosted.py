@@ -88,7 +88,7 @@ class HostedDevice(ABC):
     def acting(self) -> Iterator[int]:
         """Surround an act from outside the wire; gives the present time."""
         with self.lock:
-            # A planned act happens at its own instant, in the middle of an advance.
+            # A planned act happens at its planned time, in the middle of an advance.
             if self.present_ns is not None and not self._stepping:
                 self.advance(self.present_ns())
             try:

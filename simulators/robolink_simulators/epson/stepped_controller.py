@@ -95,7 +95,7 @@ class SteppedController(RequestService, ABC):
         self._begun = False
         # Time until which everything is done: a transport asks for the same instant repeatedly.
         self._settled_ns = -1
-        # What next_change found last, and for which of those instants.
+        # The last result of next_change, and the instant that it was for.
         self._next_ns: int | None = None
         self._known_ns = -1
 

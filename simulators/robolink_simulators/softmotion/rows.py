@@ -71,7 +71,7 @@ def _turning(low: float, high: float) -> AxisLimits:
 
 
 _C_LIMITS: Final = AxisLimits(-360.0, 360.0, 720.0, 3600.0)
-# A tool that can lean stands upright at 60 % of this range.
+# A tool that can tilt is upright at 60 % of this range.
 _LEAN_LIMITS: Final = _turning(-90.0, 60.0)
 _ARM_LIMITS: Final = {
     0: _turning(-170.0, 170.0),

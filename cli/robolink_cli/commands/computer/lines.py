@@ -122,7 +122,7 @@ def ask_lines(urls: Sequence[str], timeout_s: float) -> list[AskedLine]:
 def show_lines(asked: Sequence[AskedLine]) -> None:
     """Show what was found at each line, and every byte that was sent."""
     from robolink.controllers.epson.verify import AtTheLine
-    from robolink_cli.console.render import say  # doctor reads ports where click is broken
+    from robolink_cli.console.render import say  # doctor lists ports even without click
 
     found = {
         AtTheLine.CONTROLLER: tr("an EPSON controller answers by Remote RS232"),

@@ -224,7 +224,7 @@ class TrialConnections:
     def stop(self) -> None:
         """Stop the controller, whether a check has it now or none does; any thread."""
         self._stopped = True
-        with self._lock:  # a connection that is being made is the one that stops
+        with self._lock:  # wait for a connection in progress: it is the one to stop
             controller = self._latest
         if controller is not None:
             with suppress(TransportClosedError):  # the check has ended

@@ -239,7 +239,7 @@ class _Setting:
         controller.tools.require_writable(self._number)
         before = controller.tools.read(self._number)
         note_change(controller, self._number, before)
-        # Nothing of what no tool has is kept beside what was given.
+        # The values of an impossible tool are not kept beside the given ones.
         kept_from = ToolOffset() if before is None or before.of_no_tool else before
         return before, replace(kept_from, **self._changes)
 

@@ -91,7 +91,7 @@ class Progress(Listener):
         elif self._tools > 1 and moment is Moment.BEFORE_MEASURE:
             heading = tr("Measuring tool {tool}.", tool=self.tool)
         else:
-            heading = ""  # the screen has one of its own
+            heading = ""  # the screen has a heading
         if heading:
             note(heading)
         self._events.emit("phase", phase=moment, tool=tool)

@@ -181,7 +181,7 @@ def _raise_most_files() -> None:
     except ImportError:
         return
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
-    with suppress(ValueError, OSError):  # some systems name a limit that they do not grant
+    with suppress(ValueError, OSError):  # some systems report a limit but do not grant it
         resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
 
 
@@ -254,7 +254,7 @@ def _tell_end(document: str, messages: str) -> None:
     if document.startswith(_READY):  # a line about listening may come before it
         _, _, document = document.partition("\n")
     error = json.loads(document).get("error") if document.strip() else None
-    if error is not None:  # without one it was told to end, or the system ended it
+    if error is not None:  # otherwise it was asked to end, or the system ended it
         show(f"robolink: {error['what']}\n  {error['remedy']}", beside=True)
 
 

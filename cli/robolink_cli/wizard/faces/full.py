@@ -85,7 +85,7 @@ class FullFace:
         def begin() -> None:
             application.create_background_task(self._turn(application))
 
-        # The handlers of the command stay: they reach the work, which ends in order.
+        # The command's signal handlers stay: they reach the work, which then ends in order.
         narrow = application.run(pre_run=begin, handle_sigint=False)
         self._forget_keys()
         return narrow
@@ -150,7 +150,7 @@ class FullFace:
     def _press(self, key: str, press: KeyPress) -> None:
         data, (at_s, quiet_s) = press.data, _when(press)
         if self._state.has_field and _writes(key):
-            # A field takes bursts: scanners fill it in.
+            # A field accepts bursts: scanners fill it in.
             text = data if data.isprintable() and name_of(key) not in ("enter", "backspace") else ""
             if self._fills(key, text):
                 self._happens(KeyPressed(name_of(key), text, at_s))

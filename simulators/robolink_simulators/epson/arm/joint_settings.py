@@ -241,7 +241,7 @@ class JointRanges:
                 RefusalKind.VALUE_OUT_OF_RANGE,
                 f"Joint {joint} from {low} to {high}: allowed are {lowest} to {highest}",
             )
-        # The pulse nearest to the model's own end stands for that end.
+        # The pulse nearest to the end of the model's range stands for that end.
         ends = (
             own[0] if low == lowest else low / scale,
             own[1] if high == highest else high / scale,

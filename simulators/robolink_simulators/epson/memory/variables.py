@@ -216,8 +216,8 @@ class Variables:
         return variable, subscripts
 
     def _check_type(self, variable: _Variable, stated: Sequence[str]) -> None:
-        # Numbers asked as text, or text as numbers, are 14 (docs/reference/epson.md 1.2); that one
-        # kind of number asked as another is so too is assumed.
+        # Reading a number as text, or text as a number, is error 14 (docs/reference/epson.md 1.2).
+        # Assumed: so is reading one kind of number as another.
         if stated and stated[0].strip().lower() != variable.kind.lower():
             raise RequestRefused(ErrorCode.BAD_COUNT)
 

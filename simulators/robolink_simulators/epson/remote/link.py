@@ -47,7 +47,7 @@ def shown_reply(reply: bytes) -> str:
     text = reply.decode("latin-1").rstrip("\r\n")
     if text[:1] != "!":
         return text
-    # The refusal of a login that could not be read repeats it, password and all.
+    # The refusal of an unreadable login repeats the login, including the password.
     mistyped = "login" in text.lower() and text[1:6].lower() + text[6:7] != "login,"
     return "***" if mistyped else text
 

@@ -260,7 +260,7 @@ class RequestService(HostedDevice, ABC):
     def _logout(self, link: EpsonServerLink) -> Fields:
         if self._unfinished:
             # Logging out while a task runs raises an error (documented,
-            # docs/reference/epson.md 1.1); that the error ends what runs, as errors do, is assumed.
+            # docs/reference/epson.md 1.1); assumed: like any error, it ends the running tasks.
             self._window.interrupt(self.now_ns)
             self.condition.raise_error(self.options.numbers.logged_out_in_task)
             if self.options.logout_while_running == "refused":

@@ -96,7 +96,7 @@ def _store(evaluator: Evaluator, statement: AssignPoint | AssignCoordinate) -> N
 def _assign(evaluator: Evaluator, name: str, value: Value) -> None:
     session = evaluator.session
     if session.options.variable_assignment == "refused":
-        # Whether the command window takes variables is left open (docs/reference/spel.md 13).
+        # Not documented: does the command window accept variables (docs/reference/spel.md 13)?
         raise SpelRefusal(RefusalKind.NOT_ALLOWED_HERE, f"{name} needs a program")
     if not session.variables.holds(name):
         raise SpelRefusal(RefusalKind.NAME_UNDEFINED, f"Nothing is called {name}")

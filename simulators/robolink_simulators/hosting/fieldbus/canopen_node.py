@@ -191,7 +191,7 @@ class CanopenFace:
         self._network = network
         self._starts = simulator.plc.starts
         self._sent: tuple[int, ...] = ()
-        # canopen declares no types for what is used of it here.
+        # canopen declares no types for the parts used here.
         node: Any = canopen.LocalNode(number, object_dictionary(number))
         node.sdo = server = PlcSdoServer(node, real_seconds=real_seconds)
         objects = MailboxObjects(simulator, self._asked, server)

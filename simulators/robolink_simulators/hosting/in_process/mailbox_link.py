@@ -128,7 +128,7 @@ class InProcessMailboxLink:
             if pulled := self._cuts != self._simulator.plc.cuts:
                 served = ServedAccess(answered=False)
             else:
-                served = serve(self._clock.now_ns())  # the simulator follows before it serves
+                served = serve(self._clock.now_ns())  # the simulator catches up before it serves
             if pulled or served.cut or served.meets(PlcFaultAction.RESET):
                 raise self._ended(
                     TransportBrokenError(

@@ -165,7 +165,7 @@ class TcpHost(WireHost):
 
     def shut(self, now_ns: int) -> None:
         """See :meth:`WireHost.shut`."""
-        with contextlib.ExitStack() as all_of_it:  # also where a device fails at one of them
+        with contextlib.ExitStack() as all_of_it:  # closes all, even if one fails
             all_of_it.callback(self._listener.close)
             all_of_it.callback(self.watch_no_more, self._listener)
             for connection in self._connections.values():

@@ -76,7 +76,7 @@ class ExecutedMailbox:
         self.stands = False
         self._overrun = self._paced = 0
         # A PLC's clock starts at power-on, at an unknown time. From this clock the program
-        # draws its number, where none is given.
+        # draws its number if none is given.
         self._began_us = 0 if options.mailbox.device_id else _US * runtime.random_number(31)
         self._group = group
         self._units = units

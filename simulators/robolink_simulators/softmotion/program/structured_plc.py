@@ -217,7 +217,7 @@ class StructuredPlc(Plc):
             )
             self._executed.tell_before(encode_command(command))
             sequence, epoch = next_number(sequence), self.memory.epoch
-        self.memory.tool_changed = False  # the machine's program has seen that
+        self.memory.tool_changed = False  # the machine's program has seen the change
         self.memory.epoch = epoch_before
         self._take_over()
 

@@ -159,7 +159,7 @@ def _whole(low: int, high: int, name: str) -> Store:
     def store(value: Value) -> Value:
         if type(value) is int and low <= value <= high:
             return value
-        # Cut, not rounded: EPSON's own code halves a CRC so (docs/reference/spel.md 2.1).
+        # Truncated: EPSON's own code halves a CRC in this way (docs/reference/spel.md 2.1).
         number = int(as_number(value))
         if not low <= number <= high:
             kind = RefusalKind.OVERFLOW if number > high else RefusalKind.UNDERFLOW

@@ -190,7 +190,7 @@ def _joints(machine: Machine, tip: Pose) -> Joints:
 _SAME_MM = 0.001
 
 # LJM leaves a SCARA's point unchanged (documented); TGo and BGo move six axes
-# the least. An arch rounds Jump; Jump3 comes to rest at its corners under each (assumed).
+# the least. An arch rounds Jump; Jump3 stops at its corners with any arch (assumed).
 _UNTIL_WORDS: Final = frozenset({"till", "find"})
 _JOINT_WORDS: Final = frozenset({"cp", "sync"}) | _UNTIL_WORDS
 _LINE_WORDS: Final = frozenset({"rot"}) | _JOINT_WORDS

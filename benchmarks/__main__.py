@@ -9,12 +9,12 @@ import os
 import platform
 import sys
 
-# Before numpy is loaded: on small systems a second thread of its library only waits, and where
-# other work has the second processor a floor takes seven times as long as with one thread.
+# Before numpy is loaded: on small systems a second thread of its library only waits, and if
+# other work uses the second processor, a floor takes seven times as long as with one thread.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-# What is installed has its bytecode. A shell that forbids to write it would have every process
-# that is measured compile whatever changed since it last was allowed.
+# Installed packages have bytecode. In a shell that forbids writing it, every measured process
+# would compile all modules that changed since writing was last allowed.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 from datetime import UTC, datetime

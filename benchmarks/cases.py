@@ -23,7 +23,7 @@ CASES: Final = {
     "spel-programs": "work.spel_programs",
     "plc-program": "work.plc_program",
 }
-"""Where each stands; what it needs is imported when it runs."""
+"""Modules of the cases by name. The dependencies of a case are imported when it runs."""
 
 
 def measured_alone(name: str) -> list[Figure]:

@@ -57,7 +57,7 @@ NOTES: Final = {
     "\ntakes 115 us for 1,000 poses on four axes, a quarter of the whole. Each side"
     "\nuses one thread, and the two are measured in turn, one pair at a time.",
 }
-"""What has to be known to read the figures of a case."""
+"""Notes that explain the figures of a case."""
 
 _TOP: Final = """# Performance
 

@@ -12,7 +12,7 @@ WIDTH: Final = 460
 HEIGHT: Final = 300
 _LEFT, _RIGHT, _TOP, _BOTTOM = 74, 20, 34, 52
 _ROOM = 24
-"""Half of what a value takes: at an edge it is not written over the scale."""
+"""Half the width of a value's label: at an edge, the label must not cover the scale."""
 _INK, _FAINT, _LINE = "#333333", "#dddddd", "#2b6cb0"
 _FONT: Final = "font-family:sans-serif;font-size:12px"
 

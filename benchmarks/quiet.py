@@ -9,7 +9,7 @@ from time import perf_counter
 from typing import Final
 
 SPREAD: Final = 2.0
-"""With a larger one figures are not published."""
+"""Largest spread at which figures are published."""
 
 _LOOKS: Final = 150
 _EXCHANGES: Final = 100

@@ -22,7 +22,7 @@ TOPS: Final = {
     "robolink_simulators": ROOT / "simulators" / "robolink_simulators",
 }
 _LISTS: Final = "## robolink\n"
-"""The heading at which the lists begin; what stands before it is written by hand."""
+"""Heading above the generated lists. The text before it is written by hand."""
 
 _KINDS: Final = ("Classes", "Errors", "Functions", "Constants and types")
 _ROLE: Final = re.compile(r":(?:py:)?\w+:`~?([^`<]*?)(?: ?<[^`]*>)?`")

@@ -33,7 +33,7 @@ PARTS: Final = {
     "robolink_cli": "cli/robolink_cli",
     "tests": "tests",
 }
-"""Each part and its folder."""
+"""The parts and their folders."""
 
 COLUMNS: Final = ("code", "modules", "folders", "median", "p90")
 BEGIN: Final = "<!-- house: written by tools/house.py -->"
@@ -210,7 +210,7 @@ def _commit() -> str:
 
 
 def _today() -> str:
-    today = date.today()  # noqa: DTZ011 - the day of whoever measures
+    today = date.today()  # noqa: DTZ011 - the local date
     return f"{today.day} {today:%B %Y}"
 
 

@@ -32,7 +32,7 @@ SYSTEMS: Final[Mapping[str, tuple[str, ...]]] = {
     "linux": tuple(f"{tag}_x86_64" for tag in (*_GLIBC, "manylinux2014", "linux")),
     "win32": ("win_amd64",),
 }
-"""The platforms of wheels that each system takes, the best first."""
+"""Wheel platforms that each system accepts, the best first."""
 
 _LINUX: Final = {
     "sys_platform": "linux",
@@ -155,7 +155,7 @@ def roots(*, dev: bool) -> list[Requirement]:
     wanted = [*project["dependencies"]]
     if dev:
         wanted += project["optional-dependencies"]["dev"]
-        # What hatchling asks for when it builds an editable install, and cannot say beforehand.
+        # Packages that hatchling needs for an editable install, and cannot declare beforehand.
         wanted += [*document["build-system"]["requires"], "editables"]
     return list(map(Requirement, wanted))
 
@@ -166,7 +166,7 @@ def resolved(file: LockFile) -> Packages:
     packages.take(asked(*elsewhere(*file.targets[0]), *map(str, wanted)))
     for system, python in file.targets:
         environment = environment_of(system, python)
-        # pip judges markers by the computer that it runs on: what another one needs is asked for.
+        # pip evaluates markers for its own computer: packages for another one are requested here.
         while missing := packages.needed(wanted, environment) - set(packages.version):
             packages.take(asked("--no-deps", *elsewhere(system, python), *sorted(missing)))
         names = packages.needed(wanted, environment)

@@ -16,7 +16,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 _SHORT: Final = 60
-"""Characters; a licence field that is longer holds the text of the licence."""
+"""Longest licence name in characters. A longer field holds the text of the licence."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,7 +29,7 @@ FOLDER: Final = ROOT / "build" / "nightly"
 _LACKS: Final = re.compile(
     r"^(Not all judges are here.*|Windows was not tried: .*|\S+ +NOT RUN .*)$", re.MULTILINE
 )
-"""How a part says that this machine lacks something."""
+"""Lines in which a part reports that this machine lacks something."""
 
 _SKIPPED: Final = re.compile(r"^SKIPPED \[\d+\] [^:]+:(?:\d+:)? (.*)$", re.MULTILINE)
 _FAILED: Final = re.compile(r"\bFAILED\b")
@@ -56,18 +56,18 @@ class Part:
 
 PARTS: Final = (
     Part("docs", 0.03, ("make", "docs")),
-    # In half an hour an order killed at each of 866 instants (F79) is not through.
+    # Killing an order at each of 866 instants (F79) takes more than half an hour.
     Part("faults", 0.16, ("make", "faults")),
     Part("peers", 0.05, ("make", "peers")),
     Part("windows", 0.08, ("make", "windows")),
     Part("versions", 0.13, ("make", "versions")),
-    # The pages are a part of their own: were they broken, nothing else of soak would run.
-    # So are the faults, and theirs that take long are not run twice a night.
+    # The pages are a separate part: otherwise, broken pages would stop the rest of soak.
+    # So are the faults, so that their long tests do not run twice a night.
     Part("soak", 0.2, ("make", "-o", "docs", "soak", "MARKS=soak and not fault")),
     Part("fresh seeds", 0.15, ("make", "soak", "SEEDS=fresh"), endless=True),
     Part("mutants", 0.2, (".venv/bin/python", "-m", "tests.mutants", "--minutes", "{minutes}")),
 )
-"""Quick ones first: who looks after an hour sees most of them."""
+"""Parts of a night. The quick ones come first, so that after an hour most have ended."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,7 +168,7 @@ def _commit() -> str:
         )
         return done.stdout.strip()
 
-    # Seeds that were run and versions that were tried are records: a night itself adds to them.
+    # Lists of seeds and versions that were run are records: a night adds to them.
     records = (":!tests/soak/seeds_run.txt", ":!tests/versions/tried.json")
     seen = ("--untracked-files=no", "--", ".", *records)
     changed = " with changes" if asked("status", "--porcelain", *seen) else ""
@@ -224,7 +224,7 @@ def main(names: Sequence[str], night_h: float) -> int:
             _say(f"{part.name} ...")
             outcomes.append(carry_out(part, night_h))
             _say(f"{part.name}: {outcomes[-1].how} {outcomes[-1].said}".rstrip())
-    finally:  # Ctrl-C in the morning: what has ended is told
+    finally:  # after Ctrl-C in the morning, report the parts that have ended
         known = with_those_of_before(outcomes, commit, FOLDER / "outcomes.json")
         text = "\n".join(table(known, heading)) + "\n"
         (FOLDER / "table.md").write_text(text, encoding="utf-8")

@@ -72,7 +72,7 @@ class AnswerSchemas:
     def _referred(self, described: Any) -> dict[str, Any]:  # noqa: ANN401 - a dataclass
         name = described.__name__
         if name not in self.named:
-            self.named[name] = {}  # so that one that holds its own kind would end
+            self.named[name] = {}  # stops the recursion for a class that contains itself
             says, about = _answered(described)
             hints = get_type_hints(described, include_extras=True)
             properties, needed = {}, []
@@ -120,7 +120,7 @@ _REFUSALS: Final = {
     "503": ("Full", "Too many clients are connected."),
     "default": ("Refused", "Refused for another reason, such as the length."),
 }
-"""What may be refused, by status: a name, and why."""
+"""Refusals by status: a name and the reason."""
 
 _CELL: Final = {"name": "cell", "in": "path", "required": True, "schema": {"type": "string"}}
 

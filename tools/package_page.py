@@ -14,10 +14,10 @@ from typing import Any, Final
 from hatchling.metadata.plugin.interface import MetadataHookInterface
 
 HOME: Final = "HOME_URL"
-"""Variable with the address at which the project is at home."""
+"""Environment variable with the URL of the project's home page."""
 
 PAGES: Final = "PAGES_URL"
-"""Variable with the address under which the files of the repository are read."""
+"""Environment variable with the base URL of the repository's files."""
 
 _LINK: Final = re.compile(r"(?<!!)\[([^]]+)]\((?!https?://|#)([^)#]+)(#[^)]*)?\)")
 _PAGE: Final = re.compile(r"docs/((?:reference/)?[\w-]+)\.md")

@@ -69,10 +69,10 @@ RESULTS: Final = (
     "robolink.stations",
     "robolink.transaction",
 )
-"""The packages whose values a program keeps or hands on."""
+"""Packages whose values programs store or pass on."""
 
 BESIDE: Final = ("robolink.runner", "robolink.transport")
-"""The packages of values that stand in those; a long test knows that no other has any."""
+"""Further packages whose values occur inside those. A long test checks that there are no others."""
 
 
 class NotDataError(Exception):

@@ -14,10 +14,10 @@ from pymodbus.client import ModbusTcpClient
 from robolink.protocols.mailbox import RESPONSE_WORDS, SLOT_WORDS, Words, slot_start
 
 SLOT: Final = 5
-"""The slot that is written."""
+"""Number of the slot that is written."""
 
 ACK: Final = 1
-"""Where the response, and its head, hold the sequence that was accepted last."""
+"""Index, in the response and its head, of the last accepted sequence number."""
 
 _HEAD_WORDS: Final = 10
 _TPDO1: Final = 0x180

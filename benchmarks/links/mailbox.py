@@ -43,7 +43,7 @@ GOAL: Final = 1.3
 _OWNER: Final = 0xBE7C
 _EPOCH: Final = 14
 _CYCLE_NS: Final = 4_000_000
-"""Period of the simulated mailbox program."""
+"""Period of the simulated mailbox program in ns."""
 
 _OFFSETS: Final = (ToolOffset(12.0, -3.5, -20.0), ToolOffset(12.125, -3.25, -20.0))
 _POSES: Final = ((12.0, -3.5, -20.0, 0.0, 0.0, 0.0), (12.125, -3.25, -20.0, 0.0, 0.0, 0.0))

@@ -16,7 +16,7 @@ from robolink_simulators.hosting.streams.epson import serve_tcp
 def main(count: int) -> None:
     """Serve so many until standard input ends."""
     allow_descriptors()
-    # As `robolink sim` does; and what the first one of a process costs is not each one's.
+    # As `robolink sim` does. The extra cost of a process's first one is not counted for each.
     with RareFullCollections(), serve_tcp(EpsonSimulator()):
         before_kib, start = resident_kib(), perf_counter()
         hosts = [serve_tcp(EpsonSimulator(seed=seed)) for seed in range(count)]

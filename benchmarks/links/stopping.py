@@ -55,7 +55,7 @@ x_mm = 280.0
 y_mm = 40.0
 z_mm = 130.0
 """
-"""Whatever a cell file may say beside the URL; the stations are at places of no importance."""
+"""All optional parts of a cell file. The positions of the stations do not matter."""
 
 _CAN_PORT = 43217
 
@@ -149,7 +149,7 @@ def measure_stopping() -> Iterator[Figure]:
             ("modbus-whole", "PLC over Modbus TCP, cell file of a shop"),
         ):
             command = [robolink, "-c", name, "status"]
-            _run(command)  # the cell file is checked once
+            _run(command)  # the cell file is checked only once
             pairs = [(_run(floor), _run(command)) for _ in range(ROUNDS)]
             yield _figure(f"robolink status, {what}", pairs, 5.00)
 

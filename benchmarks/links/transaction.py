@@ -93,7 +93,7 @@ def _microseconds(write: Callable[[ToolOffset], None]) -> float:
         start = perf_counter_ns()
         write(_OFFSETS[number % 2])
         passed_ns.append(perf_counter_ns() - start)
-    # The disk holds up one commit in many; that would be laid to whoever it hit.
+    # The disk delays an occasional commit, which would count against the side it hits.
     return median(passed_ns) / 1000
 
 

@@ -27,12 +27,12 @@ from robolink import ToolOffset
 from robolink.journal import Journal, memory_journal
 
 FLEETS: Final = ((100, 300.0, 120), (2_000, 10.0, 6))
-"""Cells, how many times faster than real time they are wanted, simulated seconds of a round."""
+"""Per row: number of cells, required factor of real time, simulated seconds in a round."""
 
 ROUNDS: Final = 5
 
 WRITE_S: Final = 60
-"""So many simulated seconds pass between two writes to a cell."""
+"""Simulated time in seconds between two writes to a cell."""
 
 
 class AskedCell:
@@ -162,7 +162,7 @@ def _fleet(cells: int) -> Iterator[list[AskedCell]]:
     journal = memory_journal(f"bench-asked-{cells}")
     with ExitStack() as stack:
         fleet = [stack.enter_context(AskedCell(number, journal)) for number in range(cells)]
-        for cell in fleet:  # what the first request and the first write cost is not each one's
+        for cell in fleet:  # the first request and the first write cost more than later ones
             cell.live(1)
             cell.write(9.0)
         yield fleet

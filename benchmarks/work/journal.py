@@ -22,11 +22,11 @@ from robolink.transaction import Wanted, change_tools, plan_undo, undo
 
 ENTRIES = 100_000
 PAGE = 50
-"""As many as a person is shown at once, and as many as the small journal has."""
+"""Number of entries that a person is shown at once, and that the small journal has."""
 
 ROUNDS = 25
 GOAL = 1.5
-"""Largest ratio of listing and undoing; the tree of an index is one level deeper."""
+"""Largest allowed ratio for listing and undoing. The tree of an index is one level deeper."""
 
 _BATCH = 2_000
 _TOOLS = 15
@@ -67,7 +67,7 @@ class JournalBench:
             for first in range(0, self._entries, _BATCH):
                 log.append(*map(_entry, range(first, min(first + _BATCH, self._entries))))
             self.journal.close()
-            os.sync()  # else the commits that are measured would wait for these
+            os.sync()  # otherwise the measured commits would wait for these
             with robolink.connect(url, outcomes=log) as self._controller:
                 yield self
             unregister(self._name)

@@ -13,7 +13,7 @@ from benchmarks.table import Amount, Figure
 POSES = 5_000
 ROUNDS = 5
 WANTED_PER_S = 20_000
-"""With as many poses a line of 1 m is looked at each 0.05 mm within a second."""
+"""Poses per second with which a 1 m line is checked every 0.05 mm within a second."""
 
 
 def measure_kinematics() -> Iterator[Figure]:

@@ -18,7 +18,8 @@ from robolink.protocols.mailbox.exports import program_texts
 CYCLES = 250
 ROUNDS = 5
 PERIOD_MS = 4.0
-"""Of the task: with less a cycle, a simulated PLC keeps up with real time on one core."""
+"""Period of the task in ms. If a cycle takes less, a simulated PLC runs in real time on one core.
+"""
 
 
 def measure_plc_program() -> Iterator[Figure]:

@@ -38,7 +38,7 @@ TIP = np.array([4.2, -7.9, 131.6])
 
 _AT_LEAST_S = 0.15
 _AT_MOST_S = 5.0
-"""After so long fewer than five runs are enough: what takes seconds scatters little."""
+"""Time in seconds after which fewer than five runs are enough: long runs scatter little."""
 
 
 def measure_solvers() -> Iterator[Figure]:
@@ -99,7 +99,7 @@ def _from_poses(name: str, whole: Callable[[], object], floor: Callable[[], obje
 
 def _robust(count: int, peer: bool) -> Iterator[Figure]:
     positions, turned = _data(count, outliers=0.2)
-    # One set of draws, as the others make; a calibration makes five.
+    # One set of draws, like the other programs; a calibration makes five.
     robust = Robust(threshold_mm=THRESHOLD_MM, seeds=(1,))
     fit, kept = fit_pivot_robust(positions, turned, robust, sigma_mm=None)
     wrong = float(np.linalg.norm(fit.tip - TIP))
@@ -115,7 +115,7 @@ def _robust(count: int, peer: bool) -> Iterator[Figure]:
     matrices[:, :3, :3], matrices[:, :3, 3] = turned, positions
 
     def theirs() -> Floats:
-        with redirect_stdout(None), warnings.catch_warnings(action="ignore"):  # it talks
+        with redirect_stdout(None), warnings.catch_warnings(action="ignore"):  # it prints
             tip: Floats = pivot_calibration_with_ransac(matrices, 100, THRESHOLD_MM, 0.25)[0]
         return tip
 

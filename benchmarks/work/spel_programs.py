@@ -14,7 +14,9 @@ PASSES = 20_000
 STATEMENTS = 5 * PASSES
 ROUNDS = 5
 WANTED_PER_S = 50_000
-"""With as many, a program that never waits runs faster than its 50 us a statement."""
+"""Statements per second above which a program that never waits runs faster than its simulated 50 us
+per statement.
+"""
 
 _PROGRAM = f"""
 Function main

@@ -22,7 +22,7 @@ from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
 from robolink.journal import memory_journal
 
 GOALS: Final = ((100, 300.0), (2_000, 10.0))
-"""Cells, and how many times faster than real time all of them together are wanted to be."""
+"""Per row: number of cells, and the required factor of real time for all of them together."""
 
 CELLS: Final = 10
 CHANGES: Final = 3
@@ -96,7 +96,7 @@ def changed(cells: int, changes: int) -> tuple[float, float]:
     """Recalibrate so many cells so many times; return simulated and real seconds of all."""
     with ExitStack() as stack:
         fleet = [stack.enter_context(RecalibratedCell(number)) for number in range(cells)]
-        for cell in fleet:  # what the first change of a process costs is not each one's
+        for cell in fleet:  # the first change in a process costs more than later ones
             cell.recalibrate()
         began = perf_counter()
         simulated_s = sum(cell.recalibrate() for _ in range(changes) for cell in fleet)

@@ -67,7 +67,9 @@ SECTIONS: Final = {
     declared("Look back"): _LOOK_BACK,
     declared("Set up"): _SET_UP,
 }
-"""The first help page: heading, then name, where it is and one line of help."""
+"""The first help page: headings, and below each the commands by name, with their module and one
+line of help.
+"""
 
 SHORT_NAMES: Final = {
     "check": f"{COMPUTER}.cell_check:check",
@@ -77,9 +79,10 @@ SHORT_NAMES: Final = {
     "expert": f"{GROUPS}:expert",
     "recipe": f"{SHIPPED}.recipe:recipe",
 }
-"""Names that work and stand in no list. ``check``, ``check-contract``, ``docs`` and ``recipe``
-are short for what ``cell`` and ``expert`` list; what ``config`` held says itself how it is called
-now."""
+"""Names that work but are not listed. ``check``, ``check-contract``, ``docs`` and ``recipe`` are
+short for commands listed under ``cell`` and ``expert``. The former commands of ``config`` name
+their replacements.
+"""
 
 RENAMED: Final = {
     "backup": (f"{CONTROLLER}.backup:backup", "tool backup"),
@@ -118,4 +121,4 @@ RENAMED: Final = {
     ),
     "where": (f"{CONTROLLER}.operate:where", "robot where"),
 }
-"""Former names: where they are, and what they are called now."""
+"""Former names, each with its module and its present name."""

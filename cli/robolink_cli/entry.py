@@ -31,7 +31,7 @@ def run(arguments: Sequence[str], *, last: bool = False) -> int:
             return _stop(request, arguments)
     try:
         from robolink_cli.main import run as run_any
-    except Exception as error:  # a package of another version fails in its own way
+    except Exception as error:  # a package of another version can fail in any way
         from robolink_cli.unfit_packages import answer_without_click
 
         return answer_without_click(arguments, error)

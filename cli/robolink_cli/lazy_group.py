@@ -113,7 +113,7 @@ class LazyGroup(click.Group):
 
 
 _NAME_COLUMNS = 9
-"""Width of the column of names: that of the longest, "calibrate", so that all sections align."""
+"""Width of the column of names: that of "calibrate", the longest, so that all sections align."""
 
 
 class FrontPage(LazyGroup):

@@ -52,11 +52,11 @@ def cli(context: click.Context) -> object:
     """Root of the commands."""
     if context.invoked_subcommand is not None:
         return None
-    # Whoever names a cell and no command is asked what is wanted.
+    # With a cell and no command, ask what to do.
     if not may_be_guided() or json_is_on():
         context.fail(gettext("Missing command."))  # in click's own words
     guided = cli.get_command(context, "change")
-    assert guided is not None  # noqa: S101 - it stands in the map
+    assert guided is not None  # noqa: S101 - it is in the map
     with guided.make_context("change", [], parent=context) as sub:
         return guided.invoke(sub)
 
@@ -115,7 +115,7 @@ def _tell_stop(request: "StopRequest", outcome: "StopOutcome") -> int:
 
 
 _UNREAD: Final = declared("Not yet checked by a native technician: please report mistakes.")
-"""Under the help page of each translation."""
+"""Note below the help page of each translation."""
 
 
 def _root() -> click.Command:
@@ -153,9 +153,9 @@ def _ended(arguments: Sequence[str]) -> int:
 
         error = _explained(caught)
         code = exit_code(error)
-        # That nobody is left to read how it ended is no other end.
+        # A missing reader of the result does not change the exit code.
         with suppress(Interrupted):
-            # Looked for by hand, because the arguments may be what is wrong.
+            # Searched for here, because the arguments themselves may be wrong.
             report(error, as_json="--json" in arguments, typed=arguments)
         return code
 
@@ -181,7 +181,7 @@ def _explained(error: BaseException) -> BaseException:
 
 def _invoke(arguments: Sequence[str]) -> int:
     if not arguments and may_be_guided():
-        arguments = ["change"]  # whoever types nothing is asked what is wanted
+        arguments = ["change"]  # without arguments, ask what to do
     colour = colour_wanted()
     width = help_width()
     with _root().make_context(

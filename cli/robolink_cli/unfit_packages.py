@@ -33,12 +33,12 @@ _NOTHING_BEGUN: Final[dict[str, object]] = {
         "left_open": False,
     },
 }
-"""The rest of an error document, as of a command that reached no controller."""
+"""Remaining fields of an error document, as for a command that reached no controller."""
 
 
 def unfit_packages() -> list[Remark]:
     """Return missing packages and unfit versions; usually nothing."""
-    with suppress(Exception):  # metadata that cannot be read accuse nobody
+    with suppress(Exception):  # unreadable metadata prove nothing
         return [remark for remark in check_versions() if remark.level is Level.BAD]
     return []
 

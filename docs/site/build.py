@@ -19,7 +19,7 @@ from urllib.parse import unquote, urlsplit
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
-from tools.api import public  # noqa: E402 - the tools lie beside the packages
+from tools.api import public  # noqa: E402 - the tools are beside the packages
 
 PAGES = ROOT / "build" / "docs" / "pages"
 HTML = ROOT / "build" / "docs" / "html"
@@ -28,7 +28,7 @@ LINKED = ("docs", "simulators", "companions", "examples", "tests", "benchmarks")
 
 def described(path: str, value: object) -> list[str]:
     """Return what makes Sphinx describe a thing, in reStructuredText."""
-    if hasattr(value, "__origin__"):  # an alias of a type brings the words of that type
+    if hasattr(value, "__origin__"):  # an alias has the docstring of its type
         return [f".. py:data:: {path}", "", f"   Stands for ``{value}``."]
     if isinstance(value, (int, float, str, tuple, dict)):  # autodoc would quote its type's words
         shown = [f"   :value: {value!r}"] if isinstance(value, (int, float, str)) else []

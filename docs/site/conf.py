@@ -34,7 +34,7 @@ exclude_patterns = ["docs/site"]
 
 myst_heading_anchors = 4
 myst_links_external_new_tab = False
-# Attributes of dataclasses share names such as x_mm, and a type may be handed out twice.
+# Attributes of dataclasses share names such as x_mm, and a type may be exported twice.
 suppress_warnings = ["ref.python", "toc.not_included"]
 html_theme_options = {"navigation_with_keys": True}
 

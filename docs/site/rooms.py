@@ -61,7 +61,7 @@ WORDS = {
     "version": "which robolink",
     "checkpoints": "where another thread may come in",
 }
-"""What each room is, in words that fit its box."""
+"""Description of each room, short enough for its box."""
 
 
 def layers() -> list[list[str]]:

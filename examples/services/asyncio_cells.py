@@ -13,7 +13,7 @@ import robolink
 from robolink import Controller, ToolOffset
 
 STOPS = ThreadPoolExecutor(thread_name_prefix="stop")
-"""Threads for stops alone: those of ``asyncio.to_thread`` may all be waiting for their turn."""
+"""Threads only for stops: those of ``asyncio.to_thread`` may all be waiting."""
 
 
 def shift(controller: Controller, tool: int, dx_mm: float) -> ToolOffset:

@@ -177,7 +177,7 @@ LONE_CHECKS: tuple[Callable[[LoneMaker], None], ...] = (
     check_closing_twice_is_harmless,
     check_a_closed_transport_says_so,
 )
-"""For any transport whose far end does not speak first."""
+"""Checks for any transport whose far end does not send first."""
 
 PAIR_CHECKS: tuple[Callable[[PairMaker], None], ...] = (
     check_bytes_arrive_in_order_both_ways,
@@ -188,7 +188,7 @@ PAIR_CHECKS: tuple[Callable[[PairMaker], None], ...] = (
     check_bytes_that_trickle_in_do_not_extend_a_deadline,
     check_closing_wakes_a_waiting_thread,
 )
-"""For a transport whose far end the check can play."""
+"""Checks for a transport whose far end the check itself can operate."""
 
 
 def _soon(near: Transport, *, after_s: float = 0.05) -> Deadline:

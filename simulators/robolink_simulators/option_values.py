@@ -10,7 +10,9 @@ from robolink.messages import known_names, tr
 
 _TRUTH: Final = {"1": True, "true": True, "yes": True, "0": False, "false": False, "no": False}
 MOST_OF_AN_OPTION: Final = 1e12
-"""More than any length, time, share or device number; less than what overflows in a product."""
+"""Largest value of an option: above every length, time, share or device number, and small enough
+that products do not overflow.
+"""
 
 
 def require_known(given: Iterable[str], known: Sequence[str], *, kind: str) -> None:

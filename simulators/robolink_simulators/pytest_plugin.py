@@ -23,22 +23,22 @@ if TYPE_CHECKING:
     from robolink_simulators.testkit.served import OwnFolder, SimulatedCell
 
 _STATE: Final = ("ROBOLINK_STATE_DIR", "ROBOLINK_JOURNAL")
-"""What says where the journal, the backups and the like are kept."""
+"""Variables that name the places of the journal, the backups and other state."""
 
 _OF_THE_DEVELOPER: Final = {name: os.environ.get(name) for name in _STATE}
 
 _BEFORE: Final = {name: os.environ[name] for name in os.environ if name.startswith("ROBOLINK_")}
-"""What robolink was told before pytest began."""
+"""robolink's environment variables as they were before pytest started."""
 
 _MARKER: Final = "robolink"
 _CELLS: Final = pytest.StashKey[list["SimulatedCell"]]()
-"""The simulated cells of a test."""
+"""Key of a test's simulated cells."""
 
 _NOT_PASSED: Final = pytest.StashKey[bool]()
-"""Of a test that has failed already, or was skipped."""
+"""Key of a flag: the test has already failed or been skipped."""
 
 Factory = Callable[..., "SimulatedCell"]
-"""Makes one more cell: takes what the marker takes, and ``medium``."""
+"""Makes one more cell. Takes the marker's arguments and ``medium``."""
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -315,7 +315,7 @@ def epson_replay(
 
 def _seed(text: str) -> int:
     seed = int(text)
-    if seed < 0:  # for chance, -3 would be 3 once more
+    if seed < 0:  # the generator gives the same values for -3 as for 3
         raise ValueError(text)
     return seed
 
@@ -336,7 +336,7 @@ def _asked(
         if marker.args:
             raise pytest.UsageError("the marker robolink takes names: robolink(seed=3)")
         asked |= marker.kwargs
-        # The marker of a module or a class may be meant for the cells of other tests in it.
+        # A module's or class's marker may be for the cells of its other tests.
         of_test |= marker.kwargs if node is request.node else {}
     wanted = CellRequest.of(asked | given)
     require_time_of_its_own(medium, given)

@@ -13,10 +13,14 @@ from robolink.model import TIP, Spot, SpotUnit
 from robolink_simulators.control.assist import AssistClient, simulator_at
 
 SETTLE_S: Final = 0.1
-"""How long the simulated camera wants the robot to stand still (assumed)."""
+"""Time in seconds for which the robot must stand still before the simulated camera takes a picture
+(assumed).
+"""
 
 Picture = Callable[[int], Sequence[tuple[float, float, float | None]]]
-"""Takes a picture for a mark: X, Y and radius in pixels of each spot; ``None`` for no radius."""
+"""Takes a picture of a mark. Returns X, Y and radius in pixels of each spot; ``None`` for no
+radius.
+"""
 
 
 class SimulatedCamera:
@@ -103,5 +107,5 @@ def open_served(url: str) -> SimulatedCamera:
 
 def _identity(url: str) -> str:
     parts = urlsplit(url)
-    # Not what lets one in at the assist port: this goes into sentences and records.
+    # Without the token of the assist port: this text goes into messages and records.
     return f"{parts.scheme}://{parts.netloc.rpartition('@')[2]}"

@@ -77,7 +77,7 @@ def from_keyring(identity: str) -> Secret | None:
         value = keyring.get_password(KEYRING_SERVICE, identity)
     except KeyringError:
         # No keyring service, or a locked one, as on most cell computers: the other sources
-        # are asked, and without any the controller itself says that it wants a password.
+        # are used; without any, the controller itself reports that it needs a password.
         return None
     except Exception as error:
         cause = f"{type(error).__name__}: {error}"

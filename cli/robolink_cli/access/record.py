@@ -40,7 +40,7 @@ def recording(path: str | None, controller: str) -> "Iterator[TraceSink | None]"
         raise _unwritable(path, error) from error
 
     def write(line: str) -> None:
-        # Flushed at once: what matters most is what came before a crash.
+        # Flushed at once: the lines before a crash matter most.
         try:
             file.write(f"{line}\n")
             file.flush()
@@ -54,7 +54,7 @@ def recording(path: str | None, controller: str) -> "Iterator[TraceSink | None]"
         write(opening_line(log.dialogue))
         yield keep
     finally:
-        with suppress(OSError):  # a disk that was full is told by now, and ends no change
+        with suppress(OSError):  # a full disk was reported already, and does not end a change
             file.close()
 
 

@@ -127,7 +127,7 @@ def note_change(controller: "Controller", tool: int, now: "ToolOffset | None") -
     from robolink.errors import JournalError
     from robolink.transaction import changed_since
 
-    # What is wrong with the journal is said once, when the command is done.
+    # Problems of the journal are shown once, at the end of the command.
     with suppress(JournalError):
         change = changed_since(controller, tool, now)
         if change is not None:
@@ -141,7 +141,7 @@ def _selected_now(controller: "Controller", marker: "Marker") -> str:
     try:
         return str(controller.tools.selected())
     except RobolinkError:
-        # A selection that was sent and not proved: it may be that tool, or still the one of
+        # A selection that was sent but not confirmed: it may be that tool, or still the one
         # before.
         now = str(marker.details.get("now", "?"))
         for other in controller.outcomes.open_markers():

@@ -155,4 +155,4 @@ def expert() -> None:
 config = LazyGroup(
     name="config", lazy={}, renamed=_CONFIG, help=declared("Look at the cell files.")
 )
-"""The former group; what it held is named in ``cell``."""
+"""The former group. The names of its commands refer to ``cell``."""

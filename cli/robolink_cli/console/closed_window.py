@@ -14,7 +14,7 @@ from typing import Final
 from robolink.interrupts import window_closed
 
 _KINDS: Final = frozenset({2, 5, 6})
-"""The window was closed, the user logs off, the computer is shut down."""
+"""Console events: the window is closed, the user logs off, the computer shuts down."""
 
 _PATIENCE_S: Final = 4.5
 
@@ -45,6 +45,6 @@ def closing_in_order() -> Iterator[None]:
     finally:
         over.set()
         if not closed.is_set():
-            # Else Windows waits for that handler, and is not to be waited for here: it may keep
+            # Otherwise Windows waits for that handler. Do not wait for Windows here: it may keep
             # the list of handlers locked meanwhile.
             console.SetConsoleCtrlHandler(handler, False)

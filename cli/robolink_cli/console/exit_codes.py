@@ -24,7 +24,7 @@ _COMMAND: Final = (
     r"""(?P<quote>['"]?)(?P<robolink>robolink(?: -c (?:"[^"]*"|[^\s"']+))?) """
     r"""(?P<words>[a-z][a-z -]*)(?P=quote)(?P<stop>[.\u3002]\s?|(?=\n|$))"""
 )
-"""One command that ends a sentence or a line; the full stop of Chinese is another one."""
+"""A command that ends a sentence or a line. The Chinese full stop counts too."""
 
 
 def was_refused(error: BaseException) -> bool:
@@ -108,7 +108,7 @@ _ENDINGS: Final = {
     EndedBy.OUTPUT_CLOSED: READER_LEFT,
     EndedBy.TERMINATED: TERMINATED,
 }
-"""The four clean up alike; 6 comes before them."""
+"""Exit codes by the way a command was interrupted. All four clean up alike; 6 overrides them."""
 
 MEANINGS: Final[dict[int, str]] = {
     DONE: "done",
@@ -135,11 +135,11 @@ MEANINGS: Final[dict[int, str]] = {
     READER_LEFT: "a closed pipe: the program that read the output has ended",
     TERMINATED: "terminated (SIGTERM)",
 }
-"""What each exit code says; docs/commands.md has the same table."""
+"""Meaning of each exit code. docs/commands.md has the same table."""
 
 # The first class that fits decides. A tool number that does not exist is a mistake in the
 # command (2). A tool that was changed meanwhile, is undefined, or did not keep what was
-# written is the controller's no (5): nothing was rolled back, so it cannot be 8.
+# written is a refusal by the controller (5): nothing was rolled back, so it cannot be 8.
 EXIT_CODES: Final[tuple[tuple[type[errors.RobolinkError], int], ...]] = (
     (errors.DeclinedError, 9),
     (errors.VerifyError, 8),
@@ -195,10 +195,10 @@ def report(error: BaseException, *, as_json: bool, typed: Sequence[str] = ()) ->
 
         show("".join(traceback.format_exception(error)), beside=True)
     if is_cut_off(error) and outcome_after(error) is UNTOUCHED:
-        return code  # a list, cut off by its reader: no news to him
+        return code  # the reader has closed the pipe on purpose
     if as_json:
         hand_over(error_document(error, typed))
-        if isinstance(error, KeyboardInterrupt):  # whoever ended it may not be who reads that
+        if isinstance(error, KeyboardInterrupt):  # the reader may be another person
             show(sentences(joined(" ", filter(None, _stands(error, typed)))), beside=True)
     elif isinstance(error, NoArgsIsHelpError):
         show(sentences(error.message), beside=True)

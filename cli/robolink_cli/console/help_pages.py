@@ -21,7 +21,7 @@ from robolink_cli.console.tables import columns, filled, has_wide
 _Texts = tuple[str | None, ...]
 
 _english: "WeakKeyDictionary[click.Command | click.Parameter, _Texts]" = WeakKeyDictionary()
-"""What each click object said when it was made."""
+"""Original English texts of each click object."""
 
 
 def in_language(command: click.Command) -> click.Command:
@@ -41,7 +41,7 @@ def in_language(command: click.Command) -> click.Command:
 
 def _said(owner: "click.Command | click.Parameter", now: _Texts) -> list[str | None]:
     english = _english.setdefault(owner, now)
-    # What click keeps the lines of is spelled out: a catalogue holds no control character.
+    # click's line-keeping mark is spelled out: a catalogue has no control characters.
     return [text and spoken(_as_collected(text)).replace("\\b\n", "\b\n") for text in english]
 
 
@@ -153,7 +153,7 @@ class WideContext(click.Context):
 
 
 HelpSection = tuple[str, frozenset[str]]
-"""A heading, declared for translation, and the options below it by their first names."""
+"""A heading, declared for translation, and the first names of the options below it."""
 
 
 class SectionedCommand(click.Command):

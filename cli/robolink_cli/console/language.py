@@ -26,7 +26,7 @@ OPTION: Final = "--lang"
 VARIABLE: Final = "ROBOLINK_LANG"
 
 _FOR_MACHINES: Final = ("--json", "--jsonl")
-"""What is read by programs is in English, whoever started them."""
+"""Options whose output programs read: it is always in English."""
 
 _SYSTEM: Final = ("LC_ALL", "LC_MESSAGES", "LANG")
 _RATHER: Final = "LANGUAGE"
@@ -36,17 +36,17 @@ _SAMPLE: Final = {"zh": "\u673a\u5668\u4eba"}
 
 
 _now: Final[list[str]] = []
-"""The language of the command line that is carried out, where it is not English."""
+"""Language of the current command line, if it is not English."""
 
 
 def language_now() -> str:
     """Return the language of the present command line."""
-    spoken(" ")  # it is found with the first text, whichever that is
+    spoken(" ")  # the first text, whatever it is, determines the language
     return _now[-1] if _now else ENGLISH
 
 
 _listening: Final[list["_Listener"]] = []
-"""What listens for the command line that is carried out."""
+"""The listener of the current command line."""
 
 
 def other_language() -> str:
@@ -194,7 +194,7 @@ def _from_files(environment: Mapping[str, str]) -> str:
             with open(path, encoding="utf-8") as file:
                 text = file.read()
         except (OSError, UnicodeError):
-            continue  # whoever needs the file says what is wrong with it
+            continue  # the command that needs the file reports its errors
         if _KEY in text and (language := _language_in(text)):
             return language
     return ""

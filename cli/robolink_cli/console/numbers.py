@@ -15,7 +15,7 @@ from robolink.messages import tr
 _NUMBER: Final = re.compile(
     r"[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?)", re.ASCII | re.IGNORECASE
 )
-"""What is not finite is let through, to be refused by name where it is used."""
+"""A number. NaN and infinity pass here; the code that uses the value refuses them by name."""
 
 
 def decimal(text: str) -> float:

@@ -29,10 +29,12 @@ if TYPE_CHECKING:
 
 
 PLAINLY: Final = "robolink.plainly"
-"""Name of what stands in for characters that an encoding lacks: signs in letters, else escapes."""
+"""Name of the error handler for characters that an encoding lacks: letters instead of signs,
+otherwise escapes.
+"""
 
 PLAIN: Final = "robolink.plain"
-"""Where a command finds that lines are wanted in place of screens."""
+"""Key under which a command finds that plain lines are wanted instead of screens."""
 
 _IN_ASCII: Final = {"\u00b1": "+-", "\u221e": "inf", "\u00b0": " deg", "\u2192": "->"}
 
@@ -128,12 +130,12 @@ def visible(text: str) -> str:
     """
     lines = text.replace("\r\n", "\n")
     if lines.replace("\n", "").isprintable():
-        return lines  # nearly always; none of those characters is printable
+        return lines  # nearly always: none of those characters is printable
     return re.sub(_OBEYED, lambda found: found[0].encode("unicode_escape").decode("ascii"), lines)
 
 
 ShownBy = Callable[[str, bool], None]
-"""Takes a text, and whether it stands beside the result."""
+"""Shows a text. Takes the text, and whether it is separate from the result."""
 
 _shown_by: ShownBy | None = None
 
@@ -174,9 +176,9 @@ def draw(text: str, *, beside: bool = False) -> None:
         text: One line or several.
         beside: On stderr, beside the result.
     """
-    import click  # not above: doctor shows its findings where click cannot be imported
+    import click  # not above: doctor shows its findings even if click cannot be imported
 
-    # The stream is named, because click takes an ASCII console for a misunderstanding and
+    # The stream is given, because click considers an ASCII console a mistake and
     # would send it UTF-8.
     click.echo(visible(text), file=sys.stderr if beside else sys.stdout)
 
@@ -211,7 +213,7 @@ def terminal_width(stream: TextIO) -> int:
         width = os.get_terminal_size(stream.fileno()).columns if stream.isatty() else 0
     except (OSError, ValueError, AttributeError):
         return 0
-    # One that is not told its size says 0.
+    # A terminal without a known size reports 0.
     return width if width >= _NARROWEST else 0
 
 
@@ -234,7 +236,7 @@ class _Watched(io.FileIO):
         try:
             return super().write(data)
         except OSError:
-            # EPIPE of a pipe, EIO of a terminal that hung up, ENOSPC of a file: in each case
+            # EPIPE of a pipe, EIO of a closed terminal, ENOSPC of a file: in each case
             # nobody will ever see it.
             send_nowhere(self.fileno())
             output_closed()
@@ -261,7 +263,7 @@ def watched_output() -> Iterator[None]:
 @contextmanager
 def _watched(name: str) -> Iterator[None]:
     before = getattr(sys, name)
-    if before is None:  # closed by whoever started us: Python has no stream then
+    if before is None:  # closed by the calling program: Python has no stream then
         with open(os.devnull, "w", encoding="ascii", errors="backslashreplace") as nowhere:
             setattr(sys, name, nowhere)
             try:
@@ -272,7 +274,7 @@ def _watched(name: str) -> Iterator[None]:
     buffer = getattr(before, "buffer", None)
     raw = getattr(buffer, "raw", buffer)  # the same where Python was told not to buffer
     if type(before) is not io.TextIOWrapper or type(raw) is not io.FileIO:
-        yield  # a console of Windows, or a stream of whoever runs us inside a program
+        yield  # a Windows console, or a stream of the program that embeds this one
         return
     watched = _Watched(raw.fileno(), "wb", closefd=False)
     with suppress(OSError):

@@ -78,9 +78,9 @@ def table(title: str, columns: Sequence[str], rows: Iterable[Sequence[object]]) 
     heads = [visible(column) for column in columns]
     console = Console(stderr=json_is_on(), highlight=False, no_color=drawn_elsewhere() or None)
     if drawn_elsewhere():
-        console.width = min(console.width, SCREEN)  # whoever draws has no more
+        console.width = min(console.width, SCREEN)  # a drawn screen is no wider
     elif not console.is_terminal:
-        console.width = 1000  # nothing may be folded to an assumed width of 80
+        console.width = 1000  # do not wrap at an assumed width of 80
     drawn = drawn_table(visible(title), heads, cells, console.width)
     shown = Text(drawn) if isinstance(drawn, str) else drawn
     if drawn_elsewhere():

@@ -50,7 +50,7 @@ SHELL_WAYS: Final = {
     RemedyWord.WAIT: "--wait SECONDS",
     RemedyWord.YES: "--yes",
 }
-"""Options and commands; a test holds it to every way that there is."""
+"""Options and commands by remedy word. A test checks that every remedy word is here."""
 
 
 _WORDS: Final = (
@@ -82,7 +82,9 @@ _WORDS: Final = (
     declared("unfinished movements"),
     declared("map"),
 )
-"""What a controller, or a power mode and a hand with their noun, can be said to be."""
+"""Translatable words for the state of a controller, and for a power mode and a hand with their
+nouns.
+"""
 
 
 def state_word(code: object) -> str:

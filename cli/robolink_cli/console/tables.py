@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 SCREEN: Final = 80
-"""So many columns a whole screen has, on a wider terminal too."""
+"""Columns of a whole screen, even on a wider terminal."""
 
 _WIDE: Final = "\u1100-\u115f\u2e80-\u303e\u3041-\ua4cf\uac00-\ud7a3\uf900-\ufaff\ufe30-\ufe6f"
 _WIDE_FORMS: Final = "\uff00-\uff60\uffe0-\uffe6"
@@ -24,12 +24,12 @@ _PIECES: Final = (
     rf"[{_OPENING}]*[{_WIDE}{_WIDE_FORMS}][{_CLOSING}]*"
     rf"|[^\s{_WIDE}{_WIDE_FORMS}]+?(?=[{_OPENING}]*[{_WIDE}{_WIDE_FORMS}]|\s|$)[{_CLOSING}]*|\s+"
 )
-"""What stays on one line: a wide character with the signs about it, a word, a blank.
+"""Pattern for text that is not broken: a wide character with its punctuation, a word, a blank.
 
-To compile such large sets costs more than all else of a help page, so that it is done on need.
+Compiled only when needed: compiling such large sets takes longer than the rest of a help page.
 """
 _WORDS: Final = r"\S+|\s+"
-"""The same of a text without wide characters."""
+"""The same pattern for a text without wide characters."""
 
 
 def has_wide(text: str) -> bool:
@@ -101,10 +101,12 @@ def within(text: str, width: int) -> str:
 Row = Sequence[str]
 
 _BESIDE: Final = 3
-"""Columns that the frame of each column of a table takes; one more at its edge."""
+"""Columns for the frame of each table column; the edge takes one more."""
 
 _NARROWEST: Final = 20
-"""A longer word, such as a path, may be folded anywhere: no column is that wide for one word."""
+"""Longest word, in columns, that is kept whole. Longer words, such as paths, can be broken
+anywhere, so that no column becomes as wide as they are.
+"""
 
 
 def drawn_table(title: str, heads: Row, rows: Sequence[Row], width: int) -> "Table | str":
@@ -161,7 +163,7 @@ def column_widths(heads: Row, rows: Sequence[Row], width: int) -> list[int] | No
         return None
     widths = [*least]
     for index in sorted(range(len(wanted)), key=lambda i: wanted[i] - least[i]):
-        # The one that lacks least comes first, so that the longest sentence gets what is left.
+        # The column that lacks least comes first: the longest sentence gets the remaining width.
         lacking = sum(1 for i in range(len(wanted)) if widths[i] < wanted[i])
         more = min(wanted[index] - least[index], left // max(1, lacking))
         widths[index] += more
@@ -193,7 +195,7 @@ def _table(title: str, heads: Row, rows: Sequence[Row], widths: Sequence[int]) -
             Text(_folded(head, width)), width=width, justify="right" if right else "left"
         )
     for row in rows:
-        # rich breaks between words alone, and Chinese has no blanks between them.
+        # rich breaks lines only between words, and Chinese has no blanks between them.
         shown.add_row(*map(Text, map(_folded, row, widths)))
     return shown
 

@@ -48,14 +48,14 @@ EXAMPLES: Final = {
     "sim ctl url": "http://127.0.0.1:8080",
     "sim run file": "cells.toml",
 }
-"""A value of each parameter that must be given, by its name, or by the command's and its."""
+"""An example value of each required parameter, by its name or by the command's name and its own."""
 
 _MOST_LINES: Final = 3
 _LONGEST_VALUE: Final = 40
 _LONGEST_LIST: Final = 72
 _MINUS: Final = re.compile(r"-[\d.]+")
 _NEAR: Final = 0.7
-"""How alike two words must be, of 1, for one to be meant by the other."""
+"""Least similarity of two words, from 0 to 1, at which one is suggested for the other."""
 
 
 def usage_sentences(error: click.ClickException) -> tuple[str, str]:
@@ -248,7 +248,7 @@ def _found(template: str, message: str, name: str) -> str | None:
 
 
 def _parsed(template: str) -> list[tuple[str, str | None, str | None, str | None]]:
-    from string import Formatter  # a word that is misspelt needs none
+    from string import Formatter  # here, because a misspelt word needs none
 
     return list(Formatter().parse(template))
 
@@ -288,14 +288,14 @@ def _commands_like(typed: str, context: click.Context | None) -> list[str]:
     if context is None or not isinstance(context.command, click.Group):
         return []
     group, path = context.command, context.command_path
-    # Ours know more names than they list; a group of another package may be click's own.
+    # robolink's groups accept more names than they list; a plug-in's may be plain click.
     names = getattr(group, "typed_names", group.list_commands)(context)
     elsewhere: list[str] = getattr(group, "groups_with", lambda *_: [])(context, typed)
     return elsewhere or [f"{path} {one}" for one in _alike(typed, names)]
 
 
 def _alike(typed: str, names: Any) -> list[str]:  # noqa: ANN401 - any iterable of texts
-    from difflib import get_close_matches  # what is not misspelt needs none
+    from difflib import get_close_matches  # here, because only misspelt words need it
 
     return get_close_matches(typed, list(names), n=2, cutoff=_NEAR)
 

@@ -57,7 +57,7 @@ Plain = Annotated[
         help="Use lines instead of a screen; for screen readers. Also ROBOLINK_PLAIN=1.",
     ),
 ]
-"""Is kept for the whole command line, so that no command is told it."""
+"""Stored for the whole command line, so commands do not take it as a parameter."""
 
 
 class MotionOption(click.Option):

@@ -24,7 +24,9 @@ CommandT = TypeVar("CommandT", bound=Callable[..., Any])
 Decorator = Callable[[Any], Any]
 
 _UNITS: Final = {"_mm_s": "MM_S", "_mm": "MM", "_deg": "DEG", "_s": "S"}
-"""Unit at the end of a parameter's name, which its option shows in place of the value."""
+"""Units by the ending of a parameter's name. The option's help shows the unit in place of the
+value.
+"""
 
 
 class CliParameter:
@@ -57,7 +59,7 @@ class _Declared(NamedTuple):
     kind: Any
     marker: CliParameter
     types: tuple[click.ParamType[Any], ...]
-    """The type that its annotation names, if it does."""
+    """The click type in its annotation, if there is one."""
     defaults: tuple[object, ...]
     """The default, if there is one."""
 

@@ -146,5 +146,5 @@ def _show_left_out(impact: "Impact") -> None:
 
 
 def _cell(value: float) -> str:
-    # Adding zero takes the sign off what rounds to zero.
+    # Adding zero removes the minus sign of values that round to zero.
     return f"{round(value, 3) + 0.0:.3f}"

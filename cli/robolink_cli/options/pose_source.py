@@ -58,7 +58,7 @@ def reading_options(function: Callable[..., Any]) -> Callable[..., Any]:
 _RANGE: Final = re.compile(r"([0-9]{1,3})(?:-([0-9]{1,3}))?", re.ASCII)
 
 _STATED: Final = {3: set[str](), 4: {"z_mm"}, 6: {"z_mm", "v_deg", "w_deg"}}
-"""What a typed pose states besides X, Y and U, by how many numbers it has."""
+"""Coordinates besides X, Y and U that a typed pose gives, by its count of numbers."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -158,7 +158,7 @@ class ReportDraft:
             return noted
         from robolink.report import Outcome
 
-        # That nobody could be asked is on no record.
+        # No record shows that nobody could be asked.
         open_end = recorded.outcome is Outcome.PROPOSED
         return replace(
             recorded,
@@ -192,7 +192,7 @@ class ReportDraft:
         receipt = self._receipt
         if isinstance(error, VerifyError):
             return Outcome.VERIFY_FAILED
-        # After a write these two words would claim that nothing was written.
+        # After a write, these two words would state that nothing was written.
         if receipt is None and isinstance(error, DeclinedError):
             return Outcome.DECLINED
         if receipt is None and isinstance(error, CalibrationError):

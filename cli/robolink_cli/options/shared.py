@@ -25,7 +25,7 @@ else:
     _ParamType = click.ParamType  # click 8.1 knows no parameter of it
 
 LONGEST: Final = 200
-"""Characters, as in recipes."""
+"""Longest text in characters, as in recipes."""
 
 
 class LineType(_ParamType):
@@ -57,10 +57,10 @@ CommandT = TypeVar("CommandT", bound=Callable[..., Any])
 _CELL_OR_URL = "CELL|URL"
 
 GIVEN = "robolink.given"
-"""Where the options of all levels are collected."""
+"""Key under which the options of all levels are collected."""
 
 TYPED = "robolink.typed"
-"""Where the whole command line is kept, as it was typed."""
+"""Key under which the command line is stored as typed."""
 
 _ORIGINS = "robolink.origins"
 
@@ -278,7 +278,7 @@ def _link_options(command: CommandT) -> CommandT:
 def _keep(context: click.Context, parameter: click.Parameter, value: object) -> None:
     given: dict[str, object] = context.meta.setdefault(GIVEN, {})
     name = str(parameter.name)
-    # The environment speaks at each level of the command line, and must not overrule what
+    # The environment applies at each level of the command line, and must not override what
     # was written at an earlier one.
     typed = context.get_parameter_source(name) is ParameterSource.COMMANDLINE
     if value is not None and (typed or name not in given):

@@ -68,7 +68,7 @@ def tell_encoding(taken: str | None, *, named: str | None) -> None:
 
 
 DEFAULT_ADDRESS: Final = "127.0.0.1:5020"
-"""Where Modbus TCP is served when no bus is named."""
+"""Address at which Modbus TCP is served if no bus is given."""
 
 SECTIONS: Final[tuple[HelpSection, ...]] = (
     (
@@ -97,7 +97,7 @@ SECTIONS: Final[tuple[HelpSection, ...]] = (
         frozenset({"--control", "--with-parent", "--idle-exit"}),
     ),
 )
-"""The same headings on the help page of every simulator."""
+"""Headings shared by the help pages of all simulators."""
 
 EXISTING_FILE: Final = click.Path(exists=True, dir_okay=False, path_type=Path)
 

@@ -18,12 +18,12 @@ from typing import Any, Final, Protocol
 from robolink_cli.console.output import is_terminal
 
 BURST_S: Final = 1.0
-"""Longest time in which a burst is waited out: a key that is held down never ends."""
+"""Longest wait in seconds for the end of a burst: a key held down never ends."""
 
 _LOOK_S: Final = 0.02
 _ENDS: Final = "\r\n"
 _BEFORE_A_CODE: Final = "\x00\xe0"
-"""An arrow or the like: another character follows, which is its code."""
+"""First character of an arrow or similar key. The next character is its code."""
 
 
 class ConsoleLines:
@@ -112,7 +112,7 @@ def _whole(line: str) -> str:
 
 
 QUIET_S: Final = 0.035
-"""Two keys of a person are further apart; the characters of a scanner are not."""
+"""Pause in seconds that separates a person's keys. A scanner's characters come faster."""
 
 
 class Lines(Protocol):
@@ -177,10 +177,10 @@ class TerminalLines:
         while (data := self._read(quiet_s)) and time.monotonic() < end_s:
             dropped += data
         try:
-            # And what stands in a line that nobody has ended with ENTER.
+            # And the text in a line that was not ended with ENTER.
             self._termios.tcflush(self._descriptor, self._termios.TCIFLUSH)
         except (OSError, self._termios.error):
-            return []  # the terminal is gone; the next read says so
+            return []  # the terminal is gone; the next read reports it
         return [_text(line) for line in dropped.split(b"\n")[:-1]]
 
     def _read(self, wait_s: float) -> bytes | None:
@@ -211,7 +211,7 @@ class StreamLines:
         except queue.Empty:
             return None
         if line is None:
-            self._queue.put(None)  # it ends for whoever asks again, too
+            self._queue.put(None)  # later readers find the end too
             raise EOFError
         return line
 
@@ -226,7 +226,7 @@ class StreamLines:
             except queue.Empty:
                 break
             if line is None:
-                self._queue.put(None)  # it ends for whoever asks, too
+                self._queue.put(None)  # other readers find the end too
                 break
             dropped.append(line.rstrip("\r\n"))
         return dropped

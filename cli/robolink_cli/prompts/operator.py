@@ -22,12 +22,13 @@ if TYPE_CHECKING:
     from robolink.timing import Clock
 
 WAY_MM: Final = 60.0
-"""How far the stand-in jogs to show an axis."""
+"""Distance in mm that the simulated operator jogs to show an axis."""
 
 _PLACES: Final = frozenset({Question.PLACE, Question.ROOM, Question.ALONG_X, Question.ALONG_Z})
 
 MOST_STEPS: Final = 300
-"""So many answers to one question are enough for 1.5 m of jogging: the stand-in gives up then."""
+"""Most answers to one question, enough for 1.5 m of jogging. Then the simulated operator gives up.
+"""
 
 
 class TerminalOperator:
@@ -73,12 +74,12 @@ class TerminalOperator:
             ) from error
         if line is None or line.strip() or self._kind not in _PLACES:
             return line
-        # Scanners send ENTER, and hands do by mistake: it records no place.
+        # Scanners send ENTER, and people press it by mistake: it records no position.
         self._show(tr("ENTER alone does nothing. When it is there: done."))
         return None
 
     def _forget(self, quiet_s: float) -> None:
-        assert self._lines is not None  # noqa: S101 - looked at by whoever calls
+        assert self._lines is not None  # noqa: S101 - checked by the caller
         for line in self._lines.forget(quiet_s):
             if line.strip():
                 self._show(tr("Typed too early and ignored: {line!r}", line=line))
@@ -224,7 +225,7 @@ class AssistedOperator:
         if self._kind is Question.YES_NO:
             return "y"
         if self._kind is Question.CHOICE:
-            return "1"  # whoever stands in for a person decides nothing
+            return "1"  # the simulated operator makes no decisions
         if self._kind is Question.TEXT:
             return tr("simulated")
         if self._stays:
@@ -248,14 +249,14 @@ class AssistedOperator:
         return self._thinking_s > 0
 
     def _steps_to_pin(self) -> str:
-        # The last bit goes straight down in a fine step, as one does with a needle.
+        # The last step is small and straight down, as a person would do it with a needle.
         dx_mm, dy_mm, dz_mm = self._look()
         far = abs(dz_mm) > FINEST_STEP
         first_mm = (dz_mm + FINEST_STEP if dz_mm < 0.0 else dz_mm) if far else 0.0
         steps = self._steps({"x": dx_mm, "y": dy_mm, "z": first_mm}) or self._steps(
             {"z": max(-FINEST_STEP, min(FINEST_STEP, dz_mm))}
         )
-        # Who came in a long step takes a fine one back, and comes again.
+        # After a long step, go back by a fine one and approach again.
         return steps or (f"z{FINEST_STEP:+.3f}" if self._coarse else "")
 
     def _steps_along(self, kind: Question) -> Iterator[str]:
@@ -272,7 +273,7 @@ class AssistedOperator:
         pieces = math.ceil(max(map(abs, way_mm)) / self._max_step_mm)
         gone = [0.0, 0.0, 0.0]
         for piece in range(1, pieces + 1):
-            # What one step was rounded by, the next one makes good.
+            # The next step corrects the rounding of this one.
             step = [round(mm * piece / pieces - at, 3) for mm, at in zip(way_mm, gone, strict=True)]
             gone = [at + by for at, by in zip(gone, step, strict=True)]
             yield " ".join(f"{axis}{by:+.3f}" for axis, by in zip("xyz", step, strict=True))

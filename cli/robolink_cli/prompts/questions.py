@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 WATCHED: Final = "robolink.watched"
-"""Where a prompt finds the controller whose status it must read while a person thinks."""
+"""Key of the controller whose status a prompt must read while a person thinks."""
 
 
 def on_terminal() -> bool:
@@ -174,7 +174,7 @@ def accepted_jump(
 
     guard = controller.change_guard
     allowed = guard.limits
-    # Who may not is refused, not asked.
+    # A person without the right is refused, not asked.
     if controller.outcomes.signature.role != PersonRole.OPERATOR and jump.exceeds(
         accepted_mm or allowed.length_mm, accepted_deg or allowed.angle_deg
     ):

@@ -79,7 +79,7 @@ def check_before_start(
         StoppedError, DeclinedError: As :func:`agree_to_motion`.
     """
     desk = current_desk()
-    assert desk is not None  # noqa: S101 - looked at by whoever calls
+    assert desk is not None  # noqa: S101 - checked by the caller
     heed_what_was_left(yes=False)
     foreseen = {"n": moves, "v": f"{speed_mm_s:g}", "d": f"{box_mm:g}"}
     if controller.capabilities.low_power:
@@ -115,7 +115,7 @@ def name_the_needle(
     from robolink_cli.wizard.happenings import CellIs
 
     desk = current_desk()
-    assert desk is not None  # noqa: S101 - looked at by whoever calls
+    assert desk is not None  # noqa: S101 - checked by the caller
     named = list(ids(lambda question: _text(desk, controller, question)))
     if named:
         desk.regard(CellIs(needle=", ".join(named)))
@@ -172,7 +172,7 @@ def _answer_to_list(
     while (answer := desk.poll(POLL_S)) is None:
         now = _motors_are_off(controller, purpose, tried=tried)
         if now is not off:
-            # The list says what is so now; what the person has confirmed stays confirmed.
+            # The list shows the present state; items that the person confirmed stay confirmed.
             off = now
             desk.regard(CheckSubject(_points(name, terms, left, new, off=off), plan))
     if answer == SWITCH_ON:
@@ -286,7 +286,7 @@ def _points(
     clear = tr("Nobody in the cell, hoses free")
     points.append(CheckPoint(Mark.YOU, new, "mounted", tr("Yes")))
     points.append(CheckPoint(Mark.YOU, clear, "clear", tr("Yes")))
-    # Last: who switches them on has looked into the cell, and the rows above keep their numbers.
+    # Last, after the person has looked into the cell; the rows above keep their numbers.
     if off:
         points.append(CheckPoint(Mark.TO_DO, tr("Motors are off"), "motors", tr("Switch them on")))
     else:

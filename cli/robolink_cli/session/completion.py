@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 _TOOLS: Final = range(1, 16)
 _RECIPE_MARK: Final = b"robolink/recipe/"
 _LOOKED_AT: Final = 64 * 1024
-"""Bytes of a file in which that mark is looked for; the line stands above all tables."""
+"""Number of bytes of a file that are searched for the mark. Its line comes before all tables."""
 
 
 def complete_tool(context: click.Context, parameter: click.Parameter, start: str) -> list[str]:  # noqa: ARG001 - click's form

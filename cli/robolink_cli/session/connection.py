@@ -112,7 +112,7 @@ def open_controller(
                 controller.require_settled(job)
             yield controller
     if not looks:
-        # A stop that came while the connection was closed: nobody may take this for a success.
+        # A stop came while the connection was closing: do not report success.
         with controller.ledger.telling():
             controller.latch.require_open(tr("The command"))
 
@@ -161,7 +161,7 @@ def _saying_what_is_left(
         yield
         told = not leaves
     except KeyboardInterrupt:
-        # The last line says which tool is selected: as it is now, not as it was once.
+        # The last line shows the tool selected now, not the one selected before.
         with suppress(RobolinkError):
             controller.tools.selected()
         _record_for_nobody(controller)
@@ -171,7 +171,7 @@ def _saying_what_is_left(
         known = {marker.operation for marker in (found if told else left)}
         note_unsettled(controller, [m for m in left if m.operation not in known], named)
         if trouble is not None:
-            # After the work: nothing that the journal has to say stands before it.
+            # After the work, so that no message of the journal comes before the result.
             note(joined(" ", (trouble.what, _unrecorded())))
 
 
@@ -184,7 +184,7 @@ def _record_for_nobody(controller: "Controller") -> None:
         return
     details = {"ended_by": str(by)}
     entry = NewEntry(EntryKind.DECISION, verdict=describe_outcome(outcome), details=details)
-    # What cannot be recorded is said, and is no other end.
+    # A failure to record is reported, and does not change the exit code.
     with suppress(ConfigError, OutcomeUnknownError):
         controller.outcomes.append(entry)
 
@@ -200,7 +200,7 @@ def _only_what_was_touched(*, always: bool) -> Iterator[None]:
     except BaseException as error:
         ended = isinstance(error, KeyboardInterrupt)
         if ended and outcome_after(error) is UNTOUCHED:
-            # It came before the controller was reached, or at the logout.
+            # The stop came before the controller was reached, or at the logout.
             watched = click.get_current_context().meta.get(WATCHED)
             note_outcome(error, watched.ledger.outcome() if watched else ControllerOutcome())
         told = always or (ended and not is_cut_off(error))

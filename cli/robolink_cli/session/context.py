@@ -87,7 +87,7 @@ class CliContext(NamedTuple):
 
 
 Command = Callable[..., int | None]
-"""What click calls; it returns the exit code, ``None`` for 0."""
+"""The function that click calls. Returns the exit code, ``None`` for 0."""
 
 
 def stop_request() -> StopRequest:
@@ -315,7 +315,7 @@ def _typed_again(context: CliContext, chosen: tuple[str, ...], *, anew: bool) ->
         return shlex.join(words)
     import subprocess
 
-    # cmd.exe and PowerShell both know double quotes; single ones are letters to cmd.exe.
+    # cmd.exe and PowerShell both accept double quotes; cmd.exe reads single ones as text.
     return subprocess.list2cmdline(words)
 
 

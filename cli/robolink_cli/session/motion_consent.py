@@ -60,7 +60,7 @@ def heed_selection(controller: "Controller", cell: "Expected | None", *, yes: bo
     from robolink_cli.prompts.questions import asked, on_terminal
 
     if controller.outcomes.open_markers():
-        return  # which block it, and say more
+        return  # they block it themselves, with more detail
     doubt = doubt_about(controller.tools.selected(), controller, cell)
     if not doubt:
         return
@@ -109,10 +109,10 @@ def _of_the_last_procedure(controller: "Controller") -> int:
 
 
 CELL: Final = "robolink.cell"
-"""Where the cell is found that was named, ``None`` for none."""
+"""Key of the cell that was given, ``None`` for none."""
 
 REACHED: Final = "robolink.reached"
-"""Where it is found by which URL that controller was reached."""
+"""Key of the URL by which the controller was reached."""
 
 
 def agree_to_motion(question: str, *, yes: bool, in_tool: bool = True) -> None:

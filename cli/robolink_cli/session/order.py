@@ -22,7 +22,8 @@ else:
     _ParamType = click.ParamType  # click 8.1 knows no parameter of it
 
 _NO_PART: Final = frozenset({"order", "recipe", "yes", "assist", "report_path", "force", "jsonl"})
-"""What a second delivery may have otherwise: it changes nothing of what is done."""
+"""Parameters that may differ when an order is delivered again, because they do not change the work.
+"""
 
 
 class OrderType(_ParamType):

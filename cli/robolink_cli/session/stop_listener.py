@@ -35,7 +35,7 @@ def listening_for_stop(
         return
     name = ""
     if not looks:
-        # A broken journal, or a link that is gone, is told of by what needs it next.
+        # A broken journal or a lost link is reported by the next code that needs it.
         with suppress(RobolinkError):
             name = controller.outcomes.identity
     try:
@@ -108,7 +108,7 @@ def _say_who(who: str) -> None:
 
 
 _SEVERAL_CLIENTS = "+modbus-tcp://"
-"""Such a server can be asked itself, by as many as want."""
+"""Scheme of servers that accept any number of clients, so that a stop can reach them directly."""
 
 
 def seen_by_another(url: str) -> dict[str, object] | None:
@@ -129,7 +129,7 @@ def seen_by_another(url: str) -> dict[str, object] | None:
     try:
         holders = list(holders_of(far_end_of(url)))
     except RobolinkError:
-        return None  # what is wrong with the URL is told by who connects
+        return None  # connecting reports what is wrong with the URL
     for holder in holders:
         try:
             seen = holder.last_seen()

@@ -63,7 +63,7 @@ def own_name_of(controller: "Controller") -> str:
     try:
         name = controller.outcomes.identity
     except RobolinkError:
-        return ""  # a broken journal, or a link that the next exchange will tell of
+        return ""  # a broken journal, or a link whose loss the next exchange reports
     return name if is_own_name(name) else ""
 
 

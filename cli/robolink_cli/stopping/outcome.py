@@ -104,7 +104,7 @@ class Telling:
         from robolink_cli.stopping.notes import last_known
 
         if "+sim://" in outcome.url:
-            return []  # it ends with this process, and nobody else moves it
+            return []  # the simulator ends with this process, and nobody else moves it
         try:
             leave_note(
                 outcome.keys,

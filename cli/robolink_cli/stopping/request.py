@@ -17,9 +17,10 @@ VALUES: Final = {
     "--log-level": "log_level",
     "--lang": "",
 }
-"""Options with a value that may stand beside ``stop``, and where it is kept; a stop needs no
-remote time-out, waits for nobody, and the language is found elsewhere. A test compares them with
-click's."""
+"""Options with a value that are allowed with ``stop``, and the field for each value. A stop needs
+no remote time-out and waits for nobody, and the language is determined elsewhere. A test compares
+this table with click's.
+"""
 
 FLAGS: Final = {"--json": "json"}
 

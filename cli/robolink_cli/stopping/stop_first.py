@@ -69,7 +69,7 @@ def stop_first(request: StopRequest) -> StopOutcome:
     try:
         _stop(request, outcome)
     except RobolinkError as error:
-        # Here, because a stop that is taken needs none of it.
+        # Here, because a successful stop needs none of it.
         from robolink.controllers import advise_emergency_stop
 
         outcome.error = advise_emergency_stop(error)
@@ -80,7 +80,7 @@ def stop_first(request: StopRequest) -> StopOutcome:
 
 def who_asks(request: StopRequest) -> str:
     """Return who stops, for the person at another terminal."""
-    import getpass  # here, because a stop without anybody to tell does without it
+    import getpass  # here, because a stop that informs nobody needs none
 
     try:
         user = getpass.getuser()
@@ -124,7 +124,7 @@ def _stop(request: StopRequest, outcome: StopOutcome) -> None:
             raise
         raise told from error
     else:
-        # Whoever has it by another address, a PLC over the network, hears of it now.
+        # Inform a process that has it locked by another address, such as a PLC's network address.
         _through_holder(request, outcome)
 
 
@@ -143,7 +143,7 @@ def _most_telling(error: RobolinkError, refusals: list[RobolinkError]) -> Roboli
     for one in (error, *refusals):
         if _left(one):
             return one
-    # Who has it knows more than one who could not even reach it.
+    # The process that has it locked knows more than one that could not connect.
     return refusals[0] if refusals and isinstance(error, ConnectError) else error
 
 

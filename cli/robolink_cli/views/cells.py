@@ -260,7 +260,7 @@ def _checked(path: Path) -> dict[str, Any]:
 
 def _shown(value: object) -> str:
     if isinstance(value, dict):
-        # Rows of the budget are numbers; of people and stations the names are enough.
+        # Budget rows are numbers; for people and stations the names are enough.
         return ", ".join(
             f"{name} {one:g}" if isinstance(one, float) else name for name, one in value.items()
         )

@@ -233,7 +233,7 @@ def _unread(payload: Mapping[str, object]) -> list[str]:
 def _show_preferences(told: object) -> None:
     """Warn of what makes the cell unreal, and name what switches outputs off."""
     if not isinstance(told, Mapping):
-        return  # older firmware does not tell, and nothing is assumed
+        return  # older firmware does not report it, and nothing is assumed
     if told["dry_run"]:
         say(tr("  DRY RUN is set: the robot does not move. Nothing can be measured."))
     if told["virtual_io"]:

@@ -73,7 +73,7 @@ def remarks(result: CalibrationResult) -> Iterator[str]:
 
 
 _SAID_OTHERWISE: Final = ("length_not_observable",)
-"""Notes whose reason the proposal gives, in a sentence of its own."""
+"""Notes that are left out, because the proposal gives their reason in a separate sentence."""
 
 
 def _fit(result: CalibrationResult) -> str:

@@ -24,11 +24,11 @@ from robolink_cli.console.render import say, table
 from robolink_cli.views.documents import AXES, offset_difference
 
 SHORT: Final = 8
-"""How many characters of an id a table shows."""
+"""Number of characters of an id in a table."""
 
 _VALUES: Final = ("before", "proposed", "requested", "value", "tip")
 AFTER: Final = ("value", "proposed", "requested")
-"""Where the value that a tool got, or was to get, stands in the details."""
+"""Keys of the details that may hold the tool's new or requested value."""
 
 _PLAIN: Final = (
     *("number", "at", "controller", "kind", "change", "operation", "tool"),
@@ -38,7 +38,7 @@ _LISTS: Final = ("poses", "drifts", "tools")
 _IN_STATEMENTS: Final = (
     *("repeatable_to_mm", "accurate_to_mm", "accuracy", "budget", "seating", "judgement"),
 )
-"""What sentences and a table say already."""
+"""Details that are left out, because sentences and a table already give them."""
 
 _UNITS: Final = {
     "_mm_s": "mm/s",
@@ -49,7 +49,7 @@ _UNITS: Final = {
     "_ms": "ms",
     "_s": "s",
 }
-"""End of a recorded name to the unit that it stands for, the longer ends first."""
+"""Units by the ending of a recorded name, longer endings first."""
 
 
 def entry_payload(entry: Recorded, *, as_stored: bool = False) -> dict[str, object]:
@@ -285,7 +285,7 @@ def offset_cells(offset: ToolOffset | None) -> list[str]:
 
 def figure(value: object) -> str:
     """Return a table cell for a length or an angle."""
-    # Adding zero takes the sign off what rounds to zero.
+    # Adding zero removes the minus sign of values that round to zero.
     return f"{round(value, 3) + 0.0:.3f}" if isinstance(value, (int, float)) else "-"
 
 
@@ -307,7 +307,7 @@ def _plain(value: object) -> str:
 
 
 _Offsets: TypeAlias = dict[str, ToolOffset | None]
-"""What a tool held 'before' and 'after', as far as it is on record."""
+"""Offsets of a tool 'before' and 'after', as far as they are recorded."""
 
 
 class _Side:
@@ -334,7 +334,7 @@ class _Side:
                 known, offset = first_offset(entry.details, names)
                 if known:
                     offsets = self.values.setdefault(entry.tool, {})
-                    # The oldest says what was there, the newest what it came to.
+                    # The oldest entry has the value before, the newest the value after.
                     offsets[key] = offsets.get("before", offset) if key == "before" else offset
         poses = entry.details.get("poses")
         if isinstance(poses, list) and poses:

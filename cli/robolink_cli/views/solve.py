@@ -9,7 +9,7 @@ from robolink.model import json_fields, json_value
 from robolink_cli.console.render import say
 
 SOLVED: Final = "solved"
-"""Under this key stands the result itself, until what it is accurate to takes its place."""
+"""Key of the result, until the statement of its accuracy replaces it."""
 
 
 def result_payload(result: CalibrationResult) -> dict[str, object]:
@@ -229,4 +229,4 @@ _SHOWN = (
     ("poses", declared("poses")),
     ("sigma_gains", declared("gain of sigma after each pose")),
 )
-"""What is printed of a document, in this order; the rest is for machines."""
+"""Fields of a document that are printed, in this order. The others are for programs."""

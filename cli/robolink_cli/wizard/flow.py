@@ -131,7 +131,7 @@ def _regarding(state: WizardState, subject: object) -> WizardState:
             reading = replace(reading, pose=subject.after)
         return replace(state, jogging=jogging, reading=reading, message="")
     if isinstance(subject, MoveSubject):
-        # What it is for stands beside its picture, and heads no question that follows.
+        # Its purpose is shown beside its picture, not above later questions.
         fresh, remarks = (
             tuple(text for text in told if text != subject.purpose)
             for told in (state.fresh, state.remarks)
@@ -153,7 +153,7 @@ def _regarding(state: WizardState, subject: object) -> WizardState:
     if isinstance(subject, CheckSubject):
         before = state.subject
         same = isinstance(before, CheckSubject) and before.rows == subject.rows
-        # No finger is to come down on another row than the one that was read.
+        # The row under a finger must not change between reading and pressing.
         return replace(state, subject=subject, marked=state.marked if same else None)
     return replace(state, subject=subject)
 
@@ -183,11 +183,11 @@ def _waiting(state: WizardState, at_s: float) -> WizardState:
 def _asked(state: WizardState, asked: WasAsked) -> WizardState:
     size, reading = state.jogging.size, state.reading
     if reading is not None and asked.at_s - reading.at_s > 1.0:
-        # Where it was before the robot moved is not where it is.
+        # A position read before the robot moved is out of date.
         reading = replace(reading, pose=None)
     subject = state.subject
     if isinstance(subject, ChoiceSubject) and asked.kind is Question.YES_NO:
-        subject = asked  # a list that was chosen from is not what is asked about
+        subject = asked  # the question is not about the list used before
     return replace(
         state,
         subject=subject,
@@ -209,7 +209,7 @@ def _asked(state: WizardState, asked: WasAsked) -> WizardState:
 
 def _answer(state: WizardState, text: str) -> Advanced:
     """Send an answer; nothing else is accepted until the work waits again."""
-    assert state.question is not None  # noqa: S101 - looked at by whoever calls
+    assert state.question is not None  # noqa: S101 - checked by the caller
     accepted = state.accepted or (state.writing is not None and text == "y")
     sent = replace(state, waits=False, message="", accepted=accepted)
     return sent, [SendAnswer(state.question.number, text)]
@@ -224,12 +224,12 @@ def _stop(state: WizardState) -> Advanced:
     if question is None or not state.waits:
         return ending, [WizardCommand.END_WORK]
     if question.kind is not Question.YES_NO:
-        # Who jogs for its own sake has not broken anything off.
+        # Ending a plain jog interrupts nothing.
         word = "q" if state.free_jog is None else "done"
         return replace(ending, waits=False), [SendAnswer(question.number, word)]
     if state.writing is not None or confirms(state) is not None:
         return ending, [SendAnswer(question.number, "n")]
-    return ending, [WizardCommand.END_WORK]  # a no would go on
+    return ending, [WizardCommand.END_WORK]  # the answer no would continue
 
 
 def armed_anew(state: WizardState, at_s: float) -> WizardState:
@@ -253,7 +253,7 @@ def _too_early(state: WizardState, key: KeyPressed) -> bool:
 
     What is left of a code whose beginning was dropped would be another code.
     """
-    unasked = not state.waits and not state.typed  # what was answered already is not asked anew
+    unasked = not state.waits and not state.typed  # not if already answered
     early = unasked or not _armed(state, key.at_s)
     return early or key.at_s - state.early_s < ARMED_AFTER_S
 
@@ -378,7 +378,7 @@ def _line(state: WizardState, line: LineTyped) -> Advanced:
     listed = typed and isinstance(state.subject, ChoiceSubject)
     settles = typed or question.kind is Question.CHOICE
     if settles and not listed and not _armed(state, line.at_s):
-        # The end of a code that a scanner began before the question was there is another code.
+        # The end of a code scanned before the question appeared would be a wrong code.
         return state.says(tr("Typed too early and ignored. Please type it again.")), []
     if state.at_place:
         return _line_at_place(state, line, meaning)

@@ -8,7 +8,9 @@ from robolink.model import Controller
 from robolink_cli.wizard.happenings import Reading
 
 _SELDOM_S: Final = 3.0
-"""So often motors and power mode are read at rest: only a person or a program here changes them."""
+"""Interval in seconds at which motors and power mode are read at rest. Only a person or this
+program changes them.
+"""
 
 
 class ControllerGlance:
@@ -32,7 +34,7 @@ class ControllerGlance:
         """Read while a person is asked."""
         status = self._controller.status()
         halted = status.emergency_stop or status.guard_open or status.fault or status.serious_fault
-        # What comes next tells why: a position is no more of interest then.
+        # The next message gives the reason; the position no longer matters.
         if halted:
             self._seldom_s = -_SELDOM_S
             return Reading(time.monotonic(), status.state, halted=True)

@@ -177,19 +177,19 @@ class WizardCommand(Enum):
     """What the flow requests besides an answer."""
 
     END_WORK = "end"
-    """End what is under way, as Ctrl-C would."""
+    """End the current work, like Ctrl-C."""
 
     LEAVE = "leave"
     """Leave the last screen."""
 
     BEGIN_AGAIN = "begin again"
-    """Begin the same job once more, from its first question."""
+    """Start the same job again, from its first question."""
 
     SHOW_REPORT = "show the report"
-    """Write the page about the change that was carried out, and come back to the last screen."""
+    """Write the report page about the finished change, and return to the last screen."""
 
     NEXT_TOOL = "next tool"
-    """Choose another job, from the first list on."""
+    """Choose another job, starting at the first list."""
 
 
 Effect = SendAnswer | WizardCommand

@@ -19,7 +19,7 @@ from robolink_cli.wizard.state import Header, WizardState
 from robolink_cli.wizard.work import Desk, Face, Work
 
 _POOR: Final = frozenset({"", "dumb", "unknown"})
-"""Terminals that obey nothing."""
+"""Values of TERM for terminals that support no control sequences."""
 
 
 def face_here() -> "Face":
@@ -46,13 +46,13 @@ def draws_whole_screens() -> bool:
         return False
     try:
         if os.name == "nt":
-            # What prompt_toolkit calls on Windows are functions of stdout's console, whatever it
-            # is told to draw on; with stdout in a file there is none, and it breaks off.
+            # On Windows prompt_toolkit calls functions of stdout's console, whatever stream it
+            # draws on; with stdout in a file there is no console, and it fails.
             os.get_terminal_size(sys.stdout.fileno())
         size = os.get_terminal_size(sys.stderr.fileno())
     except (OSError, ValueError, AttributeError):
         return False
-    return min(size.columns, size.lines) > 0  # where nobody knows the size, none is assumed
+    return min(size.columns, size.lines) > 0  # an unknown size is not guessed
 
 
 T = TypeVar("T")
@@ -108,7 +108,7 @@ def _shown(face: Face, desk: Desk, state: WizardState, work: "Work[T]") -> Wizar
     """
     try:
         return face.run(desk, state, work)
-    except (EOFError, OSError):  # the window was closed, or the line to it is gone
+    except (EOFError, OSError):  # the window was closed, or its connection was lost
         _ends_alone(desk, work)
         return state
     except BaseException:

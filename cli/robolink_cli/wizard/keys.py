@@ -14,7 +14,7 @@ KEYPAD: Final = {
     "home": "7",
     "insert": "0",
 }
-"""Names of keys without NumLock: the same places of the keypad, and keys of a notebook."""
+"""Keypad digits by the names of keys: the keypad without NumLock, and the keys of a notebook."""
 
 AXES: Final = {
     "6": "x+",
@@ -26,10 +26,10 @@ AXES: Final = {
     "7": "u+",
     "1": "u-",
 }
-"""Which way a key jogs."""
+"""Jog axis and direction by key."""
 
 _ARROWS: Final = ("6", "8", "4", "2")
-"""Counter-clockwise, seen from above."""
+"""Arrow keys in counter-clockwise order, seen from above."""
 
 _WORDS: Final = {
     "take": "take done record t 记录",
@@ -91,13 +91,15 @@ def step_of(key: str, size: float, quarters: int) -> str | None:
 
 
 ALONE_S: Final = 0.035
-"""A key counts when none other follows within this."""
+"""Pause in seconds after a key without which it does not count."""
 
 REPEATS_S: Final = 0.012
-"""A held key repeats slower than this; a scanner sends one digit twice faster."""
+"""Shortest interval in seconds at which a held key repeats. A scanner sends the same digit twice
+faster than this.
+"""
 
 AT_ONCE: Final = frozenset({"escape", "c-c"})
-"""What stops, and never waits for anything."""
+"""Keys that stop, and that take effect without waiting."""
 
 _NAMES: Final = {
     " ": "main",

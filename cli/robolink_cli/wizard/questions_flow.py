@@ -34,10 +34,10 @@ _OFFERED: Final = {
 _OFFERED_WORDS: Final = {"report": WizardCommand.SHOW_REPORT, "next": WizardCommand.NEXT_TOOL}
 
 _LIKELY_SHARE: Final = 3.0
-"""How many times as far off as each of the others the worst one is where it is offered first."""
+"""Ratio of the worst touch's deviation to each other one above which it is offered first."""
 
 _LEAST_SHARE: Final = 1 / 3
-"""The share of the limit over which the worst one has to be off to be offered first."""
+"""Share of the limit that the worst touch's deviation must exceed to be offered first."""
 
 
 def expected_number(subject: WriteSubject) -> str:

@@ -73,7 +73,7 @@ def subject_of(offered: OfferedChoice) -> ChoiceSubject:
 
 
 CHANGE_LANGUAGE: Final = "language"
-"""The answer of a person who wants to read the other language."""
+"""The answer that switches to the other language."""
 
 
 def choose_in_either_language(
@@ -131,15 +131,19 @@ def _index(answer: str, subject: ChoiceSubject) -> int:
 
 
 STEP_SIZES: Final = (0.01, 0.1, 0.5, 1.0, 5.0)
-"""In mm, and in degrees for U; the largest is the runner's own limit."""
+"""Jog steps in mm, and in degrees for U. The largest is the runner's limit."""
 
 USUAL_SIZE: Final = 1
 
 ARMED_AFTER_S: Final = 0.3
-"""So long after a question appeared no key answers it: it was meant for what was there before."""
+"""Time in seconds for which keys are ignored after a question has appeared: they were meant for the
+previous screen.
+"""
 
 LEAST_WAY_MM: Final = 0.02
-"""Less is what a position reads besides (docs/reference/evidence.md 1)."""
+"""Shortest path in mm that counts as a movement: readings of one position differ by less
+(docs/reference/evidence.md 1).
+"""
 
 _PLACES: Final = frozenset({Question.PLACE, Question.ROOM, Question.ALONG_X, Question.ALONG_Z})
 
@@ -343,7 +347,7 @@ class Mark(StrEnum):
     TO_DO = "to do"
     YOU = "you"
     LOOK = "look"
-    """Worth knowing; nothing waits for it."""
+    """Worth knowing, but nothing waits for it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -390,4 +394,4 @@ class CheckSubject:
 
 
 SWITCH_ON = "motors"
-"""The answer with which a person has the motors switched on."""
+"""The answer that has the motors switched on."""

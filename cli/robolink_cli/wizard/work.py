@@ -27,10 +27,10 @@ from robolink_cli.wizard.happenings import (
 from robolink_cli.wizard.state import WizardState
 
 FOLLOW_S: Final = 0.4
-"""Between two looks while the robot moves."""
+"""Interval in seconds between readings while the robot moves."""
 
 GLANCE_S: Final = 0.3
-"""Between two looks at the controller while a person is asked."""
+"""Interval in seconds between readings of the controller while a question is open."""
 
 
 class Desk:

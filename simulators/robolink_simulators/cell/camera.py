@@ -18,13 +18,15 @@ from robolink_simulators.cell.frames import Frame, printed_angles, zyx
 from robolink_simulators.cell.places import Pixel, XyzMm
 
 _LENS_MM: Final = 120.0
-"""From lens to the plane of focus (assumed)."""
+"""Distance from the lens to the plane of focus, in mm (assumed)."""
 
 _DEPTH_MM: Final = 2.0
-"""Depth of field to each side (assumed); what is farther off is not found."""
+"""Depth of field on each side of the plane of focus, in mm (assumed). Marks outside it are not
+found.
+"""
 
 _RADIUS_NOISE_PX: Final = 0.05
-"""Standard deviation of a found radius (assumed)."""
+"""Standard deviation of a measured radius, in pixels (assumed)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,7 +241,7 @@ class CameraTruth:
 
 
 DRAWING_MM: Final = ((20.0, 12.5), (-20.0, 12.5), (-20.0, -12.5), (20.0, -12.5))
-"""Fiducials of the simulated board: a rectangle about its middle."""
+"""Fiducials of the simulated board in mm: the corners of a rectangle about its centre."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,13 +8,14 @@ from robolink.messages import tr
 from robolink.timing import NS_PER_S, Clock, SystemClock
 
 _LOOK_S: Final = 0.05
-"""How long a sleeper takes to see that the pace is another one."""
+"""Longest time in seconds until a sleeping thread notices that the pace has changed."""
 
 _PAUSED_S: Final = 86_400.0
 
 EXCHANGE_S: Final = 0.05
-"""What a request takes where time does not pass by itself, and in tests: who asks how far a
-movement is need not wait for it."""
+"""Simulated duration of a request in seconds, used in tests and where time does not pass by itself.
+A client that polls the progress of a movement then needs no waits of its own.
+"""
 
 
 class ManualClock:

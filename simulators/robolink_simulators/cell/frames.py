@@ -48,7 +48,7 @@ def cross(a: Vector, b: Vector) -> Vector:
 
 def turned(rotation: Matrix, vector: Vector) -> Vector:
     """Return the vector after the rotation."""
-    # Written out, here and below: every cycle of a simulated movement does it many times.
+    # Written out here and below: every cycle of a simulated movement does this many times.
     (a, b, c), (d, e, f), (g, h, i) = rotation
     x, y, z = vector
     return (a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z)
@@ -199,4 +199,4 @@ class Frame:
 
 
 ORIGIN: Final = Frame()
-"""The frame that is where the outer one is."""
+"""The identity frame, which coincides with the frame around it."""

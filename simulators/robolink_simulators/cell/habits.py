@@ -11,8 +11,9 @@ from typing import Literal
 from robolink_simulators.cell.places import Direction, XyzMm
 
 BiasFrame = Literal["base", "tool", "approach"]
-"""In which a one-sided touch is always off by the same: the base, the flange, or where the tip
-came from."""
+"""The frame in which the constant error of a one-sided touch is fixed: the base, the tool flange,
+or the direction of approach.
+"""
 
 
 @dataclass(frozen=True, slots=True)

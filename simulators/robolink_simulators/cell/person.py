@@ -16,8 +16,9 @@ from robolink_simulators.cell.workplace import MOUNTED_TOOL, Workplace
 from robolink_simulators.device.wire_time import late_random
 
 LAMP_MM: Final = 0.025
-"""So much below the first contact, and not above it, a person stops who watches the lamp of a
-contact input (assumed)."""
+"""Distance in mm below the first contact at which a person who watches the lamp of a contact input
+stops (assumed). They never stop above it.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +93,7 @@ class SimulatedOperator:
         """
         tool = MOUNTED_TOOL if tool is None else tool
         self._present_course()
-        if self._manner is None:  # nobody asked, so this look begins the touch
+        if self._manner is None:  # no question came before, so this look begins the touch
             self._manner = self._begin_next(tool, asked=False)
         self._left_at = placement = (self._workplace.robot.placement(), tool)
         if placement != self._placement:
@@ -142,7 +143,7 @@ class SimulatedOperator:
         workplace.touch_begins(course.touches)
         self._left_at = (workplace.robot.placement(), tool)
         if workplace.surface is not None:
-            # The spot that is nearest now: jogs along the axes would else lead elsewhere.
+            # The spot nearest now: otherwise jogs along the axes would lead to another one.
             self._spot_mm = add(workplace.tip_mm(tool), workplace.gap_mm(tool))
         return course.begin(workplace.gap_mm(tool), asked=asked)
 

@@ -13,7 +13,7 @@ Direction = tuple[float, float, float]
 """A unit vector."""
 
 Axis = Literal["x", "z"]
-"""An axis of a tool that a person can show."""
+"""A tool axis whose direction a person can show."""
 
 
 def axis_of(tool: ToolOffset, axis: Axis) -> Direction:

@@ -10,7 +10,7 @@ from robolink_simulators.cell.places import Direction, XyzMm
 from robolink_simulators.cell.tip_switches import STANDING, PinContact
 
 Touched = Literal["pin", "plane", "sphere"]
-"""What the person brings the tip onto."""
+"""The object that the person touches with the tip."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,7 +93,7 @@ class SurfaceContact:
 
 
 STIFFNESS_N_PER_MM: Final = 100.0
-"""Assumed: a thing gives way, with this much force for each mm that a tip is inside of it."""
+"""Stiffness of a touched object, in N per mm of penetration by the tip (assumed)."""
 
 NO_FORCE: Final[Vector] = (0.0, 0.0, 0.0)
 

@@ -10,12 +10,12 @@ from robolink_simulators.cell.frames import cross, dot, subtract
 from robolink_simulators.cell.places import Direction, XyzMm
 
 Lean = tuple[float, float]
-"""How far a bent nozzle's shaft is beside its tip, X and Y in mm per mm above the tip."""
+"""Offset of a bent nozzle's shaft from its tip: X and Y, in mm per mm of height above the tip."""
 
 UPRIGHT: Final[Lean] = (0.0, 0.0)
 
 STANDING: Final[Direction] = (0.0, 0.0, 1.0)
-"""From its tip, the shaft of an upright nozzle goes straight up."""
+"""Direction of an upright nozzle's shaft, seen from its tip: straight up."""
 
 _PARALLEL = 1e-12
 
@@ -116,7 +116,7 @@ class LightBeam:
     _way: Direction = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        # A search asks in each millisecond.
+        # A search asks this every millisecond.
         heading, tilt = math.radians(self.heading_deg), math.radians(self.tilt_deg)
         level = math.cos(tilt)
         way = (level * math.cos(heading), level * math.sin(heading), math.sin(tilt))
@@ -128,8 +128,8 @@ class LightBeam:
         to_beam, across = subtract(self.through_mm, tip_mm), cross(shaft, beam)
         area = dot(across, across)
         if area < _PARALLEL * dot(shaft, shaft):
-            return False  # a shaft along the beam hides its own tip only
-        # Where along the shaft the two are closest: behind the tip there is no shaft.
+            return False  # a shaft along the beam covers only its tip
+        # The point of the shaft closest to the beam: below the tip there is no shaft.
         if dot(cross(to_beam, beam), across) < 0:
             return False
         beside_mm = abs(dot(to_beam, across)) / math.sqrt(area)

@@ -39,7 +39,7 @@ from robolink_simulators.not_now import NotNowError
 _STRAIGHT: Final = Shaft()
 
 MOUNTED_TOOL: Final = 1
-"""The tool number of the nozzle on the arm."""
+"""The tool number of the nozzle mounted on the arm."""
 
 
 class Handled(Protocol):
@@ -204,7 +204,7 @@ class Workplace(ABC):
             return PinContact(lambda: self.pin_mm, parameters.pin_radius_mm)
 
         def touched() -> Surface:
-            # By then these are the parameters in force.
+            # By then these parameters are in force.
             return self.surface or FlatPlate(self.pin_mm, STANDING)
 
         return SurfaceContact(touched)
@@ -246,7 +246,7 @@ class Workplace(ABC):
         """Return where the tips are, or all fiducials, and how the X axis of each lies."""
         nozzle, board = self.tips.get(MOUNTED_TOOL, ToolOffset()), self.board
         if mark == TIP:
-            # A held board hides the tip of its nozzle.
+            # A board held by the nozzle hides its tip.
             shown = [tool for tool in self.tips if not (board and tool == MOUNTED_TOOL)]
             return [(self._seen_tip_mm(tool), self.axis("x", tool)) for tool in shown]
         seen = board.fiducials(nozzle) if board else ()

@@ -18,7 +18,7 @@ from robolink_simulators.cell.tip_switches import Lean
 from robolink_simulators.option_values import values_from_text
 
 PREFIX: Final = "world."
-"""Stands before each name in a sim URL."""
+"""Prefix of the world parameters in a sim URL."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -75,7 +75,7 @@ EPSON_ACTS: Final = (
     panel_act(EpsonPanel, "lose_login"),
     panel_act(EpsonPanel, "cut_link"),
 )
-"""Acts at an EPSON controller."""
+"""Acts on an EPSON controller."""
 
 
 _NO_CONNECTION: Final = frozenset({LinkKind.MODBUS_RTU, LinkKind.CAN, LinkKind.PLC_RTU})
@@ -111,14 +111,14 @@ PLC_ACTS: Final[tuple[ControlAct, ...]] = (
     panel_act(PlcPanel, "lay_words", Taken("order", "text", choices=get_args(Order))),
     panel_act(PlcPanel, "shift_map", Taken("words", "whole", most=64)),
 )
-"""Acts at a PLC with a mailbox."""
+"""Acts on a PLC with a mailbox."""
 
 MAPPED_ACTS: Final[tuple[ControlAct, ...]] = (
     panel_act(MappedPlcPanel, "give_permit"),
     panel_act(MappedPlcPanel, "withdraw_permit"),
     ControlAct("cut_link", _cut_link),
 )
-"""Acts at a PLC with a register map."""
+"""Acts on a PLC with a register map."""
 
 
 class UnknownActError(ConfigError):
@@ -126,7 +126,7 @@ class UnknownActError(ConfigError):
 
 
 MACHINE_REFUSALS: Final = (SpelRefusal, BlockRefused)
-"""What an act ends in that the simulated robot cannot do."""
+"""Exceptions raised by an act that the simulated robot cannot carry out."""
 
 
 def machine_refusal(refused: Exception) -> tuple[str, str]:
@@ -151,7 +151,7 @@ ACTS: Final[Mapping[str, Mapping[str, ControlAct]]] = {
     "softmotion": _by_name(WORLD_ACTS, KEEPING_ACTS, WIRE_ACTS, PLC_ACTS),
     "plc": _by_name(KEEPING_ACTS, WIRE_ACTS, MAPPED_ACTS),
 }
-"""Kind of controller, name of the act."""
+"""Acts by kind of controller, then by name."""
 
 
 def texts_of(name: str) -> frozenset[str]:
@@ -182,7 +182,7 @@ def methods_of(cell: ControlledCell, name: str) -> tuple[str, ...]:
     Raises:
         UnknownActError: No kind of controller has it.
     """
-    # An act of another kind is refused by what it is, not by its method, which is the same there.
+    # An act of another kind of controller is refused as such, not for its HTTP method.
     known = [of_kind[name] for of_kind in ACTS.values() if name in of_kind]
     act = known[0] if known else act_named(cell, name)
     return ("GET", "POST") if act.reads else ("POST",)

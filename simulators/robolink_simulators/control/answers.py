@@ -12,10 +12,10 @@ from robolink_simulators.device.wire_record import StartedMotion, WireLine
 from robolink_simulators.faults.fieldbus import Order
 
 Described = Any
-"""The type of an answer: a dataclass, or one of several."""
+"""The type of an answer: a dataclass or a union of dataclasses."""
 
 LEFT_OUT: Final = "left out where it is as usual"
-"""Marks what an answer has not always."""
+"""Marks a field that an answer omits while it has its usual value."""
 
 
 @dataclass(frozen=True, slots=True)

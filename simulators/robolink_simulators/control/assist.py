@@ -114,19 +114,23 @@ def assist_address(url: str) -> AssistAddress:
 
 
 LEAST_THINKING_S: Final = 0.35
-"""However fast simulated time passes, a person who thinks at all really answers no sooner: a driver
-takes it for typed ahead when an answer comes before the question can have been read."""
+"""Shortest real time, in seconds, in which a person with a thinking time answers, however fast
+simulated time passes. A driver would ignore an earlier answer as typed before the question.
+"""
 
 LONGEST_LINE: Final = 4096
-"""Bytes; the longest request there is, a whole world set up, takes some 1500."""
+"""Longest request in bytes. The longest one in use, which sets up a whole world, takes about 1500.
+"""
 
 MOST_CLIENTS: Final = 16
 
 Assisted = EpsonSimulator | SoftMotionSimulator
-"""A simulator with a person beside it."""
+"""A simulator with a simulated person."""
 
 _LONGEST_ANSWER: Final = 1 << 23
-"""Bytes; what is held of the past, and of what waits, is bounded."""
+"""Longest answer in bytes. The recorded history and the queued faults, which answers list, are
+bounded.
+"""
 
 _IN_PROCESS: Final[Mapping[str, Callable[[str], Assisted]]] = {
     "epson+sim": in_process.simulator_named,
@@ -239,7 +243,7 @@ class _AssistLink:
             what, remedy = machine_refusal(refused)
             answer = {"ok": False, "error": what, "remedy": remedy}
         except Exception as error:
-            # Whoever asked is told, and the port goes on, as that of the control API does.
+            # The client gets the error and the port stays open, as in the control API.
             what, remedy = defect(error)
             answer = {"ok": False, "error": what, "remedy": remedy}
         return json.dumps(answer).encode() + b"\n"

@@ -36,7 +36,7 @@ _NOT_SERVED: Final = {
     "softmotion": (LinkKind.MAILBOX_SIM,),
     "plc": (LinkKind.PLC_TCP,),
 }
-"""What counts for one whose host has not said where it is."""
+"""Link kinds of a cell whose host has given no URL."""
 
 
 @dataclass(slots=True)

@@ -21,13 +21,13 @@ from robolink_simulators.client_errors import (
 from robolink_simulators.control.http_port import SCHEMA
 
 _LONGEST_ANSWER: Final = 1 << 23
-"""Bytes of an answer that does not say its length: some proxy's."""
+"""Longest answer in bytes that is read when it states no length, as from some proxies."""
 
 _REFUSED_BY: Final[Mapping[int, type[RobolinkError]]] = {
     HTTPStatus.INTERNAL_SERVER_ERROR: RemoteProtocolError,
     HTTPStatus.SERVICE_UNAVAILABLE: ConnectError,
 }
-"""What is not the fault of whoever asks."""
+"""Errors by HTTP status for refusals that the caller did not cause."""
 
 
 class ControlClient(ClosedAtExit):

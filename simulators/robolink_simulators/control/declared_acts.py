@@ -15,16 +15,16 @@ Answer = dict[str, object]
 """The result of an act, ready for JSON."""
 
 Given = Mapping[str, Any]
-"""What an act is given by name, as it came in."""
+"""The values passed to an act, by name, unchecked."""
 
 MOST: Final = 9999
 _FAR: Final = 1_000_000
 LONGEST_TEXT: Final = 200
 PRINTABLE: Final = "[ -~]*"
-"""Printable ASCII, as a regular expression that Python and JSON Schema read alike."""
+"""Regular expression for printable ASCII, with the same meaning in Python and JSON Schema."""
 
 NONE: Final = "none"
-"""What a shell gives for null."""
+"""The text that stands for null where a value comes from a shell."""
 
 Form = Literal["whole", "number", "flag", "text"]
 
@@ -69,13 +69,13 @@ class Taken:
         if self.or_none and (value is None or value == NONE):
             return None
         if isinstance(value, float) and value.is_integer() and self.form in ("whole", "flag"):
-            value = int(value)  # JSON has one kind of numbers: 3.0 is a whole one
+            value = int(value)  # JSON has one type of number: 3.0 is an integer
         match self.form:
             case "whole":
                 lowest, highest = self.whole_limits
                 fits = type(value) is int and lowest <= value <= highest
             case "number":
-                # An integer of JSON may have hundreds of digits: compared before it is a float.
+                # A JSON integer may have hundreds of digits: compare before conversion to float.
                 number = isinstance(value, (int, float)) and not isinstance(value, bool)
                 fits = number and self.least <= value <= self.most  # type: ignore[operator]
             case "flag":

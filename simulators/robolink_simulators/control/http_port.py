@@ -29,18 +29,19 @@ from robolink.messages import tr
 from robolink_simulators.hosting.addresses import is_this_machine, require_loopback
 
 SCHEMA: Final = "robolink/control/1"
-"""Of each answer, but for the API's own description."""
+"""Schema of every answer except the API's own description."""
 
 MOST_CLIENTS: Final = 64
 MOST_TURNED_AWAY: Final = 16
-"""So many more are told that there is no room for them."""
+"""Number of further connections that receive the answer that no place is free."""
 
 LONGEST_REQUEST: Final = 65_536
 _SILENCE_S: Final = 60.0
 _TURNED_AWAY_S: Final = 5.0
 
 _BEFORE_ASKING_S: Final = 5.0
-"""Who has asked nothing for so long has no claim to a place where there is none left."""
+"""Time in seconds after which a connection without a request gives up its place if all are taken.
+"""
 
 
 class ApiReply(NamedTuple):
@@ -86,7 +87,7 @@ class HttpPort(ThreadingHTTPServer):
 
     daemon_threads = True
     block_on_close = False
-    request_queue_size = 512  # whoever finds no room tries again only a second later
+    request_queue_size = 512  # a client that finds no room retries only a second later
 
     def __init__(
         self,
@@ -99,7 +100,7 @@ class HttpPort(ThreadingHTTPServer):
         self.allow_remote = allow_remote
         self.address_family = AF_INET6 if ":" in address[0] else AF_INET
         self.answered = answered
-        self._served = dict[socket, float]()  # since when each has asked nothing
+        self._served = dict[socket, float]()  # start of the silence of each
         self._turned_away = set[socket]()
         self._counting = threading.Lock()
         super().__init__(address, _Served)
@@ -107,7 +108,7 @@ class HttpPort(ThreadingHTTPServer):
     def server_bind(self) -> None:
         """Bind without looking up this machine's name, which may take seconds."""
         if os.name == "posix":
-            # Else nobody can listen here for a minute after one who was connected at the end. On
+            # Without it nobody can listen here for a minute if a client was connected last. On
             # Windows it would let two programs share the port.
             self.socket.setsockopt(SOL_SOCKET, SO_REUSEADDR, 1)
         self.socket.bind(self.server_address)
@@ -165,7 +166,7 @@ class HttpPort(ThreadingHTTPServer):
 
 def _end(connection: socket) -> None:
     """End a connection; its thread notices it."""
-    with suppress(OSError):  # it has ended by itself
+    with suppress(OSError):  # the connection has ended already
         connection.shutdown(SHUT_RDWR)
 
 
@@ -259,7 +260,7 @@ class _Served(BaseHTTPRequestHandler):
                 tr("Send {most} bytes or fewer.", most=LONGEST_REQUEST),
             )
         elif len(body := self.rfile.read(int(length))) < int(length):
-            # Its sender is gone in the middle: what it wanted done, nobody knows.
+            # The client left in the middle of its request, so what it wanted is unknown.
             self._refuse(
                 HTTPStatus.BAD_REQUEST, tr("The request ended early."), tr("Send it whole.")
             )
@@ -274,7 +275,7 @@ class _Served(BaseHTTPRequestHandler):
         explain: str | None = None,  # noqa: ARG002 - part of the signature
     ) -> None:
         """Answer a malformed request, or another method, in JSON like everything else."""
-        self.request_version = self.protocol_version  # or it would get no head
+        self.request_version = self.protocol_version  # without it the answer has no headers
         if code == HTTPStatus.NOT_IMPLEMENTED:
             self.close_connection = True
             self._asked()
@@ -285,14 +286,14 @@ class _Served(BaseHTTPRequestHandler):
         """Print nothing: the URL holds the token."""
 
     def _refuse(self, status: HTTPStatus, what: str, remedy: str) -> None:
-        self.close_connection = True  # what follows is not read
+        self.close_connection = True  # the rest of the request is not read
         self._send(ApiReply(status, error_document(what, remedy)))
 
     def _answer(self, method: str, body: bytes) -> None:
         self.server.has_asked(self.connection)
         reply = self._of_a_page() or self.server.answered(method, self.path, body)
         if reply.status == HTTPStatus.FORBIDDEN:
-            self.close_connection = True  # who does not show the token keeps no place
+            self.close_connection = True  # a client without the token keeps no place
         self._send(reply)
 
     def _of_a_page(self) -> ApiReply | None:
@@ -321,7 +322,7 @@ class _Served(BaseHTTPRequestHandler):
 
     def _send(self, reply: ApiReply) -> None:
         data = json.dumps(reply.document).encode()
-        self.connection.settimeout(self.timeout)  # of all of it
+        self.connection.settimeout(self.timeout)  # for the whole answer
         self.send_response(reply.status)
         self.send_header("Content-Type", "application/json")
         self.send_header("Content-Length", str(len(data)))

@@ -46,7 +46,7 @@ _MOST_ASKED: Final = 50
 _LOOKED_AT: Final = ("GET",)
 
 _Address = tuple[tuple[str, ...], Callable[[dict[str, Any]], dict[str, Any]]]
-"""The methods of an address, and what returns its answer for what is given."""
+"""The allowed HTTP methods of an address, and the function that returns its answer."""
 
 
 class ControlServer(ClosedAtExit):
@@ -113,7 +113,7 @@ class ControlServer(ClosedAtExit):
         self.requests += 1
         try:
             parts = urlsplit(target)
-        except ValueError:  # half an address of IPv6
+        except ValueError:  # an incomplete IPv6 address
             return _refused(HTTPStatus.BAD_REQUEST, *no_request(HTTPStatus.BAD_REQUEST))
         token, *path = parts.path.strip("/").split("/")
         if not is_token(token, self._token):
@@ -136,7 +136,7 @@ class ControlServer(ClosedAtExit):
         except MACHINE_REFUSALS as refused:
             return _refused(HTTPStatus.CONFLICT, *machine_refusal(refused))
         except Exception as error:
-            # Whoever asked is told, else its client waits for an answer that never comes.
+            # The error is answered: the client would otherwise wait for an answer that never comes.
             return _refused(HTTPStatus.INTERNAL_SERVER_ERROR, *defect(error))
 
     def _found(self, path: list[str]) -> _Address:
@@ -205,7 +205,7 @@ def _given(method: str, query: str, body: bytes) -> dict[str, Any]:
         )
     try:
         given = json.loads(body, object_pairs_hook=_each_once) if body else {}
-    except ConfigError:  # which is a ValueError too
+    except ConfigError:  # also a ValueError
         raise
     except (ValueError, RecursionError):
         given = None

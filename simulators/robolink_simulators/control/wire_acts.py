@@ -97,7 +97,7 @@ def _possible(tables: list[dict[str, Any]], links: tuple[LinkKind, ...]) -> tupl
                 continue
         return faults_of_table(tables, links[-1])
     except ConfigError as error:
-        # Values that some fault has, but none on this link: a bit of a word where bytes travel.
+        # Values that some faults have, but none on this link: a bit of a word on a link of bytes.
         raise NotNowError(error.what, remedy=error.remedy) from error
 
 
@@ -130,7 +130,7 @@ WIRE_ACTS: Final = (
     ),
     ControlAct("clear_faults", _clear_faults, gives=FaultsTold),
 )
-"""Acts upon the wire."""
+"""Acts on the wire."""
 
 
 _MOST_SNAPSHOTS: Final = 100
@@ -224,4 +224,4 @@ KEEPING_ACTS: Final = (
     ControlAct("set_clock", _set_clock, (Taken("factor", least=0, most=1000),), gives=ClockShown),
     ControlAct("step", _step, (Taken("seconds", least=0, most=86_400),), gives=ClockShown),
 )
-"""Acts upon time and memory."""
+"""Acts on time and memory."""

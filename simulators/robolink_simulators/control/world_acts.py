@@ -42,7 +42,7 @@ _LIMITS: Final = {
     "person_stays_share": (0, 1),
     "camera_still_share": (0, 1),
 }
-"""What of the world's numbers is not anything from 0 on."""
+"""Lowest and highest value of the world parameters for which not every number from 0 is allowed."""
 
 _SCATTER: Final = Taken("noise_mm", needed=False, least=0)
 
@@ -192,4 +192,4 @@ WORLD_ACTS: Final = (
     ),
     ControlAct("mount_plate", _mount_plate, (NUMBER, Taken("z_mm"), _SCATTER)),
 )
-"""Acts upon the world."""
+"""Acts on the world."""

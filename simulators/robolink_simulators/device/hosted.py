@@ -16,14 +16,14 @@ from robolink_simulators.not_now import NotNowError
 from robolink_simulators.state_files import StateNotKeptError
 
 RequestHook = Callable[[int, str], None]
-"""Called with the running number of a request and a text, passwords hidden."""
+"""Called with the running number and the text of a request or reply; passwords are hidden."""
 
 SCHEMA: Final = "robolink/sim-truth/1"
 
 NEW: Final[Mapping[str, int]] = MappingProxyType(
     {"moves_started": 0, "tool_writes": 0, "starts": 1, "touches": 0}
 )
-"""The counts of a controller that was just made."""
+"""The counts of a newly made controller."""
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ class HostedDevice(ABC):
     def acting(self) -> Iterator[int]:
         """Surround an act from outside the wire; gives the present time."""
         with self.lock:
-            # A planned act happens at its own instant, in the middle of an advance.
+            # A planned act happens at its planned time, in the middle of an advance.
             if self.present_ns is not None and not self._stepping:
                 self.advance(self.present_ns())
             try:

@@ -61,7 +61,9 @@ class MotionLog:
 MOST_LINES: Final = 2000
 
 MOST_SHARED: Final = 4096
-"""So many different texts are held once in a process; then it begins anew."""
+"""Number of different texts kept only once per process. When it is reached, the store starts empty
+again.
+"""
 
 _shared: dict[str, str] = {}
 

@@ -108,7 +108,7 @@ class RefusalKind(Enum):
     FILE_DENIED = 7203  # docs/reference/spel.md 10, access denied
     POINT_FILE_LONG = 2520
     POINT_FILE_NAME = 2522
-    # Those below stand in docs/reference/spel.md 10.
+    # For those below, see docs/reference/spel.md 10.
     TOOL_NUMBER = 2229
     ARM_NUMBER = 2226
     ARM_ZERO = 2205

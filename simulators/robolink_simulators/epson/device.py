@@ -113,8 +113,8 @@ class EpsonSimulator(SteppedController):
         self._links = OpenLinks()
         self._serial = serial or drawn_serial()
         if state_path is not None or world is not None:
-            self._begin()  # a file or a world that does not fit is refused now
-            self._flash.save_changes()  # and so is a file that cannot be written
+            self._begin()  # refuses a file or world that does not fit
+            self._flash.save_changes()  # refuses a file that cannot be written
 
     def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - whatever a controller has
         """Make the controller at first use.
@@ -133,7 +133,7 @@ class EpsonSimulator(SteppedController):
     def _begin(self) -> None:
         self._begun = True
         self._make(self._serial)
-        self._count_on()  # what a file says was written before
+        self._count_on()  # the file's contents were written earlier
         self.machine.advance(self.now_ns)
 
     def _make(self, serial: str) -> None:
@@ -248,7 +248,7 @@ class EpsonSimulator(SteppedController):
         self.advance(now_ns)
         link = EpsonServerLink(self, now_ns, dialect=dialect)
         self._links.add(link)
-        self._after_act()  # whoever never logs in is cut off at a time that nobody foresaw
+        self._after_act()  # a client that never logs in is cut off at an unforeseen time
         if self._slot.client is not None and self.options.second_client == "closed":
             link.cut()
         return link

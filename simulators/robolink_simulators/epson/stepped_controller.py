@@ -22,7 +22,7 @@ from robolink_simulators.epson.spel.tasks.runner import ProgramRunner
 
 LAYOUT: Final = 1
 LAST_COUNT: Final = 1_000_000_000
-"""The count after which publications are counted from 1 again."""
+"""Highest count of publications; the next one is 1 again."""
 
 _TOOLS: Final = range(1, HIGHEST_TOOL + 1)
 _UNDEFINED: Final = (0.0,) * 6
@@ -62,7 +62,7 @@ class Companion:
         defined = [int(offset is not None) for offset in offsets]
         state = (LAYOUT, self._machine.robot_number, tools.selected, 0, *defined)
         rows = [offset.components() if offset else _UNDEFINED for offset in offsets]
-        # V and W are left out by the program on a robot of four axes.
+        # On a four-axis robot the program leaves out V and W.
         table = [value for row in rows for value in (*row[:4], 0.0, 0.0)]
         if (state, table) == self._published:
             return
@@ -93,9 +93,9 @@ class SteppedController(RequestService, ABC):
     def __init__(self, seed: int) -> None:
         super().__init__(seed)
         self._begun = False
-        # Until when all is done: a transport asks for one and the same instant several times.
+        # Time until which everything is done: a transport asks for the same instant repeatedly.
         self._settled_ns = -1
-        # What next_change found last, and for which of those instants.
+        # The last result of next_change, and the instant that it was for.
         self._next_ns: int | None = None
         self._known_ns = -1
 
@@ -115,7 +115,7 @@ class SteppedController(RequestService, ABC):
 
     def _look_ahead(self) -> int | None:
         self._next_ns = self._found_next()
-        # While something goes on what comes next changes by itself.
+        # While something is in progress, the next event changes by itself.
         self._known_ns = -1 if self._at_work else self._settled_ns
         return self._next_ns
 

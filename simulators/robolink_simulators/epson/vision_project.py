@@ -23,7 +23,7 @@ from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 __all__ = ["PropertySet", "VisionObject", "VisionProject", "VisionSequence"]
 
 VisionValue = bool | int | float | str
-"""What properties and results are."""
+"""A value of a property or a result."""
 
 SEQUENCE_PROPERTIES: Final[Mapping[str, VisionValue]] = {
     "calibration": "",
@@ -33,14 +33,14 @@ SEQUENCE_PROPERTIES: Final[Mapping[str, VisionValue]] = {
     "exposuretime": 0,
     "runtimeacquire": 1,
 }
-"""Properties of a sequence by their names in lower case, and what they are at first."""
+"""Properties of a sequence by lower-case name, with their initial values."""
 
 OBJECT_PROPERTIES: Final[Mapping[str, VisionValue]] = {
     "currentresult": 1,
     "numbertofind": 1,
     "robotuoffset": 0.0,
 }
-"""The same of an object."""
+"""Properties of an object by lower-case name, with their initial values."""
 
 
 class PropertySet:

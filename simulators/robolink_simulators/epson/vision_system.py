@@ -32,7 +32,9 @@ _EXPOSED_MS: Final = 33
 _US_PER_MS: Final = 1000
 _ALONG_X: Final = (1.0, 0.0, 0.0)
 _SCORES: Final = (850, 999)
-"""Of what is found (assumed); the best comes first, so that of two like marks either may."""
+"""Lowest and highest score of a find (assumed). The best comes first, so either of two similar
+marks may.
+"""
 
 _ONLY_CAMERA: Final = 1
 
@@ -55,10 +57,10 @@ RESULTS: Final[Mapping[str, int]] = {
     "robotxyu": 4,
     "robottoolxyu": 4,
 }
-"""Results of objects by their names in lower case, and how many variables each fills."""
+"""Results of objects by lower-case name, each with the number of variables that it fills."""
 
 OF_A_SEQUENCE: Final = frozenset({"allfound", "allpassed", "time"})
-"""Results of sequences."""
+"""Results of sequences, by lower-case name."""
 
 _PARTS: Final = {"x": 0, "y": 1, "u": 2}
 
@@ -276,9 +278,9 @@ class VisionSystem:
         (a, b), (c, d) = world.camera.optics.mm_per_px
         area = a * d - b * c
         finds = list[VisionFind]()
-        # Fiducials are looked for in the picture that was taken for the tip.
+        # Fiducials are searched for in the picture taken for the tip.
         pixels = world.camera.finds((place for place, _ in marks), exposes=mark == TIP)
-        # A finder may answer where there is no mark at all.
+        # A finder may report a mark where there is none.
         directions = [axis for _, axis in marks] or [_ALONG_X] * len(pixels)
         for pixel, (dx, dy, _) in zip(pixels, directions, strict=True):
             if pixel is not None:

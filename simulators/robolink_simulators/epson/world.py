@@ -33,10 +33,10 @@ from robolink_simulators.epson.memory.robot import DrivenRobot
 from robolink_simulators.not_now import NotNowError
 
 STORED: Final = ToolOffset(12.0, -3.5, -20.0)
-"""What the controller holds for tool 1 at first: the nozzle that was there before."""
+"""Initial tool 1 in the controller: the nozzle mounted before."""
 
 STORED_ON_SIX_AXES: Final = ToolOffset(12.0, -3.5, 120.0)
-"""The same where the Z axis of Tool 0 looks out of the flange."""
+"""Initial tool 1 on a robot whose Tool 0 Z axis points out of the flange."""
 
 
 def stored_on(model: RobotModel) -> ToolOffset:
@@ -75,7 +75,7 @@ class World(Workplace):
         now_ns: Callable[[], int],
         parameters: WorldParameters | None = None,
     ) -> None:
-        self.machine, self._inputs = robot, inputs  # wired by what follows
+        self.machine, self._inputs = robot, inputs  # wired below
         super().__init__(
             _HandledArm(robot, now_ns),
             tips,

@@ -29,7 +29,7 @@ class Planned(Protocol):
 
 
 MOST_FIRED: Final = 2000
-"""So many of those that happened are told, the last ones."""
+"""Number of fired faults that are reported: the latest ones."""
 
 AnyFault = TypeVar("AnyFault", bound=Planned)
 

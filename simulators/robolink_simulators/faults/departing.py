@@ -22,7 +22,7 @@ class DepartingReplies:
     )
 
     def __init__(self) -> None:
-        # Mostly one or none: an empty deque would take 760 bytes of each connection.
+        # Usually one or none: an empty deque would take 760 bytes per connection.
         self._waiting: list[tuple[int, bytes | LinkEnd | None]] = []
         self._held: list[HeldBack] = []
         self.half_open = False
@@ -81,7 +81,7 @@ class DepartingReplies:
             return None
         if self.stalled_until_ns > now_ns:
             return self.stalled_until_ns
-        # What is due now may not have been taken yet; behind it something may leave later.
+        # Data that is due may not have been taken yet, and later data may wait behind it.
         for at_ns, _ in self._waiting:
             if at_ns > now_ns:
                 return at_ns

@@ -41,7 +41,7 @@ from robolink_simulators.faults.sqlite_vfs import (
 
 _SECTOR: Final = 512
 _WITH: Final = ("", "-wal", "-journal")
-"""A database, and the logs beside it."""
+"""Suffixes of a database file and of the logs beside it."""
 
 
 class DiskFault(Enum):
@@ -158,7 +158,7 @@ class FaultyDisk:
                 copy.write_bytes(_as_on_disk(copy.read_bytes(), changes, chance))
         return copied
 
-    # What SQLite asks for.
+    # The calls that SQLite makes.
 
     def watches(self, path: str) -> bool:
         """Return whether a file is in the folder."""

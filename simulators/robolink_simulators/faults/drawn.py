@@ -13,15 +13,19 @@ from robolink_simulators.faults.stream import EXCEPTION_CODES, Fault, FaultActio
 MOST_EXCHANGES: Final = 1_000_000
 _ORDERS: Final[tuple[Order, ...]] = ("high_first", "pairs_swapped", "halves_swapped")
 _DELAYS_S: Final = (0.0, 0.0, 0.004, 0.05, 0.3, 1.0, 2.9, 3.1, 12.0)
-"""At once, within a cycle, within a movement, on both sides of the usual time-out, and beyond the
-silence after which a mailbox may be taken."""
+"""Delays in seconds: at once, within a cycle, within a movement, on both sides of the usual
+time-out, and beyond the silence after which a client may take over a mailbox.
+"""
 _FRAME_BYTES: Final = 240
-"""No usual answer is longer; a place past its end counts from the front again."""
+"""Longest usual answer in bytes. A position beyond the end of an answer is counted from its start
+again.
+"""
 _CODES: Final = (4001, 4025, 4242, 2353)
 _AXIS_ERRORS: Final = (16, 1, 25)
 
 _EXCHANGES_A_WRITE: Final = 5
-"""About: most exchanges with a mailbox look at it, or beat."""
+"""Approximate number of exchanges per write: most exchanges with a mailbox read it or send a beat.
+"""
 _OF_WRITES: Final = frozenset(
     {
         PlcFaultAction.DUPLICATE_REQUEST,
@@ -43,7 +47,9 @@ _OF_READS: Final = frozenset(
 )
 
 ONLY_BY_NAME: Final = frozenset({FaultAction.MODBUS_EXCEPTION, PlcFaultAction.MODBUS_EXCEPTION})
-"""Came later: where no fault is named, a seed draws what it drew before."""
+"""Faults that are drawn only if named. They were added later, and a seed without named faults must
+still draw the same ones.
+"""
 
 Action = TypeVar("Action", FaultAction, PlcFaultAction)
 
@@ -164,7 +170,7 @@ def _place_of(action: PlcFaultAction, exchange: int, match: str) -> tuple[int, s
 
 def _exchanges(chance: random.Random, rates: FaultRates) -> list[int]:
     """Return the exchanges that something happens to."""
-    # Drawn first, so that another list of actions leaves the exchanges where they are.
+    # Drawn first, so that a different list of actions does not change the exchanges.
     return [number for number in range(rates.exchanges) if chance.random() < rates.rate]
 
 

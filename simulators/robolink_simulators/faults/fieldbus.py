@@ -11,81 +11,84 @@ class PlcFaultAction(Enum):
     """What goes wrong with one exchange, or after it."""
 
     DROP_REQUEST = auto()
-    """The request never arrives: nothing is carried out and no answer leaves (F25)."""
+    """The request is lost: it is not carried out or answered (F25)."""
     DUPLICATE_REQUEST = auto()
-    """What is written arrives again ``seconds`` later (F27)."""
+    """The written data arrives again after ``seconds`` (F27)."""
     STALL = auto()
-    """The request arrives ``seconds`` late, however little patience its sender had (F12)."""
+    """The request arrives ``seconds`` late, even if its sender has stopped waiting (F12)."""
     REORDER_WRITE = auto()
-    """Acknowledged, but it arrives only behind the next write (F28)."""
+    """The write is acknowledged, but arrives after the next write (F28)."""
     DELAY = auto()
-    """The answer leaves ``seconds`` late (F01)."""
+    """The answer is sent ``seconds`` late (F01)."""
     DROP_REPLY = auto()
-    """Carried out, but no answer leaves (F25)."""
+    """The request is carried out, but not answered (F25)."""
     GARBLE_REPLY = auto()
     """Bit ``bit`` of the word at ``position`` of the answer is flipped (F07)."""
     TEAR_REPLY = auto()
-    """The last word of the answer is of another moment (F31)."""
+    """The last word of the answer comes from another moment (F31)."""
     STALE_REPLY = auto()
-    """The answer is the one that such a read had before; it waits until there is one (F02)."""
+    """The answer is the previous one to the same read. The fault waits until there is one (F02)."""
     ZERO_REPLY = auto()
     """Every word of the answer is zero (F30)."""
     TRUNCATE_REPLY = auto()
-    """Only the first ``position`` bytes of the answer's frame leave (F04)."""
+    """Only the first ``position`` bytes of the answer's frame are sent (F04)."""
     DUPLICATE_REPLY = auto()
-    """The frame of the answer leaves twice (F09)."""
+    """The answer's frame is sent twice (F09)."""
     SPLIT_REPLY = auto()
-    """The bytes of the frame behind ``position`` leave ``seconds`` later (F05)."""
+    """The bytes of the frame after ``position`` are sent ``seconds`` later (F05)."""
     GARBLE_WRITE = auto()
-    """Bit ``bit`` of the word at ``position`` of what is written arrives flipped (F07)."""
+    """Bit ``bit`` of the word at ``position`` of the written data arrives flipped (F07)."""
     TEAR_WRITE = auto()
-    """The words from ``position`` on arrive ``seconds`` later than those before (F32)."""
+    """The words from ``position`` on arrive ``seconds`` after those before it (F32)."""
     IGNORE_WRITE = auto()
-    """Acknowledged, and nothing arrives (F43)."""
+    """The write is acknowledged, but does not arrive (F43)."""
     DISCONNECT = auto()
-    """Carried out, then the link is cut (F11)."""
+    """The request is carried out, then the link is cut (F11)."""
     DISCONNECT_BEFORE = auto()
-    """The link is cut and nothing is carried out."""
+    """The link is cut and the request is not carried out."""
     RESET = auto()
-    """Carried out, then the connection is reset (F75)."""
+    """The request is carried out, then the connection is reset (F75)."""
     HALF_OPEN = auto()
-    """Carried out; from then on the connection carries nothing, and neither end is told (F11)."""
+    """The request is carried out; then the connection carries no more data and neither end notices
+    (F11).
+    """
     RESTART = auto()
-    """The PLC starts anew ``seconds`` after the request came in (F13)."""
+    """The PLC restarts ``seconds`` after the request arrived (F13)."""
     FREEZE = auto()
-    """The mailbox program stands still from ``seconds`` after the request on."""
+    """The mailbox program stops running ``seconds`` after the request."""
     FREEZE_HEARTBEAT = auto()
-    """The PLC's heartbeat stands still from ``seconds`` after the request on; the rest does not
-    (F69)."""
+    """The PLC's heartbeat stops ``seconds`` after the request; everything else continues (F69)."""
     ZERO_INPUTS = auto()
-    """What clients have written is zeroed ``seconds`` after the request (F30)."""
+    """The data written by clients is zeroed ``seconds`` after the request (F30)."""
     WORD_ORDER = auto()
-    """From ``seconds`` after the request on the program lays values in ``order`` (F33)."""
+    """From ``seconds`` after the request on, the program stores values in ``order`` (F33)."""
     SHIFT_MAP = auto()
-    """From ``seconds`` after the request on clients read and write ``position`` words behind what
-    they mean, 1 where none is given (F34)."""
+    """From ``seconds`` after the request on, clients read and write ``position`` words after the
+    intended ones; 1 if no position is given (F34).
+    """
     TAKE_OWNERSHIP = auto()
-    """Somebody else insists on the mailbox ``seconds`` after the request (F46)."""
+    """Another client takes over the mailbox ``seconds`` after the request (F46)."""
     ESTOP = auto()
-    """The emergency stop is pressed ``seconds`` after the request came in (F21)."""
+    """The emergency stop is pressed ``seconds`` after the request arrived (F21)."""
     AXIS_ERROR = auto()
-    """Axis 0 fails with error ``code`` ``seconds`` after the request came in."""
+    """Axis 0 fails with error ``code`` ``seconds`` after the request arrived."""
     WITHDRAW_PERMIT = auto()
-    """The machine's permit is withdrawn ``seconds`` after the request came in."""
+    """The machine's permit is withdrawn ``seconds`` after the request arrived."""
     LOSE_SEGMENT = auto()
-    """CAN: segment ``position`` of the answer never leaves (F52)."""
+    """CAN: segment ``position`` of the answer is never sent (F52)."""
     WRONG_TOGGLE = auto()
-    """CAN: segment ``position`` of the answer has the toggle bit of the one before (F52)."""
+    """CAN: segment ``position`` of the answer repeats the toggle bit of the previous one (F52)."""
     FOREIGN_NODE = auto()
-    """CAN: another node with our number answers for an object that nobody asked for (F51)."""
+    """CAN: another node with this node's number answers for an object that nobody requested (F51).
+    """
     ECHO = auto()
-    """CAN: the client's own frame comes back to it from the bus (F51)."""
+    """CAN: the bus returns the client's own frame (F51)."""
     MODBUS_EXCEPTION = auto()
-    """Nothing is carried out, and the answer is the Modbus exception ``code``."""
+    """The request is not carried out, and the answer is the Modbus exception ``code``."""
 
 
 Order = Literal["low_first", "high_first", "pairs_swapped", "halves_swapped"]
-"""The four orders in which a PLC may lay the words of a value."""
+"""The four word orders in which a PLC may store a value."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -50,7 +50,7 @@ _FRAMED: Final = frozenset({LinkKind.MODBUS_TCP, LinkKind.MODBUS_RTU})
 
 _OF_EPSON: Final = frozenset(
     {
-        FaultAction.GARBLE_REQUEST,  # a PLC's frames have a length: half of one is no request
+        FaultAction.GARBLE_REQUEST,  # PLC frames have a length: half a frame is no request
         FaultAction.TRUNCATE_REQUEST,
         FaultAction.RESTART,
         FaultAction.LOSE_LOGIN,
@@ -87,7 +87,7 @@ _OF_FRAMES: Final = frozenset(
 )
 _NOT_ON_CAN: Final = frozenset(
     {
-        PlcFaultAction.SHIFT_MAP,  # objects have numbers, and no neighbours
+        PlcFaultAction.SHIFT_MAP,  # objects have numbers but no neighbours
         PlcFaultAction.RESET,
         PlcFaultAction.HALF_OPEN,
     }

@@ -33,10 +33,10 @@ class HeldBack:
 
 Leaving = bytes | HeldBack | LinkEnd | None
 Departure = tuple[float, Leaving]
-"""Seconds from now, and what is sent then; ``None`` for the end of the link."""
+"""Delay in seconds and the data then sent; ``None`` for the end of the link."""
 
 _SPLIT_S: Final = 0.01
-"""Between the halves of a split reply for which no other time is given."""
+"""Time in seconds between the halves of a split reply, unless the fault gives another."""
 
 
 class FaultPlan(CountedFaults[Fault]):

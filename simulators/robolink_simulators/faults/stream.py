@@ -12,66 +12,71 @@ class FaultAction(Enum):
     """What goes wrong with one exchange."""
 
     DROP_REQUEST = auto()
-    """The request never arrives: nothing is carried out and nothing leaves (F25)."""
+    """The request is lost: it is not carried out or answered (F25)."""
     DUPLICATE_REQUEST = auto()
-    """The request arrives again ``seconds`` later, and is answered again (F27)."""
+    """The request arrives again after ``seconds``, and is answered again (F27)."""
     GARBLE_REQUEST = auto()
     """Bit ``bit`` of the byte at ``position`` of the request arrives flipped (F07)."""
     TRUNCATE_REQUEST = auto()
-    """Only the first ``position`` bytes arrive, and no line end (F04)."""
+    """Only the first ``position`` bytes arrive, without a line end (F04)."""
     STALL = auto()
-    """For ``seconds`` nothing is carried either way; then the request arrives, and what was sent
-    after it, the end of the connection too (F12)."""
+    """The link carries nothing in either direction for ``seconds``. Then the request arrives, and
+    all that was sent after it, even the end of the connection (F12).
+    """
     DELAY = auto()
-    """The reply leaves ``seconds`` late (F01)."""
+    """The reply is sent ``seconds`` late (F01)."""
     DROP_REPLY = auto()
-    """Carried out, but no reply leaves (F25)."""
+    """The request is carried out, but not answered (F25)."""
     TRUNCATE_REPLY = auto()
-    """Only the first ``position`` bytes leave; the link stays up (F04)."""
+    """Only the first ``position`` bytes are sent; the link stays up (F04)."""
     GARBLE_REPLY = auto()
     """Bit ``bit`` of the byte at ``position`` is flipped (F07)."""
     SWAP_BYTES = auto()
-    """The bytes at ``position`` and behind it change places (F08)."""
+    """The byte at ``position`` and the one after it are swapped (F08)."""
     DUPLICATE_REPLY = auto()
-    """The reply leaves twice, in one piece (F09)."""
+    """The reply is sent twice, in one piece (F09)."""
     REPEAT_REPLY = auto()
-    """The reply before it leaves once more, ahead of it (F10); without one, an empty line."""
+    """The previous reply, or an empty line if there is none, is sent again before the reply (F10).
+    """
     SPLIT_REPLY = auto()
-    """The bytes after ``position`` leave ``seconds`` later (F05)."""
+    """The bytes after ``position`` are sent ``seconds`` later (F05)."""
     JOIN_REPLY = auto()
-    """The reply is held back, and leaves in one piece with the next one, ahead of it (F06)."""
+    """The reply is held back and sent in one piece with the next one, ahead of it (F06)."""
     REORDER_REPLY = auto()
-    """The reply is held back, and leaves behind the next one (F02)."""
+    """The reply is held back and sent after the next one (F02)."""
     HALF_OPEN = auto()
-    """Carried out; from then on the link carries nothing, and neither end is told (F11)."""
+    """The request is carried out; then the link carries no more data and neither end notices (F11).
+    """
     DISCONNECT = auto()
-    """Carried out; ``position`` bytes of the reply leave, then the link is cut (F11, F13)."""
+    """The request is carried out; ``position`` bytes of the reply are sent, then the link is cut
+    (F11, F13).
+    """
     DISCONNECT_BEFORE = auto()
-    """The link is cut and nothing is carried out."""
+    """The link is cut and the request is not carried out."""
     RESET = auto()
-    """Carried out; the connection is reset, and the reply is lost (F75)."""
+    """The request is carried out; the connection is reset, and the reply is lost (F75)."""
     RESTART = auto()
-    """The controller starts anew ``seconds`` after the request came in (F13)."""
+    """The controller restarts ``seconds`` after the request arrived (F13)."""
     LOSE_LOGIN = auto()
-    """The controller forgets the login ``seconds`` after the request came in (F15)."""
+    """The controller forgets the login ``seconds`` after the request arrived (F15)."""
     TEACH_MODE = auto()
-    """The selector is turned to TEACH ``seconds`` after the request came in (F17)."""
+    """The selector is turned to TEACH ``seconds`` after the request arrived (F17)."""
     ESTOP = auto()
-    """The emergency stop is pressed ``seconds`` after the request came in (F21)."""
+    """The emergency stop is pressed ``seconds`` after the request arrived (F21)."""
     GUARD_OPEN = auto()
-    """The guard is opened ``seconds`` after the request came in (F22)."""
+    """The guard is opened ``seconds`` after the request arrived (F22)."""
     DEVICE_FAULT = auto()
-    """Error ``code`` is raised ``seconds`` after the request came in (F19)."""
+    """Error ``code`` is raised ``seconds`` after the request arrived (F19)."""
     SERIOUS_ERROR = auto()
-    """An error that only a restart clears comes ``seconds`` after the request (F20)."""
+    """An error that only a restart clears is raised ``seconds`` after the request (F20)."""
     IGNORE_WRITE = auto()
-    """The statement is acknowledged and not carried out (F43)."""
+    """The statement is acknowledged, but not carried out (F43)."""
     MODBUS_EXCEPTION = auto()
-    """Nothing is carried out, and the answer is the Modbus exception ``code``."""
+    """The request is not carried out, and the answer is the Modbus exception ``code``."""
 
 
 EXCEPTION_CODES: Final = (1, 2, 3, 4, 5, 6, 7, 8, 10, 11)
-"""The exceptions that there are (Modbus application protocol 1.1b3, chapter 7)."""
+"""All Modbus exception codes (Modbus application protocol 1.1b3, chapter 7)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,9 @@ from collections.abc import Mapping
 from typing import Any, Final
 
 _SPARE: Final = 200_000
-"""So many objects are set aside besides twice those in use before all are looked at again."""
+"""Number of frozen objects, beyond twice those in use, at which the collector examines all of them
+again.
+"""
 
 _YOUNGEST: Final = 0
 _OLDEST: Final = 2
@@ -68,7 +70,7 @@ class RareFullCollections:
         gc.freeze()
         most = 2 * self._in_use + self._spare
         if self._set_aside > most:
-            # Some of it has gone without the collector. To count takes 20 ms for 200,000.
+            # Some objects are freed without the collector. Counting 200,000 takes 20 ms.
             self._set_aside = gc.get_freeze_count()
             if self._set_aside > most:
                 self._thawed = True

@@ -29,7 +29,7 @@ from pymodbus.pdu.register_message import (
 
 from robolink.register_maps import Number, NumberType, RegisterTable
 
-# It writes to standard error when nobody listens; clients are told by their answers.
+# Without a handler it writes to standard error; clients see problems in the answers.
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 
 ILLEGAL_FUNCTION: Final = 1
@@ -62,7 +62,9 @@ _WRITE: Final = {
 _WRITE_AND_READ: Final = 23
 _KNOWN: Final = {*_READ, *_WRITE, _WRITE_AND_READ}
 _MOST_WRITTEN: Final = {5: 1, 6: 1, 15: 1968, 16: 123, _WRITE_AND_READ: 121}
-"""What one request may write, by function (Modbus Application Protocol V1.1b3, section 6)."""
+"""Most values that one request may write, by function (Modbus Application Protocol V1.1b3, section
+6).
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +148,7 @@ class Frames(ABC):
         if function not in _KNOWN:
             return PlcRequest(number, unit, function, None)
         pdu = self._framer.decoder.decode(payload)
-        if pdu is None:  # pymodbus makes nothing of a count that may not be
+        if pdu is None:  # pymodbus returns nothing for an illegal count
             return PlcRequest(number, unit, function, None, illegal=True)
         if function in _READ:
             return PlcRequest(number, unit, function, _READ[function], pdu.address, pdu.count)

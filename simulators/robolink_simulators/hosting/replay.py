@@ -178,7 +178,7 @@ class ReplayLink:
 
 
 _MOST_BYTES: Final = 256_000_000
-"""A recording of a whole shift, at ten exchanges a second."""
+"""Largest recording in bytes: a whole shift at ten exchanges per second."""
 
 
 def read_recording(path: Path) -> tuple[Dialogue, ...]:

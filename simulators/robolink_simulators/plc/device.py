@@ -52,10 +52,11 @@ class MappedPlcPanel:
 
 
 _SILENCE_NS: Final = 50_000_000
-"""Silence on a line that ends a frame: 3.5 characters (Modbus over serial line 1.02, 2.5.1.1).
+"""Silence in ns that ends a frame on a line: 3.5 characters (Modbus over serial line 1.02,
+2.5.1.1).
 
-A simulated line carries a frame at once, at no baud rate; so it is longer here than at the slowest
-of them, and no busy computer cuts a frame in two.
+A simulated line delivers a frame at once and has no baud rate. The value is therefore longer than
+on the slowest real line, so that a busy computer does not cut a frame in two.
 """
 
 
@@ -149,11 +150,11 @@ class PlcLink:
 
 
 _SEVERAL_COILS: Final = 15
-"""The one function of those that are read here which this PLC does not have."""
+"""The only function parsed here that this PLC does not support."""
 
 MOST_WRITES: Final = 2000
 MOST_REGISTERS_READ: Final = 125
-"""What the standard allows in one read."""
+"""Most registers that the standard allows in one read."""
 
 
 class PlcSimulator(HostedDevice):
@@ -220,7 +221,7 @@ class PlcSimulator(HostedDevice):
 
     def _counted(self) -> dict[str, int]:
         return {
-            "moves_started": 0,  # it moves nothing
+            "moves_started": 0,  # this PLC has no axes
             "tool_writes": self.program.taken,
             "starts": self.starts,
             "touches": 0,

@@ -19,7 +19,7 @@ from robolink_simulators.hosting.modbus_frames import decode, encode
 from robolink_simulators.state_files import drawn_number
 
 _BEYOND: Final = 16
-"""How far behind the last place of a map a table goes on."""
+"""Number of registers that a table has after the last address of the map."""
 
 
 class OutsideError(Exception):
@@ -93,7 +93,7 @@ class Memory:
 
 
 Components = dict[str, float]
-"""Components of an offset or a pose by name, mm and degrees; those that the map has."""
+"""Components of an offset or a pose by name, in mm and degrees: only those in the map."""
 
 
 class PlcProgram:

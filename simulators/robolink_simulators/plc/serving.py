@@ -70,7 +70,7 @@ class PlcHost(TcpHost):
             allow_remote=allow_remote,
         )
         self.url += f"?unit={simulator.unit}&{map_option(map_file)}"
-        # What leads out of this computer may lead to a machine, and says nothing of itself.
+        # A URL that leads out of this computer may be a machine's: it is not marked as simulated.
         self.url += _SIMULATED if parse_url(self.url).stays_here else ""
         self.present(simulator)
 

@@ -49,7 +49,7 @@ NAMES: Final = (
     *POSITION_ROWS,
     *(_COUPLING.join(parts) for parts in product(POSITION_ROWS, ORIENTATION_ROWS)),
 )
-"""Every kinematics that can be simulated, couplings behind what can stand alone."""
+"""Every kinematics that can be simulated; couplings come after the stand-alone ones."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -71,7 +71,7 @@ def _turning(low: float, high: float) -> AxisLimits:
 
 
 _C_LIMITS: Final = AxisLimits(-360.0, 360.0, 720.0, 3600.0)
-# A tool that can lean stands upright at 60 % of this range.
+# A tool that can tilt is upright at 60 % of this range.
 _LEAN_LIMITS: Final = _turning(-90.0, 60.0)
 _ARM_LIMITS: Final = {
     0: _turning(-170.0, 170.0),
@@ -112,7 +112,7 @@ POSITION_ROWS: Final[Mapping[str, KinematicsRow]] = {
         _RAILS,
     ),
 }
-"""Kinematics of up to three axes, which may carry another one."""
+"""Kinematics of up to three axes that can be combined with one for the orientation."""
 
 STANDALONE_ROWS: Final[Mapping[str, KinematicsRow]] = {
     "Kin_Scara3_Z": KinematicsRow(
@@ -135,7 +135,7 @@ STANDALONE_ROWS: Final[Mapping[str, KinematicsRow]] = {
         {1: _turning(-60.0, 90.0), 2: _turning(-120.0, 60.0), 3: _C_LIMITS},
     ),
 }
-"""Kinematics that are whole: couplings already, or with all that turns their flange."""
+"""Complete kinematics: couplings, or kinematics that turn the flange themselves."""
 
 ORIENTATION_ROWS: Final[Mapping[str, KinematicsRow]] = {
     "Kin_CAxis": KinematicsRow(
@@ -170,4 +170,4 @@ ORIENTATION_ROWS: Final[Mapping[str, KinematicsRow]] = {
         limits={0: _C_LIMITS, 1: _turning(-120.0, 120.0), 2: _C_LIMITS},
     ),
 }
-"""Kinematics that turn the flange on another one."""
+"""Kinematics for the orientation, which turn the flange on another kinematics."""

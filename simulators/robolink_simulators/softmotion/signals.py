@@ -7,11 +7,12 @@ from robolink_simulators.softmotion.kinematics.kinematics import AxisValues
 from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 SIGNALS: Final = 32
-"""How many inputs, and how many outputs, there are (assumed)."""
+"""Number of inputs, and of outputs (assumed)."""
 
 Sense = Callable[[AxisValues], bool]
-"""Tells what an input shows with the axes at given values, for example whether the tip of a
-nozzle then breaks a light beam."""
+"""Returns the state of an input at given axis values, for example whether the tip of a nozzle then
+breaks a light beam.
+"""
 
 
 class DigitalInputs:

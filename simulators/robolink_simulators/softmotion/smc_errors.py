@@ -41,10 +41,10 @@ SYMBOLS: Final = {
     ErrorKind.INTERRUPTED_BY_SINGLE_AXIS: "SMC_AXIS_GROUP_INTERRUPTED_BY_SINGLE_AXIS",
     ErrorKind.PCS_STILL_IN_USE: "SMC_AXIS_GROUP_PCS_STILL_IN_USE",
     ErrorKind.BLENDING_NOT_SUPPORTED: "SMC_BLENDING_NOT_SUPPORTED_BY_PREVIOUS_MOVEMENT",
-    # Its number was seen with that meaning; that this is its symbol is unverified.
+    # The number was seen with this meaning; the symbol is unverified.
     ErrorKind.NOTHING_TO_RESET: "SMC_R_NO_ERROR_TO_RESET",
 }
-"""The vendor's symbols, where a document names them (docs/reference/softmotion.md 1.4)."""
+"""The vendor's symbols, if a document gives them (docs/reference/softmotion.md 1.4)."""
 
 
 @dataclass(frozen=True, slots=True)

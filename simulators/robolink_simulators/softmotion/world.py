@@ -36,7 +36,7 @@ from robolink_simulators.softmotion.signals import SIGNALS
 from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 
 STORED: Final = ToolOffset(12.0, -3.5, -20.0)
-"""The nozzle that was there before, on a kinematics that carries any tool."""
+"""The nozzle mounted before, on a kinematics that accepts any tool."""
 
 _STANCE: Final = 0.6
 _ARRIVED_MM = 1e-9
@@ -81,7 +81,7 @@ class SoftMotionWorld(Workplace):
         stored: ToolOffset,
         parameters: WorldParameters | None = None,
     ) -> None:
-        self.group = group  # its inputs are wired by what follows
+        self.group = group  # its inputs are wired below
         self._seen: tuple[KinematicsModel, AxisValues, Frame] | None = None
         super().__init__(
             _HandledGroup(group),

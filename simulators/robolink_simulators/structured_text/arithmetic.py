@@ -39,7 +39,7 @@ _COMPARISONS: Final[dict[str, Join]] = {
     "<=": lambda a, b: lambda f: a(f) <= b(f),
     ">=": lambda a, b: lambda f: a(f) >= b(f),
 }
-# AND and OR work out both sides, as CODESYS does: what guards an index stands in an IF of its own.
+# AND and OR evaluate both sides, as in CODESYS: the guard of an index needs a separate IF.
 _LOGIC: Final[dict[str, Join]] = {
     "AND": lambda a, b: lambda f: a(f) & b(f),
     "OR": lambda a, b: lambda f: a(f) | b(f),
@@ -87,7 +87,7 @@ def _on_integers(left: Typed, sign: str, right: Typed, place: TextPlace) -> Type
     get = _division(left.get, sign, right.get, place)
     if left.type is UNTYPED_INTEGER:
         return constant(UNTYPED_INTEGER, get([]))
-    # The lowest value divided by -1 leaves the range of its type.
+    # The lowest value divided by -1 is outside the range of its type.
     return Typed(left.type, get, in_range=False)
 
 

@@ -20,7 +20,7 @@ from robolink_simulators.structured_text.parse import (
 )
 
 Value: TypeAlias = Any
-"""What a variable holds."""
+"""The value of a variable."""
 
 Frame = list[Any]
 """The variables of one instance, or the members of one structure or array."""
@@ -273,7 +273,7 @@ def members_of(pairs: Sequence[tuple[str, DataType]], kind: str = "var") -> dict
 
 
 UNTYPED_INTEGER: Final = ScalarType("a whole number", Family.INTEGER, 64, True)
-"""Of a literal without a type: it takes that of its surroundings."""
+"""Type of a literal without a type: it takes the type that its context requires."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -399,4 +399,4 @@ def type_name(of: DataType) -> str:
 
 
 Storer = Callable[[Frame, Any], None]
-"""Puts a value where an assignment wants it."""
+"""Stores a value at the target of an assignment."""

@@ -236,7 +236,7 @@ def _whole(
 
 _INT: Final = ELEMENTARY["INT"]
 DIFFERING: Final = frozenset({"F_TRIG", "CTD", "CTUD"})
-"""Blocks that compilers do not agree about, or that no judge was asked about."""
+"""Blocks on which compilers differ, or for which no compiler was tried."""
 
 Pins = tuple[tuple[str, DataType, str], ...]
 

@@ -18,7 +18,7 @@ from robolink.errors import ConfigError
 from robolink.messages import tr
 
 Node: TypeAlias = Any
-"""A tree or a token of lark; which children it has only the grammar knows."""
+"""A tree or token of lark. The grammar defines its children."""
 
 
 class StructuredTextError(ConfigError):
@@ -125,18 +125,19 @@ _STANDARD_TEXT: Final = """
 
 _KEYWORDS: Final = frozenset(_KEYWORD_TEXT.split())
 _TELLING: Final = frozenset(_TELLING_TEXT.split())
-"""Keywords that stay in the tree, because of what they tell; lark leaves out the others."""
+"""Keywords that stay in the tree because the translation needs them; lark drops the others."""
 _BEYOND: Final = frozenset(_BEYOND_TEXT.split())
 _TYPE_WORDS: Final = frozenset(_TYPE_TEXT.split())
 _VENDOR_WORDS: Final = _TYPE_WORDS | frozenset(_VENDOR_TEXT.split())
-"""Keywords, operators and data types of CODESYS and TwinCAT; no name of theirs may be one."""
+"""Keywords, operators and data types of CODESYS and TwinCAT, which do not allow them as names."""
 INSTRUCTION_WORDS: Final = frozenset(_LISTS_TEXT.split())
-"""Of instruction lists, with the pins of standard blocks; Structured Text may use them as names,
-which compilers take, and our own programs do not."""
+"""Words of instruction lists, and the pins of standard blocks. Compilers accept them as names in
+Structured Text; our own programs do not use them.
+"""
 _STANDARD_WORDS: Final = frozenset(_STANDARD_TEXT.split())
-"""What IEC 61131-3 reserves beyond that: keywords of other languages, functions and blocks."""
+"""Further words that IEC 61131-3 reserves: keywords of other languages, functions and blocks."""
 RESERVED_WORDS: Final = _VENDOR_WORDS | INSTRUCTION_WORDS | _STANDARD_WORDS
-"""All of them (docs/reference/structured_text.md 1.1), in capital letters."""
+"""All reserved words (docs/reference/structured_text.md 1.1), in capital letters."""
 _CONVERSION: Final = re.compile(r"(?:([A-Z_]+)_)?TO_([A-Z_]+)")
 _SIGNS: Final = {
     "NAME": "a name",

@@ -31,7 +31,8 @@ from robolink_simulators.structured_text.parse import (
 )
 
 SPENT: Final = object()
-"""Stands in the variable of a FOR loop that has run to its end: compilers leave other values."""
+"""Value of a FOR loop's variable after the loop has ended: its real value depends on the compiler.
+"""
 
 Locator = Callable[[Frame], tuple[Frame, int]]
 

@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 
 
 Step = Callable[[Frame, Frame], None]
-"""Does one thing with the caller's frame and the instance."""
+"""Carries out one step. Takes the caller's frame and the instance's frame."""
 
 
 def call(
@@ -162,13 +162,15 @@ def _taken(
 
 
 Action = Callable[[Frame], int]
-"""Executes a statement; returns how it ended."""
+"""Executes a statement. Returns how it ended."""
 
 _ON, _EXIT, _RETURN = range(3)
 _MOST_LABELS: Final = 4
 
 TURNS_A_CYCLE: Final = 200_000
-"""Turns of loops in one cycle; a real PLC's watchdog would have stepped in long before."""
+"""Most loop iterations in one cycle. A real PLC's watchdog would have stopped the program long
+before.
+"""
 
 
 class StatementTranslator(ExpressionTranslator):

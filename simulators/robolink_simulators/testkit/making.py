@@ -26,10 +26,10 @@ HEEDED: Final[Mapping[str, frozenset[str]]] = {
     "softmotion": _OF_A_WORLD | {"kinematics", "program"},
     "plc": _OF_ALL | {"map"},
 }
-"""What the cells of each kind pay heed to."""
+"""Parameters that the cells of each kind use."""
 
 FASTEST: Final = 1000.0
-"""The highest ``speed``, as of ``robolink sim --speed``."""
+"""Highest ``speed``, as for ``robolink sim --speed``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -180,19 +180,20 @@ _FORMS: Final[Mapping[str, tuple[Callable[[object], bool], str]]] = {
     "map": (_place, 'map="machine.toml"'),
     "program": (_place, 'program="our-plc"'),
 }
-"""Which form each takes, and an example of it."""
+"""Form of each parameter, and an example."""
 
 
 SERVED_SPEED: Final = 20.0
-"""Simulated seconds per real one, on a port."""
+"""Simulated seconds per real second on a port."""
 
 PROGRAM_SPEED: Final = 1.0
-"""Simulated seconds per real one of a PLC that executes a program. That one counts 500 ms between
-two heartbeats by its own cycles, and a client must not have to be faster than a real one because
-the build machine is busy."""
+"""Simulated seconds per real second of a PLC that executes a program. The program counts the 500 ms
+between two heartbeats in its own cycles. On a busy build machine a client need not be faster than a
+real one.
+"""
 
 PROGRAM_EXCHANGE_S: Final = 0.005
-"""What each request takes there, a hundredth of that patience."""
+"""Duration of each request to such a PLC in seconds: a hundredth of these 500 ms."""
 
 
 def make_epson(

@@ -16,7 +16,7 @@ MEDIA: Final = {
     "softmotion": ("sim", "modbus-tcp", "modbus-rtu", "can"),
     "plc": ("modbus-tcp", "modbus-rtu", "sim"),
 }
-"""How each kind can be reached."""
+"""Media through which each kind of controller can be reached."""
 
 _count = itertools.count(1)
 

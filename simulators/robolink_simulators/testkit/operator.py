@@ -58,7 +58,7 @@ class ScriptedOperator:
         Raises:
             ConfigError: There is no such act, or a value is missing, wrong or unknown.
         """
-        if type(skip) is not int or skip < 0:  # it would never be its turn
+        if type(skip) is not int or skip < 0:  # the cue would never fire
             raise ConfigError(
                 tr("{name} of a simulated cell cannot be {value!r}.", name="skip", value=skip),
                 remedy=tr("Give it as {example}.", example="skip=1"),
@@ -177,7 +177,7 @@ address = 11
 table = "input"
 address = 50
 """
-"""A PLC with two tools, taken over on a commit bit, that tells who it is."""
+"""Register map of a PLC with an identity and two tools, which a commit bit takes over."""
 
 
 def written_map(folder: Path) -> Path:

@@ -155,13 +155,14 @@ def listed(lines: Iterable[str], most: int) -> str:
 
 _COMMAND_S: Final = 120.0
 _IN_PROCESS: Final = ("+sim://", "interface=virtual")
-"""In the URL of what no other process reaches: a simulator, or a CAN bus, in the memory of this
-one. A command would make another simulator of the same name, and work on that."""
+"""Marks of a URL that no other process can reach: a simulator or a CAN bus in the memory of this
+process. A command would create and use another simulator of the same name.
+"""
 
 _FIRST: Final = "as it was given to the test"
 
 MOST_LINES: Final = 200_000
-"""So many lines of its wire are held: what counts requests must not have lost one."""
+"""Number of wire lines that are kept, so that counts of requests are complete."""
 
 
 @dataclass(frozen=True)
@@ -332,7 +333,7 @@ class OwnFolder:
         recipe: Path | None = None,
     ) -> SimulatedCell:
         """Return the cell of a simulator that is served, and remember it."""
-        simulator.log = WireRecord(MOST_LINES)  # nobody has asked it anything yet
+        simulator.log = WireRecord(MOST_LINES)  # no request has been made yet
         controlled = ControlledCell(simulator, clock, urls)
         url = next(iter(urls.values()))
         cell = SimulatedCell(

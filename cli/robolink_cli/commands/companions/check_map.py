@@ -166,7 +166,7 @@ def _opened(context: CliContext) -> "PlcMapController":
             tr("{url} is not a PLC with a map.", url=url.identity),
             remedy=tr("Give -c plc+modbus-tcp://192.168.0.2?map=machine.toml, or a map file."),
         )
-    # Nothing is written here, so nothing is recorded but the confirmation.
+    # Nothing is written here, so only the confirmation is recorded.
     return open_plc_map(
         url,
         outcomes=lambda identity: memory_journal(identity).log(identity),
@@ -304,7 +304,7 @@ class MapComparison:
                 made = self._asked(wanted[0], values)
             except MapDiffersError as error:
                 raise self._taken_back(error) from error
-            except ConfigError as error:  # of the answer: it is asked for again
+            except ConfigError as error:  # an invalid answer: ask again
                 note(str(error))
             else:
                 self._keep(made)
@@ -369,7 +369,7 @@ class MapComparison:
             made = []
             if self._given(answer, value):
                 made = [compare_test(self._map, values.found, now, value, answer)]
-        except MapDiffersError as error:  # where it went to, the map does not tell
+        except MapDiffersError as error:  # the map does not show where the write went
             away = tr("At the HMI, put {key} back to what it was.", key=value)
             error.remedy = joined(" ", (error.remedy, away))
             raise

@@ -102,7 +102,7 @@ def serve(
     """
     from robolink.serving import CallbackLimits
 
-    if context.cell is not None:  # nobody is there to accept more
+    if context.cell is not None:  # nobody is there to accept larger limits
         allowed_mm = context.cell.limits(usual_mm=max_change_mm).length_mm
         max_change_mm = min(max_change_mm, allowed_mm or max_change_mm)
     limits = CallbackLimits(tolerance_mm, max_change_mm, sigma_mm)

@@ -41,7 +41,7 @@ _EPSON: Final = (
 def companion_texts() -> Mapping[str, bytes]:
     """Return the EPSON companions' files by the name they get, with the line ends of RC+'s PC."""
     packaged = files("robolink_cli").joinpath("companions")
-    # A source checkout holds them at its top; only a wheel brings them in the package.
+    # A source checkout has them at its top level; only a wheel has them in the package.
     folder = packaged if packaged.is_dir() else Path(__file__).parents[4] / "companions"
     texts = {Path(name).name: folder.joinpath(name).read_bytes() for name in _EPSON}
     return {name: text.replace(b"\n", b"\r\n") for name, text in texts.items()}

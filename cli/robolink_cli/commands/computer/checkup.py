@@ -270,7 +270,7 @@ def in_words(remarks: Sequence[Remark]) -> Iterator[str]:
 def check_state_folder() -> Iterator[Remark]:
     """Check that backups can be kept; without one nothing is ever written."""
     folder = state_folder("backups")
-    # On Windows not even the drive need be there.
+    # On Windows the drive itself may be missing.
     above = (path for path in (folder, *folder.parents) if path.exists())
     existing = next(above, Path(folder.anchor))
     if not (existing.is_dir() and os.access(existing, os.W_OK | os.X_OK)):
@@ -412,5 +412,5 @@ def check_journal() -> Iterator[Remark]:
 
 
 def _others_may(path: Path, bits: int) -> bool:
-    # Windows keeps access in lists, not in these bits.
+    # Windows uses access lists instead of these bits.
     return os.name == "posix" and bool(path.stat().st_mode & bits)

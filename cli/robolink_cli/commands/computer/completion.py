@@ -8,8 +8,9 @@ from robolink.messages import tr
 
 _UNQUOTED: Final = "COMPREPLY+=($value)"
 _QUOTED: Final = 'COMPREPLY+=("$(printf %q "$value")")'
-"""click's script for bash hands over a name as it is: one with a blank would be two words, one with
-a star would be files."""
+"""Replacement for click's bash script, which does not quote names: a name with a blank would become
+two words, and one with a star would expand to files.
+"""
 
 
 @click.command()

@@ -16,7 +16,7 @@ from robolink_cli.prompts.questions import asked_for_text, on_terminal
 from robolink_cli.session.context import CliContext, optional_controller
 
 _LEFT_OUT = "-"
-"""What a person types for something that is not known yet."""
+"""What a person types for an unknown value."""
 
 
 @click.command("new")

@@ -43,7 +43,7 @@ def serial_ports() -> list[SerialPort]:
             port.description if port.description != "n/a" else "",
             port.hwid if port.hwid != "n/a" else "",
             _group_of(port.device),
-            # Windows keeps no rights on ports.
+            # Windows has no access rights on ports.
             os.name != "posix" or os.access(port.device, os.R_OK | os.W_OK),
         )
         for port in sorted(list_ports.comports())
@@ -122,7 +122,7 @@ def ask_lines(urls: Sequence[str], timeout_s: float) -> list[AskedLine]:
 def show_lines(asked: Sequence[AskedLine]) -> None:
     """Show what was found at each line, and every byte that was sent."""
     from robolink.controllers.epson.verify import AtTheLine
-    from robolink_cli.console.render import say  # doctor reads ports where click is broken
+    from robolink_cli.console.render import say  # doctor lists ports even without click
 
     found = {
         AtTheLine.CONTROLLER: tr("an EPSON controller answers by Remote RS232"),

@@ -119,7 +119,7 @@ def _show(
 
 
 MOST: Final = 256
-"""Addresses in one scan; more would be a search of somebody's network."""
+"""Most addresses in one scan. A longer one would search a foreign network."""
 
 _AT_ONCE: Final = 32
 
@@ -170,7 +170,7 @@ def probe_all(addresses: Sequence[str], port: int, timeout_s: float) -> list[Add
     try:
         return list(workers.map(lambda address: _probe(address, port, timeout_s), addresses))
     finally:
-        # Ctrl-C waits for the connections under way, not for the whole range.
+        # Ctrl-C waits only for the connections in progress, not for the whole range.
         workers.shutdown(cancel_futures=True)
 
 

@@ -285,7 +285,7 @@ class Restoration:
         if plan.select is not None:
             requests += tools.preview_select(plan.select)
         for change in plan.clears:
-            # The selection in place of it stands there already.
+            # The selection that replaces it is already shown.
             clear = tools.preview_clear(change.tool, then_select=plan.select)
             requests += [request for request in clear if request not in requests]
         return requests

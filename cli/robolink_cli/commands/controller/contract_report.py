@@ -30,10 +30,11 @@ if TYPE_CHECKING:
 
 
 _NO_XML: Final = re.compile("[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
-"""What no XML document may hold, not even escaped; a driver may say it."""
+"""Characters that an XML document cannot contain, even escaped. A driver's texts may contain them.
+"""
 
 _END: Final = "what_was_there_is_put_back"
-"""The case that says what ended the checks after the last of them."""
+"""Name of the test case that reports what ended the checks, if the last check had passed."""
 
 
 class ContractReport:
@@ -80,7 +81,7 @@ class ContractReport:
             try:
                 self._write(str(error_body(error)["what"]))
             except ConfigError as unwritten:
-                note(unwritten.what)  # what ended the checks is told, and counts
+                note(unwritten.what)  # only a note: the error that ended the checks is raised
             raise
         try:
             self._write("")
@@ -223,10 +224,10 @@ class TrialConnections:
     def stop(self) -> None:
         """Stop the controller, whether a check has it now or none does; any thread."""
         self._stopped = True
-        with self._lock:  # a connection that is being made is the one that stops
+        with self._lock:  # wait for a connection in progress: it is the one to stop
             controller = self._latest
         if controller is not None:
-            with suppress(TransportClosedError):  # that check has ended
+            with suppress(TransportClosedError):  # the check has ended
                 controller.stop()
                 self._state = controller.status()
                 return
@@ -241,7 +242,7 @@ class TrialConnections:
     def _require_no_stop(self) -> None:
         note = find_note(far_end_of(self._url), "")
         if note is not None:
-            # It came while no check had the controller, and went there by itself.
+            # The stop came while no check used the controller, and was sent separately.
             what = note.sentence
         elif self._stopped_by:
             what = tr("{who} stopped the checks.", who=self._stopped_by)
@@ -267,7 +268,7 @@ class TrialConnections:
         if "+sim://" in self._url:
             return
         who = tr("the contract checks")
-        # Where there is no place to listen, Ctrl-C is left, as the command's page says.
+        # Without a place to listen, only Ctrl-C remains, as the command's page says.
         with suppress(OSError):
             self._listening.enter_context(StopListener(self, self._url, who=who, heard=self._hear))
 
@@ -291,7 +292,7 @@ def driver_named(name: str) -> "Callable[[], Controller]":
         module_path.append(str(Path.cwd()))
     try:
         made = getattr(import_module(module), attribute)
-    except (Exception, SystemExit) as error:  # it is somebody else's code that runs here
+    except (Exception, SystemExit) as error:  # this runs third-party code
         ours = isinstance(error, (ImportError, AttributeError))
         cause = str(error) if ours else f"{type(error).__name__}: {error}"
         raise ConfigError(

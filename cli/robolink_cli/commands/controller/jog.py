@@ -26,7 +26,9 @@ _CELL_KEYS: Final = {
     "box_mm": "jog_box_mm",
     "lift_mm": "lift_mm",
 }
-"""Option to key in the cell file: a box for calibrating is too wide for jogging."""
+"""Keys of the cell file by option. The box has a separate key, because one for calibrating is too
+wide for jogging.
+"""
 
 
 @click.command()
@@ -93,7 +95,7 @@ def jog(
         _require_keys(steps, dry_run=dry_run)
     _require_one(steps, turn_deg, keys=keys)
     if steps:
-        parse_steps(" ".join(steps))  # a slip of the fingers is told before anything is asked
+        parse_steps(" ".join(steps))  # typing errors are reported before any question
     typed = {"speed_mm_s": speed_mm_s, "box_mm": box_mm, "lift_mm": lift_mm}
     speed_mm_s, box_mm, lift_mm = with_cell_limits(context.cell, typed, _CELL_KEYS).values()
     line = " ".join(steps)

@@ -135,7 +135,7 @@ def reset(
             return
         effect, told = _effect_of_reset(controller)
         if told and (yes or not on_terminal()):
-            note(effect)  # nobody is asked, so it is said before it is sent
+            note(effect)  # there is no question, so the effect is shown before it is sent
         with controller.latch.calming(str(Act.RESET)):
             agree(tr("{effect} Reset now?", effect=effect), yes=yes)
             controller.reset_fault()
@@ -143,7 +143,7 @@ def reset(
         name = own_name_of(controller)
         left = _left_open(controller)
         named = context.expected.cell if context.expected else context.require_url()
-        # After the reset, because what is left can be settled from now on.
+        # After the reset, because an interrupted job can be finished or undone from now on.
         note_unsettled(controller, left, named)
     forget_stop(context.require_url(), name)
     payload: dict[str, object] = {"state": state}

@@ -228,7 +228,7 @@ class _Setting:
     ) -> None:
         from robolink.model import ToolOffset
 
-        # Checks the numbers before a connection is made.
+        # Check the numbers before connecting.
         ToolOffset(**changes)
         self._context, self._number, self._changes, self._kept = context, number, changes, kept
 
@@ -239,7 +239,7 @@ class _Setting:
         controller.tools.require_writable(self._number)
         before = controller.tools.read(self._number)
         note_change(controller, self._number, before)
-        # Nothing of what no tool has is kept beside what was given.
+        # The values of an impossible tool are not kept beside the given ones.
         kept_from = ToolOffset() if before is None or before.of_no_tool else before
         return before, replace(kept_from, **self._changes)
 
@@ -249,7 +249,7 @@ class _Setting:
         """Show a person the tool's present value, and its new one."""
         from robolink_cli.views.documents import show_change
 
-        controller.tools.selected()  # read now: the last line of a failure names it
+        controller.tools.selected()  # read now: the last line after a failure shows it
         if not json_is_on():
             show_change(self._number, before, wanted, after_name=tr("new"))
 
@@ -314,7 +314,7 @@ def clear(
             requests = controller.tools.preview_clear(number, then_select=then_select)
             show_requests(requests)
             return
-        # What is refused is refused before anybody is asked.
+        # Refuse before asking a question.
         controller.tools.preview_clear(number, then_select=then_select)
         agree(_clear_question(number, then_select), yes=yes, asks=not json_is_on())
         keep_first_backup(controller, tell=note)

@@ -71,7 +71,7 @@ def get(
     emit("variable", payload, lambda: say(f"{name} = {line}"))
 
 
-# A negative value is no option.
+# A negative value is not an option.
 @var.command(
     "set",
     context_settings={"ignore_unknown_options": True},

@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from robolink.controllers.epson.verify import Fact, Verification
 
 _SHOWN = 40
-"""Characters of evidence in the table; the document and the transcript have it whole."""
+"""Number of characters of evidence in the table. The JSON document and the transcript have all of
+it.
+"""
 
 _file = click.Path(dir_okay=False, path_type=Path)
 

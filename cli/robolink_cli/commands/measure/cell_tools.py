@@ -86,7 +86,7 @@ def _changes_left(context: CliContext) -> dict[int, int]:
     journal = open_journal(read_only=True)
     left: dict[int, int] = {}
     for path in recipes_at(context.cell):
-        # One that is wrong is told of where it is to be run.
+        # The command that runs a recipe reports its errors.
         with suppress(ConfigError):
             loaded = load_recipe(path)
             if loaded.recipe.is_for(name):
@@ -98,7 +98,7 @@ def _changes_left(context: CliContext) -> dict[int, int]:
 def _days_since(at: str) -> float | None:
     from robolink.timing import wall_time
 
-    # A label of a damaged record tells no age.
+    # The date in a damaged record gives no age.
     with suppress(ValueError):
         then = datetime.fromisoformat(at)
         age = wall_time() - (then if then.tzinfo else then.replace(tzinfo=UTC))

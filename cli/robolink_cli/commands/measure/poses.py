@@ -49,7 +49,7 @@ def _payload(found: "PoseTable") -> dict[str, object]:
         **json_fields(how, "columns", "ignored", "skipped"),
     }
     poses = [_pose_payload(entry) for entry in found.entries]
-    # What one pose has all have, so that a list from which something was lost shows it.
+    # All poses have the same fields, so a field that was lost from one is noticed.
     said = [key for key in _BESIDE if any(pose[key] is not None for pose in poses)]
     silent = [key for key in _BESIDE if key not in said]
     for pose in poses:

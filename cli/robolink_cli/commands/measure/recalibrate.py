@@ -101,7 +101,7 @@ Sensor = Annotated[
 
 
 _STEPS: Final = 7
-"""Choose, check, on the way, touch, fit, new values, turn test: numbered in the first row."""
+"""Number of steps in the first row: choose, check, approach, touch, fit, new values, turn test."""
 
 
 @click.command()
@@ -186,16 +186,16 @@ def recalibrate(
         Recalibration(at, loaded, options, events).run()
 
     def another() -> None:
-        # What was typed is about the tool before: neither its needle nor a consent holds again.
+        # The typed needle and consent were for the previous tool and do not apply to the next.
         at, loaded = told(*_chosen_anew(reached[-1]))
         nothing = answers_from(loaded.recipe, texts=(), z_mm=(), nozzle=None, lot=None, yes=False)
         Recalibration(at, loaded, RunOptions(nothing), events).run()
 
     with events.closing():
-        # An order comes from a program, also where that has a terminal.
+        # An order comes from a program, even if the program has a terminal.
         alone = recipe is None or (assist is None and not dry_run and order is None)
         job = tr("Change needle")
-        # A program that reads what comes of it waits for one result.
+        # A program that reads the output waits for one result.
         following = None if jsonl or json_is_on() else another
         guided_if_alone(context, change, job=job, alone=alone, following=following, steps=_STEPS)
 
@@ -218,7 +218,7 @@ def _chosen(context: CliContext, recipe: Path | None) -> "tuple[CliContext, Load
         if desk is not None:
             desk.regard(head(steps=steps_of(named)))
         return at, named
-    assert desk is not None  # noqa: S101 - looked at by whoever calls
+    assert desk is not None  # noqa: S101 - checked by the caller
     loaded = choose_recipe(desk, at.cell, at.url, head=head)
     desk.regard(head(*_as_typed(loaded.path), steps=steps_of(loaded)))
     return at, loaded

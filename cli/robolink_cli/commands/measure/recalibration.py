@@ -91,7 +91,7 @@ class Progress(Listener):
         elif self._tools > 1 and moment is Moment.BEFORE_MEASURE:
             heading = tr("Measuring tool {tool}.", tool=self.tool)
         else:
-            heading = ""  # the screen has one of its own
+            heading = ""  # the screen has a heading
         if heading:
             note(heading)
         self._events.emit("phase", phase=moment, tool=tool)
@@ -391,7 +391,7 @@ class Recalibration:
         self, controller: Controller, run: RecipeRun, report: ChangeReport
     ) -> dict[str, object]:
         """Show a person what was done; return its document."""
-        # Now, because Ctrl-C may come before the logout is answered.
+        # Now, because Ctrl-C may come before the logout is confirmed.
         desk = current_desk()
         if desk is not None:
             desk.regard(report)

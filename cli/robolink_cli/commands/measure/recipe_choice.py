@@ -22,7 +22,7 @@ _WIDE: Final = 78
 """Columns of a row of the list."""
 
 _FOLDERS: Final = ("", "recipes")
-"""Where recipes are looked for, beside the cell file and in the working folder."""
+"""Folders in which recipes are searched, relative to the cell file and to the working folder."""
 
 
 def nobody_to_ask() -> DeclinedError:
@@ -181,7 +181,7 @@ def _copied(
 
     axes = _axes(cell)
     fitting = _of_this_kind([load_recipe(path) for path in models().values()], url, axes)
-    # What fits every robot comes first.
+    # Recipes for every robot come first.
     fitting.sort(key=lambda one: one.recipe.source.of_method.needs.tilt)
 
     def ask() -> tuple[str, ChoiceSubject]:
@@ -291,7 +291,7 @@ def _rows_of(loaded: "Sequence[LoadedRecipe]", pasts: "Sequence[RecipePast]") ->
     ]
     wide = max(map(columns, names))
     if wide + 3 + max(map(columns, told)) > _WIDE:
-        # The longest name decides: how long it takes is not cut off.
+        # The longest name decides: the duration is never cut off.
         return tuple(
             f"{time}   {name}" if time else name for name, time in zip(names, told, strict=True)
         )

@@ -130,7 +130,7 @@ def _height_of_pin(controller: Controller, known: Station, found: Found, tool: i
 
 def _known(context: CliContext, controller: Controller, name: str) -> Station:
     entries = controller.outcomes.recorded(kinds=(EntryKind.STATION,))
-    # A pin needs nothing but its name: the person finds it.
+    # A pin needs only its name: the person finds it.
     unknown = Station(id=name, kind=StationKind.PIN)
     known = find_stations(context.cell, entries).get(name) or unknown
     if learnt_elsewhere(controller, known) is None:

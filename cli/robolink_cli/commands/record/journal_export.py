@@ -30,11 +30,10 @@ COLUMNS: Final = (
 """The columns of a CSV file."""
 
 _FORMULA: Final = re.compile("((?:^|[;\t\r\n|])[\\s\x00-\x20]*)([=+@\uff1d\uff0b\uff20\uff0d-])")
-"""Where a spreadsheet would calculate a cell instead of showing it.
+"""Text that a spreadsheet would calculate as a formula instead of showing it.
 
-Also behind a semicolon, tab or line end within a text: where a spreadsheet cuts lines at those, as
-it does in most of Europe, the rest of the text becomes a cell of its own. The full-width signs are
-taken for the others in East Asia.
+The text may follow a semicolon, tab or line end: a spreadsheet that splits lines there, as most do
+in Europe, makes it a separate cell. Spreadsheets in East Asia accept the full-width signs too.
 """
 
 
@@ -76,7 +75,7 @@ FORMATS: Final[Mapping[str, Callable[[Iterable[Recorded]], Iterator[bytes]]]] = 
     "json": json_document,
     "jsonl": json_lines,
 }
-"""The forms of an export by their names, which are also the usual endings of such files."""
+"""Export formats by name. The names are also the usual file extensions."""
 
 
 def form_of(file: Path) -> str:

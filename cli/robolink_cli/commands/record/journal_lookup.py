@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from robolink.model import Recorded
 
 SHORTEST_ID: Final = 4
-"""How many characters of a change's id are asked for at least."""
+"""Fewest characters of a change's id that are accepted."""
 
 _LONGEST_NUMBER: Final = 18
 _NAMED: Final = 5

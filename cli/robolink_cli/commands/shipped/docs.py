@@ -17,7 +17,7 @@ from robolink_cli.options.declaration import CliArgument, CliOption
 from robolink_cli.options.shared import json_option
 
 _COMMENT: Final = re.compile(r"<!--.*?-->\n*", re.DOTALL)
-"""For whoever edits a page; a browser does not show it either."""
+"""HTML comments, which are for authors of a page. A browser hides them too."""
 
 
 def _complete_page(_: click.Context, __: click.Parameter, start: str) -> list[str]:

@@ -23,13 +23,13 @@ from robolink_cli.commands.simulate.simulated_kind import SimulatedKind
 from robolink_cli.commands.simulate.softmotion import SOFTMOTION_KIND
 
 ADDRESS: Final = "HOST:PORT"
-"""The metavar of an option that takes an address to listen on."""
+"""Metavar of an option that takes a listening address."""
 
 _OF_THE_RUN: Final = frozenset({"control", "with_parent", "idle_exit", "json", "help", "replay"})
-"""Options that say how a process lives, or that serve no simulator at all."""
+"""Options that concern the process instead of a simulator, or that serve no simulator."""
 
 Objection = Callable[[str, str], None]
-"""Is told a key and what is wrong with it."""
+"""Reports a key and what is wrong with it."""
 
 
 class DeclaredKeys:
@@ -88,7 +88,7 @@ class DeclaredKeys:
             return {}
         try:
             return self._command.make_context("sim", line).params
-        except click.UsageError as error:  # options that do not go together
+        except click.UsageError as error:  # options that cannot be combined
             object_to("", error.message)
             return {}
 
@@ -156,7 +156,7 @@ _LAST_NODE: Final = 127
 _PLACEHOLDER: Final = "{name}"
 
 CellObjection = Callable[[str, str, str], None]
-"""Is told a cell, a key of it, and what is wrong with that."""
+"""Reports a cell, one of its keys, and what is wrong with that key."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -68,7 +68,7 @@ def demo(
 
 
 TOOL = 1
-"""Whose nozzle is changed."""
+"""Number of the tool whose nozzle is changed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -202,7 +202,7 @@ class DemoOperator(StrEnum):
     """The person at the demonstrated cells."""
 
     CAREFUL = "careful"
-    """Jogs the tip onto the pin whenever asked to."""
+    """Jogs the tip onto the pin whenever asked."""
 
     CARELESS = "careless"
     """Only presses ENTER."""
@@ -273,7 +273,7 @@ def require_refused(changes: Sequence[DemonstratedChange]) -> None:
 
 def _on_epson(seed: int, speed: float, operator: DemoOperator) -> DemonstratedChange:
     """Change a nozzle on a simulated EPSON SCARA, over a real TCP connection."""
-    # The driver has the clock that really passes, and so has the person whom it asks.
+    # The driver uses real time, and so does the simulated person.
     share, thinks_s = _stays_share(operator), LEAST_THINKING_S
     world = WorldParameters(person_stays_share=share, person_thinks_s=thinks_s)
     simulator = EpsonSimulator("T6-602S", seed=seed, world=world)

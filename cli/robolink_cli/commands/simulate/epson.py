@@ -62,7 +62,7 @@ def make_epson(
         password=password_in(password_env),
         options=habits(options, profile),
         state_path=state,
-        world=world_from(world) if world else None,  # which need not be made to be judged
+        world=world_from(world) if world else None,  # the default needs no check
     )
     surroundings = ProjectSurroundings(vision, lines, folder, encoding, before)
     load_programs(simulator, programs, points, surroundings, cell=cell)
@@ -104,7 +104,7 @@ EPSON_KIND: Final = SimulatedKind(
     lambda simulator: {"robot": simulator.robot_name},
     _title,
 )
-"""``sim epson``."""
+"""The simulator of ``sim epson``."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -81,4 +81,4 @@ PLC_KIND: Final = SimulatedKind(
     _title,
     person=False,
 )
-"""``sim plc``."""
+"""The simulator of ``sim plc``."""

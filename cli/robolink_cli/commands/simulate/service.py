@@ -42,8 +42,8 @@ class ParentWatch:
         self._handle: int | None = None
         self._gone = False
         if number is not None:
-            # A handle tells of an end that nobody has waited for yet, and is not taken in by
-            # another process that has got the same number. Some systems have none.
+            # A handle reports the end even before anybody has waited for it, and is not misled by
+            # another process with the same number. Some systems have no such handles.
             try:
                 self._handle = os.pidfd_open(number)
             except ProcessLookupError:
@@ -56,7 +56,7 @@ class ParentWatch:
         if self._number is None:
             return os.getppid() != self._starter
         if self._handle is not None:
-            looked_at = select.poll()  # which takes any handle of a process with thousands
+            looked_at = select.poll()  # works even if the process has thousands of handles
             looked_at.register(self._handle, select.POLLIN)
             self._gone = bool(looked_at.poll(0))
         elif not self._gone:
@@ -65,7 +65,7 @@ class ParentWatch:
             except ProcessLookupError:
                 self._gone = True
             except PermissionError:
-                return False  # it lives, and is somebody else's
+                return False  # it is running, under another user
         return self._gone
 
     def close(self) -> None:

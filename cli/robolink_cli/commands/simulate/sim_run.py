@@ -84,7 +84,7 @@ def _as_typed(life: ServedLife) -> list[str]:
 
 
 SCHEMA: Final = "robolink/sim-run/1"
-"""Of the first line."""
+"""Schema of the first output line."""
 
 _MOST_SHOWN: Final = 20
 
@@ -181,12 +181,12 @@ def _raise_most_files() -> None:
     except ImportError:
         return
     _, most = resource.getrlimit(resource.RLIMIT_NOFILE)
-    with suppress(ValueError, OSError):  # some systems name a limit that they do not grant
+    with suppress(ValueError, OSError):  # some systems report a limit but do not grant it
         resource.setrlimit(resource.RLIMIT_NOFILE, (most, most))
 
 
 PARENT: Final = "ROBOLINK_SIM_PARENT"
-"""Tells the process whose end it is to wait for."""
+"""Environment variable with the number of the process whose end the started process waits for."""
 
 _READY: Final = f'{{"schema": "{SCHEMA}"'
 _LOOK_S: Final = 0.02
@@ -219,9 +219,9 @@ def start_and_wait(arguments: Sequence[str]) -> int:
         )
     try:
         return _first_line(process, log, errors)
-    except BaseException:  # nobody is left behind whose first line nobody has read
+    except BaseException:  # leave no process whose first line was not read
         process.kill()
-        process.wait()  # killed, so at once; else it stays in the table of processes
+        process.wait()  # returns at once after the kill, and removes the zombie
         raise
 
 
@@ -232,7 +232,7 @@ def _first_line(process: "subprocess.Popen[bytes]", log: Path, errors: Path) -> 
         first, line_end, _ = log.read_text(encoding="utf-8").partition("\n")
         if ended is not None:
             _tell_end(log.read_text(encoding="utf-8"), errors.read_text(encoding="utf-8"))
-            shutil.rmtree(log.parent, ignore_errors=True)  # all that stood there was told
+            shutil.rmtree(log.parent, ignore_errors=True)  # its contents were shown
             return ended
         if line_end and first.startswith(_READY):
             hand_over(json.dumps({**json.loads(first), "log": str(log)}))
@@ -251,10 +251,10 @@ def _tell_end(document: str, messages: str) -> None:
     if json_is_on() or not document.startswith("{"):
         hand_over(document.rstrip("\n"))
         return
-    if document.startswith(_READY):  # the line of who listens may stand before it
+    if document.startswith(_READY):  # a line about listening may come before it
         _, _, document = document.partition("\n")
     error = json.loads(document).get("error") if document.strip() else None
-    if error is not None:  # without one it was told to end, or the system ended it
+    if error is not None:  # otherwise it was asked to end, or the system ended it
         show(f"robolink: {error['what']}\n  {error['remedy']}", beside=True)
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 Options = Mapping[str, Any]
-"""The values of a command's options, by the names of its parameters."""
+"""Values of a command's options by parameter name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +90,7 @@ class SimulatedKind:
             ConnectError: A port is taken.
         """
         speed, exchange_s = given["speed"], given["exchange"]
-        if exchange_s is None:  # where time stands still, nothing else would let it pass
+        if exchange_s is None:  # at speed 0 only exchanges let time pass
             exchange_s = 0.0 if speed else EXCHANGE_S
         clock = SteeredClock(speed, exchange_s=exchange_s)
         urls = self.place(stack, simulator, clock, **given)

@@ -185,4 +185,4 @@ SOFTMOTION_KIND: Final = SimulatedKind(
     lambda simulator: {"kinematics": _kinematics(simulator)},
     _title,
 )
-"""``sim softmotion``."""
+"""The simulator of ``sim softmotion``."""

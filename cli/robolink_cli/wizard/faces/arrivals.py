@@ -26,7 +26,7 @@ from prompt_toolkit.key_binding import KeyPress
 from robolink_cli.wizard.keys import ALONE_S
 
 TICK_S: Final = 0.005
-"""So often it is looked whether nothing follows, until that is known."""
+"""Interval in seconds between checks for further keys."""
 
 _WATCHED_S: Final = ALONE_S + 2 * TICK_S
 _MOST_BYTES: Final = 1024
@@ -74,7 +74,7 @@ class ArrivalReader:
                 return False
             try:
                 data = os.read(self._fd, _MOST_BYTES)
-            except OSError:  # the far end of a terminal is gone: a signal says so
+            except OSError:  # the far end of the terminal is gone: a signal reports it
                 self.over = True
                 return False
             self.over = not data
@@ -312,7 +312,7 @@ class TimedConsole(TimedKeys):
 
         def follow() -> None:
             while not over.is_set():
-                # An Event would wait 16 ms here; since Python 3.11 this is as fine as it says.
+                # An Event would wait 16 ms here; since Python 3.11, sleep is accurate.
                 time.sleep(TICK_S)
                 if self.look():
                     with suppress(RuntimeError):  # the loop is over

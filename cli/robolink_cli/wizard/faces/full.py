@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 _TURN_S: Final = 0.03
 _REPAINT_S: Final = 0.4
-"""So often the age of the reading is drawn anew while nothing happens."""
+"""Interval in seconds at which the age of the reading is redrawn while nothing happens."""
 
 
 class FullFace:
@@ -85,7 +85,7 @@ class FullFace:
         def begin() -> None:
             application.create_background_task(self._turn(application))
 
-        # The handlers of the command stay: they reach the work, which ends in order.
+        # The command's signal handlers stay: they reach the work, which then ends in order.
         narrow = application.run(pre_run=begin, handle_sigint=False)
         self._forget_keys()
         return narrow
@@ -123,7 +123,7 @@ class FullFace:
     def _shows_the_end(self) -> bool:
         """Show how the work ended, if there is a screen for it, until a person leaves it."""
         if ended_by() is EndedBy.HUNG_UP:
-            return False  # nobody is there to leave it
+            return False  # nobody is there to close it
         if self._state.ended is None:
             ended = ended_of(self._state, self._work.error, time.monotonic())
             if ended is None:
@@ -150,7 +150,7 @@ class FullFace:
     def _press(self, key: str, press: KeyPress) -> None:
         data, (at_s, quiet_s) = press.data, _when(press)
         if self._state.has_field and _writes(key):
-            # A field takes bursts: scanners fill it in.
+            # A field accepts bursts: scanners fill it in.
             text = data if data.isprintable() and name_of(key) not in ("enter", "backspace") else ""
             if self._fills(key, text):
                 self._happens(KeyPressed(name_of(key), text, at_s))
@@ -166,7 +166,7 @@ class FullFace:
         """
         line, ends, more = press.data.replace("\r", "\n").partition("\n")
         if not self._state.has_field or self._state.writing is not None or more.strip("\n"):
-            # A key just before it is the beginning of the same burst.
+            # A key just before it is the start of the same burst.
             for one in self._gate.burst(*_when(press)):
                 self._happens(self._pressed(one))
             return

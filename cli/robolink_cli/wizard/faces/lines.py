@@ -53,7 +53,9 @@ def leaves(effects: list[Effect]) -> bool:
 
 _TURN_S: Final = 0.05
 _STEADY_S: Final = 0.5
-"""So long a window has room before a screen is drawn in it: a hand that drags its edge is slow."""
+"""Time in seconds for which a window must be large enough before a screen is drawn in it. A person
+dragging the window's edge is slow.
+"""
 
 
 class LineFace:
@@ -87,7 +89,7 @@ class LineFace:
                 self._tell(happening, state)
                 carry_out(desk, effects)
             if ended:
-                # All of what was told stands above.
+                # Everything that was shown is above.
                 return self._at_the_end(replace(state, fresh=()), work)
             if self._screen_may_follow():
                 return state
@@ -106,7 +108,7 @@ class LineFace:
             self._room_since_s = now_s
         if now_s - self._room_since_s < _STEADY_S:
             return False
-        # A line that was begun here would be keys there.
+        # A line started here would arrive as keys on the screen.
         self._forget(0.0)
         self.handed_back = True
         return True
@@ -137,7 +139,7 @@ class LineFace:
             return state
         for row in (*ended.kept, state.message):
             _put(row)
-        # It is told now, and not once more when the dialogue is over.
+        # Shown now, and not again when the dialogue is over.
         state, _ = advance(state, HasEnded(replace(ended, kept=())))
         self._begin_question(state, Question.TEXT)
         _put(told_end(state))
@@ -169,7 +171,7 @@ class LineFace:
                 self._forget(0.0)
                 _put(told_question(state))
             case WaitsForAnswer() if state.at_place:
-                # What was typed while it moved is no step to go on with.
+                # A step typed during the movement is not executed.
                 self._forget(0.0)
                 _put(told_after_jog(state))
             case WasRegarded():

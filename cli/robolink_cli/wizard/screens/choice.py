@@ -9,16 +9,16 @@ from robolink_cli.wizard.screens.layout import BODY, JobStep, Screen, broken, st
 from robolink_cli.wizard.state import CheckPoint, CheckSubject, ChoiceSubject, Mark, WizardState
 
 _LEAST_SHOWN: Final = 3
-"""So many options stand on the screen, however much there is to be read above them."""
+"""Fewest options on the screen, however long the text above them."""
 
 
 def choice_screen(state: WizardState, subject: ChoiceSubject, now_s: float) -> Screen:
     """Return the screen of a list; if it is too long, the part around the mark."""
-    assert state.question is not None  # noqa: S101 - looked at by whoever calls
+    assert state.question is not None  # noqa: S101 - checked by the caller
     above = [row for line in subject.above for row in broken(line)]
     most = BODY - 2 - min(_LEAST_SHOWN, len(subject.options))
     if len(above) > most:
-        # What is chosen from has to be seen.
+        # The options must be visible.
         above = [*above[: most - 1], "..."]
     told = [row for line in _details(state, subject) for row in broken(line)]
     room = max(_LEAST_SHOWN, BODY - len(above) - 2 - (len(told) + 1 if told else 0))
@@ -34,7 +34,7 @@ def choice_screen(state: WizardState, subject: ChoiceSubject, now_s: float) -> S
         ("0", subject.leaves or tr("Leave")),
     )
     return Screen(
-        # What is chosen after the write belongs to the turn test.
+        # A choice after the write belongs to the turn test.
         title_row(state, subject.step, JobStep.TURN_TEST if state.accepted else JobStep.CHOOSE),
         (*above, "", state.question.text, *rows, *(["", *told] if told else ())),
         keys,

@@ -108,7 +108,7 @@ def stopped_lines(state: WizardState, error: RobolinkError) -> list[str]:
     outcome = outcome_after(error)
     blocked = _is_blocked(error)
     stands = "" if outcome is UNTOUCHED else describe_outcome(outcome, settles=not blocked)
-    # What stands says best that nothing was written.
+    # The sentence about the outcome already says that nothing was written.
     remedy = "" if error.remedy in stands else error.remedy
     typed = state.header.command.split()
     texts = (next_of(one, error, outcome, typed) for one in (error.what, remedy, stands))

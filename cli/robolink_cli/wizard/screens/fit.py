@@ -14,7 +14,7 @@ from robolink_cli.wizard.state import WizardState
 
 _BAR: Final = 20
 _LEAST_BAR: Final = 8
-"""A shorter bar shows nothing."""
+"""Shortest useful bar, in columns."""
 
 _MOST_ROWS: Final = 9
 
@@ -24,7 +24,7 @@ def fit_screen(state: WizardState, fit: FitSubject) -> Screen:
     worst = fit.rows[fit.worst].number if fit.worst is not None else 0
     retake, show = ("/", tr("Touch {k} again", k=worst)), ("5", tr("Show the result"))
     more = (("+", tr("One more touch")),) if fit.more else ()
-    # What is to be done first stands first; what a key does is the same.
+    # The recommended action comes first; the keys do not change.
     keys = (retake, *more, show) if worst_first(fit) else (show, *more, retake)
     return Screen(
         title_row(state, tr("How well it fits"), JobStep.FIT),

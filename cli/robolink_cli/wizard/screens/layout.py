@@ -15,7 +15,7 @@ from robolink_cli.wizard.state import WizardState
 WIDTH: Final = SCREEN
 HEIGHT: Final = 24
 BODY: Final = 17
-"""Rows between the two rules."""
+"""Number of rows between the two rules."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ class Screen:
         keys = list(key_rows(self.actions))
         messages = list(broken(self.message))[:2] if self.message else []
         room = HEIGHT - len(shown) - 2 - len(keys) - len(messages)
-        # The keys stand at the same place on every screen.
+        # The keys are at the same place on every screen.
         below = [""] * (room - len(body))
         return [
             cut(row, WIDTH) for row in [*shown, rule, *body[:room], *below, *messages, rule, *keys]
@@ -149,7 +149,7 @@ def _switched(reading: Reading) -> Iterator[str]:
 UPRIGHT: Final = ("X", "Y", "Z", "U")
 _TILTED: Final = (*UPRIGHT, "V", "W")
 _TILTS_DEG: Final = 0.005
-"""Less than this is 0 in the two decimals that are shown."""
+"""Smallest angle in degrees that is not 0 in the two decimals shown."""
 
 
 def coordinate_names(*shown: Pose | ToolOffset) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ from robolink_cli.wizard.state import WizardState
 COLUMNS: Final = 34
 ROWS: Final = 9
 _RATIO: Final = 2.0
-"""A character is about twice as high as it is wide."""
+"""Approximate height of a character divided by its width."""
 
 _LEAST_BEND: Final = 0.05
 _MOST_UNLIKE: Final = 6.0
@@ -126,14 +126,14 @@ class _Page:
 
 
 _TURNS_DEG: Final = 0.05
-"""Less is what a reading of U differs by."""
+"""Smallest turn in degrees. Readings of U vary by less."""
 
 
 _LEFT: Final = COLUMNS + 4
-"""Columns of the picture, with the room between it and what stands beside it."""
+"""Columns of the picture and of the gap between it and the text beside it."""
 
 _OLD_S: Final = 1.0
-"""A reading of longer ago says nothing about where the robot is now."""
+"""Age in seconds above which a reading no longer gives the robot's present position."""
 
 
 def moving_screen(state: WizardState, now_s: float) -> Screen:

@@ -58,7 +58,7 @@ def _with_heard(state: WizardState, screen: Screen) -> Screen:
 
 def _question_screen(state: WizardState, now_s: float) -> Screen:
     """Return the screen of a question that has none of its own."""
-    assert state.question is not None  # noqa: S101 - looked at by whoever calls
+    assert state.question is not None  # noqa: S101 - checked by the caller
     asked = ["", *broken(state.question.text), ""]
     keys: tuple[tuple[str, str], ...]
     if state.question.kind is Question.TEXT:
@@ -70,7 +70,7 @@ def _question_screen(state: WizardState, now_s: float) -> Screen:
             for index, answer in enumerate((tr("Yes"), tr("No")))
         ]
         keys = (("5", tr("Do it")), (tr("arrows"), tr("choose")), ("0", tr("STOP")))
-    # What was told before often says why it is asked.
+    # The message before a question often gives the reason for it.
     before = [row for remark in state.remarks[-6:] for row in broken(remark)]
     room = max(0, BODY - len(asked) - 1)
     return Screen(

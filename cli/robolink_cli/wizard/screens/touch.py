@@ -22,7 +22,7 @@ from robolink_cli.wizard.state import STEP_SIZES, WizardState
 _HEAD = 14
 
 _MOST_ANGLES = 4
-"""So many angles of the turn test stand above the keys; more leave no room for a message."""
+"""Most angles of the turn test above the keys. More would leave no room for a message."""
 
 
 def touch_screen(state: WizardState, now_s: float) -> Screen:
@@ -71,7 +71,7 @@ def instruction(state: WizardState) -> str:
     asks = question is not None and question.kind is Question.PLACE
     if touch is None or not touch.number:
         return said
-    # What is no pin is named by whoever asks; so is the first contact after a break.
+    # The caller names a target that is not a pin, and the first contact after a break.
     if asks and (touch.surface or (touch.proof and touch.arrival is None)):
         return said
     if touch.proof:
@@ -118,7 +118,7 @@ def _where(state: WizardState) -> list[str]:
     head = padded("", _HEAD) + row_of(names)
     places = (*map(mm, pose.coordinates()[:3]), *(f"{at:.2f}" for at in pose.coordinates()[3:]))
     where = places[: len(names)]
-    # A touch is measured with the flange; elsewhere it is the tool that is selected.
+    # A touch is measured with the flange; other positions are of the selected tool.
     name = tr("Flange now") if not pose.tool else tr("Tip now")
     return [head, padded(f" {name}", _HEAD) + row_of(where)]
 
@@ -218,7 +218,7 @@ def _turned(names: tuple[str, ...], quarters: int) -> tuple[str, ...]:
 def _actions(state: WizardState) -> tuple[tuple[str, str], ...]:
     touch = state.touch
     if state.free_jog is not None:
-        # While it moves they stop the step; at rest there is nothing left but to leave.
+        # During a movement the keys stop the step; at rest they can only leave.
         leaves = tr("STOP, leave")
         return (("0", leaves), (tr("Space"), leaves), ("Esc", leaves))
     if touch is None or not touch.number:

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 _HEAD = 18
 _COLUMN = 11
 _NARROW = 10
-"""Six columns of numbers beside the names."""
+"""Width of a column when six columns of numbers are beside the names."""
 
 _ROOM = BODY - 2
 _LENGTHS = 3

@@ -21,13 +21,13 @@ from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 _CHECKS = 90
 _STRAIGHT = 1e-6
 _ON_THE_CIRCLE_MM = 0.01
-"""How much further one end may be from the centre than the other (assumed)."""
+"""Largest difference in mm between the distances of the two ends from the centre (assumed)."""
 
 Way = Callable[[float], Vector]
-"""Where the tip is after a share of its way."""
+"""Returns the position of the tip after a share of the path."""
 
 MeasuredWay = tuple[Way, float]
-"""A way and its length in mm."""
+"""A path and its length in mm."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,7 +21,7 @@ from robolink_simulators.epson.arm.trajectory import JointLeg
 from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 
 GATE: Final = 7
-"""C7, the default: straight up, across, straight down (documented)."""
+"""Arch number C7, the default: straight up, across, straight down (documented)."""
 
 
 class Arch(NamedTuple):
@@ -32,7 +32,7 @@ class Arch(NamedTuple):
 
 
 AT_DELIVERY: Final = tuple(Arch(10.0 * n, 10.0 * n) for n in range(3, 10))
-"""30, 40 ... 90 mm on both sides (docs/reference/spel.md 6.3)."""
+"""Arches at delivery: 30, 40 ... 90 mm on both sides (docs/reference/spel.md 6.3)."""
 
 
 class ArchTable:

@@ -18,7 +18,7 @@ Coordinates = tuple[float, float, float, float, float, float]
 """X, Y, Z in mm and U, V, W in degrees."""
 
 Span = tuple[float, float]
-"""Lowest and highest, in mm; two zeros check nothing (documented)."""
+"""Lowest and highest value in mm; two zeros switch the check off (documented)."""
 
 
 class CheckBox(NamedTuple):

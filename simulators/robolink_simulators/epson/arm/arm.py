@@ -61,7 +61,7 @@ class _Travel:
     ends_ns: tuple[int, ...] = field(init=False)
 
     def __post_init__(self) -> None:
-        # Once: each poll of a movement asks for them several times.
+        # Calculated once: each poll of a movement reads them several times.
         totals = accumulate(leg.duration_ns for leg in self.legs)
         object.__setattr__(self, "ends_ns", tuple(self.start_ns + total for total in totals))
 

@@ -51,16 +51,18 @@ from robolink_simulators.epson.arm.trajectory import LinePace, RampedLeg
 from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 
 Place = tuple[float, ...]
-"""X, Y, Z in mm, U in degrees, on six axes V and W too, in the robot's coordinates."""
+"""X, Y, Z in mm and U in degrees, with six axes also V and W, in the robot's coordinates."""
 
 AXES_OF_CURVES: Final = (2, 3, 4)
-"""How many of X, Y, Z, U a curve of four axes rules; the others stay (assumed)."""
+"""Allowed numbers of coordinates, out of X, Y, Z, U, that a curve of four axes controls; the others
+stay as they are (assumed).
+"""
 
 SIX_AXES: Final = 6
-"""How many a curve of a robot of six axes rules."""
+"""Number of coordinates that a curve of a six-axis robot controls."""
 
 TANGENTIAL: Final = 2
-"""The mode of a curve that turns U with its direction in the plane (documented)."""
+"""Mode of a curve in which U follows the direction of the curve in the plane (documented)."""
 
 
 class CurveSwitch(NamedTuple):
@@ -125,7 +127,7 @@ def _restored(
     axes: int,
     places: list[list[float]],
     switches: list[list[object]],
-    tangential: object = False,  # a file of before there were any has none
+    tangential: object = False,  # older files have none
     control_point: int = 0,
 ) -> FreeCurve:
     read = tuple(tuple(map(float, place)) for place in places)
@@ -231,7 +233,7 @@ def _slopes(places: Sequence[Place], *, closed: bool) -> list[Place]:
         weight = after_mm / (before_mm + after_mm)
         pairs = zip(first, second, strict=True)
         slopes.append(tuple(a * weight + b * (1 - weight) for a, b in pairs))
-    # The end of a parabola through the last two points alone is their chord.
+    # A parabola through only the last two points ends along their chord.
     return slopes if closed else [rises[0], *slopes, rises[-1]]
 
 

@@ -58,7 +58,7 @@ def _switch(put_back: RestoredAt, listing: str = "{}", *, on: bool = False) -> D
 OF_EACH_JOINT: Final = -1
 
 OF_SIX_AXES: Final = frozenset({"vsd"})
-"""Settings that other robots do not have."""
+"""Settings that only six-axis robots have."""
 
 DRIVE_SETTINGS: Final[dict[str, DriveSetting]] = {
     "limzmargin": DriveSetting((1,), 0, 1000, 0.02, RestoredAt.DRIVES),
@@ -85,7 +85,9 @@ DRIVE_SETTINGS: Final[dict[str, DriveSetting]] = {
     "cp_offset": _switch(RestoredAt.FIVE),
     "tc": _switch(RestoredAt.FIVE),
 }
-"""By their statements. Where the reference gives no limit, value or listing, those are assumed."""
+"""Drive settings by statement. Limits, values and listings that the reference does not give are
+assumed.
+"""
 
 
 class DriveSettings:
@@ -239,7 +241,7 @@ class JointRanges:
                 RefusalKind.VALUE_OUT_OF_RANGE,
                 f"Joint {joint} from {low} to {high}: allowed are {lowest} to {highest}",
             )
-        # The pulse nearest to the model's own end stands for that end.
+        # The pulse nearest to the end of the model's range stands for that end.
         ends = (
             own[0] if low == lowest else low / scale,
             own[1] if high == highest else high / scale,

@@ -34,8 +34,9 @@ from robolink_simulators.epson.condition import OutOfReach
 
 _ROUNDING = 1e-9
 _ON_THE_AXIS_MM = 1e-6
-"""Nearer to the axis of joint 1 the flange of an RS leaves joint 1 free; a point that prints 0.000
-for X and Y is there."""
+"""Distance in mm from the axis of joint 1 below which the flange of an RS leaves joint 1 free. A
+point that prints 0.000 for X and Y is on the axis.
+"""
 _FIRST_TURN_MIDDLE_DEG = 90.0
 _HALF = 180.0
 
@@ -127,7 +128,7 @@ def _scara_solve(model: RobotModel, flange: Pose, hand: Hand, posture: Posture) 
 
 
 PLAIN: Final = Posture()
-"""The posture of a point without flags (inferred): elbow above, wrist not flipped, first turns."""
+"""Posture of a point without flags (inferred): elbow above, wrist not flipped, first turns."""
 
 
 def forward(model: RobotModel, joints: Joints) -> Pose:

@@ -7,12 +7,13 @@ from typing import Final
 from robolink_simulators.epson.arm.trajectory import JointPace, LinePace
 
 LOW_POWER_TIP_MM_S: Final = 250.0
-"""In low power the tip stays below this (docs/reference/spel.md 7.2,
-docs/reference/epson.md 3.4)."""
+"""Limit of the tip speed in low power, in mm/s (docs/reference/spel.md 7.2, docs/reference/epson.md
+3.4).
+"""
 
 
 HIGHEST_SPEED_S: Final = 2000.0
-"""SpeedS in mm/s (docs/reference/spel.md 7.2)."""
+"""Highest SpeedS in mm/s (docs/reference/spel.md 7.2)."""
 
 
 class MotionPhase(IntEnum):

@@ -9,7 +9,9 @@ from typing import Final
 from robolink_simulators.epson.arm.joint_settings import joint_order
 
 FINE_PULSES: Final = 10
-"""Default of Fine; per model in the reference, 10 in its sample (docs/reference/spel.md 7.3)."""
+"""Default of Fine in pulses. The reference gives it per model, and 10 in its sample
+(docs/reference/spel.md 7.3).
+"""
 
 
 @dataclass(frozen=True, slots=True)

@@ -42,7 +42,9 @@ class Mount(StrEnum):
 
 _ROBOT_TYPES: Final = {Mechanism.SCARA: 3, Mechanism.SIX_AXIS: 5, Mechanism.FOLDED_SCARA: 6}
 _NARROW_BELOW: Final = {"GX8-C453S": (-270.0, 145.0), "GX8-C453C": (-240.0, 137.5)}
-"""Height in mm below which joint 2 is held to fewer degrees (the maker's manual of GX8)."""
+"""By model: the height in mm below which joint 2 has a smaller range, and that range in degrees
+(manufacturer's manual of the GX8).
+"""
 
 _TURN: Final = 360.0
 _ON_A_WALL: Final = "w"

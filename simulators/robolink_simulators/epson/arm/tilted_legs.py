@@ -215,7 +215,7 @@ def plan_about_point(
     require_same_posture(model, near, ends[1])
     start, end = (frame_of(pose).inverse() @ point for pose in ends)
     course, length_mm = way or _straight(start.shift_mm, end.shift_mm)
-    # The workpiece turns, so the point turns against it.
+    # The workpiece turns, so the point turns the opposite way.
     axis, angle_deg = _turn(model, ends[::-1], product(end.rotation, transposed(start.rotation)))
     to_flange = carried_by(model, offset).inverse()
     held = _HeldCourse(model, point, ends[0], course, start.rotation, axis, angle_deg, to_flange)

@@ -156,11 +156,12 @@ class DriveGuard:
 
 _PERCENT: Final = 100.0
 _LEAST: Final = 0.01
-"""A limit of 0 counts as 1 %: no share of nothing can be told (assumed)."""
+"""A limit of 0 counts as 1 %, because a share of zero is undefined (assumed)."""
 
 _FELT: Final = 0.05
-"""Assumed: from this share of a drive's torque on a thing in the way counts as a collision. A
-controller compares speeds (documented)."""
+"""Share of a drive's torque on an obstacle from which it counts as a collision (assumed). A
+controller compares speeds (documented).
+"""
 
 
 class TorqueLimits:

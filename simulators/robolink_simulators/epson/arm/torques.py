@@ -34,13 +34,13 @@ from robolink_simulators.epson.arm.trajectory import FULL_SPEED_AFTER_S
 from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 
 OWN_KG: Final = 2.0
-"""Assumed: what the arm weighs as its drives feel it at the flange."""
+"""Weight of the arm in kg, as its drives carry it at the flange (assumed)."""
 
 RESERVE: Final = 4.0
-"""Assumed: how many times more a drive can give than its joint alone needs."""
+"""Ratio of the torque that a drive can give to the torque that its joint alone needs (assumed)."""
 
 _ECCENTRIC_M: Final = 0.1
-"""Assumed: how far from the last joint the heaviest load may have its centre."""
+"""Largest distance in m of the heaviest load's centre from the last joint (assumed)."""
 
 _GRAVITY: Final[Vector] = (0.0, 0.0, 9.81)
 _NUDGE: Final = 1e-3
@@ -147,15 +147,16 @@ def _place_m(model: RobotModel, joints: Joints) -> Vector:
 
 
 MEAN_FOR_S: Final = 60
-"""For how long a mean can be asked after it was cleared (documented)."""
+"""Longest time in seconds after clearing for which a mean can be read (documented)."""
 
 _LOOKS: Final = 32
 _LOOKS_BACK: Final = 16
 _STEP_NS: Final = 1_000_000
 _KEPT: Final = 256
 _LASTING: Final = 0.05
-"""Assumed: the mean square of the torque, as a share of the momentary one, that a drive bears for
-ever; OLRate 1 stands for it."""
+"""Mean square of the torque that a drive can bear permanently, as a share of the momentary one
+(assumed). OLRate 1 stands for it.
+"""
 
 
 class DriveQuantity(StrEnum):

@@ -88,11 +88,11 @@ class BrakedRamp:
 
 
 TimeLaw = Ramp | BrakedRamp
-"""How the share of a path grows with time."""
+"""The share of a path covered, as a function of time."""
 
 
 FULL_SPEED_AFTER_S: Final = 0.2
-"""Assumed: time to a joint's top speed at Accel 100."""
+"""Time in seconds to a joint's top speed at Accel 100 (assumed)."""
 
 _NO_TOOL: Final = ToolOffset()
 _STILL = 1e-9

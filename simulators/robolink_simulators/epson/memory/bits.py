@@ -13,11 +13,12 @@ from typing import Final, NamedTuple
 from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 
 IO_BITS: Final = 512
-"""Inputs and outputs (docs/reference/spel.md 8: bit numbers 0 to 511)."""
+"""Number of inputs, and of outputs (docs/reference/spel.md 8: bit numbers 0 to 511)."""
 
 MEMORY_BITS: Final = 1024
-"""Memory bits (docs/reference/spel.md 8: the reference gives 256, 512 and 1024; the largest is
-used)."""
+"""Number of memory bits. The reference gives 256, 512 and 1024 (docs/reference/spel.md 8); the
+largest is used.
+"""
 
 _REAL: Final = struct.Struct("<f")
 
@@ -64,7 +65,7 @@ class BitBank:
         no_byte: RefusalKind = RefusalKind.IO_BYTE,
     ) -> None:
         self._size = size
-        # One whole number: a list of 1024 would take 8 KB, of which a process holds thousands.
+        # One integer: a list of 1024 would take 8 KB, and a process holds thousands of banks.
         self._bits = 0
         self._no_bit = no_bit
         self._no_byte = no_byte

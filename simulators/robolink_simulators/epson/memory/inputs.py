@@ -32,13 +32,15 @@ from robolink_simulators.epson.memory.bits import BitBank
 
 _COUNTERS: Final = 16
 _HIGHEST_COUNT: Final = 65535
-"""Where a counter stays (docs/reference/spel.md 8; what comes after it is not stated)."""
+"""Count at which a counter stops (docs/reference/spel.md 8; the behaviour above it is not
+documented).
+"""
 
 Sense = Callable[[int | None], bool]
-"""Tells what an input shows at an instant of the motion under way, ``None`` for the present."""
+"""Returns the state of an input at an instant of the current motion, or now for ``None``."""
 
 InputsAsked = dict[int, bool]
-"""What was shown by the inputs that somebody asked for, by their numbers."""
+"""States of the inputs that were read, by number."""
 
 
 class InputBits(BitBank):
@@ -135,7 +137,7 @@ class InputBits(BitBank):
 
     def show(self, asked: InputsAsked, instant_ns: int) -> bool:
         """Return whether inputs show at an instant of the motion in progress what they showed."""
-        # Without a block, of which a search would enter one for each millisecond.
+        # No ``with`` block: a search would enter one every millisecond.
         before_ns, self._instant_ns = self._instant_ns, instant_ns
         try:
             return all(self.get(number) is on for number, on in asked.items())
@@ -244,11 +246,11 @@ def _way(model: RobotModel, flange: Pose, tip: ToolOffset | None, lean: Lean) ->
 
 
 PORTS: Final = range(24, 28)
-"""Inputs that can trigger a latch (documented)."""
+"""Numbers of the inputs that can trigger a latch (documented)."""
 
 MOST_TIMES: Final = 4
 _SAMPLE_NS: Final = 1_000_000
-"""A pulse of an input at the tip that is shorter is not seen (assumed)."""
+"""Pulses of an input at the tip that are shorter than this, in ns, are missed (assumed)."""
 
 
 class LatchSetting(NamedTuple):

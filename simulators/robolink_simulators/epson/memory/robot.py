@@ -95,7 +95,7 @@ class KeptDefinitions:
 
 
 _KEPT_FROM_THE_START: Final = ("arches", "arms", "curves", "limits")
-"""What no file lacks."""
+"""Parts that every state file has."""
 
 _KEPT: Final = ("arches", "arms", "areas", "curves", "limits", "ranges", "base", "origins")
 

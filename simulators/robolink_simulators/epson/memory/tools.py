@@ -9,7 +9,7 @@ from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 HIGHEST_TOOL: Final = 15
 
 ClearInForce: TypeAlias = Literal["selects_zero", "keeps", "error"]
-"""What TLClr does to the selected tool."""
+"""Effect of TLClr on the selected tool."""
 
 
 class ToolMemory:

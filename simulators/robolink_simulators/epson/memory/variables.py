@@ -26,7 +26,9 @@ _SHOWN_AS: Final = {
     "ubyte": VariableType.INTEGER,
     "short": VariableType.INTEGER,
 }
-"""Types of programs; those that the wire does not know are shown as wider ones (assumed)."""
+"""Types on the wire by the types of programs. Types without an equivalent on the wire are sent as
+wider ones (assumed).
+"""
 
 _DIGITS: Final = {VariableType.REAL: 6, VariableType.DOUBLE: 14}
 _TRUTH: Final = {"true": True, "-1": True, "1": True, "false": False, "0": False}
@@ -159,7 +161,7 @@ class Variables:
         """
         variable, subscripts = self._find(reference)
         self._check_type(variable, rest[:1])
-        if not subscripts:  # a count is a surplus parameter then
+        if not subscripts:  # a count is then one parameter too many
             return (self._shown(variable.kind, variable.get(())),)
         stated = rest[1].strip() if len(rest) > 1 else ""
         if variable.kind is VariableType.STRING or not stated.isdecimal():
@@ -214,8 +216,8 @@ class Variables:
         return variable, subscripts
 
     def _check_type(self, variable: _Variable, stated: Sequence[str]) -> None:
-        # Numbers asked as text, or text as numbers, are 14 (docs/reference/epson.md 1.2); that one
-        # kind of number asked as another is so too is assumed.
+        # Reading a number as text, or text as a number, is error 14 (docs/reference/epson.md 1.2).
+        # Assumed: so is reading one kind of number as another.
         if stated and stated[0].strip().lower() != variable.kind.lower():
             raise RequestRefused(ErrorCode.BAD_COUNT)
 

@@ -39,10 +39,10 @@ from robolink_simulators.epson.memory.variables import Variables
 from robolink_simulators.epson.options import ControllerCard, EpsonOptions, SpelNumbers
 
 Fields = tuple[str, ...]
-"""What a served command answers; nothing stands for a lone ``0``."""
+"""Fields of the answer to a command; empty for a plain ``0``."""
 
 Served = Callable[..., Fields]
-"""Carries a command out; takes its parameters as text."""
+"""Carries out a command. Takes its parameters as text."""
 
 
 def io_commands(machine: Machine) -> dict[str, Served]:
@@ -92,19 +92,20 @@ _AXES: Final = 6
 _HIGHEST_LANGUAGE: Final = 6  # Spanish, which only ErrMsg$ documents (docs/reference/spel.md 4.4)
 _WARNED_PARTS: Final = 6  # battery, belt, grease, motor, gear, ball screw
 _FIRMWARE: Final = {5: "5. 4. 0. 0", 7: "7. 5. 4. 0", 8: "8. 1. 0. 0"}
-"""With the blanks after the dots that Epson's own client takes out."""
+"""Firmware versions by RC+ version. EPSON's own client removes the spaces after the dots."""
 
 _OTHER_DEVICE: Final = "21"
-"""The control device where Remote Ethernet may only monitor: the PC (docs/reference/spel.md 9),
-assumed."""
+"""Control device that leaves Remote Ethernet with monitoring only: the PC (docs/reference/spel.md
+9); assumed.
+"""
 
 _WIDTH_OF_A_FUNCTION: Final = 64
 _INSTALLED: Final = "2020/01/01 00:00:00"
 _NEW: Final = (_INSTALLED, "0.0", "120.0")
-"""Maintenance data of a part without wear: installed, consumed in percent, months left."""
+"""Maintenance data of a part without wear: installation date, percent consumed, months left."""
 
 _STAMP: Final = "2020/01/01 08:00:00"
-"""When an error happened: simulated time has no date."""
+"""Time of every error: simulated time has no date."""
 
 
 def query_commands(
@@ -247,7 +248,7 @@ def _messages(card: ControllerCard, options: EpsonOptions, condition: Condition)
         own = card.messages.get(number(code))
         failure = condition.failure
         if failure is not None and failure[0] == number(code):
-            own = failure[1]  # of the program that failed, with its line
+            own = failure[1]  # the failed program's own text, with its line
         texts = _error_texts(options.numbers)
         return (own or texts.get(number(code), f"Error {number(code)}"),)
 

@@ -37,7 +37,7 @@ def shown_request(event: Request | BadRequest) -> str:
         case "login":
             return f"${name},***"
         case "execute":
-            return f'${name},"{event.parameters[0]}"'  # quotes inside stand as they came
+            return f'${name},"{event.parameters[0]}"'  # inner quotes stay as received
         case _:
             return ",".join((f"${name}", *event.parameters))
 
@@ -47,7 +47,7 @@ def shown_reply(reply: bytes) -> str:
     text = reply.decode("latin-1").rstrip("\r\n")
     if text[:1] != "!":
         return text
-    # The refusal of a login that could not be read repeats it, password and all.
+    # The refusal of an unreadable login repeats the login, including the password.
     mistyped = "login" in text.lower() and text[1:6].lower() + text[6:7] != "login,"
     return "***" if mistyped else text
 
@@ -159,7 +159,7 @@ class PendingRequest:
 
 
 _SILENCE_NS: Final = 100_000_000
-"""How long nothing must come for a request without a line end to be whole (inferred)."""
+"""Silence in ns after which a request without a line end counts as complete (inferred)."""
 
 _ACK: Final = b"\x06"
 
@@ -323,7 +323,7 @@ class EpsonServerLink:
         try:
             reply = self._codec.send(event)
         except LocalProtocolError:
-            # Longer than 4060 bytes, or not to be framed: how a controller answers then is
+            # Longer than 4060 bytes, or impossible to frame: a controller's answer to this is
             # not documented.
             reply = self._codec.send(Refusal(exchange.name, ErrorCode.SYSTEM))
         departures = self._controller.leaving(exchange, reply)

@@ -135,14 +135,15 @@ class RequestService(HostedDevice, ABC):
     condition: Condition
     faults: FaultPlan
     _password: str
-    """What Login must carry; empty for none."""
+    """The password that Login must give; empty for none."""
     _slot: ClientSlot
     _desk: CommandDesk
     _window: SpelWindow
     _mishaps: PlannedActs
     _flash: Flash
     _settled_ns: int
-    """Until when all is done, -1 after anything that may have changed what comes."""
+    """Time until which everything is done; -1 after any event that may have changed what follows.
+    """
 
     def take(self, link: EpsonServerLink, event: Request | BadRequest) -> None:
         """Handle a request of a client; while another is logged in, it is not served."""
@@ -168,7 +169,7 @@ class RequestService(HostedDevice, ABC):
         if heard is None:
             return
         self._mishaps.strike(faults, self.now_ns)
-        if link.over:  # a restart has cut it
+        if link.over:  # a restart has closed it
             return
         self._carry_out(link, heard, shown, faults)
         for fault in faults:
@@ -206,7 +207,7 @@ class RequestService(HostedDevice, ABC):
             if name == "Execute":
                 self._window.start(request.parameters[0], exchange, self.now_ns)
             elif name == "Home":
-                # It answers when the arm is there, as a motion of Execute does (assumed).
+                # The answer is sent on arrival of the arm, as for a motion of Execute (assumed).
                 self._desk.check_home(request.parameters)
                 self._window.start("Home", exchange, self.now_ns)
             elif name == "Abort":
@@ -249,7 +250,7 @@ class RequestService(HostedDevice, ABC):
         if bare and self.options.login_without_parameter == "error_12":
             raise RequestRefused(ErrorCode.MALFORMED)
         password = "" if bare else request.parameters[0]
-        # That a controller without a password takes an empty one only is assumed.
+        # Assumed: a controller without a password accepts only an empty one.
         if password != self._password:
             raise RequestRefused(ErrorCode.WRONG_PASSWORD)
         self._slot.admit(link, self.now_ns)
@@ -259,7 +260,7 @@ class RequestService(HostedDevice, ABC):
     def _logout(self, link: EpsonServerLink) -> Fields:
         if self._unfinished:
             # Logging out while a task runs raises an error (documented,
-            # docs/reference/epson.md 1.1); that the error ends what runs, as errors do, is assumed.
+            # docs/reference/epson.md 1.1); assumed: like any error, it ends the running tasks.
             self._window.interrupt(self.now_ns)
             self.condition.raise_error(self.options.numbers.logged_out_in_task)
             if self.options.logout_while_running == "refused":
@@ -277,7 +278,7 @@ class RequestService(HostedDevice, ABC):
         """Count a reply and return which parts of it are sent, and when."""
         self._flash.save_changes()
         self.exchanges += 1
-        # A login that was bent may come back in its refusal.
+        # A garbled login may be repeated in its refusal.
         echoed = bool(exchange.faults) and reply[:1] == b"!"
         self.log.add(self.now_ns, "<", "***" if echoed else shown_reply(reply))
         if not exchange.faults:
@@ -298,7 +299,7 @@ class RequestService(HostedDevice, ABC):
         """Note the end of a connection; an option decides whether running statements continue."""
         self._settled_ns = -1
         if self._slot.client is link:
-            # Production that another device started is not this client's to supervise.
+            # This client does not supervise production that another device started.
             own = self._unfinished and not self.condition.monitoring_only
             self._slot.lost(unfinished=own)
             if self.options.execute_on_disconnect == "stops":

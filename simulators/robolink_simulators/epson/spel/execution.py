@@ -96,7 +96,7 @@ def _store(evaluator: Evaluator, statement: AssignPoint | AssignCoordinate) -> N
 def _assign(evaluator: Evaluator, name: str, value: Value) -> None:
     session = evaluator.session
     if session.options.variable_assignment == "refused":
-        # Whether the command window takes variables is left open (docs/reference/spel.md 13).
+        # Not documented: does the command window accept variables (docs/reference/spel.md 13)?
         raise SpelRefusal(RefusalKind.NOT_ALLOWED_HERE, f"{name} needs a program")
     if not session.variables.holds(name):
         raise SpelRefusal(RefusalKind.NAME_UNDEFINED, f"Nothing is called {name}")
@@ -230,7 +230,7 @@ class StatementExecution:
             self._held = True
         elif self.travels:
             self._evaluator.session.machine.arm.halt(now_ns)
-        elif now_ns >= self._busy_until_ns:  # else the safeguard has stopped it just now
+        elif now_ns >= self._busy_until_ns:  # otherwise the safeguard has just stopped it
             self._aim = None
 
     def resume(self, now_ns: int) -> None:
@@ -421,7 +421,7 @@ class StatementExecution:
     def _begin(self, motion: MotionStatement) -> StatementOutcome:
         machine, start_ns = self._evaluator.session.machine, self._busy_until_ns
         if self._evaluator.blends and machine.arm.moving:
-            # The motion before was to blend into this one; here it ends first (assumed).
+            # The previous motion should blend into this one; here it ends first (assumed).
             self._pending.append(motion)
             return StatementOutcome(duration_ns=(machine.arm.next_change() or start_ns) - start_ns)
         start = begin_motion(self._evaluator, motion, start_ns)

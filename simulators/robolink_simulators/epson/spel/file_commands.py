@@ -59,7 +59,7 @@ FILE_COMMANDS: Final[dict[str, Callable[[Evaluator, KeywordStatement], str]]] = 
     "chdir": _present,
     "chdrive": _command(1, FileFolder.change_drive),
 }
-"""Keyword to what carries it out."""
+"""Statement handlers by keyword."""
 
 
 _BLOCK: Final = re.compile(r"([A-Za-z]+?)(\d*)\s*\{$")
@@ -276,4 +276,4 @@ POINT_FILE_COMMANDS: Final[dict[str, Callable[[Evaluator, KeywordStatement], str
     "importpoints": _import,
     "exportpoints": _export,
 }
-"""Keyword to what carries it out."""
+"""Statement handlers by keyword."""

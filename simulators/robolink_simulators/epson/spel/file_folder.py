@@ -18,7 +18,7 @@ from robolink_simulators.epson.condition import RefusalKind, SpelRefusal
 FIRST_DRIVE: Final = "c"
 _DRIVE: Final = re.compile(r"([A-Za-z]):(.*)$", re.DOTALL)
 _FORBIDDEN: Final = re.compile(r'[\x00-\x1f<>:"|?*]')
-"""What no name of a file holds on Windows, where a controller's files lie."""
+"""Characters that Windows, where a controller's files are stored, does not allow in a file name."""
 
 
 class FileFolder:

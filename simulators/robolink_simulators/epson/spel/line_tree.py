@@ -250,4 +250,4 @@ LineNode = (
     | Unsimulated
     | Statement
 )
-"""What stands between the semicolons of a program's line."""
+"""One part between the semicolons of a program line."""

@@ -33,10 +33,12 @@ from robolink_simulators.epson.spel.tree import Expression, KeywordStatement, Mo
 NS_PER_MS: Final = NS_PER_S // 1000
 
 GIVEN_UP_NS: Final = 2 * NS_PER_S
-"""After about this long without Fine a motion ends in error 4024 (documented)."""
+"""Approximate time in ns after which a motion that has not reached Fine ends in error 4024
+(documented).
+"""
 
 _LEAST_PULSES: Final = 0.5
-"""Assumed: Fine 0 is met where no encoder tells a difference."""
+"""Deviation in pulses at which Fine 0 is reached: no encoder resolves less (assumed)."""
 
 
 def settling_ns(session: Session, legs: Sequence[Leg]) -> int:
@@ -113,7 +115,7 @@ def begin_motion(evaluator: Evaluator, motion: MotionStatement, start_ns: int) -
     if evaluator.blends and blends(machine, motion):
         lasts_ns = machine.arm.start(legs, start_ns) - start_ns
         if lasts_ns >= sum(leg.duration_ns for leg in legs):
-            # What the drives cut short does not slow down before it rests.
+            # A motion that the drives cut short does not slow down before it stops.
             lasts_ns -= fall_ns(legs[-1])
         return MotionStart(StatementOutcome(duration_ns=lasts_ns), legs[-1], travelled_ns=way_ns)
     if until is None:

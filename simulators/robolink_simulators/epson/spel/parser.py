@@ -28,7 +28,7 @@ _NUMBER: Final = re.compile(r"(?<![\w.&$])\d{1,9}\.\d{1,9}(?![\w.])")
 _QUOTES: Final = frozenset("\"'")
 
 Filler = Callable[[Sequence[Literal]], Any]
-"""Returns a part of a tree with numbers in the places of the marks."""
+"""Returns a part of a tree in which numbers have replaced the marks."""
 
 
 def marked(line: str) -> tuple[str, list[str]]:
@@ -105,7 +105,7 @@ _WORDS_OF_OTHER_ROBOTS = """
 """
 
 OF_OTHER_ROBOTS: Final = frozenset(_WORDS_OF_OTHER_ROBOTS.split())
-"""Statements that the reference allows, for arms that this simulator has none of."""
+"""Statements that the reference allows, for arms that are not simulated."""
 
 _WORDS_NOT_SIMULATED = """
     areacorrectionclr areacorrectionset chdisk
@@ -162,18 +162,18 @@ _WITH_A_FORM_OF_THEIR_OWN = """
 WINDOW_ONLY: Final = frozenset(
     ["where", "brake", "sysconfig", "workque_list", "cnv_quelist", "history", "clearhistory"]
 )
-"""Statements that no program may hold (docs/reference/spel.md 13, classes D and G)."""
+"""Statements that are not allowed in a program (docs/reference/spel.md 13, classes D and G)."""
 
 UNSIMULATED: Final = (
     NOT_SIMULATED | OF_OTHER_ROBOTS | frozenset(_OF_PROGRAMS_ALONE.split())
 ) - frozenset(_WITH_A_FORM_OF_THEIR_OWN.split())
-"""Statements that a program may hold and that are refused when it comes to them."""
+"""Statements that are allowed in a program and refused when it reaches them."""
 
 UNSIMULATED_FUNCTIONS: Final = FUNCTION_ONLY | frozenset(_UNSIMULATED_FUNCTIONS.split())
-"""Functions that a program may call and that are refused when it comes to them."""
+"""Functions that are allowed in a program and refused when it reaches them."""
 
 UNSIMULATED_FAMILIES: Final = ("workque_", "cnv_", "sf_", "aio_", "pg_", "fbusio_", "force_")
-"""What statements and functions of options of the controller begin with: none is simulated."""
+"""Prefixes of the statements and functions of controller options; none of these is simulated."""
 
 _REFUSED_WORDS: Final = (
     (PROGRAM_ONLY, RefusalKind.NOT_ALLOWED_HERE, "is allowed in programs only"),
@@ -231,7 +231,7 @@ def _shape(shape: str, count: int) -> Filler | None:
     try:
         return filler(_read(shape), count)
     except SpelRefusal:
-        return None  # the line itself says what is wrong with it
+        return None  # parsing the line itself reports the error
 
 
 def _read(text: str) -> tuple[Statement, ...]:
@@ -325,7 +325,9 @@ _WORDS: Final = {
     "NEXT": "Next",
     "TRAILING": ",",
 }
-"""What a person calls a terminal of the grammar; the others are left out of what is expected."""
+"""Names of the grammar's terminals in messages. Other terminals are not listed among what was
+expected.
+"""
 
 _ORDER: Final = tuple(_WORDS)
 

@@ -15,7 +15,7 @@ from robolink_simulators.epson.spel.file_folder import FileFolder
 from robolink_simulators.epson.spel.tree import Binary, Expression, Literal, Name
 
 PointFile = tuple[dict[int, Point], dict[str, int]]
-"""Points by their numbers, and the numbers of labels."""
+"""Points by number, and the point numbers of labels."""
 
 
 @cache

@@ -76,8 +76,9 @@ class ProgramRefused(ConfigError):
 
 
 LONGEST_EXPANSION: Final = 8192
-"""Characters of a line after its macros (not stated; a macro may name its parameter twice, so that
-thirty of them inside each other would fill any memory)."""
+"""Most characters of a line after its macros are expanded (no limit is documented). A macro may use
+its parameter twice, so thirty nested ones would fill any memory.
+"""
 
 _TOKENS: Final = re.compile(
     r'"[^"]*(?:"|$)|&[hbo][0-9a-f]+|[a-z][a-z0-9_]*\$?|.', re.IGNORECASE | re.DOTALL
@@ -148,7 +149,7 @@ def _arguments(tokens: list[str], position: int) -> tuple[list[str], int]:
 
 LONGEST_LINE: Final = 512
 LARGEST_PROGRAM: Final = 8 * 2**20
-"""Bytes of a program's text (documented for a project, docs/reference/spel.md 16)."""
+"""Most bytes of a program's text (documented for a project, docs/reference/spel.md 16)."""
 
 _DEEPEST_INCLUDE: Final = 8
 _ENCODINGS: Final = ("utf-8-sig", "cp932", "gbk")

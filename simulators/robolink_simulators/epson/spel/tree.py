@@ -63,7 +63,7 @@ class PointFunction:
 
 
 OLD_HERE = "p*"
-"""The name under which ``P*`` stands among the point functions."""
+"""Name of ``P*`` among the point functions."""
 
 
 class ModifierKind(Enum):
@@ -134,7 +134,7 @@ class ComputedPoint:
 
 
 Base = StoredPoint | LabelledPoint | PointFunction | ComputedPoint
-"""What a point expression begins with."""
+"""The first part of a point expression."""
 
 Expression = (
     Literal | Name | Unary | Binary | PointExpression | PointPair | ResultSlot | ByReference
@@ -194,7 +194,7 @@ class PrintTo:
 
 
 Meanwhile = Distance | Print | PrintTo | KeywordStatement
-"""What may stand inside ``!...!``."""
+"""A statement that is allowed inside ``!...!``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,8 +226,9 @@ class SwitchOnTheWay:
 
 
 Target = PointExpression | PointRange | SwitchOnTheWay | Literal
-"""What stands between the commas of a motion; a number is an angle or a radius of Arc, a
-text the file of a curve."""
+"""One item between the commas of a motion. A number is an angle or a radius of Arc, a text the file
+of a curve.
+"""
 
 
 @dataclass(frozen=True, slots=True)
@@ -300,7 +301,7 @@ def names_in(node: object) -> frozenset[str]:
 SHIFTING = frozenset(
     {*"XYZUVW", *(f"TL{axis}" for axis in "XYZUVW"), *(f"R{axis}" for axis in "XYZ")}
 )
-"""Axes of the shifts behind a point."""
+"""Axes of the shifts after a point."""
 
 _FLAG = re.compile(r"[RLABF]|NF|J[14]F[01]|J[26]F[0-9]+")
 
@@ -341,7 +342,7 @@ def _taken_apart(value: "Expression") -> "tuple[Expression, tuple[Modifier, ...]
             base, before = _taken_apart(left)
             return base, (*before, _flag(right))
         case Binary("+" | "-" as sign, left, right):
-            # "/" binds closer than the sign: label -Z(10) /L arrives as label - (Z(10) / L).
+            # "/" binds more tightly than the sign: label -Z(10) /L arrives as label - (Z(10) / L).
             match _taken_apart(right):
                 case Name(axis, (amount,)), flags if axis.upper() in SHIFTING:
                     by = Unary("-", amount) if sign == "-" else amount

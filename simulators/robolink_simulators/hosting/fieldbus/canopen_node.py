@@ -34,7 +34,7 @@ _SEGMENT_BYTES: Final = 7
 _EXPEDITED_BYTES: Final = 4
 _TOGGLE: Final = 0x10
 _OF_ANOTHER_NODE: Final = bytes.fromhex("4b41600037020000")
-"""An answer of a drive: its status word, 6041h."""
+"""An answer of a drive: its status word, object 6041h."""
 
 
 class PlcSdoServer(SdoServer):
@@ -76,7 +76,7 @@ class PlcSdoServer(SdoServer):
         self._met = served.met
         size = 2 * len(served.words)
         self._segments = -(-size // _SEGMENT_BYTES) if size > _EXPEDITED_BYTES else 0
-        self._segment = -1  # that of the answer that only announces them
+        self._segment = -1  # the answer that only announces segments
 
     def send_response(self, response: bytes) -> None:
         """Send an answer, unless this one is to be lost; what a plan wants comes with it."""
@@ -130,9 +130,9 @@ def _untyped(server: object) -> Any:  # noqa: ANN401 - canopen declares no types
 
 
 PERIOD_S: Final = 0.1
-"""Of the NMT heartbeat and of TPDO1's event timer, as the data sheet says."""
+"""Period in seconds of the NMT heartbeat and of TPDO1's event timer, as in the EDS file."""
 LOOK_S: Final = 0.01
-"""So often a host looks whether something in TPDO1 has changed."""
+"""Interval in seconds at which a host checks TPDO1 for changes."""
 
 _PERIOD_NS: Final = round(PERIOD_S * NS_PER_S)
 _BOOT_UP: Final = 0
@@ -191,7 +191,7 @@ class CanopenFace:
         self._network = network
         self._starts = simulator.plc.starts
         self._sent: tuple[int, ...] = ()
-        # canopen declares no types for what is used of it here.
+        # canopen declares no types for the parts used here.
         node: Any = canopen.LocalNode(number, object_dictionary(number))
         node.sdo = server = PlcSdoServer(node, real_seconds=real_seconds)
         objects = MailboxObjects(simulator, self._asked, server)
@@ -243,12 +243,12 @@ class CanopenFace:
                 self._simulator.write(_BEAT, (word,), self._clock.now_ns(), LinkKind.CAN)
 
 
-for _name in ("can", "canopen"):  # they write to standard error when nobody listens
+for _name in ("can", "canopen"):  # without a handler they write to standard error
     logging.getLogger(_name).addHandler(logging.NullHandler())
 
 _NOTIFIER_CYCLE_S: Final = 0.02
 MULTICAST_PORT: Final = 43113
-"""python-can's own."""
+"""Default port of python-can."""
 
 
 @dataclass(frozen=True, slots=True)

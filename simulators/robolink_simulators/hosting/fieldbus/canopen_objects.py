@@ -39,7 +39,7 @@ _BOOT_ID, _CAPABILITIES, _SNAPSHOT = 2, 3, 5
 _LENGTH_DOES_NOT_FIT: Final = 0x0607_0010
 
 Present = Callable[[], int]
-"""Tells the simulated time."""
+"""Returns the simulated time in ns."""
 
 
 class SdoAnswering(Protocol):

@@ -30,10 +30,10 @@ _BANKS: Final = {
     RegisterTable.INPUT: Bank.INPUT,
 }
 _SILENCE_NS: Final = 50_000_000
-"""Longer than that, and what came before it is no part of a frame any more."""
+"""Silence in ns that ends a frame: earlier data no longer belongs to it."""
 
 _SPLIT_S: Final = 0.01
-"""How much later the second half of a split answer comes."""
+"""Delay in seconds of the second half of a split answer."""
 
 
 class MailboxFrames:

@@ -128,7 +128,7 @@ class InProcessMailboxLink:
             if pulled := self._cuts != self._simulator.plc.cuts:
                 served = ServedAccess(answered=False)
             else:
-                served = serve(self._clock.now_ns())  # the simulator follows before it serves
+                served = serve(self._clock.now_ns())  # the simulator catches up before it serves
             if pulled or served.cut or served.meets(PlcFaultAction.RESET):
                 raise self._ended(
                     TransportBrokenError(
@@ -149,7 +149,7 @@ class InProcessMailboxLink:
                 )
             if served.delay_s:
                 self._pass(served.delay_s)
-            # What comes due in this half is done, at its own instant, before the next request.
+            # Events due in this half happen, each at its time, before the next request.
             self._clock.advance(self._exchange_s / 2)
             return served.words
 

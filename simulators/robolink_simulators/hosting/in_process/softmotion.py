@@ -59,7 +59,7 @@ clock_of = _named.clock
 
 
 def _made(options: Mapping[str, str]) -> SoftMotionSimulator:
-    # A plus that was not escaped has become a space.
+    # An unescaped plus sign has become a space.
     kinematics = options.get("kinematics", DEFAULT_KINEMATICS).replace(" ", "+")
     of_machine = parameter_names(kinematics)
     names = (*_OWN_OPTIONS, *of_machine, *option_names())

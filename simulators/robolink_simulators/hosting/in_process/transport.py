@@ -53,7 +53,7 @@ class InProcessTransport:
         self._closed = False
         with lock:
             self._link: DeviceLink = device.connect(clock.now_ns())
-        # Told once: to ask a protocol costs more than an exchange.
+        # Determined once: asking a protocol costs more than an exchange.
         self._resettable = self._link if isinstance(self._link, ResettableLink) else None
 
     @property
@@ -163,7 +163,7 @@ class InProcessTransport:
             return False
         change = self._device.next_change()
         until_ns = deadline.at_ns if change is None else min(change, deadline.at_ns)
-        # A change that is overdue must not stop the time.
+        # An overdue change must not stop the time.
         self._clock.advance_to(max(until_ns, now_ns + 1))
         return True
 
@@ -215,7 +215,7 @@ class _OpenPort:
     """One client's session at the port."""
 
     closed = False
-    """A line has no end."""
+    """Always false: a serial line does not close."""
 
     def __init__(self, port: LinePort, now_ns: int) -> None:
         self._port = port

@@ -15,7 +15,7 @@ from robolink_simulators.hosting.streams.serial_host import (
 from robolink_simulators.hosting.streams.tcp_host import TcpHost as TcpHost
 
 _SHOWN_BAUD = 115_200
-"""A pseudo terminal has no rate; a client has to name one all the same."""
+"""Baud rate in the URL. A pseudo terminal has none, but a client must give one."""
 
 
 def serve_serial(

@@ -17,11 +17,11 @@ from robolink_simulators.hosting.addresses import DeviceLink, WireDevice
 from robolink_simulators.hosting.streams.wire_host import WireHost
 
 PTY_LINE: Final = {"baud": "115200", "parity": "none"}
-"""A pseudo terminal knows no parity and refuses to be set to one."""
+"""Line settings for a pseudo terminal, which has no parity and refuses to have one set."""
 
 _CHUNK_BYTES: Final = 4096
 _CHARACTER_BITS: Final = 10
-"""Start, eight data bits, stop: a pseudo terminal has no parity."""
+"""Bits per character: start, eight data bits, stop. A pseudo terminal has no parity."""
 
 
 class SerialCable:
@@ -67,7 +67,7 @@ class SerialCable:
             for end in ready:
                 data = os.read(end, _CHUNK_BYTES)
                 time.sleep(len(data) * self._character_s)
-                # There is no flow control: what nobody takes is lost.
+                # There is no flow control: data that is not read is lost.
                 with contextlib.suppress(BlockingIOError):
                     os.write(other if end == one else one, data)
 

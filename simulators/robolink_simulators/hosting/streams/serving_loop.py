@@ -23,7 +23,7 @@ from time import monotonic
 from typing import Any, Final, Protocol
 
 MOST_AT_ONCE: Final = 16
-"""So many are served before they are answered, and before the queue is looked at again."""
+"""Number of connections served before the answers are sent and the queue is polled again."""
 
 
 class Readiness(Protocol):
@@ -108,7 +108,7 @@ class QueuedReadiness:
 
     def ready(self, timeout_s: float) -> Iterable[tuple[Any, int]]:
         """See :meth:`Readiness.ready`."""
-        # Looked up at once: while they are served a number may come to be another connection's.
+        # Looked up at once: during serving, another connection may get the same number.
         data = self._data
         return [
             (data[number], _READ if events == select.EPOLLIN else _seen(events))
@@ -139,11 +139,11 @@ def _seen(events: int) -> int:
 
 
 Served = Callable[[int, int], None]
-"""Deals with what was seen; is given the events and the simulated time."""
+"""Handles a connection's events. Takes the events and the simulated time."""
 
 _LONGEST_SLEEP_S: Final = 3600.0
 _SPARE_ENTRIES: Final = 64
-"""The heap may hold so many more entries than twice the hosts before it is cleared up."""
+"""Number of heap entries, beyond twice the number of hosts, at which the heap is cleared up."""
 
 
 class LoopHost(Protocol):
@@ -229,7 +229,7 @@ class ServingLoop:
         self._asked.append(act)
         if not self._alarmed:
             self._alarmed = True
-            # A full pipe wakes it as well.
+            # A full pipe also wakes the loop.
             with contextlib.suppress(BlockingIOError):
                 self._waker.send(b"\0")
 
@@ -273,7 +273,7 @@ class ServingLoop:
         while self._heap and self._heap[0][0] <= now_s:
             at_s, _, host = heappop(self._heap)
             if at_s != host.queued_s:
-                continue  # an earlier look has taken its place
+                continue  # an earlier entry has replaced this one
             host.queued_s = None
             if host.due_s is not None and host.due_s > now_s:
                 self._queue(host, host.due_s)
@@ -341,7 +341,7 @@ class ServingLoop:
                 host.queued_s = host.due_s = None
                 try:
                     host.end()
-                except BaseException as error:  # of the same device that has failed, mostly
+                except BaseException as error:  # usually of the same failed device
                     self._tell(error)
                 with self._gate:
                     self._members -= 1

@@ -23,7 +23,7 @@ from robolink_simulators.hosting.streams.wire_host import WireHost
 _CHUNK_BYTES: Final = 65536
 _MOST_UNSENT: Final = 1 << 22
 NO_TIME: Final = struct.pack("HH" if sys.platform == "win32" else "ii", 1, 0)
-"""For SO_LINGER: a socket that lingers for no time is reset when it is closed."""
+"""Value of SO_LINGER with a time of zero: closing the socket resets the connection."""
 
 
 class Connection:
@@ -51,7 +51,7 @@ class Connection:
         except BlockingIOError:
             return
         except OSError:
-            data = b""  # a reset: the client is gone all the same
+            data = b""  # a reset: the client is gone too
         self._link.receive(data, now_ns)
         if not data:
             self._close()
@@ -82,7 +82,7 @@ class Connection:
         except OSError:
             self._unsent = b""  # the next read finds the end
         if len(self._unsent) > _MOST_UNSENT:
-            # A client that never reads must not eat our memory; the next read finds the end.
+            # A client that never reads must not fill the memory; the next read finds the end.
             self._unsent = b""
             with contextlib.suppress(OSError):
                 self._client.shutdown(socket.SHUT_RDWR)
@@ -97,14 +97,16 @@ class Connection:
         if not self.finished:
             self.finished = True
             self._host.watch_no_more(self._client)
-            if reset:  # to linger for no time is to reset
+            if reset:  # a linger time of zero resets the connection
                 self._client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, NO_TIME)
             self._client.close()
 
 
 _NONE_FREE: Final = (errno.EMFILE, errno.ENFILE)
 _UNTIL_ONE_IS_FREE_S: Final = 0.02
-"""All that this process serves waits so long; to look again at once would take a whole CPU."""
+"""Pause in seconds of everything that this process serves while no descriptor is free. Retrying at
+once would use a whole CPU.
+"""
 
 
 class TcpHost(WireHost):
@@ -163,7 +165,7 @@ class TcpHost(WireHost):
 
     def shut(self, now_ns: int) -> None:
         """See :meth:`WireHost.shut`."""
-        with contextlib.ExitStack() as all_of_it:  # also where a device fails at one of them
+        with contextlib.ExitStack() as all_of_it:  # closes all, even if one fails
             all_of_it.callback(self._listener.close)
             all_of_it.callback(self.watch_no_more, self._listener)
             for connection in self._connections.values():
@@ -174,7 +176,7 @@ class TcpHost(WireHost):
         try:
             client, _ = self._listener.accept()
         except OSError as error:
-            # It left before it was let in; or no descriptor is free, and it goes on waiting.
+            # The client left before it was accepted, or waits on because no descriptor is free.
             if error.errno in _NONE_FREE:
                 time.sleep(_UNTIL_ONE_IS_FREE_S)
             return

@@ -52,7 +52,7 @@ ASSUMED_LIMITS: Final = {
     AxisKind.ROTARY: AxisLimits(-170.0, 170.0, 360.0, 1800.0),
     AxisKind.LINEAR: AxisLimits(-300.0, 300.0, 500.0, 5000.0),
 }
-"""Limits of a drive for which none are given (assumed: every machine has its own)."""
+"""Default limits of a drive by kind of axis (assumed: each machine has its own)."""
 
 
 @dataclass(frozen=True, slots=True)

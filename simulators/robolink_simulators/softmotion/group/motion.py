@@ -141,7 +141,7 @@ class GroupMotion:
         values = self.queue.axes_at(now_ns)
         if values is not None:
             if len(self.queue.running) > 1:
-                require_inside(values, self._axes())  # a line is checked as a whole, no corner is
+                require_inside(values, self._axes())  # a whole line was checked, a corner was not
             self._place(values)
 
     def step(self, now_ns: int) -> None:

@@ -294,7 +294,7 @@ class MovementQueue:
     def settle(self, now_ns: int) -> list[Movement]:
         """Remove what has stopped by now, and return it."""
         rested = []
-        # In order: the second in a corner may be at rest before the first has arrived there.
+        # In order: in a corner, the second movement may be at rest before the first has arrived.
         while self._running and self._running[0].rest_ns <= now_ns:
             rested.append(self._running.pop(0))
         return rested

@@ -111,7 +111,7 @@ class LinePath:
     _unturned: Matrix = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        # A movement asks for its way in every cycle.
+        # A movement evaluates its path in every cycle.
         a, b = self.start_tcp, self.end_tcp
         axis, angle_deg = axis_and_angle(product(b.rotation, transposed(a.rotation)))
         object.__setattr__(self, "_way", subtract(b.shift_mm, a.shift_mm))
@@ -263,7 +263,7 @@ def _axis_pace(slopes: Sequence[float], axes: Sequence[Axis]) -> Pace | None:
 
 
 Position = tuple[float, ...]
-"""``SMC_POS_REF``: six numbers, axis values in ACS, else X, Y, Z, A, B, C."""
+"""``SMC_POS_REF``: six numbers, axis values in ACS, otherwise X, Y, Z, A, B, C."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -47,7 +47,7 @@ class SpeedProfile:
     falls_after_s: float = field(init=False, compare=False)
 
     def __post_init__(self) -> None:
-        # Asked for in every cycle of the motion task, so worked out once.
+        # Calculated once, because every cycle of the motion task reads it.
         object.__setattr__(self, "duration_s", sum(phase.duration_s for phase in self.phases))
         falls_after_s = sum(phase.duration_s for phase in self.phases[:-1])
         object.__setattr__(self, "falls_after_s", falls_after_s)

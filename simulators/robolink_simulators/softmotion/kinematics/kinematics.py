@@ -113,7 +113,7 @@ class CoordinateTransforms:
 
 
 AxisValues = tuple[float, ...]
-"""One value an axis, a0 first: degrees of a rotary axis, mm of a linear one."""
+"""One value per axis, a0 first: degrees for a rotary axis, mm for a linear one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +150,9 @@ class Configuration:
 
 
 ANY_CONFIGURATION: Final = Configuration()
-"""Says nothing: the only one of a kinematics without a choice, or the present one."""
+"""An unspecified configuration: the only one of a kinematics without a choice, otherwise the
+current one.
+"""
 
 
 class KinematicsModel(Protocol):

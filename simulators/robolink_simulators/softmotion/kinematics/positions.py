@@ -35,7 +35,7 @@ def yaw_deg(rotation: Matrix) -> float | None:
 
 def about_z(angle_deg: float) -> Matrix:
     """Return a turn about Z."""
-    # Written out, as :func:`about` of Z: every cycle of a simulated movement asks several times.
+    # Written out, as :func:`about` of Z: a simulated movement calls it several times per cycle.
     angle = math.radians(angle_deg)
     c, s = math.cos(angle), math.sin(angle)
     return ((c, 0.0 - s, 0.0), (s + 0.0, c, 0.0), (0.0, 0.0, c + (1 - c)))
@@ -70,7 +70,7 @@ def turn_and_lean_deg(rotation: Matrix) -> tuple[float, float]:
 _ROUNDING = 1e-9
 _IN_PLANE_MM = 1e-6
 
-# A simulated movement asks for these in every cycle.
+# A simulated movement reads these in every cycle.
 _TURNS_ABOUT_Z: Final = OrientationSpace(OrientationDof.ONE)
 _NEVER_TURNS: Final = OrientationSpace.known(NO_TURN)
 

@@ -55,7 +55,7 @@ from robolink_simulators.softmotion.smc_errors import BlockRefused, ErrorKind
 _STRAIGHT: Final = 1e-9
 _NO_SHIFT: Final[Vector] = (0.0, 0.0, 0.0)
 
-# A simulated movement asks for these in every cycle.
+# A simulated movement reads these in every cycle.
 _DRIVEN_ABOUT_Z: Final = OrientationImage(
     CsTool.FLANGE, OrientationSpace(OrientationDof.ONE), b_active=True
 )
@@ -206,7 +206,7 @@ class Wrist2:
         turn_deg = math.degrees(math.atan2(y, x))
         ways = [(turn_deg, lean_deg), (turn_deg + 180.0, -lean_deg)]
         found = [(near_turn(a, near[0]), near_turn(self.leans * lean, near[1])) for a, lean in ways]
-        # The way that keeps the whole orientation, where it is given; else the shorter one.
+        # The path that keeps the whole orientation, if it is given; otherwise the shorter one.
         return min(found, key=lambda it: (self._misses(it, rotation), math.dist(it, near)))
 
     def image(self, wanted: Matrix, base: OrientationSpace) -> OrientationImage:
@@ -313,7 +313,7 @@ class Coupled:
     place: int | None = None
     own_name: str = ""
     kinds: tuple[AxisKind, ...] = field(init=False, repr=False, compare=False)
-    """The axes, a0 first."""
+    """Kinds of the axes, a0 first."""
     _own: slice = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:

@@ -26,10 +26,11 @@ from robolink_simulators.softmotion.mailbox.image import arranged
 _CRC: Final = COMMAND["crc"].word
 _HEARTBEAT: Final = COMMAND["client_heartbeat"].word
 _SEQUENCES: Final = 0xFFFF
-"""1 to 65535, and 1 again."""
+"""Number of sequence numbers: after 65535 comes 1."""
 
 _MOST_AHEAD: Final = _SEQUENCES // 2
-"""What is farther ahead than this is behind.
+"""Largest distance by which a sequence number can be ahead of the newest one. A larger distance
+means that it is behind.
 
 Source: docs/reference/mailbox.md, "When a command counts".
 """
@@ -238,10 +239,10 @@ class WireFaults(CountedFaults[PlcFault]):
             case PlcFaultAction.STALE_REPLY if shown in self._before:
                 return self._before[shown]
             case PlcFaultAction.STALE_REPLY:
-                # There is nothing stale yet: it did not happen, and waits for the next one.
+                # No earlier answer yet: the fault did not fire and waits for the next read.
                 self.fired.remove(fault)
                 self.times_fired -= 1
-                if not fault.every:  # else it comes again by itself
+                if not fault.every:  # otherwise the fault recurs by itself
                     self.add(replace(fault, on_exchange=0, match=fault.match or shown))
         return words
 

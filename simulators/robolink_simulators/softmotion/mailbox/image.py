@@ -88,10 +88,11 @@ def _six(
 
 
 REGISTERS: Final = 4096
-"""Holding registers, and input registers: the most that CODESYS offers (documented)."""
+"""Number of holding registers, and of input registers: the most that CODESYS offers (documented).
+"""
 
 OUTPUT_WORDS: Final = DEVICE_START + DEVICE_WORDS
-"""Response, slots and device block, one behind the other."""
+"""Words of the response, the slots and the device block, one after the other."""
 
 
 class Bank(Enum):

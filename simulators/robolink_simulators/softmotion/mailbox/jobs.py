@@ -125,7 +125,7 @@ def ok(answer: Answer | None = None) -> CommandResult:
 
 
 Handler = Callable[[Command], CommandResult]
-"""Carries out one opcode; what it refuses it raises as ``Rejected``."""
+"""Carries out one opcode. Raises ``Rejected`` to refuse a command."""
 
 
 MOVEMENTS: Final = frozenset({Opcode.MOVE_DIRECT, Opcode.MOVE_LINEAR, Opcode.MOVE_UNTIL_INPUT})
@@ -271,7 +271,7 @@ class Jobs:
         self.acknowledged = job
         job.follow(self._group)
         if job.state is CommandState.ABORTED:
-            job.error_class = ErrorClass.STOPPING  # another block has precedence
+            job.error_class = ErrorClass.STOPPING  # another block takes precedence
         elif not job.state.final:
             self._unfinished.append(job)
 

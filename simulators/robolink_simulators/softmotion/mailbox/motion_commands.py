@@ -82,7 +82,7 @@ class MotionDesk:
         if require_operand(command.operands[0], range(2)) == 0:
             return CommandResult(self._group.stop())
         if self._group.state is not SmcGroupState.STOPPING:
-            return ok()  # nothing is held (assumed)
+            return ok()  # there is nothing to hold (assumed)
         self._group.release_stop()
         release = BlockExecution()
         self._releases.append(release)

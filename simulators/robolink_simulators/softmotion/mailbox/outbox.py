@@ -34,9 +34,9 @@ from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
 from robolink_simulators.softmotion.mailbox.tool_commands import ToolDesk
 
 HEAD: Final = RESPONSE.before("boot_id")
-"""The beginning of the response block, as far as it tells how a command is getting on."""
+"""The start of the response block, which shows the progress of a command."""
 
-# Their numbers alone: they are looked at in every answer, and an enumeration is slow to add.
+# Plain numbers: every answer reads them, and adding enumeration members is slow.
 _BITS: Final = tuple(
     bit.value
     for bit in (

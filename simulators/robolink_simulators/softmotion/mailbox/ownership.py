@@ -9,7 +9,8 @@ from robolink_simulators.softmotion.mailbox.jobs import Rejected
 from robolink_simulators.softmotion.mailbox.retained import RetainedMemory
 
 SILENCE_NS: Final = 10 * NS_PER_S
-"""After this long without a sign of its owner a mailbox may be taken, if nothing moves."""
+"""Silence of the owner in ns after which another client may take over a mailbox, if nothing moves.
+"""
 
 _A_STRANGER: Final = 0x5EE7_0001
 

@@ -16,7 +16,7 @@ from robolink_simulators.softmotion.signals import SIGNALS
 from robolink_simulators.softmotion.smc_errors import BlockRefused
 
 _LAG_ERROR = 16
-"""SMC_ERROR: lag error (docs/reference/softmotion.md 1.4)."""
+"""Number of the lag error in SMC_ERROR (docs/reference/softmotion.md 1.4)."""
 
 
 class PlcPanel:

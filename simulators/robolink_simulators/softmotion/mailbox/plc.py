@@ -178,7 +178,7 @@ class Plc:
 
     def keep_pace(self, took_ns: int) -> None:
         """Note how much simulated time passed while this computer calculated one step."""
-        del took_ns  # a program that is worked out cycle by cycle has use for it
+        del took_ns  # only a program that is executed cycle by cycle uses it
 
     def output(self, now_ns: int) -> Words:
         """Return response, slots and device block, one behind the other."""
@@ -220,7 +220,7 @@ class Plc:
 
     def _begin_program(self, now_ns: int) -> None:
         """Start the mailbox program anew; it counts the start."""
-        del now_ns  # a program that counts time has use for it
+        del now_ns  # only a program that counts time uses it
         self.memory.boot_id = next_number(self.memory.boot_id)
         self._modelled = self._new_program()
         self.program = self._modelled

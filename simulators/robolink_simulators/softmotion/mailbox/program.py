@@ -149,7 +149,7 @@ class MailboxProgram:
         """Return when :meth:`run` will next do something by itself, if ever."""
         deadline_ns = self._watch.deadline_ns
         if self.jobs.moving and (self._reason_to_end(now_ns) or self.jobs.expelled):
-            # The permit or the owner went since the last cycle, or a halt was refused: try again.
+            # Permit or owner lost since the last cycle, or a halt was refused: try again.
             deadline_ns = self._next_cycle_ns(now_ns)
         if self._look_ns is None or deadline_ns is None:
             return deadline_ns if self._look_ns is None else self._look_ns

@@ -88,7 +88,7 @@ class RetainedMemory:
         self._slots.update(slots)
         self.boot_id, self.epoch = int(state["boot_id"]), int(state["epoch"])
         self.tool_changed = bool(state.get("tool_changed", False))
-        # A file of an earlier simulator has none; the one that was drawn stays and is kept.
+        # A file of an earlier simulator has none; the number drawn at the start stays.
         device_id = int(state.get("device_id", self.device_id))
         encode_device_id(device_id)
         self.device_id = device_id
@@ -123,7 +123,7 @@ class RetainedFile(StateFile):
         if document["schema"] != SCHEMA or document["machine"] != self._machine:
             raise ValueError(document["machine"])
         self._memory.restore(document["memory"])
-        return False  # it starts, and counts that
+        return False  # the PLC starts, and counts this start
 
     def _foreign(self, path: Path) -> str:
         return tr(

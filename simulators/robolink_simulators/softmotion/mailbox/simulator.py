@@ -38,7 +38,7 @@ from robolink_simulators.state_files import StateNotKeptError
 DEFAULT_KINEMATICS: Final = "Kin_Scara3_Z"
 
 _TORN_S: Final = 0.02
-"""Between the halves of a torn write for which no other time is given."""
+"""Time in seconds between the halves of a torn write, unless the fault gives another."""
 
 PlcMaker = Callable[[MachineModel, Mapping[str, float], PlcOptions], Plc]
 
@@ -158,7 +158,7 @@ class SoftMotionSimulator(HostedDevice):
 
     def advance(self, now_ns: int) -> None:
         """Let simulated time reach ``now_ns``, stopping wherever something changes."""
-        # Most calls come at the instant of the last one: then nothing lies in between.
+        # Most calls come at the same instant as the last one: nothing can have happened between.
         while now_ns > self.now_ns < (change := self.next_change() or now_ns) < now_ns:
             before_ns = self._presently_ns()
             self._step(change)
@@ -259,7 +259,7 @@ class SoftMotionSimulator(HostedDevice):
         self.faults.forget()
         starts, cuts = self.plc.starts, self.plc.cuts
         self._make()
-        self.plc.starts += starts  # hosts cut their links when they see another number
+        self.plc.starts += starts  # hosts cut their links when this number changes
         self.plc.cuts = cuts
 
     def _moment(self) -> dict[str, Any]:

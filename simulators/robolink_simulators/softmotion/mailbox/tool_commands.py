@@ -41,7 +41,7 @@ from robolink_simulators.softmotion.smc_errors import BlockRefused
 _NO_TOOL: Final[Six] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 _COUPLING: Final = "+"
 _LONGEST_MM: Final = 10_000.0
-"""What is longer is no tool but a mistake (docs/reference/mailbox.md, "Tools")."""
+"""Longest tool in mm. A longer one is an input error (docs/reference/mailbox.md, "Tools")."""
 
 
 class ToolDesk:
@@ -118,7 +118,7 @@ class ToolDesk:
     def _write(self, command: Command) -> CommandResult:
         number = require_slot(command.operands[0])
         require_finite(command.pose)
-        x, y, z, a, b, c = (part + 0.0 for part in command.pose)  # a minus zero is a zero
+        x, y, z, a, b, c = (part + 0.0 for part in command.pose)  # makes -0.0 a zero
         pose: Six = (x, y, z, a, b, c)
         lengths_mm = self._units.pose(pose)[:3]
         named = command.name.isascii() and command.name.isprintable()
@@ -144,7 +144,7 @@ class ToolDesk:
 
     def _read(self, command: Command) -> CommandResult:
         mode = ReadToolMode(require_operand(command.operands[0], range(len(ReadToolMode))))
-        # What was interrupted is the active movement of the mailbox.
+        # The interrupted movement is the active movement of the mailbox.
         waits = mode is ReadToolMode.ACTIVE_MOVEMENT and self._group.motion.interrupted
         try:
             tool = self._group.continue_tool_offset() if waits else self._group.read_tool(mode)
@@ -181,7 +181,7 @@ class ToolDesk:
         parameters = {key: value for key, value in self._parameters.items() if key in known}
         try:
             return machine_named(name, parameters).kinematics
-        except ConfigError:  # its own figures with the machine's parameters make none
+        except ConfigError:  # its values and the machine's parameters give no kinematics
             raise Rejected(ErrorClass.NO_KINEMATICS) from None
 
     def _apply(self, number: int, tool: Six, name: str) -> CommandResult:

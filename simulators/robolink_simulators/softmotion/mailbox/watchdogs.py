@@ -6,8 +6,9 @@ from robolink.protocols.mailbox import beats_for
 from robolink_simulators.device.wire_time import WireTime
 
 PATIENCE_NS: Final = 500_000_000
-"""Without a new beat for this long, what moves is halted (docs/reference/mailbox.md, "What ends by
-itself")."""
+"""Time in ns without a new beat after which movements are halted (docs/reference/mailbox.md, "What
+ends by itself").
+"""
 
 
 class ClientWatch:

@@ -27,13 +27,13 @@ from robolink_simulators.structured_text.program import ForeignParts
 
 MAIN: Final = "RL_PRG"
 FIRST_LEFT_OUT: Final = 25
-"""Cycles that are left out at first while nothing happens; then twice as many each time."""
+"""Number of cycles skipped at first while nothing happens. It doubles each time."""
 
 _GOING: Final = 1
 _REPLY: Final = 9
-"""Members of RL_Call: whether it is under way, and the state that the adapter replied."""
+"""Indices in RL_Call: ``_GOING`` for a command in progress, ``_REPLY`` for the adapter's reply."""
 _ENDED: Final = 10
-"""The lowest state of a command that has ended."""
+"""Lowest state of a command that has ended."""
 _HEARTBEAT: Final = 9
 _TOOL_SLOT: Final = 11
 _CAPABILITIES: Final = 90
@@ -75,8 +75,8 @@ class ExecutedMailbox:
         self.cycles = 0
         self.stands = False
         self._overrun = self._paced = 0
-        # The clock of a PLC began when it was switched on, nobody knows when; from it the program
-        # draws its number, where none is given.
+        # A PLC's clock starts at power-on, at an unknown time. From this clock the program
+        # draws its number if none is given.
         self._began_us = 0 if options.mailbox.device_id else _US * runtime.random_number(31)
         self._group = group
         self._units = units
@@ -223,14 +223,14 @@ class ExecutedMailbox:
         calls, seen = self._calls(), self._seen
         going = any((going or reply) and not (going and reply >= _ENDED) for going, reply in calls)
         moving = self._group.state is SmcGroupState.MOVING or not self._group.motion.resting
-        self._seen = (still, calls)  # a stop that is held goes on with its end replied
+        self._seen = (still, calls)  # a held stop continues after its end was replied
         self._restless = self._seen != seen or going or moving
         self._left_out = FIRST_LEFT_OUT if self._restless else 2 * self._left_out
 
     def _calls(self) -> Sequence[tuple[bool, int]]:
         try:
             calls: Sequence[Sequence[Any]] = self.structured.value("calls")
-        except KeyError:  # a program of another make
+        except KeyError:  # a program with another structure
             return ()
         return [(call[_GOING], call[_REPLY]) for call in calls]
 

@@ -41,7 +41,7 @@ _MEMBERS: Final[Mapping[str, ErrorKind]] = {
     "blending": ErrorKind.BLENDING_NOT_SUPPORTED,
     "byaxis": ErrorKind.INTERRUPTED_BY_SINGLE_AXIS,
 }
-"""Members of RL_Numbers, and what they number."""
+"""Kinds of errors by the member of RL_Numbers that gives their number."""
 
 
 class ErrorNumbers:
@@ -55,7 +55,7 @@ class ErrorNumbers:
         self._numbers = {
             kind: known.error(kind).number or -order for order, kind in enumerate(ErrorKind, 1)
         }
-        # One symbol covers both (documented): the program tells them apart by the kinematics.
+        # One symbol covers both (documented): the program distinguishes them by the kinematics.
         both = self._numbers[ErrorKind.TOOL_INCOMPATIBLE]
         self._numbers[ErrorKind.NO_ORIENTATION_IMAGE] = both
 
@@ -91,7 +91,7 @@ _MODES: Final = (
 )
 
 SYMBOLS: Final[Mapping[ScalarType, Sequence[str]]] = {COORD_SYSTEM: _SYSTEMS, BUFFER_MODE: _MODES}
-"""The names of enumerations, in the order of their numbers."""
+"""Names of enumeration members, in the order of their numbers."""
 
 
 def kinematics_types(name: str) -> Mapping[str, DataType]:

@@ -158,7 +158,7 @@ PROGRAM_SOURCES: Final = (
     ("robolink_softmotion.st", TextDialect.CODESYS),
     ("robolink_program.st", TextDialect.CODESYS),
 )
-"""The files that are executed, and what each may hold."""
+"""Source files that are executed, each with the dialect that it may use."""
 
 _SOMEBODY: Final = 0x5EE7_0002
 _FIRST_SLOT: Final = 1
@@ -217,7 +217,7 @@ class StructuredPlc(Plc):
             )
             self._executed.tell_before(encode_command(command))
             sequence, epoch = next_number(sequence), self.memory.epoch
-        self.memory.tool_changed = False  # the machine's program has seen that
+        self.memory.tool_changed = False  # the machine's program has seen the change
         self.memory.epoch = epoch_before
         self._take_over()
 

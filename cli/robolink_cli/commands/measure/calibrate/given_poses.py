@@ -141,7 +141,7 @@ def _calibrate(
     """Carry it out, or show what it would do; return the document."""
     with reporting(frame.report, controller) as draft:
         remark_on_pin(frame, controller)
-        # A pin that is kept needs its height.
+        # A pin that is recorded needs a height.
         needs = {*method.needs, "z_mm"} if frame.pin else {*method.needs}
         given = PointsSource(
             lambda: source.poses(controller, sorted(needs)),
@@ -166,7 +166,7 @@ def _calibrate(
         else:
             done = _carry_out(controller, frame, given, listener, order=order, describe=document)
             payload = document(done)
-            # Now, because Ctrl-C may come before the logout is answered.
+            # Now, because Ctrl-C may come before the logout is confirmed.
             _show_end(done.tools[0])
     return {**payload, "report": draft.saved}
 

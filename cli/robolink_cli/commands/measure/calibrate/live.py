@@ -126,7 +126,7 @@ def calibrate_live(frame: CalibrationRequest, source: Callable[[Controller], Tip
         LimitError: The foreseen course leads outside the limits; nothing was moved.
         VerifyError: The tip drifts too far; the old value was restored.
     """
-    # An order comes from a program, also where that has a terminal.
+    # An order comes from a program, even if the program has a terminal.
     alone = frame.assist is None and not frame.dry_run and frame.order is None
     guided_if_alone(
         frame.context,
@@ -218,7 +218,7 @@ def _change(
         )
         report = change.run()
         listener.note_proved(report)
-    # Now, because Ctrl-C may come before the logout is answered.
+    # Now, because Ctrl-C may come before the logout is confirmed.
     desk = current_desk()
     if desk is None:
         show_report(report.tools[0])

@@ -38,7 +38,7 @@ _CELL_KEYS: Final = {
     "residual_mm": "residual_tolerance_mm",
     "interval_mm": "interval_tolerance_mm",
 }
-"""Option to key in the cell file."""
+"""Keys of the cell file by option."""
 
 
 def calibration_options(function: Callable[..., None]) -> Callable[..., int | None]:
@@ -86,7 +86,7 @@ _LIMITS: Final = {
     "max_mm": "--max-residual",
     "interval_mm": "--max-interval",
 }
-"""The option of each of the limits that somebody may state."""
+"""Options by the limit that they set."""
 
 Decorator = Callable[[Callable[..., Any]], Callable[..., Any]]
 

@@ -48,7 +48,7 @@ def calibrate_with(
     higher = replace(limits, box=limits.box.larger(up_mm=parameters.height_mm()))
     frame = replace(frame, limits=higher, method=method.name, length=parameters.length_rule())
     place_mm = None if at is None else _three(at)
-    # Where a camera is to be found is another matter than what its pixels mean.
+    # A camera's address is independent of the meaning of its pixels.
     told = needs.station is not StationKind.CAMERA and (
         place_mm is not None or parameters.states_station()
     )

@@ -64,12 +64,13 @@ METHODS: Final[Mapping[str, Callable[[Node], Payload]]] = {
     "touch_evidence": touch_cases.touch_evidence,
     "verify_evidence": touch_cases.verify_evidence,
 }
-"""Methods by the names that the shared cases use."""
+"""Methods by their names in the shared cases."""
 
 _GAINS_OF: Final = ("two_pose", "two_pose_general", "n_angle", "n_angle_robust")
 _SEVERITY: Final = ("ok", "warn", "error")
 _MOST_BYTES: Final = 64_000_000
-"""A file of many cases is longer than anything else that is named."""
+"""Largest size of a cases file in bytes, above the limit for other files: it may hold many cases.
+"""
 
 
 def load(path: Path) -> Node:

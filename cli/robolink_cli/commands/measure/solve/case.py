@@ -15,12 +15,12 @@ from robolink.model import Hand, Pose, ToolOffset, WorkBox
 EULER: Final = "R=Rz(U)Ry(V)Rx(W)"
 
 Payload = dict[str, object]
-"""The answer to a case, plain values under the names of the shared cases."""
+"""The answer to a case: plain values by their names in the shared cases."""
 
 T = TypeVar("T")
 
 _HUGE: Final = 1e12
-"""No length or angle of a cell is larger, and squares of what is smaller are finite."""
+"""Limit above every length or angle in a cell. Squares of smaller values are finite."""
 
 _UNIT_WITHIN: Final = 0.01
 
@@ -390,7 +390,7 @@ _READERS: Final["Mapping[object, Callable[[Node], object]]"] = {
     cal.Touch: _record(cal.Touch, "z speed_mm_s"),
     cal.TouchedPlane: _plane,
 }
-"""How an object of the file is read, by what a solver takes in its place."""
+"""Readers of the objects in the file, by the type that a solver takes."""
 
 
 def unusable(path: str, why: str) -> ConfigError:

@@ -72,7 +72,7 @@ def needle_chain(node: Node) -> Payload:
     changes = node.whole("changes")
     if changes < 0:
         raise unusable(node.at("changes"), tr("expected: 0 or more"))
-    # Whatever is no shared touch is two touches a change, which is the larger.
+    # Anything but a shared touch counts as two touches per change, the larger uncertainty.
     shared = node.text("reference") == _SHARED
     u_mm = cal.chain_sigma_mm(
         node.number("u0_mm"), node.number("sigma_mm"), changes, shared_touch=shared
@@ -185,7 +185,7 @@ def _table(node: Node, axes: tuple[str, ...]) -> list[list[list[float]]]:
         {len(inner) for outer in table for inner in outer},
     )
     if axes == _AXES or any(len(size) != 1 for size in sizes):
-        return table  # what is missing is named by the solver
+        return table  # the solver names missing values
     place = [axes.index(axis) for axis in _AXES]
     n, o, r = (next(iter(sizes[at])) for at in place)
     found = [[[0.0] * r for _ in range(o)] for _ in range(n)]

@@ -132,7 +132,7 @@ def suggest_poses(node: Node) -> Payload:
     )
     return {
         "poses": [dict(zip("xyzuvw", pose.coordinates(), strict=True)) for pose in plan.poses],
-        # JSON has no infinity: after the first pose nothing is known yet.
+        # JSON has no infinity, which would be the value after the first pose.
         "sigma_gains": [None if gain == float("inf") else gain for gain in plan.sigma_gains],
     }
 

@@ -131,5 +131,5 @@ def _known_tip(node: Node) -> Payload:
     stored = node.child("stored")
     height = cal.TipHeight(stored.number("z"), sigma) if "z" in stored else None
     offset = read_offset(stored)
-    # Without a height only X and Y are kept, so that no Z of 0 is taken for one.
+    # Without a height only X and Y are kept, so that a Z of 0 is not taken for a height.
     return {} if height is None else {"stored": offset, "height": height}

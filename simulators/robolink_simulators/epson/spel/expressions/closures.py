@@ -101,7 +101,7 @@ def _strings(sign: str, left: str, right: str) -> Value:
 
 
 def _compare(sign: str, left: Value, right: Value) -> bool:
-    # Beside a Boolean the other side counts as zero or not zero (docs/reference/spel.md 2.1).
+    # With a Boolean, the other operand counts as zero or not zero (docs/reference/spel.md 2.1).
     if isinstance(left, bool) or isinstance(right, bool):
         return _COMPARE[sign](truth(left), truth(right))
     return _COMPARE[sign](as_number(left), as_number(right))
@@ -117,10 +117,10 @@ def _arithmetic(sign: str, left: Number, right: Number) -> Number:
             case "*":
                 return left * right
             case "/":
-                # Always a real; how integers divide is left open (docs/reference/spel.md 2.1).
+                # Always a real; integer division is not documented (docs/reference/spel.md 2.1).
                 return left / right
             case "mod":
-                # A whole number with the sign of the dividend (sign left open).
+                # An integer with the sign of the dividend (the sign is not documented).
                 if not int(right):
                     raise ZeroDivisionError
                 return int(math.fmod(int(left), int(right)))
@@ -165,7 +165,7 @@ class Surroundings(Protocol):
 
 
 Run = Callable[[Surroundings], Value]
-"""What works an expression out."""
+"""Evaluates an expression."""
 
 _WHOLE: Final[dict[str, Callable[[int, int], int]]] = {
     "+": operator.add,
@@ -174,7 +174,7 @@ _WHOLE: Final[dict[str, Callable[[int, int], int]]] = {
     **_BITS,
 }
 _OF_ANY_ROBOT: Final = frozenset({"insidebox", "insideplane"})
-"""Functions that take All for the number of a robot."""
+"""Functions that accept All as a robot number."""
 
 
 class Scope(Protocol):

@@ -45,7 +45,7 @@ from robolink_simulators.epson.spel.tree import (
 )
 
 FARTHEST: Final = 1e9
-"""Largest coordinate that a point may have (assumed), in mm or degrees."""
+"""Largest coordinate of a point, in mm or degrees (assumed)."""
 
 _HANDS = {"R": Hand.RIGHT, "L": Hand.LEFT}
 _ELBOWS = {"A": Elbow.ABOVE, "B": Elbow.BELOW}
@@ -53,7 +53,7 @@ _WRISTS = {"NF": Wrist.NO_FLIP, "F": Wrist.FLIP}
 
 
 _ADDITIONAL: Final = frozenset({"R", "S", "T", "ST"})
-"""Axes of joint robots, and additional ones (docs/reference/spel.md 5.2)."""
+"""Axes of joint robots and additional axes (docs/reference/spel.md 5.2)."""
 
 _MOST_REMEMBERED: Final = 2000
 
@@ -274,7 +274,7 @@ def _flagged(point: Point, word: str) -> Point:
         return replace(point, hand=_HANDS[word])
     if word.isdigit():
         return replace(point, local=_local_number(word))
-    # On a SCARA, which has none of them, they are kept without effect (assumed).
+    # A SCARA has none of them; it keeps them without effect (assumed).
     posture = point.posture or PLAIN
     if word in _ELBOWS:
         return replace(point, posture=replace(posture, elbow=_ELBOWS[word]))

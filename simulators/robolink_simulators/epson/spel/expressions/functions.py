@@ -149,7 +149,7 @@ TEXT_FUNCTIONS: Final[dict[str, tuple[range, Function]]] = {
     "btst": (range(2, 3), _tested(_BITS)),
     "btst64": (range(2, 3), _tested(_MORE_BITS)),
 }
-"""Name to the numbers of arguments allowed and the function."""
+"""Functions by name, each with its allowed numbers of arguments."""
 
 
 _LEADING_NUMBER = re.compile(
@@ -211,7 +211,7 @@ def _hex(arguments: Arguments) -> Value:
 
 
 def _val(arguments: Arguments) -> Value:
-    # Text that is no number gives 0 (assumed).
+    # Text that is not a number gives 0 (assumed).
     match = _LEADING_NUMBER.match(as_text(arguments[0]))
     if match is None:
         return 0
@@ -283,4 +283,4 @@ PLAIN_FUNCTIONS: Final[dict[str, tuple[range, Function]]] = {
     "fmtstr$": (range(2, 3), _fmtstr),
     **TEXT_FUNCTIONS,
 }
-"""Name to the numbers of arguments allowed and the function."""
+"""Functions by name, each with its allowed numbers of arguments."""

@@ -33,7 +33,7 @@ from robolink_simulators.epson.spel.session import Session
 Arguments = Sequence[Value]
 
 JOINT_COUNTS: Final = frozenset({4, 6})
-"""How many joints EPSON's robots have, as far as they are simulated."""
+"""Numbers of joints of the EPSON robots that are simulated."""
 
 _FOUR: Final = 4
 _HIGHEST_LJM: Final = 4
@@ -252,7 +252,7 @@ FLAG_FUNCTIONS: Final[dict[str, Callable[[Session, Arguments], Value]]] = {
     "j1angle": _of_singular_place(1),
     "j4angle": _of_singular_place(4),
 }
-"""Name to the function of a point, or without one of the arm."""
+"""Functions of a point by name; without a point they apply to the arm."""
 
 _NAMED: Final[dict[str, dict[int, Elbow | Wrist]]] = {
     "elbow": {number: elbow for elbow, number in _ELBOWS.items()},

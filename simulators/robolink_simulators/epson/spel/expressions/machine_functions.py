@@ -262,14 +262,14 @@ MACHINE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     "syncrobots": (range(1), _reserved),
     "ctrldev": (range(1), lambda s, _: s.machine.control_device),
 }
-"""Name to the numbers of arguments allowed and the function."""
+"""Functions by name, each with its allowed numbers of arguments."""
 
 
 OF_POINT_NUMBERS: Final[dict[str, Callable[[PointTable, int], Value]]] = {
     "plabel$": _label_of_point,
     "pdescription$": PointTable.description,
 }
-"""Functions of a point's own number: of P1, P(n), a label or a number."""
+"""Functions of a point's number, which is given as P1, P(n), a label or a number."""
 
 
 def clock_of(session: Session) -> datetime:
@@ -335,7 +335,7 @@ def _real_position(session: Session, _: Arguments) -> Point:
 
 def _found_position(session: Session, _: Arguments) -> Point:
     if session.machine.found is None:
-        # What FindPos gives before anything was found is not documented: an error here.
+        # The result of FindPos before anything was found is not documented: an error here.
         raise SpelRefusal(RefusalKind.POINT_UNDEFINED, "No Find has met its condition")
     return session.machine.found
 
@@ -395,4 +395,4 @@ POINT_FUNCTIONS: Final[dict[str, tuple[range, PointFunction]]] = {
     "vxtrans": (range(2, 4), _place_of_pixel),
     "ecpset": (range(1, 2), lambda s, a: Point(s.machine.control_points.get(as_integer(a[0])))),
 }
-"""Name to the numbers of arguments allowed and the function."""
+"""Functions by name, each with its allowed numbers of arguments."""

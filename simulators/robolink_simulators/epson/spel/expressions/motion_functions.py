@@ -57,7 +57,7 @@ DRIVE_VALUES: Final[dict[str, DriveValue]] = {
     "olrate": DriveObserver.overload,
     "realtorque": DriveObserver.present,
 }
-"""Name to what tells the value of a joint; the shares are told to six digits (assumed)."""
+"""Functions by name that return the value of a joint; shares have six digits (assumed)."""
 
 
 def joint_number(machine: Machine, number: int) -> int:
@@ -96,7 +96,7 @@ TORQUE_FUNCTIONS: Final[dict[str, tuple[range, MachineFunction]]] = {
     **{word: (range(1, 2), _told(tell)) for word, tell in DRIVE_VALUES.items()},
     "tcpspeed": (range(1), _speed_of_tip),
 }
-"""Name to the numbers of arguments allowed and the function."""
+"""Functions by name, each with its allowed numbers of arguments."""
 
 
 def _time_to(session: Session, arguments: Sequence[Value]) -> Value:
@@ -132,7 +132,7 @@ TRAVEL_FUNCTIONS: Final[dict[str, tuple[range, Callable[[Session, Sequence[Value
     "ptptime": (range(3, 4), _time_to),
     "ptpboostok": (range(1, 2), _short_enough),
 }
-"""Name to the numbers of arguments allowed and the function."""
+"""Functions by name, each with its allowed numbers of arguments."""
 
 
 _AXES: Final = 3
@@ -160,7 +160,7 @@ def turned_tool(session: Session, arguments: Sequence[Value]) -> Value:
 
 
 LEAST_TURN_DEG: Final = 0.001
-"""Assumed: a smaller turn counts as none."""
+"""Smallest turn in degrees that counts as one (assumed)."""
 
 
 def turn_deg(machine: Machine, start: Pose, end: Pose) -> float:
@@ -197,13 +197,13 @@ _Function = Callable[[Session, Sequence[Value]], Value]
 ORIENTATION_FUNCTIONS: Final[dict[str, tuple[range, _Function]]] = {
     "rotok": (range(1, 3), _may_turn),
 }
-"""Name to the numbers of arguments allowed and the function."""
+"""Functions by name, each with its allowed numbers of arguments."""
 
 
 Arguments = Sequence[Value]
 
 _COMPLETED: Final = 16
-"""From which bit JT tells which parts are completed; from bit 0, which have begun."""
+"""First bit of JT for the completed parts. The parts that have begun start at bit 0."""
 
 
 def _parts_of_jump(session: Session, _: Arguments) -> Value:
@@ -235,4 +235,4 @@ def place_to_recover(session: Session, arguments: Arguments) -> Point:
 UNFINISHED_FUNCTIONS: Final[dict[str, tuple[range, Callable[[Session, Arguments], Value]]]] = {
     "jt": (range(1), _parts_of_jump),
 }
-"""Name to the numbers of arguments allowed and the function."""
+"""Functions by name, each with its allowed numbers of arguments."""

@@ -17,10 +17,9 @@ from robolink_simulators.epson.spel.expressions.values import Number, Value, out
 
 CRLF: Final = "\r\n"
 LONGEST_PRINT: Final = 256
-"""Bytes that one Print may show (docs/reference/spel.md 3.2); what more does is assumed to be an
-error."""
+"""Most bytes that one Print can show (docs/reference/spel.md 3.2); more is an error (assumed)."""
 LONGEST_PRINT_TO: Final = 1024
-"""Bytes that one Print to a TCP/IP port may send (docs/reference/spel.md 3.2)."""
+"""Most bytes that one Print can send to a TCP/IP port (docs/reference/spel.md 3.2)."""
 
 _EXPONENT_FROM = 1e14
 _EXPONENT_BELOW = 1e-4

@@ -44,7 +44,7 @@ ARM_FUNCTIONS: Final[dict[str, tuple[range, Callable[[Session, Sequence[Value]],
     "armdef": (range(1, 2), lambda s, a: s.machine.kept.arms.is_defined(as_integer(a[0]))),
     "armset": (range(2, 3), _value),
 }
-"""Name to the numbers of arguments allowed and the function."""
+"""Functions by name, each with its allowed numbers of arguments."""
 
 
 def _side(session: Session, arguments: Sequence[Value]) -> Value:
@@ -58,13 +58,13 @@ def _side(session: Session, arguments: Sequence[Value]) -> Value:
 ARCH_FUNCTIONS: Final[dict[str, tuple[range, Callable[[Session, Sequence[Value]], Value]]]] = {
     "arch": (range(2, 3), _side),
 }
-"""Name to the numbers of arguments allowed and the function."""
+"""Functions by name, each with its allowed numbers of arguments."""
 
 
 Arguments = Sequence[Value]
 
 ANY_ROBOT: Final = "all"
-"""What stands for All among the arguments of InsideBox and InsidePlane."""
+"""Value of the argument All of InsideBox and InsidePlane."""
 
 
 def _robot(session: Session, arguments: Arguments, at: int) -> DrivenRobot:
@@ -153,7 +153,7 @@ AREA_FUNCTIONS: Final[dict[str, tuple[range, Callable[[Session, Arguments], Valu
     "boxdef": (range(1, 3), _defined("box")),
     "planedef": (range(1, 3), _defined("plane")),
 }
-"""Name to the numbers of arguments allowed and the function."""
+"""Functions by name, each with its allowed numbers of arguments."""
 
 
 def corner_of_limits(session: Session, arguments: Sequence[Value]) -> Point:
@@ -183,7 +183,7 @@ LIMIT_FUNCTIONS: Final[dict[str, tuple[range, Callable[[Session, Sequence[Value]
     "xylimdef": (range(1), lambda s, _: s.machine.kept.limits.defined),
     "xylimmode": (range(1), lambda s, _: int(s.machine.kept.limits.strict)),
 }
-"""Name to the numbers of arguments allowed and the function."""
+"""Functions by name, each with its allowed numbers of arguments."""
 
 
 def _told(word: str) -> Callable[[Session, Sequence[Value]], Value]:
@@ -214,7 +214,7 @@ DRIVE_FUNCTIONS: Final[dict[str, tuple[range, Callable[[Session, Sequence[Value]
     "jrange": (range(2, 3), _end_of_range),
     "finestatus": (range(1), lambda s, _: int(s.machine.robot.drives.get("finedist")[0] > 0)),
 }
-"""Name to the numbers of arguments allowed and the function."""
+"""Functions by name, each with its allowed numbers of arguments."""
 
 
 NS_PER_HOUR: Final = 3600 * NS_PER_S
@@ -269,4 +269,4 @@ ORIGIN_FUNCTIONS: Final[dict[str, tuple[range, Callable[[Session, Arguments], Va
     "brake": (range(1, 2), _brake),
     "mhour": (range(2), _motor_hours),
 }
-"""Name to the numbers of arguments allowed and the function."""
+"""Functions by name, each with its allowed numbers of arguments."""

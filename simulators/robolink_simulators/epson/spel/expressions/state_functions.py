@@ -23,7 +23,8 @@ Arguments = Sequence[Value]
 StateFunction = Callable[[Session, Arguments], Value]
 
 _VERSION: Final = {5: 5_040_000, 7: 7_050_400, 8: 8_010_000}
-"""CtrlInfo(9): major, minor, revision and build, two digits each but the first."""
+"""CtrlInfo(9) by RC+ version: major, minor, revision and build, two digits each except the first.
+"""
 
 _HIGHEST_LANGUAGE: Final = 6
 
@@ -162,4 +163,4 @@ STATE_FUNCTIONS: Final[dict[str, tuple[range, StateFunction]]] = {
     "projectname$": (range(1), lambda s, _: s.project_name),
     "tw": (range(1), lambda s, _: s.memory.timed_out),
 }
-"""Name to the numbers of arguments allowed and the function."""
+"""Functions by name, each with its allowed numbers of arguments."""

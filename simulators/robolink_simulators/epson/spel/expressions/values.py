@@ -125,7 +125,9 @@ def number_value(text: str) -> int | float:
 Store = Callable[[Value], Value]
 
 _REAL_DIGITS: Final = 7
-"""Single precision; the reference says 6 valid digits and prints 7 (docs/reference/spel.md 3.2)."""
+"""Digits of single precision. The reference says 6 valid digits and prints 7
+(docs/reference/spel.md 3.2).
+"""
 
 MOST_SUBSCRIPTS: Final = 3
 
@@ -136,7 +138,7 @@ _MOST_ELEMENTS: Final = {
     "global": (100_000, 10_000),
     "preserve": (4000, 400),
 }
-"""Elements of an array by how long it lives: of numbers, of texts (docs/reference/spel.md 2)."""
+"""Most elements of an array by lifetime: of numbers, of texts (docs/reference/spel.md 2)."""
 
 
 class DataType(NamedTuple):
@@ -157,7 +159,7 @@ def _whole(low: int, high: int, name: str) -> Store:
     def store(value: Value) -> Value:
         if type(value) is int and low <= value <= high:
             return value
-        # Cut, not rounded: EPSON's own code halves a CRC so (docs/reference/spel.md 2.1).
+        # Truncated: EPSON's own code halves a CRC in this way (docs/reference/spel.md 2.1).
         number = int(as_number(value))
         if not low <= number <= high:
             kind = RefusalKind.OVERFLOW if number > high else RefusalKind.UNDERFLOW
@@ -248,7 +250,7 @@ def most_elements(kind: DataType, life: str) -> int:
 
 
 Cells = list[Value] | _Element
-"""Where a variable keeps what it holds: a list, or one place in another variable's list."""
+"""Storage of a variable: a list, or one element of another variable's list."""
 
 
 def elements(bounds: Sequence[int]) -> int:

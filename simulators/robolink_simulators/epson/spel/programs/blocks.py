@@ -28,7 +28,7 @@ from robolink_simulators.epson.spel.tasks.compiled_program import JumpTarget
 from robolink_simulators.epson.spel.tree import Expression
 
 DEEPEST_FOR = 10
-"""For in For (docs/reference/spel.md 4.3)."""
+"""Deepest nesting of For (docs/reference/spel.md 4.3)."""
 
 _ENDS = {"if": "EndIf", "select": "Send", "for": "Next", "do": "Loop"}
 

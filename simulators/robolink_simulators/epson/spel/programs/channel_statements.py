@@ -374,7 +374,7 @@ CHANNEL_STATEMENTS: Final[dict[str, Callable[[Emitter, ChannelStatement], Operat
     "write": _write,
     "writebin": _write_binary,
 }
-"""Keyword to what compiles it."""
+"""Compilers of statements by keyword."""
 
 
 def _open_file(emitter: Emitter, node: ChannelStatement) -> Operation:
@@ -414,4 +414,4 @@ FILE_STATEMENTS: Final[dict[str, Callable[[Emitter, ChannelStatement], Operation
     "flush": _flush,
     "seek": _seek,
 }
-"""Keyword to what compiles it."""
+"""Compilers of statements by keyword."""

@@ -27,14 +27,14 @@ from robolink_simulators.epson.spel.tree import (
 )
 
 _NAMES_A_TASK: Final = frozenset({"taskstate", "taskdone", "taskinfo", "taskinfo$"})
-"""Functions whose argument may name a function that is not called by that."""
+"""Functions whose argument may name another function without calling it."""
 
 _Node = TypeVar("_Node")
 _Maker = Callable[[SpelTask], Variable]
 
 
 FunctionOfArray = Callable[["Emitter", Sequence[Expression], int], Operation]
-"""Compiles a function of the language that takes an array; its result goes to a slot."""
+"""Compiles a SPEL+ function that takes an array. Its result goes to a slot."""
 
 
 class Emitter:

@@ -92,7 +92,7 @@ FamilyStatement = (
 )
 
 PROCEDURE_TABLES: Final = (PROCEDURES, TIMERS)
-"""Statements written as a call; the first table that knows a name compiles it."""
+"""Tables of the statements written as a call. The first table that has the name compiles it."""
 
 _Compiler = Callable[[Emitter, Call], Operation]
 
@@ -129,7 +129,7 @@ def compile_family(
 
 
 Line = tuple[SourcePlace, str | None, Sequence[LineNode]]
-"""A line: where it is, its label, its statements."""
+"""A line: its position, its label and its statements."""
 
 
 class FunctionCompiler:

@@ -26,7 +26,7 @@ from robolink_simulators.epson.spel.tasks.compiled_program import (
 from robolink_simulators.epson.spel.tasks.task import DEEPEST_CALL, SpelTask
 
 SWITCHED: Final = object()
-"""What an operation gives when the task goes on in another function."""
+"""Returned by an operation after which the task continues in another function."""
 
 
 def condition_holds(value: Value) -> bool:

@@ -240,7 +240,7 @@ class ProjectBuilder:
             except ProgramFault as fault:
                 self._faults.append(fault)
                 if current is None and _BEGINS_A_FUNCTION.match(line.text):
-                    # What follows is inside all the same: one mistake is told once.
+                    # The lines that follow still count as inside: one mistake is reported once.
                     current = _Outline(FunctionHeader("", "", (), None), line.place, module)
         self._faults += preprocessor.faults
         if current is not None:
@@ -317,7 +317,7 @@ class ProjectBuilder:
     def _announce(self, outline: _Outline) -> None:
         """Make a function known to the others before any is compiled."""
         header, scope = outline.header, self._scope(outline.module)
-        # A function without a type gives a number nobody reads.
+        # A function without a type returns a number that nobody reads.
         kind = self._types[header.type_name or "integer"]
         function = CompiledFunction(
             header.name, header.spelled, outline.place, scope, len(header.parameters)

@@ -16,10 +16,10 @@ from robolink_simulators.epson.spel.tasks.task_functions import task_function
 from robolink_simulators.epson.spel.tree import Expression
 
 ENUMERATED: Final = frozenset({"forced", "merge", "error", "all", "none", "outside"})
-"""Words among the arguments of statements that are no names."""
+"""Words among the arguments of statements that are not names."""
 
 Reference = Callable[[Surroundings], Variable]
-"""What gives a variable itself, and not what it holds."""
+"""Returns a variable itself instead of its value."""
 
 
 @dataclass(slots=True)

@@ -339,7 +339,7 @@ TASK_STATEMENTS: Final[dict[str, Callable[[Emitter, TaskStatement], Operation]]]
     "restart": _restart,
     "startmain": _start_main,
 }
-"""Keyword to what compiles it."""
+"""Compilers of statements by keyword."""
 
 
 def compile_trap(emitter: Emitter, node: Trap, label: JumpTarget | None) -> Operation:
@@ -432,4 +432,4 @@ TIMERS: Final[dict[str, Callable[[Emitter, Call], Operation]]] = {
     "resetelapsedtime": _reset_elapsed,
     "randomize": _randomize,
 }
-"""Statements that are written as calls."""
+"""Compilers of the statements written as calls, by name."""

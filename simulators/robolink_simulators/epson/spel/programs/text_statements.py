@@ -181,7 +181,7 @@ PROCEDURES: Final[dict[str, Callable[[Emitter, Call], Operation]]] = {
     "eval": _evaluate,
     "spelcom_event": _tell,
 }
-"""Statements that are written as calls."""
+"""Compilers of the statements written as calls, by name."""
 
 FUNCTIONS_OF_ARRAYS: Final[dict[str, Callable[[Emitter, Sequence[Expression], int], Operation]]] = {
     "parsestr": parse_text,
@@ -189,4 +189,4 @@ FUNCTIONS_OF_ARRAYS: Final[dict[str, Callable[[Emitter, Sequence[Expression], in
     "recover": recovered,
     "ubound": upper_bound,
 }
-"""Functions that take a variable itself, and not what it holds."""
+"""Compilers, by name, of the functions that take a variable itself instead of its value."""

@@ -151,7 +151,7 @@ def _setting(
 
 
 _SETTLING_NS: Final = 500_000_000
-"""Between a motion and its picture: nMotionDelay of the calibrations that were seen."""
+"""Time in ns between a motion and its picture: nMotionDelay of the calibrations that were seen."""
 
 _NO_OPTIONS: Final = MotionOptions()
 
@@ -233,4 +233,4 @@ VISION_STATEMENTS: Final[dict[str, Callable[[Emitter, VisionStatement], Operatio
     "vsaveimage": compile_image,
     "vxcalib": _calibrate_image,
 }
-"""Statements about the vision project and its calibrations."""
+"""Compilers of the statements about the vision project and its calibrations, by keyword."""

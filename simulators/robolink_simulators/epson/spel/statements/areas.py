@@ -40,7 +40,7 @@ def _box(evaluator: Evaluator, command: KeywordStatement) -> str:
         return _listing(machine, [evaluator.integer(a) for a in arguments], _boxes)
     number, *values = (evaluator.number(argument) for argument in arguments)
     robot = machine.robot
-    # Whose On or Off follows names its robot too (documented): eight values are a robot's.
+    # A Box with On or Off also names its robot (documented): eight values begin with it.
     if len(values) > _SPANS:
         robot = machine.numbered(int(values.pop(0)))
     shows_on = bool(values.pop()) if len(values) == _WITH_LOGIC else True
@@ -130,11 +130,11 @@ AREA_STATEMENTS: Final[dict[str, Callable[[Evaluator, KeywordStatement], str]]] 
     "plane": _plane,
     "planeclr": _clear,
 }
-"""Keyword to what carries it out."""
+"""Statement handlers by keyword."""
 
 
 _LOOKS_A_LEG: Final = 200
-"""Assumed: places of a leg that are looked at in mode 1."""
+"""Number of positions checked along a leg in mode 1 (assumed)."""
 
 _SAME_MM: Final = 1e-6
 
@@ -202,4 +202,4 @@ LIMIT_SETTINGS: Final[dict[str, Callable[[Machine, Sequence[Number]], str]]] = {
     "xylimclr": _clear_limits,
     "xylimmode": _mode,
 }
-"""Keyword to what sets or shows it."""
+"""Functions that set or show a setting, by keyword."""

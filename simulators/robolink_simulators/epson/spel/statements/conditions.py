@@ -36,7 +36,7 @@ from robolink_simulators.epson.spel.tree import (
 )
 
 LONGEST_WAIT_S: Final = 2_147_483
-"""Longest Wait (docs/reference/spel.md 4.6)."""
+"""Longest Wait in seconds (docs/reference/spel.md 4.6)."""
 
 NEVER_NS: Final = 2**62
 
@@ -49,7 +49,7 @@ _EVENT_WORDS = """
 _EVENTS: Final = frozenset(_EVENT_WORDS.split())
 
 LOOK_NS: Final = 2_000_000
-"""Assumed: how often a condition is looked at that another place of a moving robot may meet."""
+"""Interval in ns between checks of a condition that a moving robot may meet elsewhere (assumed)."""
 
 _OF_THE_PLACE = """
     getrobotinsidebox getrobotinsideplane insidebox insideplane athome inpos here curpos realpos
@@ -127,7 +127,7 @@ class Waiting:
             if self.holds():
                 return seen_ns + 1  # switched just now
         except SpelRefusal:
-            return seen_ns + 1  # whoever looks then is told why
+            return seen_ns + 1  # the next check reports the reason
         machine = self._evaluator.session.machine
         coming_ns = machine.timed_bits.next_change()
         look_ns = min(self._end_ns, NEVER_NS if coming_ns is None else coming_ns)
@@ -215,10 +215,11 @@ def shown_condition(expression: Expression) -> str:
 
 
 _SAMPLE_NS: Final = 1_000_000
-"""A condition that holds for less is not seen (assumed: controllers sample their inputs)."""
+"""A condition that holds for less than this, in ns, is missed (assumed: controllers sample inputs).
+"""
 
 _INPUTS: Final = frozenset({"sw", "in", "inw", "on", "off"})
-"""Functions of inputs, and the values to which they are compared."""
+"""Functions of inputs, and the values with which they are compared."""
 
 
 class Watch:

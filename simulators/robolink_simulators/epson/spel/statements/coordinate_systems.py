@@ -48,10 +48,10 @@ from robolink_simulators.epson.spel.tree import (
 )
 
 _SHORTEST_MM: Final = 1e-3
-"""Assumed: points nearer than this, or nearer to one line, give no direction."""
+"""Points closer together than this, in mm, or closer to one line, define no direction (assumed)."""
 
 Pair = tuple[Coordinates, Coordinates]
-"""A place as a local sees it, and as the base does."""
+"""A position in local coordinates and in base coordinates."""
 
 
 def frame_of_points(origin: Vector, x_at: Vector, y_at: Vector, *, along_x: bool = True) -> Frame:
@@ -162,7 +162,7 @@ def _base(evaluator: Evaluator, command: KeywordStatement) -> str:
 
 
 BASE_STATEMENTS: Final[dict[str, Callable[[Evaluator, KeywordStatement], str]]] = {"base": _base}
-"""Keyword to what carries it out."""
+"""Statement handlers by keyword."""
 
 
 _LEVEL_DEG: Final = 1e-6
@@ -185,7 +185,7 @@ def _local(evaluator: Evaluator, command: KeywordStatement) -> str:
         raise command.miscounted()
     number, locals_ = evaluator.integer(arguments.pop(0)), evaluator.session.machine.locals
     if not arguments:
-        # The layout is not shown anywhere: as ArmSet prints (assumed).
+        # The layout is not documented: the one of ArmSet is used (assumed).
         x, y, z, u, v, w, _ = astuple(locals_.get(number))
         return f"Local {number}: " + ", ".join(map(decimal, (x, y, z, u, v, w))) + CRLF
     made = _made(evaluator, command, arguments, words)
@@ -254,7 +254,7 @@ PLACE_STATEMENTS: Final[dict[str, Callable[[Evaluator, KeywordStatement], str]]]
     "pallet outside": _pallet,
     "palletclr": _clear_pallet,
 }
-"""Keyword to what carries it out."""
+"""Statement handlers by keyword."""
 
 
 _COUNTS: Final = range(3, 6)
@@ -271,7 +271,7 @@ def _arm(machine: Machine, values: Sequence[Number]) -> str:
             return f"{machine.kept.arms.selected}" + CRLF
         case [number]:
             if number and machine.model.six_axes:
-                # Which of its twelve values are angles of which joints is not described.
+                # The reference does not say which of its twelve values are angles of which joints.
                 machine.kept.arms.values(int(number))
                 raise SpelRefusal(RefusalKind.NOT_SIMULATED, "An added arm of six axes")
             machine.robot.put_in_force(int(number))
@@ -310,4 +310,4 @@ ARM_SETTINGS: Final[dict[str, Callable[[Machine, Sequence[Number]], str]]] = {
     "armset": _arm_set,
     "armclr": _arm_clear,
 }
-"""Keyword to what sets or shows it."""
+"""Functions that set or show a setting, by keyword."""

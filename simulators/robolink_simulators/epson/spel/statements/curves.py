@@ -204,7 +204,9 @@ _MOST: Final = 1000
 _MODES: Final = 256
 _LOW_MODES: Final = 16
 _SAME: Final = 0.01
-"""Assumed: how near the first point, in mm and degrees, the tip has to stand for CVMove."""
+"""Largest distance of the tip from the first point at which CVMove can start, in mm and degrees
+(assumed).
+"""
 
 
 def store_curve(evaluator: Evaluator, motion: MotionStatement) -> None:
@@ -241,7 +243,7 @@ def _mode(evaluator: Evaluator, target: Target) -> tuple[int, bool]:
     if low not in (0, TANGENTIAL):
         raise SpelRefusal(RefusalKind.NOT_SIMULATED, "A curve of another mode than 0 and 2")
     if low and control_point:
-        # Whether the tangent lies in the plane of the point or of the workpiece is not said.
+        # Not documented: does the tangent lie in the plane of the point or of the workpiece?
         text = "A tool that follows a curve past an external control point"
         raise SpelRefusal(RefusalKind.NOT_SIMULATED, text)
     if control_point:

@@ -43,11 +43,11 @@ from robolink_simulators.epson.spel.statements.settings import SETTINGS, SYSTEM_
 from robolink_simulators.epson.spel.tree import KeywordStatement, Name
 
 LATCH_SETTING_NS: Final = 40_000_000
-"""How long SetLatch takes (documented, p. 721)."""
+"""Duration of SetLatch in ns (documented, p. 721)."""
 
 SHORTEST_PULSE_S: Final = 0.01
 LONGEST_PULSE_S: Final = 10.0
-"""Times after which On and Off switch back (docs/reference/spel.md 8)."""
+"""Longest time in seconds after which On and Off can switch back (docs/reference/spel.md 8)."""
 
 
 class TimedBit(NamedTuple):
@@ -332,7 +332,7 @@ _AT_ONCE: Final = {
     **POINT_FILE_COMMANDS,
     **SYSTEM_COMMANDS,
 }
-"""Statements that take no time: keyword to what carries it out and returns what it prints."""
+"""Handlers of the statements that take no time, by keyword. Each returns the printed text."""
 
 _HANDLERS: Final[dict[str, Callable[[Evaluator, KeywordStatement], StatementOutcome]]] = {
     "tlset": _tlset,

@@ -119,11 +119,11 @@ def _sync(evaluator: Evaluator, command: KeywordStatement) -> str:
 SYNC_STATEMENTS: Final[dict[str, Callable[[Evaluator, KeywordStatement], str]]] = {
     "syncrobots": _sync
 }
-"""Keyword to what carries it out."""
+"""Statement handlers by keyword."""
 
 
 DESCENT = 2
-"""Which leg of a Jump is the descent; Sense is looked at just before it (documented)."""
+"""Index of the leg of a Jump that is the descent. Sense is checked just before it (documented)."""
 
 
 def jump(
@@ -190,7 +190,7 @@ def _joints(machine: Machine, tip: Pose) -> Joints:
 _SAME_MM = 0.001
 
 # LJM leaves a SCARA's point unchanged (documented); TGo and BGo move six axes
-# the least. An arch rounds Jump; Jump3 comes to rest at its corners under each (assumed).
+# the least. An arch rounds Jump; Jump3 stops at its corners with any arch (assumed).
 _UNTIL_WORDS: Final = frozenset({"till", "find"})
 _JOINT_WORDS: Final = frozenset({"cp", "sync"}) | _UNTIL_WORDS
 _LINE_WORDS: Final = frozenset({"rot"}) | _JOINT_WORDS

@@ -138,4 +138,4 @@ POINT_STATEMENTS: Final[dict[str, Callable[[Evaluator, KeywordStatement], str]]]
     "ecpclr": _no_control_point,
     **dict.fromkeys(FLAG_FUNCTIONS, _flag),
 }
-"""Keyword to what carries it out."""
+"""Statement handlers by keyword."""

@@ -119,4 +119,4 @@ BIT_STATEMENTS: Final[dict[str, Callable[[Evaluator, KeywordStatement], str]]] =
     "ctreset": _reset_counter,
     "latchenable": _enable_latch,
 }
-"""Keyword to what carries it out."""
+"""Statement handlers by keyword."""

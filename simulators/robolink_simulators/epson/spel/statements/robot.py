@@ -153,7 +153,7 @@ ORIGIN_STATEMENTS: Final[dict[str, Callable[[Machine, Numbers], str]]] = {
     "homeclr": _forget_home,
     "brake": _brake,
 }
-"""Keyword to what carries it out; what is shown comes back as text."""
+"""Statement handlers by keyword. Each returns the shown text."""
 
 
 _JRANGE_VALUES: Final = 3
@@ -197,7 +197,7 @@ def _home_order(machine: Machine, values: Numbers) -> None:
 
 _HIGHEST_FINE: Final = 65535
 _HEAVIEST_KG: Final = 20.0
-"""Assumed; per model in the reference, where too much is an error."""
+"""Largest load in kg (assumed). The reference gives it per model; a larger one is an error."""
 
 
 def _within(value: Number, low: float, high: float) -> float:
@@ -227,7 +227,7 @@ def _fine(machine: Machine, values: Numbers) -> str:
     if not values:
         return ", ".join(map(str, machine.settings.fine_pulses)) + CRLF
     machine.settings.fine_pulses = tuple(int(_within(value, 0, _HIGHEST_FINE)) for value in values)
-    # The one of Fine and FineDist counts that was said last (assumed).
+    # Of Fine and FineDist, the one set last applies (assumed).
     machine.robot.drives.set("finedist", (0.0,))
     return ""
 
@@ -338,4 +338,4 @@ ROBOT_SETTINGS: Final[dict[str, Setting]] = {
     "singularityspeed": _surroundings("speed_percent", 100),
     "singularitydist": _surroundings("distance_mm", 1000),
 }
-"""Keyword to what sets or shows it; what is shown comes back as text."""
+"""Functions that set or show a setting, by keyword. Each returns the shown text."""

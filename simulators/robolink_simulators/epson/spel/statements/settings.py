@@ -51,13 +51,13 @@ Numbers = Sequence[Number]
 Setting = Callable[[Machine, Numbers], str]
 
 HIGHEST_ACCEL_S: Final = 25_000.0
-"""AccelS in mm/s2 of most SCARA robots (docs/reference/spel.md 7.2)."""
+"""Highest AccelS in mm/s2 of most SCARA robots (docs/reference/spel.md 7.2)."""
 
 HIGHEST_SPEED_R: Final = 1000.0
-"""SpeedR in degrees/s (docs/reference/spel.md 7.2)."""
+"""Highest SpeedR in degrees/s (docs/reference/spel.md 7.2)."""
 
 HIGHEST_ACCEL_R: Final = 5000.0
-"""AccelR in degrees/s2 (docs/reference/spel.md 7.2)."""
+"""Highest AccelR in degrees/s2 (docs/reference/spel.md 7.2)."""
 
 
 def expect(values: Numbers, *counts: int) -> None:
@@ -152,7 +152,7 @@ def _speed_r(machine: Machine, values: Numbers) -> None:
 
 @setting(lambda machine: _shown(machine.parameters.accel_r), 1, 2)
 def _accel_r(machine: Machine, values: Numbers) -> None:
-    # One value rules both ends of a turn here; the slower of two is taken.
+    # One value applies to both ends of a turn here: the lower of the two.
     machine.parameters.accel_r = min(_checked(values, 0.1, HIGHEST_ACCEL_R))
 
 
@@ -193,7 +193,7 @@ SETTINGS: Final[dict[str, Setting]] = {
     "power": _power,
     "robot": _robot,
 }
-"""Keyword to what sets or shows it; what is shown comes back as text."""
+"""Functions that set or show a setting, by keyword. Each returns the shown text."""
 
 
 def _listed(setting: DriveSetting, values: Sequence[float]) -> str:
@@ -236,7 +236,7 @@ def _setting(word: str) -> Callable[[Machine, Sequence[Number]], str]:
 DRIVE_STATEMENTS: Final[dict[str, Callable[[Machine, Sequence[Number]], str]]] = {
     word: _setting(word) for word in DRIVE_SETTINGS
 }
-"""Keyword to what sets or shows it."""
+"""Functions that set or show a setting, by keyword."""
 
 
 _LISTED: Final = 6
@@ -275,7 +275,7 @@ TORQUE_STATEMENTS: Final[dict[str, Setting]] = {
     **{word: _listing(DRIVE_VALUES[word]) for word in ("atrq", "ptrq", "avgspeed", "peakspeed")},
     "olrate": _listing(DriveObserver.overload, _DECIMALS_OF_OVERLOAD),
 }
-"""Keyword to what clears or shows it."""
+"""Functions that clear or show a value, by keyword."""
 
 
 def _arch(machine: Machine, values: Sequence[Number]) -> str:
@@ -291,7 +291,7 @@ def _arch(machine: Machine, values: Sequence[Number]) -> str:
 
 
 ARCH_SETTINGS: Final[dict[str, Callable[[Machine, Sequence[Number]], str]]] = {"arch": _arch}
-"""Keyword to what sets or shows it."""
+"""Functions that set or show a setting, by keyword."""
 
 
 _LIMITS_LISTED: Final = 6
@@ -340,4 +340,4 @@ def _row(word: str, values: Iterable[float]) -> str:
 SYSTEM_COMMANDS: Final[dict[str, Callable[[Evaluator, KeywordStatement], str]]] = {
     "sysconfig": _system_listing
 }
-"""Keyword to what carries it out."""
+"""Statement handlers by keyword."""

@@ -28,7 +28,9 @@ if TYPE_CHECKING:
 FILE_NUMBERS: Final = range(30, 64)
 _END: Final = b"\r\n"
 _LARGEST: Final = 64 * 1024 * 1024
-"""Assumed, in bytes: a loop that only writes ends with an error, and not with a full disk."""
+"""Largest file in bytes (assumed). A loop that only writes ends in an error instead of filling the
+disk.
+"""
 
 _WAYS: Final = {"r": "rb", "w": "wb", "a": "ab", "u": "r+b", "b": "r+b"}
 
@@ -232,7 +234,9 @@ class OpenFiles:
 
 
 WINDOW_NUMBERS: Final = (20, 21, 24)
-"""A pendant, RC+, another pendant: one and the same window here (docs/reference/spel.md 17)."""
+"""Channel numbers of a pendant, RC+ and another pendant: all the same window here
+(docs/reference/spel.md 17).
+"""
 
 USUAL_WINDOW: Final = 21
 

@@ -9,7 +9,7 @@ from robolink_simulators.epson.spel.expressions.values import DataType, Variable
 from robolink_simulators.epson.spel.source_text import SourcePlace
 
 Operation = Callable[[Any], Any]
-"""One step of a ``SpelTask``. It gives ``None`` when it is done, or what is to be waited for."""
+"""One step of a ``SpelTask``. Returns ``None`` when done, otherwise what the task must wait for."""
 
 
 class JumpTarget:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 COM_NUMBERS: Final = (*range(1, 5), *range(1001, 1009))
-"""Of the controller, and of the PC (docs/reference/spel.md 17)."""
+"""Numbers of the COM ports of the controller and of the PC (docs/reference/spel.md 17)."""
 
 
 @dataclass(frozen=True, slots=True)

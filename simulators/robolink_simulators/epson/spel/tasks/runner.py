@@ -121,14 +121,15 @@ class TaskTable:
 
 
 BURST_NS: Final = 1_000_000
-"""How long a task goes on before the others are looked at, in ns, if none of them is due."""
+"""Time in ns for which a task runs before the others get their turn, if none of them is due."""
 
 NO_JOINT: Final = 0
-"""The joint of an error that lies at none; which joint met it, no error tells here."""
+"""Joint number of an error that concerns no joint. No error here reports the joint it occurred at.
+"""
 
 _CONSOLE_LINES: Final = 2000
 TraceHook = Callable[[SpelTask, str, int, str], None]
-"""Called with a task, file, line and text before each statement."""
+"""Called before each statement with the task, the file, the line number and the text."""
 
 
 class ProgramRunner:
@@ -388,7 +389,7 @@ class ProgramRunner:
 _LONGEST_NAP_NS: Final = 20_000_000
 
 Advance = Callable[[int], None]
-"""Lets a controller's simulated time reach an instant."""
+"""Advances a controller's simulated time to an instant."""
 
 
 def run_to_end(

@@ -12,7 +12,7 @@ from robolink_simulators.epson.spel.expressions.values import out_of_range
 from robolink_simulators.epson.spel.tasks.task import SpelTask
 
 HIGHEST_NUMBER: Final = 63
-"""Of locks, signals and timers."""
+"""Highest number of a lock, signal or timer."""
 
 
 class TaskSharing:

@@ -27,7 +27,9 @@ from robolink_simulators.epson.spel.tasks.waits import (
 )
 
 DEEPEST_CALL: Final = 200
-"""Functions, or subroutines of one, that may call each other (no limit is mentioned; assumed)."""
+"""Deepest nesting of calls of functions, or of subroutines in a function (no limit is documented;
+assumed).
+"""
 
 
 class TaskKind(StrEnum):
@@ -296,7 +298,7 @@ class SpelTask(Evaluator):
 EVENTS: Final = frozenset({"emergency", "error", "pause", "sgopen", "sgclose", "abort", "finish"})
 HIGHEST_TRAP: Final = 4
 TOLD_OF_ERROR: Final = ("number", "robot", "joint")
-"""What a function of Trap Error may take: three Integer by value (p. 855)."""
+"""Parameters that a function of Trap Error may have: three Integer by value (p. 855)."""
 
 
 @dataclass(frozen=True, slots=True)

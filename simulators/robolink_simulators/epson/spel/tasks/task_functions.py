@@ -134,7 +134,7 @@ TASK_FUNCTIONS: Final[dict[str, tuple[range, TaskFunction]]] = {
     "freefile": (range(1), lambda t, _: _runner(t).channels.files.free_number()),
     "opennet": (range(1, 2), lambda t, a: _runner(t).ports.owner_number(as_integer(a[0]))),
 }
-"""Name to the numbers of arguments allowed and the function."""
+"""Functions by name, each with its allowed numbers of arguments."""
 
 _OF_TASKS: Final = frozenset({"taskstate", "taskdone", "taskinfo", "taskinfo$"})
 

@@ -29,10 +29,10 @@ _WORDS = """
 """
 FORBIDDEN: Final = frozenset(_WORDS.split())
 _ALONE: Final = frozenset({"home", "slock", "xylimclr", "mcal", "homeclr", "reset", "waitpos"})
-"""Those that act without an argument; without one the others show what they set."""
+"""Statements that act even without an argument. Without one, the others show their setting."""
 
 BOUND: Final = frozenset({TaskKind.NO_ABORT, TaskKind.BACKGROUND})
-"""Kinds of tasks that may not do all (p. 912 to 917)."""
+"""Kinds of tasks in which some statements are not allowed (p. 912 to 917)."""
 
 
 def forbidden_in(kind: TaskKind, statement: Statement) -> bool:

@@ -7,7 +7,7 @@ from robolink_simulators.epson.spel.execution import StatementExecution
 from robolink_simulators.epson.spel.statements.conditions import NEVER_NS
 
 POLL_NS: Final = 10_000_000
-"""How often what happens outside the controller is looked at, in ns.
+"""Interval in ns between checks of events outside the controller.
 
 A condition that holds for less than 0.01 s may be missed (docs/reference/spel.md 16).
 """

@@ -279,15 +279,9 @@ class Lease:
         """
         return LeaseLostError(
             self._taken.took_over(self.controller),
-            remedy=tr(
-                "The record does not say how this ended: the job stays open for the new "
-                "user. Read the tools again; 'robolink journal list' shows who did what."
-            )
+            remedy=tr("The job stays open for the new user. Who did what: robolink journal list")
             if sent
-            else tr(
-                "Nothing was sent. Read the tool again before you write: 'robolink journal list' "
-                "shows who did what."
-            ),
+            else tr("Nothing was sent. Read the tool again. Who did what: robolink journal list"),
             controller=self.controller,
         )
 

@@ -187,7 +187,7 @@ class SdoTransfer:
         elif code in _LENGTH_DOES_NOT_FIT:
             remedy = tr("The PLC's mailbox has another version: compare its EDS.")
         else:
-            remedy = tr("Look at the PLC's state; nothing was changed by this request.")
+            remedy = tr("This request changed nothing. Look at the PLC's state.")
         return RejectedError(what, code=code, remedy=remedy, request=self._shown)
 
     def _mismatched(self, answer: bytes) -> RemoteProtocolError:
@@ -198,10 +198,7 @@ class SdoTransfer:
                 identity=self._identity,
                 object=self._shown,
             ),
-            remedy=tr(
-                "Look for a second SDO client, or a second node with this number, on the bus; "
-                "then connect again."
-            ),
+            remedy=tr("Look for a second SDO client or node with this number, then connect again."),
             request=self._shown,
             raw=answer,
         )

@@ -114,9 +114,8 @@ def _noise(raw: bytes) -> str:
     if raw[:1] != b"\0":
         return ""
     return tr(
-        "The 00 before the answer is noise of an RS-485 line that nobody drives: fit bias "
-        "resistors and terminators, or let the adapter switch later. Otherwise check the baud rate "
-        "and the parity."
+        "The 00 in front is noise of an idle RS-485 line: fit bias resistors and "
+        "terminators, or let the adapter switch later. Else check baud rate and parity."
     )
 
 

@@ -43,6 +43,7 @@ class Sentences(Values):
         super().__init__(root, folders)
         self._fill = fill
         self._known: dict[tuple[object, ...], list[Said] | None] = {}
+        self._kept: list[Scope] = []
 
     # What an expression can be.
 
@@ -65,6 +66,7 @@ class Sentences(Values):
         found = None if found is None else distinct(found)
         if found is not None or self._cut == cut:
             self._known[key] = found
+            self._kept.append(scope)  # while a scope lives, nothing else gets the ids in its key
         return found
 
     def _said(self, node: Node, scope: Scope) -> list[Said] | None:
@@ -108,17 +110,18 @@ class Sentences(Values):
         found = self._value(part.value, scope)
         if found is not None:
             return found
-        form = part.format_spec.values[0].value if part.format_spec else ""
+        form = ast.unparse(part.format_spec)[2:-1] if part.format_spec else ""
         name = named(part.value)
         return [Said(self._fill("{" + name + (f":{form}" if form else "") + "}", {}))]
 
     def _concatenated(
         self, parts: list[list[Said] | None], between: str = "", *, full: bool = False
     ) -> list[Said] | None:
-        if None in parts:
+        known = [part for part in parts if part is not None]
+        if len(known) < len(parts):
             return None
         made = []
-        for some in islice(product(*parts), MOST_AT_ONCE * 20):
+        for some in islice(product(*known), MOST_AT_ONCE * 20):
             chosen = together(*(one.chosen for one in some))
             if chosen is not None:
                 texts = [one.text for one in some if one.text or not full]
@@ -160,7 +163,7 @@ class Sentences(Values):
 
     # Calls.
 
-    def _called(self, call: ast.Call, scope: Scope) -> list[Said] | None:
+    def _called(self, call: Node, scope: Scope) -> list[Said] | None:
         name = called(call)
         if isinstance(call.func, ast.Name) and name in SENTENCE_MAKERS:
             return self._sentence(call, scope)
@@ -185,16 +188,16 @@ class Sentences(Values):
                 )
             if name == "get":
                 some = list(self._items(call.func.value, call.args[0], scope))
-                found = [(self.said(one, where), chosen) for one, where, chosen in some]
+                rows = [(self.said(one, where), chosen) for one, where, chosen in some]
                 last = self.said(call.args[1], scope) if call.args[1:] else [Said("")]
-                return self._either(*found, (last, {})) if found else None
+                return self._either(*rows, (last, {})) if rows else None
             if name == "replace":
                 return [Said(self._fill("{" + named(call.func.value) + "}", {}))]
-        found = list(self._of_call(call, scope))
-        if not found:
+        returned = list(self._of_call(call, scope))
+        if not returned:
             return None
         made = []
-        for one, where, chosen in found:
+        for one, where, chosen in returned:
             texts = self.said(one, where)
             if texts is None:
                 return None
@@ -205,8 +208,11 @@ class Sentences(Values):
         texts = self.said(call.args[0], scope)
         if texts is None:
             return None
-        given = {one.arg: self._value(one.value, scope) for one in call.keywords if one.arg}
-        given = {name: found for name, found in given.items() if found}
+        given = {
+            one.arg: found
+            for one in call.keywords
+            if one.arg and (found := self._value(one.value, scope))
+        }
         made = []
         for text in texts:
             for some in islice(product(*given.values()), MOST_AT_ONCE):
@@ -226,7 +232,7 @@ class Sentences(Values):
         return found if found and all(" " in one.text for one in found) else None
 
     def _joined(self, between: Node, parts: Node, scope: Scope) -> list[Said] | None:
-        sign = between.value if isinstance(between, ast.Constant) else " "
+        sign = str(between.value) if isinstance(between, ast.Constant) else " "
         full = False
         match parts:
             case ast.Call(func=ast.Name(id="filter"), args=[_, inner]):

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
-Node = ast.AST
+Node = Any  # of ast
 Chosen = dict[str, str]
 """Which branch was taken at each place where sentences part."""
 
@@ -137,13 +138,16 @@ class Module:
 
     def _note(self, node: Node, chosen: Chosen, found: dict[Node, Chosen]) -> None:
         for name, value in ast.iter_fields(node):
-            for child in value if isinstance(value, list) else [value]:
+            children: list[Any] = value if isinstance(value, list) else [value]
+            for child in children:
                 if isinstance(child, ast.AST):
                     there = chosen
                     if isinstance(node, ast.If | ast.IfExp) and name in ("body", "orelse"):
                         there = chosen | branch_of(node.test, taken=name == "body")
                     elif isinstance(node, ast.Match) and name == "cases":
-                        there = chosen | {f"match {node.lineno}": str(child.pattern.lineno)}
+                        there = chosen | {
+                            f"match {node.lineno}": str(getattr(child, "pattern", node).lineno)
+                        }
                     found[child] = there
                     self._note(child, there, found)
 

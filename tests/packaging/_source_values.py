@@ -142,7 +142,7 @@ class Values:
 
     def _handed_in(self, name: str, scope: Scope) -> Iterator[tuple[Node, Scope, Chosen]]:
         function = scope.node
-        if sum(key[-1] == "values" and key[2] for key in self._under_way) > MOST_CALLERS:
+        if sum(key[-1] == "values" and bool(key[2]) for key in self._under_way) > MOST_CALLERS:
             self._cut += 1
             return
         name_there = scope.owner if function.name == "__init__" else function.name
@@ -178,7 +178,7 @@ class Values:
             return True
         if where.module is scope.module:
             return not scope.owner
-        origin, one = where.module.imported.get(call.func.id, ("", ""))
+        origin, one = where.module.imported.get(named(call.func), ("", ""))
         return self._defining(origin, one) is scope.module
 
     def _of_self(self, name: str, scope: Scope) -> Iterator[tuple[Node, Scope, Chosen]]:
@@ -209,7 +209,7 @@ class Values:
         self, kind: ast.ClassDef, module: Module, name: str, default: Node | None
     ) -> Iterator[tuple[Node, Scope, Chosen]]:
         """Yield what a dataclass is made with."""
-        fields = [one.target.id for one in kind.body if isinstance(one, ast.AnnAssign)]
+        fields = [named(one.target) for one in kind.body if isinstance(one, ast.AnnAssign)]
         for call, where in self._callers[kind.name]:
             given = dict(zip(fields, call.args, strict=False))
             given |= {one.arg: one.value for one in call.keywords if one.arg}
@@ -387,20 +387,21 @@ class Values:
 
     def function(self, call: ast.Call, scope: Scope) -> tuple[ast.FunctionDef, Module, str] | None:
         """Return the function that a call means, where that can be told."""
+        module: Module | None = scope.module
+        owner = ""
         match call.func:
             case ast.Name(id=name):
-                module, owner = scope.module, ""
-                if (owner, name) not in module.functions and name in module.imported:
-                    origin, name = module.imported[name]
+                if ("", name) not in scope.module.functions and name in scope.module.imported:
+                    origin, name = scope.module.imported[name]
                     module = self._defining(origin, name)
             case ast.Attribute(value=ast.Name(id="self"), attr=name):
-                for module, kind in self._family(scope.owner, scope.module):
-                    function = module.functions.get((kind.name, name))
+                for there, kind in self._family(scope.owner, scope.module):
+                    function = there.functions.get((kind.name, name))
                     if function is not None and not is_abstract(function):
-                        return module.functions[kind.name, name], module, kind.name
+                        return function, there, kind.name
                 return None
             case ast.Attribute(value=ast.Name(id=of), attr=name):
-                module, owner = self._module_of(of, scope), ""
+                module = self._module_of(of, scope)
             case _:
                 return None
         if module is None or (owner, name) not in module.functions:

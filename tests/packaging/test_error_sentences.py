@@ -8,6 +8,7 @@ import ast
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 from robolink_cli.console.shell_words import SHELL_WAYS
@@ -29,8 +30,21 @@ SHIPPED = ("robolink", "cli", "simulators")
 KINDS = {name for name in errors.__all__ if name.endswith("Error")}
 MOST_LINES = 3
 
-LONGER = {}
-NOT_FOLLOWED = {}
+SHORT = 42
+"""So much of an expression names an error in the list of those that differ."""
+
+LIST = Path(__file__).with_name("error_sentences.txt")
+
+
+def listed(head, end=""):
+    """Return the errors of one part of the list, each with why it stands there."""
+    part = LIST.read_text(encoding="utf-8").partition(f"\n{head}\n")[2]
+    lines = (part.partition(f"\n\n{end}\n")[0] if end else part).splitlines()
+    return {name: why.strip() for name, why in zip(lines[::2], lines[1::2], strict=True)}
+
+
+LONGER = listed("LONGER", end="NOT FOLLOWED")
+NOT_FOLLOWED = listed("NOT FOLLOWED")
 
 OFFSET = "X 12.324 Y -3.729 Z -20.000 U 0.000"
 URL = "epson+tcp://192.168.0.1:5000"
@@ -66,14 +80,16 @@ LIKELY = {
 }
 """What fills a sentence, as long as it is likely to be; all else is a name or a number."""
 
-OF_VARIABLES = "{request} was accepted, but reads back as {found!r}, not {requested!r}."
-"""Its values are those of a variable, never a whole offset."""
+OTHERWISE = {
+    "{request} was accepted, but reads back as {found!r}, not {requested!r}.": "1.5",
+    "Cell {cell} needs robot {expected}; at {url} there is {found}.": "C8-C901S",
+    "Between touch {before} and {after} something moved by {shift:.2f} mm.": "3",
+    "Station {id}: {what} must be known first.": "where it is",
+    "The journal {name} has form {found}; this robolink knows forms up to {own}.": "7",
+}
+"""Sentences whose names stand for something else than those of all others."""
 
-OF_CELLS = "Cell {cell} needs robot {expected}; at {url} there is {found}."
-"""Its values are models of robots."""
-
-OF_TOUCHES = "Between touch {before} and {after} something moved by {shift:.2f} mm."
-"""Its values are numbers of touches."""
+OTHER_NAMES = {"after", "before", "expected", "found", "own", "requested", "what"}
 
 TOLD_TO_PROGRAMS = ("robolink/serving/", "robolink/protocols/", "robolink/testing/")
 """What is raised there is a line for a robot program, or a report: nobody reads what to do."""
@@ -92,10 +108,8 @@ def filled(text, sentences):
             return sentences[found["name"]]
         if re.search(r"[a-z]$", found["form"] or ""):
             return "10" if found["form"].endswith((".0f", "d")) else "-112.345"
-        if text == OF_TOUCHES and found["name"] in ("before", "after"):
-            return "3"
-        if text in (OF_CELLS, OF_VARIABLES) and found["name"] in ("found", "requested", "expected"):
-            return "C8-C901S"
+        if text in OTHERWISE and found["name"] in OTHER_NAMES:
+            return OTHERWISE[text]
         if found["name"] in RemedyWord.__dict__:
             return SHELL_WAYS[getattr(RemedyWord, found["name"])].format_map(LIKELY)
         return LIKELY.get(found["name"], "needle-12")
@@ -118,15 +132,15 @@ class Raised:
     kind: str
     place: str
     line: int
-    what: ast.expr | None
-    remedy: ast.expr | None
+    what: Any
+    remedy: Any
     pairs: list[tuple[str, str]] | None
     """What it can say: what happened, what to do; ``None`` where that is not followed."""
 
     @property
     def named(self):
         """The place without a line, which changes with each change above."""
-        return f"{self.kind} at {self.place}: {ast.unparse(self.what)}"
+        return f"{self.kind} at {self.place}: {ast.unparse(self.what)[:SHORT].strip()}"
 
     @property
     def is_passed_on(self):
@@ -146,11 +160,11 @@ def raised():
     kinds = KINDS | heirs(sources)
     found = []
     for module in sources.modules.values():
-        for call, within, owner in module.calls if module.name != "robolink.errors" else ():
+        for call, function, owner in module.calls if module.name != "robolink.errors" else ():
             kind = called(call)
             if kind in kinds:
-                scope = sources.scope(module, within, owner)
-                given = call.args[kind == "CalibrationError" :] or [None]
+                scope = sources.scope(module, function, owner)
+                given: list[Any] = call.args[kind == "CalibrationError" :] or [None]
                 remedy = next((one.value for one in call.keywords if one.arg == "remedy"), None)
                 whats = sources.said(given[0], scope)
                 does = sources.said(remedy, scope) if remedy else [Said("")]
@@ -243,20 +257,3 @@ def test_each_modbus_exception_takes_three_lines(code):
         request = ModbusRequest(255, 3, Area.HOLDING, 12289, 64, values)
         error = refused_by_modbus("modbus+tcp://192.168.0.10:502", request, code)
         assert shown(error.what, error.remedy).count("\n") < MOST_LINES, str(error)
-
-
-def test_zz_dump(raised):
-    long = set()
-    for one in raised:
-        for what, do in one.pairs or ():
-            if shown(what, do).count("\n") >= MOST_LINES:
-                long.add((one.named, shown(what, do)))
-    d = {}
-    for n, t in long:
-        d[n] = min(d.get(n, t), t, key=lambda x: (len(x), x))
-    with open("/tmp/w/errs_dump.txt", "w") as f:
-        for n, t in sorted(d.items()):
-            f.write(n + "\n" + t + "\n\n")
-        f.write("LOST\n")
-        for n in sorted({one.named for one in raised if not one.pairs and not one.is_passed_on}):
-            f.write(n + "\n")

@@ -279,7 +279,9 @@ class Lease:
         """
         return LeaseLostError(
             self._taken.took_over(self.controller),
-            remedy=tr("The job stays open for the new user. Who did what: robolink journal list")
+            remedy=tr(
+                "The record does not say how this ended; the job stays open. See the journal."
+            )
             if sent
             else tr("Nothing was sent. Read the tool again. Who did what: robolink journal list"),
             controller=self.controller,

@@ -148,6 +148,6 @@ def _remedy(error_class: int, raw_error: int = 0) -> str:
         ErrorClass.NO_ORIENTATION_IMAGE: tr(
             "Use a kinematics with ISMKinematicsWithOrientationImage."
         ),
-        ErrorClass.HEARTBEAT_LOST: tr("PC or network was too slow: close other programs."),
+        ErrorClass.HEARTBEAT_LOST: tr("It continues only while a program waits: check the PC."),
     }
     return remedies.get(error_class) or tr("Check the status before you continue.")

@@ -289,4 +289,4 @@ def _refused(what: str) -> ConfigError:
 
 
 def _anew() -> str:
-    return tr("Nothing was moved or written: no order is repeated. Give a new one if needed.")
+    return tr("Nothing was moved or written. Give a new order if the work must be done again.")

@@ -198,7 +198,9 @@ class SdoTransfer:
                 identity=self._identity,
                 object=self._shown,
             ),
-            remedy=tr("Look for a second SDO client or node with this number, then connect again."),
+            remedy=tr(
+                "Look for another SDO client or a second node with this number; connect again."
+            ),
             request=self._shown,
             raw=answer,
         )

@@ -199,7 +199,7 @@ class SdoTransfer:
                 object=self._shown,
             ),
             remedy=tr(
-                "Look for another SDO client or a second node with this number; connect again."
+                "Look for a second SDO client, or a second node with this number, on the bus."
             ),
             request=self._shown,
             raw=answer,

@@ -175,10 +175,7 @@ def _not_seen(mark: int, sensor: TipSensor, seen: int, pictures: int) -> Calibra
         return CalibrationError(
             "tip_not_seen",
             tr("The camera does not see the tip. {where}", where=where),
-            remedy=tr(
-                "Check light, lens and focus, that the tip is clean, and that the station is where "
-                "the camera looks."
-            ),
+            remedy=tr("Check light, lens and focus; clean the tip; check where the camera looks."),
         )
     return CalibrationError(
         "fiducial_not_seen",

@@ -257,10 +257,7 @@ class StopLatch:
         return bool(self._permits.__dict__.get(name))
 
     def _stopped(self, said: str, request: str) -> StoppedError:
-        remedy = tr(
-            "The robot will not move by itself. When the cell is clear, release the stop and "
-            "start again."
-        )
+        remedy = tr("The robot will not move by itself. When the cell is clear, release the stop.")
         return StoppedError(said, remedy=remedy, controller=self._controller, request=request)
 
 

@@ -75,8 +75,8 @@ class AcceptanceCriteria:
                 doubt,
                 _out_of_order(result) or tr("The touches agree far less well than stated."),
                 remedy=tr(
-                    "Nothing was written: no person confirms this write. Measure again, or "
-                    "let a person check it."
+                    "Nothing was written: no person confirms this write. Measure again, or let a "
+                    "person check it."
                 ),
             )
         self._require_judged(result)

@@ -247,8 +247,8 @@ def _unknown(recipe: "Recipe", why: str) -> ConfigError:
     return ConfigError(
         tr("The recipe does not say where {id} is. {why}", id=recipe.station.id, why=why),
         remedy=tr(
-            "State it in the recipe or in the cell file, learn it with 'robolink cell "
-            "station learn', or run a full calibration there. Nothing moved."
+            "Nothing moved. State it in the recipe or in the cell file, learn it with "
+            "'robolink cell station learn', or run a full calibration there."
         ),
     )
 

@@ -315,8 +315,8 @@ def _require_cell(loaded: "LoadedRecipe", cell: Cell | None) -> None:
             cells=cells,
         ),
         remedy=tr(
-            "Choose a recipe of this cell, or name the cell; 'cells' in the recipe lists "
-            "its cells. Nothing was sent."
+            "Nothing was sent. Choose a recipe of this cell, or name the cell; 'cells' in "
+            "the recipe lists its cells."
         ),
     )
 
@@ -393,7 +393,7 @@ def _require_able(
     if found:
         raise ConfigError(
             " ".join(found),
-            remedy=tr("Choose a recipe for this kind of controller. Nothing was moved or written."),
+            remedy=tr("Nothing was moved or written. Choose a recipe for this kind of controller."),
             controller=controller.identity,
         )
 

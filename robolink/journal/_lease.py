@@ -280,14 +280,10 @@ class Lease:
         return LeaseLostError(
             self._taken.took_over(self.controller),
             remedy=tr(
-                "The record does not say how this ended: the job stays open for the new "
-                "user. Read the tools again; 'robolink journal list' shows who did what."
+                "The record does not say how this ended; the job stays open. See the journal."
             )
             if sent
-            else tr(
-                "Nothing was sent. Read the tool again before you write: 'robolink journal list' "
-                "shows who did what."
-            ),
+            else tr("Nothing was sent. Read the tool again. Who did what: robolink journal list"),
             controller=self.controller,
         )
 

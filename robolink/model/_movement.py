@@ -116,7 +116,7 @@ class MotionProfile:
             except ValueError:
                 raise ConfigError(
                     tr("There is no path {given!r}.", given=self.path),
-                    remedy=tr("Give Path.JOINT or Path.STRAIGHT. Nothing moved."),
+                    remedy=tr("Nothing moved. Give Path.JOINT or Path.STRAIGHT."),
                 ) from None
         require_numbers(self, "speed_percent", "speed_mm_s")
 
@@ -226,7 +226,7 @@ class WorkBox:
         if not numbers:
             raise ConfigError(
                 tr("A target is a Pose of numbers, not {given!r}.", given=target),
-                remedy=tr("Write Pose(x, y, z, u), in mm and degrees. Nothing moved."),
+                remedy=tr("Nothing moved. Write Pose(x, y, z, u), in mm and degrees."),
             )
         for axis in "xyz":
             value = getattr(target, f"{axis}_mm")

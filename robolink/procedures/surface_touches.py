@@ -186,8 +186,5 @@ def _refusal(code: str, residual_mm: float) -> CalibrationError:
     return CalibrationError(
         code,
         whats[code],
-        remedy=tr(
-            "Nothing was written. Check that the surface is clean and fixed and measure "
-            "again, each time until the tip is on it."
-        ),
+        remedy=tr("Nothing was written. Clean and fasten the surface; touch it each time."),
     )

@@ -177,10 +177,7 @@ def _refusal(code: str, range_mm: float | None, residual_mm: float | None) -> Ca
     return CalibrationError(
         code,
         whats.get(code, tr("A touch was not made.")),
-        remedy=tr(
-            "Nothing was written. Check that the pin is tight and measure again, each time "
-            "until the tip is on it."
-        ),
+        remedy=tr("Nothing was written. Check that the pin is tight, then touch it each time."),
     )
 
 

@@ -289,7 +289,4 @@ def _refused(what: str) -> ConfigError:
 
 
 def _anew() -> str:
-    return tr(
-        "robolink does not repeat it: nothing was moved or written. Give a new order if "
-        "the work must be done again."
-    )
+    return tr("Nothing was moved or written. Give a new order if the work must be done again.")

@@ -424,8 +424,7 @@ def _expected(controller: Controller, tool: int, old: ToolOffset | None) -> Tool
         raise ToolChangedError(
             changed.sentence,
             remedy=tr(
-                "Nothing was written. Find out who changed it; 'robolink tool set' writes "
-                "the value that you choose."
+                "Nothing was written. Find out who changed it, then use 'robolink tool set'."
             ),
             controller=controller.identity,
         )

@@ -219,7 +219,7 @@ def test_a_program_that_another_task_calls_is_told_what_to_change():
     options = PlcOptions(GroupOptions(program_task="other"))
     with served("sim", SoftMotionSimulator(options=options)) as cell, cell.connect() as controller:
         group = controller.groups[0]
-        with pytest.raises(RejectedError, match="ErrorID is 12108") as refused:
+        with pytest.raises(RejectedError, match="ErrorID 12108") as refused:
             group.move_to(above(group.pose(), 1.0), QUICK, box=ANYWHERE).wait(timeout_s=5)
         assert refused.value.code == ErrorClass.UNMAPPED
         assert "motion task" in refused.value.remedy

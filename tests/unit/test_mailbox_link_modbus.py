@@ -131,7 +131,7 @@ def test_a_server_that_has_hung_up_is_noticed_before_anything_is_sent():
         (6, RejectedError, "server busy"),
         (4, RemoteProtocolError, "server device failure"),
         (0x0A, ConnectError, "gateway path unavailable"),
-        (0x0B, TransportTimeoutError, "gateway target does not respond"),
+        (0x0B, TransportTimeoutError, "gateway target is silent"),
         (99, RemoteProtocolError, "not in the standard"),
     ],
 )

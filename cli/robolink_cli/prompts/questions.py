@@ -188,8 +188,7 @@ def _ask(figure: str) -> None:
         raise DeclinedError(
             figure,
             remedy=tr(
-                "Nothing was written. Check sign and unit. An engineer may write it on a "
-                "terminal, or with --accept-jump and --accept-turn."
+                "Nothing was written. Check sign and unit, or give --accept-jump/--accept-turn."
             ),
         )
     if not asked(tr("{figure} Write it anyway? Check sign and unit first.", figure=figure)):

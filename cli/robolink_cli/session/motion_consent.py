@@ -64,10 +64,7 @@ def heed_selection(controller: "Controller", cell: "Expected | None", *, yes: bo
     doubt = doubt_about(controller.tools.selected(), controller, cell)
     if not doubt:
         return
-    remedy = tr(
-        "Nothing moved. Another program may have selected it. Select the right tool, the one "
-        "that the cell file names: robolink tool select N"
-    )
+    remedy = tr("Nothing moved. Select the tool of the cell file: robolink tool select N")
     if yes or json_is_on() or not on_terminal():
         raise DeclinedError(doubt, remedy=remedy)
     if not asked(tr("{doubt} Move with it anyway?", doubt=doubt)):

@@ -36,10 +36,7 @@ def heed_stop(url: str, controller: "Controller", *, yes: bool) -> None:
     if yes or not on_terminal():
         raise StoppedError(
             found.sentence,
-            remedy=tr(
-                "Look into the cell first. Then run 'robolink robot release' (or 'reset', "
-                "if the controller needs it), or leave out --yes and answer the question."
-            ),
+            remedy=tr("Look into the cell. Then run 'robolink robot release' (or 'robot reset')."),
             controller=url.partition("?")[0],
         )
     note(found.sentence)

@@ -100,7 +100,7 @@ def require_told_apart(fit: LinearFit, unknowns: int, remedy: str) -> None:
     if tip_is_told(fit, unknowns):
         return
     code = "rank_deficient" if fit.rank < unknowns else "insufficient_rotation"
-    what = tr("The orientations differ too little to separate the tip from the surface.")
+    what = tr("The orientations differ too little to separate tip and surface.")
     raise CalibrationError(code, what, remedy=remedy)
 
 

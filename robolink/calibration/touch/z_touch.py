@@ -192,10 +192,7 @@ def _implausible(what: str) -> CalibrationError:
     return CalibrationError(
         "implausible_latency",
         what,
-        remedy=tr(
-            "Check that the robot reaches these speeds before the touch, that surface and "
-            "tip are clean, and the input number. Then touch again."
-        ),
+        remedy=tr("Check input number and speeds; clean surface and tip, then touch again."),
     )
 
 

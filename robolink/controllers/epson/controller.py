@@ -235,7 +235,7 @@ class EpsonController(ControllerCore):
             if group.motors_on() is not on:
                 raise ReadBackError(
                     tr("The motors are not on.") if on else tr("The motors are not off."),
-                    remedy=tr("Check the controller; nothing was repeated."),
+                    remedy=tr("Nothing was repeated. Check the controller."),
                 )
 
     def robot_number(self) -> int:

@@ -168,12 +168,12 @@ class Handshake:
                 tr("The PLC is in error: {error}.", error=self._error_in_words(code)),
                 reason=NotReadyReason.FAULT,
                 code=code,
-                remedy=tr("Clear it at the HMI; nothing was written."),
+                remedy=tr("Nothing was written. Clear it at the HMI."),
             )
         if self.is_busy() or registers.is_on(self._commit.answer):
             return BusyError(
                 tr("The PLC is busy with another request."),
-                remedy=tr("Wait until it has finished, then try again; nothing was written."),
+                remedy=tr("Nothing was written. Wait until it has finished, then try again."),
             )
         return None
 

@@ -147,8 +147,7 @@ class Registers:
                 place=describe_place(table, addresses.start),
             ),
             remedy=tr(
-                "Compare the addresses in the map with the PLC's register list; or "
-                "another program is writing them now."
+                "Compare the map's addresses with the PLC's; or another program writes them."
             ),
         )
 
@@ -341,7 +340,7 @@ class MappedPlc(DriverLink):
                 identity=self.identity,
             ),
             reason=NotReadyReason.NOT_REMOTE,
-            remedy=tr("Check that the PLC's program runs, then try again; nothing was written."),
+            remedy=tr("Nothing was written. Check that the PLC's program runs, then try again."),
         )
 
     def require_probe(self) -> None:
@@ -376,7 +375,7 @@ class MappedPlc(DriverLink):
             raise NotReadyError(
                 tr("The machine does not permit changes now ({place}).", place=permit.place),
                 reason=NotReadyReason.NOT_REMOTE,
-                remedy=tr("Permit them at the machine, then try again; nothing was written."),
+                remedy=tr("Nothing was written. Permit them at the machine, then try again."),
             )
 
     def require_known_place(self, tool: int) -> None:

@@ -95,7 +95,7 @@ class OffsetValues:
                         tool=slot.tool,
                         value=value,
                     ),
-                    remedy=tr("Leave it out; nothing was sent."),
+                    remedy=tr("Nothing was sent. Leave it out."),
                 )
         self._require_believable(slot, words)
         return words

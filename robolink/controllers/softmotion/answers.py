@@ -119,7 +119,7 @@ def _meaning(error_class: int, now: Response) -> str:
     # The PLC's own number belongs to the command now shown in the response.
     if now.error_class == error_class and now.raw_error:
         return tr(
-            "{meaning} ({number}; the PLC's ErrorID is {raw})",
+            "{meaning} ({number}, ErrorID {raw})",
             meaning=meaning,
             number=error_class,
             raw=now.raw_error,
@@ -129,38 +129,25 @@ def _meaning(error_class: int, now: Response) -> str:
 
 def _remedy(error_class: int, raw_error: int = 0) -> str:
     if error_class == ErrorClass.UNMAPPED and raw_error == _OUTSIDE_MOTION_TASK:
-        return tr(
-            "Let the motion task of the PLC call the mailbox program, then download it again."
-        )
+        return tr("Let the PLC's motion task call the mailbox program, then download it again.")
     remedies: dict[int, str] = {
         ErrorClass.VERSION: tr("Export the PLC program of this robolink and load it."),
         ErrorClass.UNKNOWN_OPCODE: tr("Load the profile 'full' of the PLC program."),
         ErrorClass.NOT_OWNER: tr("Connect again when the other client has ended."),
         ErrorClass.STALE_EPOCH: tr("Connect again when the other client has ended."),
         ErrorClass.OTHER_BOOT: tr("Connect again; no tool slot is selected after a start."),
-        ErrorClass.NOT_PERMITTED: tr(
-            "The machine's program gives the permit (xPermit); bring it to its service state."
-        ),
+        ErrorClass.NOT_PERMITTED: tr("Bring the machine to its service state (xPermit)."),
         ErrorClass.DISABLED: tr("Run 'robolink robot motors on' when the cell is clear."),
         ErrorClass.ERRORSTOP: tr("Remove the cause, then run 'robolink robot reset'."),
-        ErrorClass.STOPPING: tr(
-            "Run 'robolink robot reset' to release the stop when the cell is clear."
-        ),
+        ErrorClass.STOPPING: tr("When the cell is clear, run 'robolink robot reset'."),
         ErrorClass.MOVING: tr("Wait for the end of the movement."),
         ErrorClass.BUSY: tr("Wait for the running command, or stop it."),
         ErrorClass.QUEUE_FULL: tr("Wait for the first movement to end."),
         ErrorClass.SLOT_EMPTY: tr("Write the slot first, with a calibration or 'tool set'."),
-        ErrorClass.TOOL_INCOMPATIBLE: tr(
-            "This kinematics fixes no full orientation of the flange: only a shift along its own "
-            "axis can be a tool. Couple an orientation kinematics in the PLC, or leave X and Y 0."
-        ),
+        ErrorClass.TOOL_INCOMPATIBLE: tr("Couple an orientation kinematics, or leave X and Y 0."),
         ErrorClass.NO_ORIENTATION_IMAGE: tr(
-            "The PLC's own kinematics must implement ISMKinematicsWithOrientationImage."
+            "Use a kinematics with ISMKinematicsWithOrientationImage."
         ),
-        ErrorClass.HEARTBEAT_LOST: tr(
-            "A movement continues only while a program waits for it. This computer, "
-            "or the network, was too slow for half a second: close other programs, "
-            "then start again."
-        ),
+        ErrorClass.HEARTBEAT_LOST: tr("It continues only while a program waits: check the PC."),
     }
     return remedies.get(error_class) or tr("Check the status before you continue.")

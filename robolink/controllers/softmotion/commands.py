@@ -379,7 +379,7 @@ class CommandSender:
         except BlockError as error:
             raise ConfigError(
                 tr("{request!r} cannot be sent: {cause}.", request=describe(command), cause=error),
-                remedy=tr("Correct the value; nothing was sent."),
+                remedy=tr("Nothing was sent. Correct the value."),
             ) from error
 
     def _require_able(self, draft: Command, before: Response) -> None:

@@ -62,9 +62,7 @@ def require_permit(now: Response) -> None:
         raise NotReadyError(
             tr("The machine does not permit it now."),
             reason=NotReadyReason.NOT_REMOTE,
-            remedy=tr(
-                "The machine's program gives the permit (xPermit); bring it to its service state."
-            ),
+            remedy=tr("Bring the machine to its service state (xPermit)."),
         )
 
 
@@ -167,7 +165,7 @@ def _obstacle(now: Response) -> tuple[NotReadyReason, str, str] | None:
         return (
             NotReadyReason.PAUSED,
             tr("The axis group is held by a stop."),
-            tr("Run 'robolink robot reset' to release the stop when the cell is clear."),
+            tr("When the cell is clear, run 'robolink robot reset'."),
         )
     if now.group_state == GroupState.DISABLED:
         return (

@@ -300,5 +300,5 @@ class SoftMotionGroup(MotionGroupCore):
             if self.motors_on() is not enabled:
                 raise ReadBackError(
                     tr("The axis group did not change its state."),
-                    remedy=tr("Look at the PLC; nothing was repeated."),
+                    remedy=tr("Nothing was repeated. Look at the PLC."),
                 )

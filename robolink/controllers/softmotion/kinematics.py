@@ -226,8 +226,8 @@ def _space(images: OrientationImages, now: Response) -> OrientationSpace | None:
             tr("{kinematics} cannot carry tool offsets at all.", kinematics=_name(now)),
             code=ErrorClass.NO_ORIENTATION_IMAGE,
             remedy=tr(
-                "The PLC's own kinematics must implement ISMKinematicsWithOrientationImage. "
-                "Nothing was sent."
+                "Nothing was sent. The PLC's own kinematics must implement "
+                "ISMKinematicsWithOrientationImage."
             ),
         ) from None
 
@@ -237,8 +237,8 @@ def _incompatible(what: str) -> RejectedError:
         what,
         code=ErrorClass.TOOL_INCOMPATIBLE,
         remedy=tr(
-            "Couple an orientation kinematics in the PLC, or mount the tip on that line. Nothing "
-            "was sent."
+            "Nothing was sent. Couple an orientation kinematics in the PLC, or mount the "
+            "tip on that line."
         ),
     )
 

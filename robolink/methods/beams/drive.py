@@ -117,8 +117,8 @@ def require_run_up(group: MotionGroup, plan: BeamsParameters, change_mm: float) 
     raise CalibrationError(
         "run_up_too_short",
         tr(
-            "The tip needs {way:.2f} mm to reach {speed:g} mm/s before a beam. With a search of "
-            "{search:g} mm it has less where the new tip is {shift:g} mm beside the old one.",
+            "The tip needs {way:.2f} mm to reach {speed:g} mm/s. With a search of "
+            "{search:g} mm it has less if it is {shift:g} mm beside the old one.",
             way=needs.way_mm,
             speed=plan.crossing_mm_s,
             search=plan.search_mm,
@@ -165,9 +165,8 @@ def require_reached(
     raise CalibrationError(
         "run_up_too_short",
         tr(
-            "The tip met beam {beam} too near to where it started, or to where it stopped: it "
-            "cannot have had {speed:g} mm/s at both edges. The tip is far from where it was "
-            "expected.",
+            "The tip met beam {beam} too near to where it started or stopped to have "
+            "{speed:g} mm/s at both edges: it is far from where expected.",
             beam=crossing.beam + 1,
             speed=plan.crossing_mm_s,
         ),

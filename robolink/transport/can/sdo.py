@@ -188,7 +188,7 @@ class SdoTransfer:
         elif code in _LENGTH_DOES_NOT_FIT:
             remedy = tr("The PLC's mailbox has another version: compare its EDS.")
         else:
-            remedy = tr("Look at the PLC's state; nothing was changed by this request.")
+            remedy = tr("This request changed nothing. Look at the PLC's state.")
         return RejectedError(what, code=code, remedy=remedy, request=self._shown)
 
     def _mismatched(self, answer: bytes) -> RemoteProtocolError:
@@ -200,8 +200,7 @@ class SdoTransfer:
                 object=self._shown,
             ),
             remedy=tr(
-                "Look for a second SDO client, or a second node with this number, on the bus; "
-                "then connect again."
+                "Look for a second SDO client, or a second node with this number, on the bus."
             ),
             request=self._shown,
             raw=answer,

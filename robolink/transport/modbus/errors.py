@@ -58,8 +58,7 @@ def unanswered(
     )
     if serial:
         remedy = _noise(held) or tr(
-            "Check cable and power of the PLC, the baud rate and the unit ({unit}), then try "
-            "again.",
+            "Check the PLC's cable and power, baud rate and unit ({unit}), then try again.",
             unit=request.unit,
         )
     return TransportTimeoutError(
@@ -114,9 +113,8 @@ def _noise(raw: bytes) -> str:
     if raw[:1] != b"\0":
         return ""
     return tr(
-        "The 00 before the answer is noise of an RS-485 line that nobody drives: fit bias "
-        "resistors and terminators, or let the adapter switch later. Otherwise check the baud rate "
-        "and the parity."
+        "The 00 in front is noise of an idle RS-485 line: fit bias resistors and "
+        "terminators, or let the adapter switch later. Else check baud rate and parity."
     )
 
 
@@ -204,7 +202,7 @@ def _name(code: int) -> str:
         7: tr("negative acknowledge"),
         8: tr("memory parity error"),
         _GATEWAY_NO_PATH: tr("gateway path unavailable"),
-        _GATEWAY_NO_ANSWER: tr("gateway target does not respond"),
+        _GATEWAY_NO_ANSWER: tr("gateway target is silent"),
     }
     return names.get(code, tr("not in the standard"))
 
@@ -212,21 +210,14 @@ def _name(code: int) -> str:
 def _remedy(code: int, unit: int) -> str:
     remedies = {
         1: tr("Check that the PLC's Modbus device offers this kind of register."),
-        2: tr(
-            "Check the addresses in the URL (a register printed 40001 is address 0) and the "
-            "sizes of the areas in the PLC's Modbus device."
-        ),
-        3: tr(
-            "The PLC's Modbus device may allow fewer registers at once: raise its limit, or state "
-            "the limit in the URL (most_registers=50)."
-        ),
+        2: tr("Check the addresses (40001 is address 0) and the PLC's Modbus area sizes."),
+        3: tr("Raise the PLC's register limit, or state it in the URL (most_registers=50)."),
         6: tr("Wait until the PLC has finished what it does, then try again."),
         _GATEWAY_NO_PATH: tr(
             "The gateway knows no unit {unit}: give another one with unit= in the URL.", unit=unit
         ),
         _GATEWAY_NO_ANSWER: tr(
-            "The gateway is there, unit {unit} behind it is not: check unit= in the URL, and "
-            "that device's power and cable.",
+            "Check unit= in the URL ({unit}), and power and cable of that device.",
             unit=unit,
         ),
     }

@@ -172,7 +172,7 @@ def test_a_number_of_the_plc_s_own_is_told_of_the_error_that_it_belongs_to_alone
     plc.now = replace(plc.now, error_class=ErrorClass.DISABLED, raw_error=4711)
     own = answers._meaning(ErrorClass.DISABLED, plc.now)
     other = answers._meaning(ErrorClass.MOVING, plc.now)
-    assert "ErrorID is 4711" in own
+    assert "ErrorID 4711" in own
     assert "ErrorID" not in other
 
 

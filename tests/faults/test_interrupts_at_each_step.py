@@ -149,10 +149,20 @@ def test_a_second_signal_during_the_cleaning_up_breaks_nothing(tmp_path, monkeyp
 EVERY_COMMIT = 3
 SHARES = 8
 """The instants are dealt to this many tests, so that several workers can share them."""
+EACH_TIME = (1, 3, 5, 6)
+"""The shares of each run of the tests, with the write, both selections, login and logout among
+them; the others run only in ``make soak``.
+"""
 
 
 @pytest.mark.fault("F24")
-@pytest.mark.parametrize("share", range(SHARES))
+@pytest.mark.parametrize(
+    "share",
+    [
+        pytest.param(share, marks=() if share in EACH_TIME else pytest.mark.soak)
+        for share in range(SHARES)
+    ],
+)
 def test_ctrl_c_at_each_step_leaves_no_tool_selected_that_is_not_the_cell_s_own(last_pose, share):
     cell = EpsonRecipeCell((1,))
     ending = Ending(cell)

@@ -24,7 +24,7 @@ from tests.faults._recipe_ends import (
     check_put_right,
     check_stopped,
 )
-from tests.faults._recipe_instants import Instant, Instants, chosen, without_inner_polls
+from tests.faults._recipe_instants import EVERYTHING, Instant, Instants, chosen, without_inner_polls
 from tests.faults._worlds import Worlds
 
 pytestmark = pytest.mark.timeout(7200)
@@ -85,7 +85,10 @@ def check(worlds: Worlds, disturbance: Disturbance, ended: Ended) -> None:
 @pytest.mark.fault("F21", "F22", "F24")
 @pytest.mark.parametrize(
     ("name", "how"),
-    [pytest.param(*test, marks=() if test in EACH_TIME else pytest.mark.soak) for test in TESTS],
+    [
+        pytest.param(*test, marks=() if EVERYTHING or test in EACH_TIME else pytest.mark.soak)
+        for test in TESTS
+    ],
 )
 def test_f21_f22_f24_a_disturbed_run_leaves_all_or_nothing_and_says_what(
     tmp_path, instants, name, how

@@ -265,7 +265,7 @@ def test_looks_that_agree_with_no_camera_are_refused(sigma_px, code, stated):
     solve_camera_affine(seen, limits=CameraLimits(**stated))
 
 
-@pytest.mark.parametrize("count", [5, 9])
+@pytest.mark.parametrize("count", [5, pytest.param(9, marks=pytest.mark.soak)])
 def test_the_interval_holds_the_truth_with_noise_in_the_pixels(count, trials):
     plan = (PLACES + TURNS)[:3] + TURNS[:2] if count == 5 else PLACES + TURNS
     # A pixel is not quite square here, so the noise in mm is not quite round.

@@ -28,6 +28,7 @@ from tests.calibration._simulated import shaken as realistic_shaken
 
 # The 95 % interval of looks at several angles holds the truth in 95 % of them.
 
+LONG = pytest.mark.soak
 TIP = (12.3, -3.9)
 HELD = ToolOffset(12.3, -3.9, -20.0, 1.2)
 DRAWING = ((20.0, 12.5), (-20.0, 12.5), (-20.0, -12.5), (20.0, -12.5))
@@ -50,8 +51,15 @@ def shaken(sightings, random):
     ]
 
 
-@pytest.mark.parametrize("stated", [False, True])
-@pytest.mark.parametrize("angles_deg", [(0, 60, 120, 180), (0, 90, 180)])
+@pytest.mark.parametrize(
+    ("angles_deg", "stated"),
+    [
+        ((0, 60, 120, 180), False),
+        ((0, 90, 180), True),
+        pytest.param((0, 60, 120, 180), True, marks=LONG),
+        pytest.param((0, 90, 180), False, marks=LONG),
+    ],
+)
 def test_a_tip(angles_deg, stated, trials):
     exact, sigma = [seen(TIP, u_deg) for u_deg in angles_deg], SIGMA_MM if stated else None
     assert_honest(
@@ -61,7 +69,7 @@ def test_a_tip(angles_deg, stated, trials):
     )
 
 
-@pytest.mark.parametrize("stated", [False, True])
+@pytest.mark.parametrize("stated", [False, pytest.param(True, marks=LONG)])
 def test_a_board_at_two_angles_that_do_not_balance(stated, trials):
     marks = [
         (HELD.x_mm + dx, HELD.y_mm + dy)
@@ -96,8 +104,19 @@ def poses(count, arc_deg=360.0):
     return [touching(TIP, arc_deg * k / count - 180) for k in range(count)]
 
 
-@pytest.mark.parametrize("stated", [False, True])
-@pytest.mark.parametrize(("count", "arc_deg"), [(3, 360), (4, 360), (4, 120), (8, 360)])
+@pytest.mark.parametrize(
+    ("count", "arc_deg", "stated"),
+    [
+        (3, 360, False),
+        (4, 360, True),
+        (4, 120, False),
+        (8, 360, True),
+        pytest.param(3, 360, True, marks=LONG),
+        pytest.param(4, 360, False, marks=LONG),
+        pytest.param(4, 120, True, marks=LONG),
+        pytest.param(8, 360, False, marks=LONG),
+    ],
+)
 def test_n_angle(count, arc_deg, stated, trials):
     exact, sigma = poses(count, arc_deg), PLANAR_SIGMA_MM if stated else None
     assert_honest(
@@ -121,7 +140,7 @@ def test_two_pose_with_its_stated_sigma(arc_deg, trials):
     assert_honest(coverage(measure, TIP, trials), trials)
 
 
-@pytest.mark.parametrize("count", [6, 12])
+@pytest.mark.parametrize("count", [6, pytest.param(12, marks=LONG)])
 def test_a_robust_fit_is_less_honest_refuses_nothing_good_and_that_is_known(count, trials):
     # It takes an occasional good pose for an outlier; docs/solvers.md shows these shares.
     exact = poses(count)

@@ -71,8 +71,15 @@ def test_a_short_arc_or_few_sightings_are_refused():
         runout_report(turning(3))
 
 
-@pytest.mark.parametrize("stated", [None, 0.01])
-@pytest.mark.parametrize("count", [4, 9])
+@pytest.mark.parametrize(
+    ("count", "stated"),
+    [
+        (4, None),
+        (9, 0.01),
+        pytest.param(4, 0.01, marks=pytest.mark.soak),
+        pytest.param(9, None, marks=pytest.mark.soak),
+    ],
+)
 def test_the_interval_of_the_offset_holds_the_truth(count, stated, trials):
     rng, hits = np.random.default_rng(3), np.zeros(2)
     for _ in range(trials):

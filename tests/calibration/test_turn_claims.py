@@ -224,8 +224,17 @@ def test_a_shift_from_which_on_it_is_said_to_show_shows_in_95_percent(name):
     assert all(93.0 <= share <= 99.5 for share in several), several
 
 
-@pytest.mark.parametrize("nu", [None, 4.0, 6.0])
-@pytest.mark.parametrize("in_space", [False, True])
+@pytest.mark.parametrize(
+    ("in_space", "nu"),
+    [
+        (False, None),
+        (True, 4.0),
+        (False, 6.0),
+        pytest.param(True, None, marks=pytest.mark.soak),
+        pytest.param(False, 4.0, marks=pytest.mark.soak),
+        pytest.param(True, 6.0, marks=pytest.mark.soak),
+    ],
+)
 def test_such_a_shift_shows_as_often_whatever_tells_the_scatter(nu, in_space):
     """Plain arithmetic: two looks, and a known or estimated scatter."""
     random, found, trials = np.random.default_rng(29), 0, 1_500

@@ -53,8 +53,15 @@ def test_too_little_is_named():
     assert solve_z_touch(touches((2, 8)), SURFACE).warnings == ("few_poses",)
 
 
-@pytest.mark.parametrize("stated", [None, 0.01])
-@pytest.mark.parametrize("speeds", [SPEEDS, SPEEDS[1:]])
+@pytest.mark.parametrize(
+    ("speeds", "stated"),
+    [
+        (SPEEDS, None),
+        (SPEEDS[1:], 0.01),
+        pytest.param(SPEEDS, 0.01, marks=pytest.mark.soak),
+        pytest.param(SPEEDS[1:], None, marks=pytest.mark.soak),
+    ],
+)
 def test_the_interval_holds_the_truth(speeds, stated, trials):
     def solved(rng):  # of a robot that stops at the trigger
         return solve_z_touch(

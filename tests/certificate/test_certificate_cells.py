@@ -189,8 +189,8 @@ BENT = {0.5: (), 1.0: (), 1.9: ("bent_needle",)}
 """The tilt in degrees, and its refusals: a PLC's latch may make more than 2 degrees of it."""
 
 CELLS = (
-    Cell("moved by 0.05", "beams on EPSON", TAKEN_BACK, CONTRADICTED, moved(0.05)),
     *soak(
+        Cell("moved by 0.05", "beams on EPSON", TAKEN_BACK, CONTRADICTED, moved(0.05)),
         Cell("moved by 0.08", "beams on EPSON", TAKEN_BACK, CONTRADICTED[:1], moved(0.08)),
         Cell("moved by 0.05", "beams on PLC", TAKEN_BACK, CONTRADICTED, moved(0.05)),
         Cell("moved by 0.08", "beams on PLC", TAKEN_BACK, CONTRADICTED, moved(0.08)),
@@ -270,8 +270,8 @@ CELLS = (
             at_write=slipped_up(0.08),
         ),
     ),
-    Cell("bent by 1.9 degrees", "beams on EPSON", WITHIN, (), bent(1.9)),
     *soak(
+        Cell("bent by 1.9 degrees", "beams on EPSON", WITHIN, (), bent(1.9)),
         Cell("no noise in the latch", NO_NOISE, WITHIN),
         *(
             Cell(f"bent by {lean:g} degrees", course, WITHIN, BENT[lean], bent(lean), times=1.2)

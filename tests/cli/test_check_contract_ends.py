@@ -100,7 +100,12 @@ def ended(cell, number, at, *told):
 
 
 @pytest.mark.parametrize(
-    "every", [pytest.param(311, id="sample"), pytest.param(7, id="each", marks=pytest.mark.soak)]
+    "every",
+    [
+        pytest.param(733, id="few"),
+        pytest.param(311, id="sample", marks=pytest.mark.soak),
+        pytest.param(7, id="each", marks=pytest.mark.soak),
+    ],
 )
 def test_a_signal_at_any_moment_leaves_all_as_it_was_and_says_so(cell, every):
     with observed(counting := Signals()):

@@ -86,7 +86,9 @@ def environment(tmp_path, encoding):
     }
 
 
-@pytest.mark.parametrize("encoding", ["ascii", pytest.param("cp1252", marks=LONG), "cp936"])
+@pytest.mark.parametrize(
+    "encoding", ["ascii", *(pytest.param(other, marks=LONG) for other in ("cp1252", "cp936"))]
+)
 def test_no_command_and_no_error_fails_for_want_of_a_character(tmp_path, encoding):
     codes = tmp_path / "codes.json"
     done = subprocess.run(

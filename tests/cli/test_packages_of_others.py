@@ -129,7 +129,9 @@ def instead(tmp_path):
     return run
 
 
-@pytest.mark.parametrize("name", ["click", "pydantic", "rich"])
+@pytest.mark.parametrize(
+    "name", [pytest.param("click", marks=pytest.mark.soak), "pydantic", "rich"]
+)
 def test_doctor_names_what_is_there_and_what_is_needed(instead, name):
     done = instead(name, "1.0.3", BREAKS, "doctor")
     assert done.returncode == 1, done.stderr

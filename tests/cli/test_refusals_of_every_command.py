@@ -248,8 +248,14 @@ def test_a_wrong_password(golden, shown, name, monkeypatch):
     assert "wrong-one" not in repr((refused, document))
 
 
-@pytest.mark.parametrize("state", STATES)
-@pytest.mark.parametrize("name", sorted({*NEEDS_A_CONTROLLER} - ANY_STATE))
+@pytest.mark.parametrize(
+    ("name", "state"),
+    [
+        pytest.param(name, state, marks=() if (row + column) % 2 else pytest.mark.soak)
+        for row, name in enumerate(sorted({*NEEDS_A_CONTROLLER} - ANY_STATE))
+        for column, state in enumerate(STATES)
+    ],
+)
 def test_a_state_that_forbids_it(simulator, golden, shown, name, state):
     act, reason, words = STATES[state]
     put_into(simulator, act)

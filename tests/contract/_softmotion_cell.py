@@ -27,6 +27,11 @@ LINKS: Final = [
 """The links that every test of links uses. The bus within one process is left to ``make soak``: the
 bus between processes demands more.
 """
+FEW_LINKS: Final = [
+    pytest.param(name, marks=() if name in ("sim", "modbus-tcp") else pytest.mark.soak)
+    for name in BACKENDS
+]
+"""The links of tests about what lies above the link; they use the others only in ``make soak``."""
 OWNER_SILENCE_S: Final = 10.1
 """A mailbox is free after its owner has been silent for this long.
 

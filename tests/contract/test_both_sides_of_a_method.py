@@ -4,7 +4,7 @@ import pytest
 
 from robolink.calibration_run import usual_box
 from robolink.recipe import load_recipe
-from tests.contract._method_cell import KINDS, method_cell
+from tests.contract._method_cell import KINDS, method_cell, on
 from tests.contract.test_calibrate_pivot import plc, run
 from tests.contract.test_calibrate_six_point import TURNED
 
@@ -66,6 +66,7 @@ def test_an_orientation_is_no_difference_to_a_reference(tmp_path, plc):
     assert 'basis: must be "absolute"' in document["error"]["what"]
 
 
+@pytest.mark.parametrize("cell", on("plc"), indirect=True)
 def test_a_command_says_where_a_surface_is_that_nobody_knows(cell):
     plate = cell.cell.plate
     place = ",".join(f"{value:g}" for value in (plate.x_mm, plate.y_mm, plate.z_mm))
@@ -78,6 +79,7 @@ def test_a_command_says_where_a_surface_is_that_nobody_knows(cell):
     assert "its input must be known first" in refused.document["error"]["what"]
 
 
+@pytest.mark.parametrize("cell", on("plc"), indirect=True)
 def test_a_command_says_where_beams_are_that_nobody_knows(cell):
     x_mm, y_mm, z_mm = cell.cell.place_mm
     beams = [f"--beam={number},{x_mm},{y_mm},{at}" for number, at in ((3, 3), (4, 88))]

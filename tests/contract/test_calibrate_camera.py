@@ -75,7 +75,7 @@ def miss_mm(document, true):
     return math.hypot(proposed["x_mm"] - true.x_mm, proposed["y_mm"] - true.y_mm)
 
 
-@pytest.mark.parametrize("kind", HOSTING)
+@pytest.mark.parametrize("kind", [pytest.param("epson", marks=pytest.mark.soak), "softmotion"])
 def test_a_camera_is_found_and_then_sees_the_next_nozzle(desk, kind):
     opened = desk(kind)
     cell = opened.cell

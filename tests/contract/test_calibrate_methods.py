@@ -5,7 +5,7 @@ import signal
 import pytest
 
 from robolink.model import EntryKind, ToolOffset
-from tests.contract._method_cell import KINDS, method_cell
+from tests.contract._method_cell import KINDS, method_cell, on
 
 pytestmark = pytest.mark.simulator_only
 
@@ -28,6 +28,7 @@ def within(document, truth, *, axes="xy"):
     )
 
 
+@pytest.mark.parametrize("cell", on("epson"), indirect=True)
 def test_many_touches_end_early_and_one_touch_finds_the_next_needle(cell):
     done = cell.calibrate("n-angle", "--station", "PIN-07", "--until", "0.05", "--count", "8")
     assert done.code == 0, done.err
@@ -112,6 +113,7 @@ def test_one_touch_may_trust_the_place_of_the_pin(arm):
 @pytest.mark.parametrize(
     ("method", "station", "axes"), [("beams", "BEAMS-02", "xy"), ("z-touch", "PLATE", "z")]
 )
+@pytest.mark.parametrize("cell", on("epson"), indirect=True)
 def test_a_sensor_measures_at_its_station_and_nobody_is_asked(cell, method, station, axes):
     cell.mount()
     done = cell.calibrate(method, "--station", station)

@@ -126,8 +126,8 @@ def test_one_touch_may_be_taught_too(tmp_path, monkeypatch):
     [
         ("epson", "PIN-07"),
         ("epson", "BEAMS-02"),
-        ("epson", "PLATE"),
-        ("plc", "PIN-07"),
+        pytest.param("epson", "PLATE", marks=pytest.mark.soak),
+        pytest.param("plc", "PIN-07", marks=pytest.mark.soak),
         ("plc", "PLATE"),
     ],
     indirect=["cell"],

@@ -41,7 +41,7 @@ def cell():
 @pytest.mark.parametrize(
     ("shape", "wiring"),
     [
-        ({}, {}),
+        pytest.param({}, {}, marks=pytest.mark.soak),
         pytest.param({"nozzle_radius_mm": 0.6, "radius_mm": 0.2}, {}, marks=pytest.mark.soak),
         ({"tilt_deg": 3.0}, {}),
         ({}, {"latency_s": 0.01}),
@@ -167,7 +167,7 @@ def test_swapped_inputs_are_refused(cell):
     refused(cell, "no_edge", replace(cell.station, inputs=(4, 3)))
 
 
-@pytest.mark.parametrize("lean_deg", [4.0, -6.0])
+@pytest.mark.parametrize("lean_deg", [4.0, pytest.param(-6.0, marks=pytest.mark.soak)])
 def test_a_bent_needle_is_refused(cell, lean_deg):
     cell.mount_beams(cell.beams())
     cell.simulator.world.leans[TOOL] = (0.0, math.tan(math.radians(lean_deg)))

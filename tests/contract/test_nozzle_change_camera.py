@@ -109,7 +109,10 @@ def test_a_camera_of_unknown_pose_is_found_with_the_nozzle(cell, capsys):
     assert report.verification.passed
 
 
-@pytest.mark.parametrize(("kind", "count"), [("epson", 2), ("epson", 4), ("softmotion", 2)])
+@pytest.mark.parametrize(
+    ("kind", "count"),
+    [pytest.param("epson", 2, marks=pytest.mark.soak), ("epson", 4), ("softmotion", 2)],
+)
 def test_a_held_board_is_measured_written_and_proved(kind, count, capsys):
     with cell_of(kind) as cell:
         furnish(cell, board_held=True)
@@ -134,9 +137,9 @@ def test_a_held_board_is_measured_written_and_proved(kind, count, capsys):
         ({"camera_tilt_deg": 3.0, "camera_tilt_toward_deg": 40.0}, 0.010),
         ({"camera_um_per_px_y": 15.0, "camera_shear_deg": 2.0}, FINE_MM),
         ({"camera_mirrored": False}, FINE_MM),
-        ({"camera_miss_share": 0.15}, FINE_MM),
-        ({"camera_outlier_share": 0.05}, FINE_MM),
-        ({"camera_noise_px": 1.0}, 0.04),
+        pytest.param({"camera_miss_share": 0.15}, FINE_MM, marks=pytest.mark.soak),
+        pytest.param({"camera_outlier_share": 0.05}, FINE_MM, marks=pytest.mark.soak),
+        pytest.param({"camera_noise_px": 1.0}, 0.04, marks=pytest.mark.soak),
     ],
     ids=lambda value: "-".join(value) if isinstance(value, dict) else None,
 )

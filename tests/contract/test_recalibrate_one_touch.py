@@ -11,7 +11,7 @@ from robolink.model import EntryKind, ToolOffset
 from robolink.report import reports_of
 from robolink.report.sections.evidence import interval_sentences
 from robolink.report.sections.offsets import offsets
-from tests.contract._method_cell import KINDS, method_cell
+from tests.contract._method_cell import method_cell, on
 
 pytestmark = pytest.mark.simulator_only
 
@@ -48,7 +48,7 @@ number = 1
 """
 
 
-@pytest.fixture(params=KINDS)
+@pytest.fixture(params=on("plc"))
 def cell(request, tmp_path, monkeypatch):
     with method_cell(request.param, tmp_path, monkeypatch) as cell:
         yield cell

@@ -23,7 +23,7 @@ from robolink.errors import (
 )
 from robolink.model import ANY, ControllerState, EntryKind, ToolOffset, Verdict, WorkBox
 from robolink.transaction import Wanted, change_tools, plan_undo, recover, undo
-from tests.contract._softmotion_cell import LINKS, OWNER_SILENCE_S, QUICK, above, served
+from tests.contract._softmotion_cell import FEW_LINKS, LINKS, OWNER_SILENCE_S, QUICK, above, served
 
 SCRATCH = 15
 NEW = ToolOffset(11.25, -3.125, -20.5, 12.0)
@@ -31,7 +31,7 @@ OTHER = ToolOffset(1.0, 2.0, 3.0, 0.0, 20.0)
 TIMEOUT_S = 0.4
 
 
-@pytest.fixture(params=LINKS)
+@pytest.fixture(params=FEW_LINKS)
 def cell(request):
     with served(request.param) as cell:
         yield cell
@@ -64,6 +64,7 @@ def test_the_machine_is_named_and_its_start_is_numbered(cell, controller):
 
 
 @pytest.mark.fault("F70")
+@pytest.mark.parametrize("cell", LINKS, indirect=True)
 def test_a_start_of_the_plc_is_told_as_one_on_every_link(cell, controller):
     cell.restart()
     with pytest.raises(TransportBrokenError, match="restarted") as ended:
@@ -133,6 +134,7 @@ def test_a_nozzle_change_finds_the_true_tip_writes_it_once_and_proves_it(cell, c
     ],
     ids=["done", "not applied"],
 )
+@pytest.mark.parametrize("cell", LINKS, indirect=True)
 def test_a_write_without_an_answer_is_settled_by_reading(cell, action, verdict, held):
     cell.simulator.faults.add(PlcFault(action, match="write_command WRITE_TOOL"))
     with cell.connect(timeout_s=TIMEOUT_S) as controller:

@@ -165,7 +165,7 @@ def at_the_edge(cell, margin_px):
     return replace(station, x_mm=x_mm + a * right, y_mm=y_mm + c * right)
 
 
-@pytest.mark.parametrize("fleck", [False, True])
+@pytest.mark.parametrize("fleck", [pytest.param(False, marks=pytest.mark.soak), True])
 def test_a_spot_that_leaves_the_picture_beside_its_place_is_looked_for_nearer(fleck):
     """A fleck that is found there instead does not pass for the spot."""
     with cell_of("epson") as cell:
@@ -192,7 +192,13 @@ CHANGES: dict[str, dict[str, Any]] = {
 }
 
 
-@pytest.mark.parametrize("change", CHANGES)
+@pytest.mark.parametrize(
+    "change",
+    [
+        pytest.param(one, marks=pytest.mark.soak if one in ("turned", "another scale") else ())
+        for one in CHANGES
+    ],
+)
 @pytest.mark.parametrize("method", soaked("camera", among=CALIBRATED))
 def test_a_camera_that_changed_since_it_was_calibrated_is_to_be_measured_again(method, change):
     kind = KINDS[sorted(CHANGES).index(change) % 2]
@@ -314,7 +320,7 @@ def no_false_alarms(kind, seeds, **parameters):
     [
         pytest.param({}, marks=pytest.mark.soak),
         {"camera_noise_px": 0.5},
-        {"backlash_deg": 0.02},
+        pytest.param({"backlash_deg": 0.02}, marks=pytest.mark.soak),
         pytest.param(
             {"camera_tilt_deg": 3.0, "camera_tilt_toward_deg": 40.0}, marks=pytest.mark.soak
         ),

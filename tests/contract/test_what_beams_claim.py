@@ -38,7 +38,7 @@ def within(report, off_mm):
 @pytest.mark.parametrize(
     ("lean_deg", "turn_deg", "seed"),
     [
-        (1.0, 0.0, 4),
+        pytest.param(1.0, 0.0, 4, marks=soak),
         (1.9, 180.0, 5),
         *(
             pytest.param(lean, turn, seed, marks=soak)

@@ -2,7 +2,7 @@
 
 Until the verification has passed, an interrupted change ends with the old value in tool 1: it was
 not written, or it is restored, and a message says so. From then on the new value is kept. A fixed
-sample of them is tried; ``ROBOLINK_ALL_KILL_POINTS=1`` tries all.
+sample of them is tried, half of it only in ``make soak``; ``ROBOLINK_ALL_KILL_POINTS=1`` tries all.
 """
 
 import json
@@ -21,7 +21,7 @@ from tests.faults import _killed_calibrations as calibrations
 from tests.faults._client_process import ClientProcess
 from tests.faults._epson_recipe_cell import EpsonRecipeCell
 from tests.faults._nozzle_cell import MOVE, OLD_TIP, served_cell
-from tests.faults._recipe_instants import Instant, Instants
+from tests.faults._recipe_instants import EVERYTHING, Instant, Instants
 from tests.faults._worlds import Worlds
 
 pytestmark = [pytest.mark.timeout(3600), pytest.mark.usefixtures("signals_of_a_terminal")]
@@ -149,10 +149,20 @@ def test_a_second_signal_during_the_cleaning_up_breaks_nothing(tmp_path, monkeyp
 EVERY_COMMIT = 3
 SHARES = 8
 """The instants are dealt to this many tests, so that several workers can share them."""
+EACH_TIME = (1, 3, 5, 6)
+"""The shares of each run of the tests, with the write, both selections, login and logout among
+them; the others run only in ``make soak``.
+"""
 
 
 @pytest.mark.fault("F24")
-@pytest.mark.parametrize("share", range(SHARES))
+@pytest.mark.parametrize(
+    "share",
+    [
+        pytest.param(share, marks=() if EVERYTHING or share in EACH_TIME else pytest.mark.soak)
+        for share in range(SHARES)
+    ],
+)
 def test_ctrl_c_at_each_step_leaves_no_tool_selected_that_is_not_the_cell_s_own(last_pose, share):
     cell = EpsonRecipeCell((1,))
     ending = Ending(cell)

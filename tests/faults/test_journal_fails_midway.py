@@ -79,7 +79,13 @@ def check(cell, failing, number):
     assert (cell.tool_1 != OLD_TIP) == kept
 
 
-@pytest.mark.parametrize("number", [1, 4, 17, 18, 28, 30, 36, 37, 53, 55])
+@pytest.mark.parametrize(
+    "number",
+    [
+        *(1, 17, 30, 37, 55),
+        *(pytest.param(number, marks=pytest.mark.soak) for number in (4, 18, 28, 36, 53)),
+    ],
+)
 def test_what_was_in_force_is_put_back_without_a_record(cell, number):
     nozzle_cell, failing = cell
     check(nozzle_cell, failing, number)

@@ -96,13 +96,13 @@ def die(cell: ChangeCell, program: str, sample: Sample, check: Callable[[], None
 @pytest.mark.parametrize(
     ("kind", "program"),
     [
-        ("EPSON", "one tool"),
+        pytest.param("EPSON", "one tool", marks=SOAK),
         pytest.param("EPSON", "two tools", marks=SOAK),  # on a PLC in every run of the suite
         ("EPSON", "two tools, verified"),
         pytest.param("PLC", "one tool", marks=SOAK),
         ("PLC", "two tools"),
         pytest.param("PLC", "two tools, verified", marks=SOAK),
-        ("register map", "one tool"),
+        pytest.param("register map", "one tool", marks=SOAK),
         ("register map", "two tools"),
     ],
 )

@@ -24,7 +24,7 @@ from tests.faults._recipe_ends import (
     check_put_right,
     check_stopped,
 )
-from tests.faults._recipe_instants import Instant, Instants, chosen, without_inner_polls
+from tests.faults._recipe_instants import EVERYTHING, Instant, Instants, chosen, without_inner_polls
 from tests.faults._worlds import Worlds
 
 pytestmark = pytest.mark.timeout(7200)
@@ -33,6 +33,12 @@ CTRL_C: Final = "Ctrl-C"
 TESTS: Final = [
     (name, how) for name, case in CASES.items() for how in (CTRL_C, *case.kind.disturbances)
 ]
+EACH_TIME: Final = {
+    *(("EPSON, two tools", how) for how in (CTRL_C, "e-stop", "guard")),
+    *(("PLC, two tools", how) for how in (CTRL_C, "drive fault")),
+    *(("PLC, one tool", how) for how in ("e-stop", "permit")),
+}
+"""Each disturbance on each kind; the same of the other number of tools runs only in soak."""
 MATTERS: Final = re.compile(
     r'\$(SetIO|Execute,"(Tool \d|TLSet \d))|write_command (SELECT|WRITE|OWNER)|[A-Z]'
 )
@@ -77,7 +83,13 @@ def check(worlds: Worlds, disturbance: Disturbance, ended: Ended) -> None:
 
 
 @pytest.mark.fault("F21", "F22", "F24")
-@pytest.mark.parametrize(("name", "how"), TESTS)
+@pytest.mark.parametrize(
+    ("name", "how"),
+    [
+        pytest.param(*test, marks=() if EVERYTHING or test in EACH_TIME else pytest.mark.soak)
+        for test in TESTS
+    ],
+)
 def test_f21_f22_f24_a_disturbed_run_leaves_all_or_nothing_and_says_what(
     tmp_path, instants, name, how
 ):

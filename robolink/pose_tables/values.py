@@ -265,9 +265,24 @@ def refused(path: Path, cause: UnusableText) -> ConfigError | CalibrationError:
 
 def unclear(path: Path, questions: Sequence[OpenQuestion]) -> AmbiguousPosesError:
     """Return the error for a file that leaves something open."""
-    whats = joined("; ", (question.what for question in questions))
+    asks = tuple(question.about for question in questions)
+    if len(questions) > 1:
+        return AmbiguousPosesError(
+            tr(
+                "{path} leaves {count} questions open:\n{lines}",
+                path=path,
+                count=len(questions),
+                lines="\n".join(f"    {one.what}. {one.remedy}" for one in questions),
+            ),
+            asks=asks,
+            remedy=tr("Nothing was sent. Answer all of them, then try again."),
+        )
     return AmbiguousPosesError(
-        tr("{path} is not clear: {what}.", path=path, what=whats),
-        asks=tuple(question.about for question in questions),
+        tr(
+            "{path} is not clear: {what}.",
+            path=path,
+            what=joined("; ", (question.what for question in questions)),
+        ),
+        asks=asks,
         remedy=joined(" ", (question.remedy for question in questions)),
     )

@@ -16,7 +16,6 @@ from typing import Final
 __all__ = [
     "Translated",
     "declared",
-    "first_sentence",
     "in_english",
     "install",
     "joined",

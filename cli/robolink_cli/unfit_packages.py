@@ -53,7 +53,7 @@ def cannot_run(unfit: Sequence[Remark], error: BaseException) -> str:
         unfit: Those packages, at least one.
         error: What the failure was.
     """
-    found = [f"    {remark.subject}: {remark.what}" for remark in unfit[:MOST_NAMED]]
+    found = [f"    {one.subject}: {one.what}" for one in unfit[:MOST_NAMED]]
     if len(unfit) > MOST_NAMED:
         found.append("    " + tr("and {more} more", more=len(unfit) - MOST_NAMED))
     return tr(

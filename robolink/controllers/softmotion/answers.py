@@ -110,7 +110,9 @@ def motion_failure(request: str, now: Response, error_class: int) -> ControllerE
             meaning=_meaning(error_class, now),
         ),
         code=error_class,
-        remedy=tr("Nothing was repeated. {remedy}", remedy=_remedy(error_class)),
+        remedy=_remedy(error_class)
+        if error_class == ErrorClass.HEARTBEAT_LOST
+        else tr("Nothing was repeated. {remedy}", remedy=_remedy(error_class)),
     )
 
 
@@ -149,7 +151,7 @@ def _remedy(error_class: int, raw_error: int = 0) -> str:
             "Use a kinematics with ISMKinematicsWithOrientationImage."
         ),
         ErrorClass.HEARTBEAT_LOST: tr(
-            "This PC or the network was too slow: close other programs, then start again."
+            "Nobody waited, or PC or network was too slow: close programs and start again."
         ),
     }
     return remedies.get(error_class) or tr("Check the status before you continue.")

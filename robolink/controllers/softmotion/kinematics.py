@@ -260,6 +260,6 @@ def _why(space: OrientationSpace) -> str:
     x, y, z = space.v_u
     line = _AXES.get((abs(x), abs(y), abs(z))) or f"({x:.3f}, {y:.3f}, {z:.3f})"
     return tr(
-        "Its flange turns about its {line}: only a shift along it stays in place.",
+        "Its flange turns about its {line}: only shifts along it stay fixed.",
         line=line,
     )

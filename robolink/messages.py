@@ -94,6 +94,18 @@ def joined(between: str, sentences: Iterable[str]) -> str:
     return text if text == english else Translated(text, english)
 
 
+def first_sentence(text: str) -> str:
+    """Return the first sentence of a text on one line; like the text, it keeps its English."""
+    cut, english = _first(text), _first(in_english(text))
+    return cut if cut == english else Translated(cut, english)
+
+
+def _first(text: str) -> str:
+    flat = " ".join(text.split())
+    ends = [at + 1 for stop in (". ", "? ", "! ", *_WIDE_STOPS) if (at := flat.find(stop)) >= 0]
+    return flat[: min(ends)] if ends else flat
+
+
 def in_english(text: str) -> str:
     """Return the English of a text that a person was shown, for a record."""
     return text.english if isinstance(text, Translated) else text

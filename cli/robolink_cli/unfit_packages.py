@@ -10,10 +10,13 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import Final
 
-from robolink.messages import joined, tr
+from robolink.messages import first_sentence, tr
 from robolink_cli.commands.computer.checkup import Level, Remark, check_versions
 from robolink_cli.console.language import speaking_for
 from robolink_cli.console.output import tolerate_any_console, visible
+
+MOST_NAMED = 8
+"""Largest number of packages that the error lists."""
 
 _FOUND = 1
 _NOT_RUNNABLE = 2
@@ -50,12 +53,15 @@ def cannot_run(unfit: Sequence[Remark], error: BaseException) -> str:
         unfit: Those packages, at least one.
         error: What the failure was.
     """
+    found = [f"    {one.subject}: {one.what}" for one in unfit[:MOST_NAMED]]
+    if len(unfit) > MOST_NAMED:
+        found.append("    " + tr("and {more} more", more=len(unfit) - MOST_NAMED))
     return tr(
-        "robolink cannot work with the packages that are installed: {packages} It ended with "
-        "{kind}: {error}",
-        packages=joined(" ", (f"{remark.subject}: {remark.what}" for remark in unfit)),
+        "robolink cannot work with the packages that are installed:\n{packages}\n"
+        "    {kind}: {error}",
+        packages="\n".join(found),
         kind=type(error).__name__,
-        error=error,
+        error=first_sentence(str(error)),
     )
 
 

@@ -166,33 +166,17 @@ class AcceptanceCriteria:
         row = accuracy.largest_default
         if row is None or accuracy.without_defaults_mm > limit_mm:
             return None
-        if row.half_width is None:
-            found = tr(
-                "Accurate to +-{found:.3f} mm (95 %), limit {limit:.3f} mm. Largest row: {row}, a "
-                "default.",
-                found=accuracy.within_mm,
-                limit=limit_mm,
-                row=row.title,
-            )
-        else:
-            found = tr(
-                "Accurate to +-{found:.3f} mm (95 %), limit {limit:.3f} mm. Largest row: {row}, "
-                "+-{half:g} {unit}, a default.",
-                found=accuracy.within_mm,
-                limit=limit_mm,
-                row=row.title,
-                half=row.half_width,
-                unit=row.unit,
-            )
         return CalibrationError(
             "large_interval",
-            found,
+            tr(
+                "Accurate to +-{found:.3f} mm (95 %), limit {limit:.3f} mm, due to a default.",
+                found=accuracy.within_mm,
+                limit=limit_mm,
+            ),
             remedy=joined(
                 " ",
                 (
-                    tr(
-                        "Nothing was written. 'robolink cell accuracy' shows all rows of this cell."
-                    ),
+                    tr("Nothing was written."),
                     _how_measured(row.key, station=station, kind=kind, tool=tool),
                 ),
             ),

@@ -297,7 +297,7 @@ def _decided(
     )
     if decision == "ask":
         if not attended:
-            raise _undecided(plan.tool, told)
+            raise _undecided(plan.tool, told, by_recipe=by_recipe)
         agreed = context.runner(tool=plan.tool).confirm(question)
         decision, of_answer = "difference" if agreed else "keep", {}
     else:
@@ -355,12 +355,14 @@ def in_words(tool: int, told: LengthChange) -> str:
     )
 
 
-def _undecided(tool: int, told: LengthChange) -> CalibrationError:
+def _undecided(tool: int, told: LengthChange, *, by_recipe: bool) -> CalibrationError:
     return CalibrationError(
         "length_changed",
         in_words(tool, told),
-        remedy=tr(
-            "Nothing was written. For Z: choose with {decide}, or run this at a terminal.",
+        remedy=tr("Nothing was written. Set if_length_changed in the recipe, or use a terminal.")
+        if by_recipe
+        else tr(
+            "Nothing was written. For Z: {decide}, or run this at a terminal.",
             decide=remedy_word(RemedyWord.LENGTH),
         ),
     )

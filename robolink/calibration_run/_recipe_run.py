@@ -392,7 +392,10 @@ def _require_able(
     found = beyond(recipe, able, other_sensor=other_sensor, writes=writes)
     if found:
         raise ConfigError(
-            " ".join(found),
+            tr(
+                "This controller lacks what the recipe needs:\n{lines}",
+                lines="\n".join(f"    {one}" for one in found),
+            ),
             remedy=tr("Nothing was moved or written. Choose a recipe for this kind of controller."),
             controller=controller.identity,
         )

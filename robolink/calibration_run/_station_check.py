@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from typing import Final
 
 from robolink.calibration import StationShift, TipShift, judge_shifts
 from robolink.calibration_run._plan import Proposals, ToolPlan
@@ -10,12 +11,15 @@ from robolink.calibration_run._proposal import Proposal
 from robolink.calibration_run._records import finds_pin, found_pin
 from robolink.calibration_run._repeatability import Seating, nozzle_in, seating_of
 from robolink.errors import CalibrationError
-from robolink.messages import tr
+from robolink.messages import in_english, tr
 from robolink.methods import KEPT
 from robolink.model import Controller, EntryKind, NewEntry
+from robolink.package_log import PackageLog
 from robolink.procedures import FindsStation
 from robolink.remedy_words import RemedyWord, remedy_word
 from robolink.stations import Station, base_now, find_stations, station_entry, stations_on_record
+
+_LOG: Final = PackageLog(__package__)
 
 
 def check_stations(controller: Controller, proposals: Proposals) -> Proposals:
@@ -42,7 +46,7 @@ def check_stations(controller: Controller, proposals: Proposals) -> Proposals:
             continue
         relying = [one.tool for one in there if not finds_pin(one.result)]
         if shift.moved and len(relying) > 1:
-            raise _refusal(name, shift)
+            raise _refusal(controller.identity, name, shift)
         judged = [
             (plan, _judged(plan, proposal, shift) if plan.pin == name else proposal)
             for plan, proposal in judged
@@ -155,10 +159,23 @@ def _with(proposal: Proposal, sentence: str, *, doubt: str) -> Proposal:
     )
 
 
-def _refusal(station: str, shift: StationShift) -> CalibrationError:
+def _refusal(identity: str, station: str, shift: StationShift) -> CalibrationError:
+    _LOG.decided(in_english(_sentence(station, shift)), controller=identity)
     return CalibrationError(
         "station_moved",
-        _sentence(station, shift),
+        tr(
+            "Pin {station} seems to have moved {mm:.3f} mm, as tools {tools} show.",
+            station=station,
+            mm=math.hypot(*shift.vector_mm[:2]),
+            tools=", ".join(map(str, shift.tools)),
+        )
+        if len(shift.tools) > 1
+        else tr(
+            "Pin {station} seems to have moved {mm:.3f} mm, as tool {tool} shows.",
+            station=station,
+            mm=math.hypot(*shift.vector_mm[:2]),
+            tool=shift.tools[0],
+        ),
         remedy=tr(
             "Nothing was written. Fasten the pin, find it again with a full calibration "
             "({calibrate}), then touch it with each tool.",

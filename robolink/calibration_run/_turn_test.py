@@ -30,7 +30,7 @@ from robolink.calibration_run._acceptance import require_proved
 from robolink.calibration_run._plan import ToolPlan
 from robolink.calibration_run._records import decision_entry, verification_entry
 from robolink.errors import CalibrationError, ConfigError, VerifyError
-from robolink.messages import joined, tr
+from robolink.messages import first_sentence, joined, tr
 from robolink.methods import find_method
 from robolink.model import Controller, EntryKind, require_engineer
 from robolink.procedures import TOUCH_CODES
@@ -378,8 +378,8 @@ def touches_counting(
             raise
         tell(error)
         raise VerifyError(
-            tr("The new tip was not tested. {cause}", cause=error.what),
-            remedy=error.remedy,
+            tr("The new tip was not tested. {cause}", cause=first_sentence(error.what)),
+            remedy=tr("Remove the cause, then measure again."),
             code=error.code,
             controller=controller.identity,
         ) from error
@@ -392,40 +392,39 @@ def told_of_contradiction(proof: VerifyResult, judgement: TurnJudgement) -> str:
         proof: The turn test.
         judgement: What it says.
     """
+    return joined(" ", (_found(proof, judgement), doubt_sentence(judgement.code)))
+
+
+def _found(proof: VerifyResult, judgement: TurnJudgement) -> str:
     if judgement.apart_mm is not None:
-        found = tr(
+        return tr(
             "Turn test: results at the same angle differ by {apart:.3f} mm, more than "
             "their scatter.",
             apart=judgement.apart_mm,
         )
-        return joined(" ", (found, doubt_sentence(judgement.code)))
     drift, limits = proof.drifts[judgement.worst], judgement.limits[judgement.worst]
     limit_mm = limits.accurate_mm if judgement.contradicts_accuracy else limits.repeatable_mm
-    found = tr(
+    return tr(
         "Turn test: {drift:.3f} mm off at U {u:.1f}; up to {limit:.3f} mm would agree with the "
         "measurement.",
         drift=drift.distance_mm,
         u=drift.u_deg,
         limit=limit_mm,
     )
-    return joined(" ", (found, doubt_sentence(judgement.code)))
 
 
 def _contradicted(
     controller: Controller, proof: VerifyResult, judgement: TurnJudgement
 ) -> VerifyError:
+    found = _found(proof, judgement)
     if judgement.offers_wider:
-        remedy = tr(
-            "Check the mount of the nozzle and whether the station was moved; learn the station "
-            "again, then measure again."
-        )
+        what = found
+        remedy = tr("Check that nozzle and station are tight, learn the station, measure again.")
     else:
-        remedy = tr(
-            "Measure the camera again ('robolink calibrate camera-affine'), then the tool: was the "
-            "camera turned or its lens changed?"
-        )
+        what = joined(" ", (found, tr("Was the camera turned, or its lens changed?")))
+        remedy = tr("Measure the camera ('robolink calibrate camera-affine'), then the tool again.")
     return VerifyError(
-        told_of_contradiction(proof, judgement),
+        what,
         remedy=remedy,
         code=judgement.code,
         controller=controller.identity,

@@ -16,7 +16,7 @@ from robolink.config._files import config_files, read_document
 from robolink.errors import ConfigError
 from robolink.files.durable import file_name, make_folder, state_folder, write_whole
 from robolink.files.named import read_named
-from robolink.messages import tr
+from robolink.messages import first_sentence, tr
 from robolink.model import PersonRole
 
 _KIND = "cells"
@@ -97,7 +97,13 @@ def reach_cell(name: str) -> Reach:
                 doubt=" ".join(doubts),
             )
     raise ConfigError(
-        " ".join([tr("No address is known for the cell {name!r}.", name=name), *doubts]),
+        tr(
+            "No address is known for the cell {name!r}:\n{lines}",
+            name=name,
+            lines="\n".join(f"    {first_sentence(doubt)}" for doubt in doubts),
+        )
+        if doubts
+        else tr("No address is known for the cell {name!r}.", name=name),
         remedy=tr(
             "Give its URL in place of the name, for example -c epson+tcp://192.168.0.1:5000."
         ),

@@ -280,7 +280,7 @@ class Lease:
         return LeaseLostError(
             self._taken.took_over(self.controller),
             remedy=tr(
-                "The record does not say how this ended; the job stays open. See the journal."
+                "The job stays open. Read the tools again. Who did what: robolink journal list"
             )
             if sent
             else tr("Nothing was sent. Read the tool again. Who did what: robolink journal list"),

@@ -189,10 +189,7 @@ class JournalOutcomeLog:
             names = self._named()
             last = not self._holds and not self._begun - {operation}
             with self._writing(
-                tr(
-                    "The end of the last command could not be recorded, so it counts as "
-                    "unfinished. Then run 'robolink recover'."
-                )
+                tr("The last command counts as unfinished."), tr("Then run 'robolink recover'.")
             ) as tables:
                 if operation in self._begun:
                     try:
@@ -413,10 +410,10 @@ class JournalOutcomeLog:
         return run_of(client, self._holder) if self.durable else None
 
     @contextmanager
-    def _writing(self, consequence: str = "") -> Iterator["Tables"]:
+    def _writing(self, consequence: str = "", then: str = "") -> Iterator["Tables"]:
         """Write in one transaction; answers that it recorded are kept no longer."""
         self._told = 0
-        with self._store.write(consequence) as tables:
+        with self._store.write(consequence, then) as tables:
             yield tables
         del self._answers[: self._told]
 

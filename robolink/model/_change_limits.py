@@ -103,28 +103,39 @@ class ChangeLimits:
 
     def figure(self, tool: int, jump: Jump) -> str:
         """Return by how much a jump is larger, in sentences."""
-        sentences = []
-        if self.length_mm is not None and jump.length_mm > self.length_mm:
-            sentences.append(
-                tr(
-                    "The tip of tool {tool} would move {change:.3f} mm; this cell allows "
-                    "{limit:.3f} mm.",
-                    tool=tool,
-                    change=jump.length_mm,
-                    limit=self.length_mm,
-                )
-            )
-        if self.angle_deg is not None and jump.angle_deg > self.angle_deg:
-            sentences.append(
-                tr(
-                    "Tool {tool} would turn by {turn:.3f} degrees; this cell allows "
-                    "{limit:.3f} degrees.",
-                    tool=tool,
-                    turn=jump.angle_deg,
-                    limit=self.angle_deg,
-                )
-            )
-        return joined(" ", sentences)
+        return joined(" ", filter(None, (self._moved(tool, jump), self._turned(tool, jump))))
+
+    def findings(self, tool: int, jump: Jump) -> str:
+        """Return by how much a jump is larger: one sentence, or a list where both limits are."""
+        moved, turned = self._moved(tool, jump), self._turned(tool, jump)
+        if not (moved and turned):
+            return moved or turned
+        return tr(
+            "Tool {tool} would change by more than this cell allows:\n    {moved}\n    {turned}",
+            tool=tool,
+            moved=moved,
+            turned=turned,
+        )
+
+    def _moved(self, tool: int, jump: Jump) -> str:
+        if self.length_mm is None or jump.length_mm <= self.length_mm:
+            return ""
+        return tr(
+            "The tip of tool {tool} would move {change:.3f} mm; this cell allows {limit:.3f}.",
+            tool=tool,
+            change=jump.length_mm,
+            limit=self.length_mm,
+        )
+
+    def _turned(self, tool: int, jump: Jump) -> str:
+        if self.angle_deg is None or jump.angle_deg <= self.angle_deg:
+            return ""
+        return tr(
+            "Tool {tool} would turn by {turn:.3f} degrees; this cell allows {limit:.3f}.",
+            tool=tool,
+            turn=jump.angle_deg,
+            limit=self.angle_deg,
+        )
 
 
 class ChangeGuard:
@@ -155,7 +166,7 @@ class ChangeGuard:
         ...         print(error.what)
         ...     with controller.change_guard.accepting(1, Jump.between(before, far)):
         ...         receipt = controller.tools.write(1, far, expected=before)
-        The tip of tool 1 would move 5.000 mm; this cell allows 2.000 mm.
+        The tip of tool 1 would move 5.000 mm; this cell allows 2.000.
     """
 
     def __init__(self, outcomes: OutcomeLog, latch: StopLatch) -> None:
@@ -197,7 +208,7 @@ class ChangeGuard:
         ):
             return
         raise NotAllowedError(
-            self.limits.figure(tool, jump),
+            self.limits.findings(tool, jump),
             remedy=tr(
                 "Nothing was written. Check sign and unit. If the change is real, an engineer "
                 "may accept it: {accept_change}.",

@@ -43,8 +43,7 @@ def which_columns(numeric: Sequence[bool], rows: Sequence[Sequence[float]] = ())
     if not written:
         return OpenQuestion("columns", what, tr("Name each with {columns}.", columns=columns))
     remedy = tr(
-        "Name each with {columns}, for example {readings}; '-' skips one. Joint values do not "
-        "count.",
+        "Name each with {columns}, such as {readings}; '-' skips one, or a joint value.",
         columns=columns,
         readings=written,
     )
@@ -96,13 +95,12 @@ def which_rotation(heads: Sequence[ColumnHead], numeric: Sequence[bool] = ()) ->
     ]
     if not readings:
         remedy = tr(
-            "Add a column u with the turn about Z in degrees, or name each column with {columns}.",
+            "Add a column u (turn about Z in degrees), or name each with {columns}.",
             columns=remedy_word(RemedyWord.COLUMNS),
         )
         return OpenQuestion("columns", what, remedy)
     remedy = tr(
-        "Name each with {columns}, for example {readings}: u, v, w are EPSON's angles, qx, qy, qz, "
-        "qw a quaternion, '-' skips one.",
+        "Name each with {columns}, such as {readings}; '-' skips one.",
         columns=remedy_word(RemedyWord.COLUMNS),
         readings="; ".join(dict.fromkeys(readings)),
     )

@@ -265,9 +265,18 @@ def refused(path: Path, cause: UnusableText) -> ConfigError | CalibrationError:
 
 def unclear(path: Path, questions: Sequence[OpenQuestion]) -> AmbiguousPosesError:
     """Return the error for a file that leaves something open."""
-    whats = joined("; ", (question.what for question in questions))
+    if len(questions) > 1:
+        what = tr(
+            "{path} leaves {count} questions open:\n{lines}",
+            path=path,
+            count=len(questions),
+            lines="\n".join(f"    {question.what}" for question in questions),
+        )
+    else:
+        whats = joined("; ", (question.what for question in questions))
+        what = tr("{path} is not clear: {what}.", path=path, what=whats)
     return AmbiguousPosesError(
-        tr("{path} is not clear: {what}.", path=path, what=whats),
+        what,
         asks=tuple(question.about for question in questions),
         remedy=joined(" ", (question.remedy for question in questions)),
     )

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final
 from robolink import runtime
 from robolink.calibration import PERSON_SIGMA_Z_MM, PROBE_SIGMA_Z_MM
 from robolink.errors import CalibrationError
-from robolink.messages import tr
+from robolink.messages import joined, tr
 from robolink.model import InputEdge, Pose
 from robolink.runner import (
     AngleShown,
@@ -272,15 +272,11 @@ class WitnessedTouches(ABC):
             if self._plan.nominal or touch.typed or self._made(touch):
                 self._taken[key] = touch
                 return touch
-            told = self._not_made(touch)
+            told, how = self._not_made(touch)
             if left:
-                yield Notify(told)
+                yield Notify(joined(" ", filter(None, (told, how))))
         yield self.off(touch)
-        raise CalibrationError(
-            "not_touched",
-            told,
-            remedy=self._how_to_make(),
-        )
+        raise CalibrationError("not_touched", told, remedy=how or self._how_to_make())
 
     def adopt(self, touches: Mapping[Hashable, TouchedAt]) -> None:
         """Take over the touches of a measurement that is continued.
@@ -384,13 +380,15 @@ class WitnessedTouches(ABC):
             return touch.contact is True
         return was_jogged(touch)
 
-    def _not_made(self, touch: TouchedAt) -> str:
-        if self._plan.contact is not None:
-            return tr(
-                "Touch {number} was not made: input {input} did not go over to contact since the "
-                "robot stopped. Jog until it does; if it shows contact all the time, look at its "
-                "wiring.",
-                number=self._number,
-                input=self._plan.contact.number,
-            )
-        return self._not_jogged(math.hypot(*touch.standoff_mm))
+    def _not_made(self, touch: TouchedAt) -> tuple[str, str]:
+        """Return what happened, and what to do where a contact input shows it."""
+        if self._plan.contact is None:
+            return self._not_jogged(math.hypot(*touch.standoff_mm)), ""
+        told = tr(
+            "Touch {number} was not made: input {input} did not go over to contact since the "
+            "robot stopped.",
+            number=self._number,
+            input=self._plan.contact.number,
+        )
+        how = tr("Jog until it does; if it shows contact all the time, look at its wiring.")
+        return told, how

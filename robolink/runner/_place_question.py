@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Final
 
 from robolink.errors import CalibrationError, ConfigError, DeclinedError, JournalError
-from robolink.messages import tr
+from robolink.messages import first_sentence, tr
 from robolink.model import Controller, DigitalIo, InputEdge, MotionGroup, Pose
 from robolink.runner._jog_steps import parse_steps
 from robolink.runner._prompt_context import GuidedOperator, Operator, Question, TouchSubject, regard
@@ -260,11 +260,9 @@ class PlaceQuestion:
             tr(
                 "{count} jogs in a row were refused; the last one: {cause}",
                 count=MOST_REFUSED,
-                cause=error.what,
+                cause=first_sentence(error.what),
             ),
-            remedy=" ".join(
-                (error.remedy, tr("The robot is where the last jog left it; start again."))
-            ).strip(),
+            remedy=tr("The robot is where the last jog left it; start again."),
             controller=self._controller.identity,
         )
 

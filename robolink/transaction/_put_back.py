@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from robolink.errors import ReadBackError, RobolinkError, SelectedToolError
-from robolink.messages import in_english, tr
+from robolink.messages import first_sentence, in_english, tr
 from robolink.model import (
     Controller,
     EntryKind,
@@ -124,12 +124,9 @@ def _restored(step: Step, sentence: str, *, written: bool) -> PutBack:
 
 def _conflict(step: Step, now: ToolOffset | None) -> PutBack:
     sentence = tr(
-        "Tool {tool} holds {now}, neither the old value {before} nor the new one "
-        "{requested}. It was left as it is.",
+        "Tool {tool} holds {now}, neither its old value nor the new one. It was left as it is.",
         tool=step.tool,
         now=describe_offset(now),
-        before=describe_offset(step.before),
-        requested=describe_offset(step.requested),
     )
     return PutBack(
         step.tool, False, False, sentence, _entry(EntryKind.CONFLICT, step, now, sentence)
@@ -141,7 +138,7 @@ def _failed(step: Step, error: RobolinkError) -> PutBack:
         "DO NOT START THE CELL. Tool {tool} holds an untested value; the old one could not "
         "be written back: {error}",
         tool=step.tool,
-        error=error,
+        error=first_sentence(error.what),
     )
     kind = EntryKind.CONFLICT if isinstance(error, ReadBackError) else EntryKind.UNKNOWN
     entry = _entry(kind, step, None, sentence)

@@ -198,8 +198,16 @@ class Settler:
             return
         self._controller.outcomes.append(*entries)
         raise OutcomeUnknownError(
-            joined(" ", (result.sentence for result in failures)),
-            remedy=tr("The change stays open. Look at the controller."),
+            tr(
+                "{count} tools could not be restored:\n{lines}",
+                count=len(failures),
+                lines="\n".join(f"    {result.sentence}" for result in failures),
+            )
+            if len(failures) > 1
+            else joined(" ", (result.sentence for result in failures)),
+            remedy=tr(
+                "The change stays open. Look at the controller. Values: robolink journal list"
+            ),
             controller=self._controller.identity,
         )
 

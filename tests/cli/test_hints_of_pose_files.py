@@ -66,7 +66,7 @@ def shown(tmp_path, capsys):
 def hints_in(remedy):
     """Return the options that a remedy names, as typed."""
     found = []
-    columns = re.search(r"--columns(?:, for example|:) (.+?)(?::|;? '-'|\. |\.$)", remedy)
+    columns = re.search(r"--columns(?:, such as|:) (.+?)(?::|;? '-'|\. |\.$)", remedy)
     if columns:
         found += [("--columns", one.strip()) for one in columns[1].split(";")]
     euler = re.search(r"--euler: (.+?)\.(?: |$)", remedy)

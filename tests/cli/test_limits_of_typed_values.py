@@ -91,7 +91,7 @@ def test_off_a_terminal_an_engineer_says_beforehand_how_far(cell, tools):
     for more in ((), ("--yes",), ("--accept-jump", "23.9")):
         code, _, err = cell("eva", *SIGN_ERROR, *more)
         assert code == 9, err
-        assert "The tip of tool 1 would move 24.000 mm; this cell allows 1.500 mm." in err
+        assert "The tip of tool 1 would move 24.000 mm; this cell allows 1.500." in err
         assert "--accept-jump" in err
     assert tools.get(1) == STORED
     code, out, err = cell("eva", *SIGN_ERROR, "--accept-jump", "24.1", "--json")
@@ -104,7 +104,7 @@ def test_on_a_terminal_an_engineer_is_asked_with_the_figure_whatever_yes_says(ce
     code, _, err = cell("eva", *SIGN_ERROR, "--yes")
     assert code == 0, err
     (question,) = person.questions
-    assert "would move 24.000 mm; this cell allows 1.500 mm" in question
+    assert "would move 24.000 mm; this cell allows 1.500" in question
     assert tools.get(1) == ToolOffset(-12.0, -3.5, -20.0)
 
 
@@ -131,7 +131,7 @@ def test_a_no_sets_clears_and_selects_nothing(run, tools, person, words):
 def test_a_turn_has_a_limit_of_its_own(cell, tools):
     code, _, err = cell("eva", "tool", "set", "1", "--u", "6")
     assert code == 9
-    assert "Tool 1 would turn by 6.000 degrees; this cell allows 5.000 degrees." in err
+    assert "Tool 1 would turn by 6.000 degrees; this cell allows 5.000." in err
     assert cell("eva", "tool", "set", "1", "--u", "6", "--accept-turn", "7")[0] == 0
     assert tools.get(1).u_deg == 6.0
 
@@ -191,7 +191,7 @@ def test_a_restore_is_asked_about_and_an_undo_is_not(cell, tools, tmp_path):
     assert cell("eva", *SIGN_ERROR, "--accept-jump", "24.1")[0] == 0
     code, _, err = cell("eva", "restore", file, "--yes")
     assert code == 9
-    assert "The tip of tool 1 would move 24.000 mm; this cell allows 1.500 mm." in err
+    assert "The tip of tool 1 would move 24.000 mm; this cell allows 1.500." in err
     assert tools.get(1).x_mm == -12.0
     # The earlier value was tested, and the record names the engineer who undoes.
     assert cell("eva", "undo", "--yes")[0] == 0
@@ -215,7 +215,7 @@ def test_a_program_that_calls_back_is_held_to_it(cell, monkeypatch, said, held_m
 def test_a_preview_says_by_how_much(cell, tools):
     code, _, err = cell("eva", *SIGN_ERROR, "--dry-run")
     assert code == 0
-    assert "would move 24.000 mm; this cell allows 1.500 mm" in err
+    assert "would move 24.000 mm; this cell allows 1.500" in err
     assert tools.get(1) == STORED
 
 

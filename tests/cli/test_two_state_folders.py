@@ -91,7 +91,7 @@ def test_without_a_cell_file_the_record_of_the_last_procedure_tells(epson, folde
     folder(here.name)
     code, said = run("-c", url, "jog", "x+1", "--yes")
     assert code == 9
-    assert "the last procedure on record started with tool 1" in said
+    assert "the last procedure began with tool 1" in said
     assert simulator.machine.tools.selected == 0
 
 

@@ -1,6 +1,8 @@
 """``recalibrate`` at named stations: one touch with Z, a bumped pin, recorded beams, a retake."""
 
 import json
+import logging
+import re
 import sys
 from pathlib import Path
 
@@ -12,6 +14,7 @@ from robolink.report import reports_of
 from robolink.report.sections.evidence import interval_sentences
 from robolink.report.sections.offsets import offsets
 from tests.contract._method_cell import method_cell, on
+from tests.unit.test_logging import listening
 
 pytestmark = pytest.mark.simulator_only
 
@@ -113,12 +116,15 @@ def test_a_bumped_pin_shifts_all_tools_and_nothing_is_written(arm, tmp_path):
     held = [arm.held(tool) for tool in (1, 2)]
     path = written(tmp_path / "two.toml", TWO_TOOLS)
     arm.bump_pin(0.3, -0.2)
-    refused = recalibrate(arm, path)
+    with listening(logging.INFO) as heard:
+        refused = recalibrate(arm, path)
     assert refused.code == 7, refused.err
     error = refused.document["error"]
     assert error["code"] == "station_moved"
-    assert "seems to have moved by X +0." in error["what"]
-    assert ": tools 1, 2 shifted alike" in error["what"]
+    logged = "\n".join(record.getMessage() for record in heard)
+    assert re.search(r"seems to have moved 0\.3\d\d mm, as tools 1, 2 show\.$", error["what"])
+    assert "seems to have moved by X +0." in logged
+    assert ": tools 1, 2 shifted alike" in logged
     assert [arm.held(tool) for tool in (1, 2)] == held
     assert {entry.details["code"] for entry in arm.recorded(EntryKind.REFUSED)} == {"station_moved"}
     arm.bump_pin(-0.3, 0.2)

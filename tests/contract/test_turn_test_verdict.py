@@ -204,7 +204,7 @@ def test_a_doubt_that_the_accuracy_covers_may_be_kept_as_stated():
 @pytest.mark.parametrize(
     ("answer", "chosen", "remedy", "commands"),
     [
-        (TAKES_BACK, "take_back", "Check the mount of the nozzle and", ()),
+        (TAKES_BACK, "take_back", "Check that nozzle and station are tight", ()),
         (MOUNT, "check_mount", "measure the tip anew", ()),
         (LEARNS, "learn_station", "'robolink cell station learn BEAMS-02 --tool 15'", RELEARN),
     ],

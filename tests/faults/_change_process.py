@@ -153,9 +153,9 @@ def _watch_commits(noted: Path, kill_at: CommitStep | None) -> None:
             os.kill(os.getpid(), signal.SIGKILL)
 
     @contextmanager
-    def watched(store: Store, consequence: str = "") -> Iterator[Tables]:
+    def watched(store: Store, *told: str) -> Iterator[Tables]:
         nonlocal number
-        with write(store, consequence) as tables:
+        with write(store, *told) as tables:
             yield tables
             number += 1
             head = tables.entries.head()

@@ -120,15 +120,15 @@ def _watch_journal(wait: Wait) -> None:
     read, write = Store.read, Store.write
 
     @contextmanager
-    def reading(store: Store, consequence: str = "") -> Iterator[Tables]:
+    def reading(store: Store, *told: str) -> Iterator[Tables]:
         wait("journal read")
-        with read(store, consequence) as tables:
+        with read(store, *told) as tables:
             yield tables
 
     @contextmanager
-    def writing(store: Store, consequence: str = "") -> Iterator[Tables]:
+    def writing(store: Store, *told: str) -> Iterator[Tables]:
         wait("journal write")
-        with write(store, consequence) as tables:
+        with write(store, *told) as tables:
             yield tables
 
     Store.read, Store.write = reading, writing  # type: ignore[method-assign, assignment]

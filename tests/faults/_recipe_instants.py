@@ -146,9 +146,9 @@ def exchanges_and_commits(simulator: HostedDevice, instants: Instants) -> Iterat
         instants.pass_by("answer", asked.get(number, ""))
 
     @contextmanager
-    def written(store: Store, consequence: str = "") -> Iterator[Tables]:
+    def written(store: Store, *told: str) -> Iterator[Tables]:
         instants.pass_by("commit", "before")
-        with write(store, consequence) as tables:
+        with write(store, *told) as tables:
             yield tables
         instants.pass_by("commit", "after")
 

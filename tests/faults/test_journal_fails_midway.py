@@ -25,12 +25,12 @@ class Failing:
         self.first = None
         write = Store.write
 
-        def counted(store, consequence=""):
+        def counted(store, *told):
             self.count += 1
             if self.first is not None and self.count >= self.first:
                 what = "The journal cannot be used: the disk is full."
-                raise JournalError(what, remedy=f"Free space. {consequence}".strip())
-            return write(store, consequence)
+                raise JournalError(what, remedy=" ".join(("Free space.", *told)).strip())
+            return write(store, *told)
 
         monkeypatch.setattr(Store, "write", counted)
 

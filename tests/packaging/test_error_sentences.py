@@ -85,11 +85,13 @@ OTHERWISE = {
     "Cell {cell} needs robot {expected}; at {url} there is {found}.": "C8-C901S",
     "Between touch {before} and {after} something moved by {shift:.2f} mm.": "3",
     "Station {id}: {what} must be known first.": "where it is",
+    "{reference} (address {address}) of unit {unit}": "412290",
     "The journal {name} has form {found}; this robolink knows forms up to {own}.": "7",
 }
 """Sentences whose names stand for something else than those of all others."""
 
-OTHER_NAMES = {"after", "before", "expected", "found", "own", "requested", "what"}
+OTHER_NAMES = {"address", "after", "before", "expected", "found", "own", "reference", "requested"}
+OTHER_NAMES |= {"what"}
 
 TOLD_TO_PROGRAMS = ("robolink/serving/", "robolink/protocols/", "robolink/testing/")
 """What is raised there is a line for a robot program, or a report: nobody reads what to do."""

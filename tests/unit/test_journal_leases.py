@@ -145,7 +145,7 @@ def test_an_end_after_the_lease_was_lost_is_not_recorded_and_frees_nothing(lease
     with pytest.raises(LeaseLostError) as refused:
         anna.clear("a", NewEntry(EntryKind.DONE, tool=3))
     assert f"Bert (bert, process {HERE.pid} on {HERE.host}) took over" in refused.value.what
-    assert "does not say how this ended" in refused.value.remedy
+    assert "The job stays open. Read the tools again." in refused.value.remedy
     assert list(leases.journal.entries(kinds=(EntryKind.DONE,))) == []
     assert [known.operation for known in bert.open_markers()] == ["a", "b"]
     with pytest.raises(LeaseHeldError, match="Bert"):
@@ -193,7 +193,7 @@ def test_a_beat_that_cannot_be_stored_raises_nothing(leases, monkeypatch):
     anna.begin(marker("a"))
     leases.clock.advance(2)
 
-    def fail(consequence=""):
+    def fail(*_told):
         raise JournalError("The disk is full.")
 
     monkeypatch.setattr(leases.journal._store, "write", fail)

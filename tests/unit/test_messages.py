@@ -293,7 +293,7 @@ def test_no_blank_stands_behind_a_chinese_full_stop():
     ],
 )
 def test_a_remedy_of_several_sentences_is_kept_in_english_and_has_no_blank_in_chinese(joins):
-    messages.install(lambda sentence: f"\u79fb{'{elsewhere}' * ('{e' in sentence)}\u3002")
+    messages.install(lambda sentence: f"{'{export}' * ('{e' in sentence)}\u79fb\u3002")
     try:
         remedy = joins().remedy
     finally:

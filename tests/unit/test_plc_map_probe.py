@@ -46,7 +46,7 @@ def controller_with(**changes):
     [
         ({"low_word_first": False}, 'word_order = "low_first"'),
         ({"swapped_bytes": True}, 'byte_order = "big"'),
-        ({"address": 19}, r"30021 \(address 20\): the addresses of this map are off by -1"),
+        ({"address": 19}, r"30021 \(address 20\): the addresses are off by -1"),
         ({"address": 22, "low_word_first": False}, 'off by \\+2. .*word_order = "low_first"'),
         ({"address": 2}, "Check the unit"),
     ],

@@ -76,7 +76,8 @@ def test_a_run_refuses_by_the_same_sentences_before_anything_is_asked(case):
         before = controller.exchanges
         with pytest.raises(ConfigError) as refused:
             RecipeRun(controller, LoadedRecipe(recipe, Path("a.toml"), ""), operator=nobody)
-        assert refused.value.what == " ".join(beyond(recipe, controller.capabilities))
+        listed = "".join(f"\n    {one}" for one in beyond(recipe, controller.capabilities))
+        assert refused.value.what == f"This controller lacks what the recipe needs:{listed}"
         assert controller.exchanges == before
 
 

@@ -24,7 +24,7 @@ SHELL_WAYS: Final = {
     RemedyWord.FORGET_MARKER: "'robolink recover --forget'",
     RemedyWord.GIVEN_POSES: "--pose",
     RemedyWord.HEIGHT: "--z {tool}=MM",
-    RemedyWord.LENGTH: "--if-length-changed; in a recipe if_length_changed",
+    RemedyWord.LENGTH: "--if-length-changed",
     RemedyWord.LENGTH_UNIT: "--length",
     RemedyWord.LENGTH_TOLERANCE: "--tolerance 0.05",
     RemedyWord.LIST_CHANGES: "'robolink journal list --kind done'",

@@ -178,17 +178,18 @@ def accepted_jump(
     if controller.outcomes.signature.role != PersonRole.OPERATOR and jump.exceeds(
         accepted_mm or allowed.length_mm, accepted_deg or allowed.angle_deg
     ):
-        _ask(allowed.figure(tool, jump))
+        _ask(allowed.figure(tool, jump), allowed.findings(tool, jump))
     with guard.accepting(tool, jump):
         yield
 
 
-def _ask(figure: str) -> None:
+def _ask(figure: str, findings: str) -> None:
     if json_is_on() or not on_terminal():
         raise DeclinedError(
-            figure,
+            findings,
             remedy=tr(
-                "Nothing was written. Check sign and unit, or give --accept-jump/--accept-turn."
+                "Nothing was written. Check sign and unit. An engineer may write it on a "
+                "terminal, or with --accept-jump and --accept-turn."
             ),
         )
     if not asked(tr("{figure} Write it anyway? Check sign and unit first.", figure=figure)):

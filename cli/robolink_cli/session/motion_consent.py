@@ -42,8 +42,7 @@ def doubt_about(selected: int | None, controller: "Controller", cell: "Expected 
     if not before:
         return ""
     return tr(
-        "Tool 0, the bare flange, is selected; the last procedure on record started with "
-        "tool {tool}.",
+        "Tool 0 (flange) is selected; the last procedure began with tool {tool}.",
         tool=before,
     )
 
@@ -64,7 +63,10 @@ def heed_selection(controller: "Controller", cell: "Expected | None", *, yes: bo
     doubt = doubt_about(controller.tools.selected(), controller, cell)
     if not doubt:
         return
-    remedy = tr("Nothing moved. Select the tool of the cell file: robolink tool select N")
+    remedy = tr(
+        "Nothing moved. Another program may have selected it. Select the tool that the cell "
+        "file names: robolink tool select N"
+    )
     if yes or json_is_on() or not on_terminal():
         raise DeclinedError(doubt, remedy=remedy)
     if not asked(tr("{doubt} Move with it anyway?", doubt=doubt)):

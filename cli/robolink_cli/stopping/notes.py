@@ -36,7 +36,7 @@ def heed_stop(url: str, controller: "Controller", *, yes: bool) -> None:
     if yes or not on_terminal():
         raise StoppedError(
             found.sentence,
-            remedy=tr("Look into the cell. Then run 'robolink robot release' (or 'robot reset')."),
+            remedy=tr("Look into the cell; then robolink robot release (or reset), or omit --yes."),
             controller=url.partition("?")[0],
         )
     note(found.sentence)

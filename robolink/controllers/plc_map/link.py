@@ -221,19 +221,17 @@ def _diagnosis(registers: Registers, probe: MapProbe) -> str:
     if found.address != number.address:
         hints.append(
             tr(
-                "It was found at {place}: the addresses of this map are off by {shift:+d}.",
+                "It was found at {place}: the addresses are off by {shift:+d}.",
                 place=describe_place(found.table, found.address),
                 shift=number.address - found.address,
             )
         )
     if found.low_word_first != number.low_word_first:
         order = "low_first" if found.low_word_first else "high_first"
-        hints.append(
-            tr('The words are in the opposite order: word_order = "{order}".', order=order)
-        )
+        hints.append(tr('Set word_order = "{order}".', order=order))
     if found.swapped_bytes != number.swapped_bytes:
         order = "little" if found.swapped_bytes else "big"
-        hints.append(tr('The bytes are swapped: byte_order = "{order}".', order=order))
+        hints.append(tr('Set byte_order = "{order}".', order=order))
     return " ".join(hints)
 
 

@@ -96,7 +96,7 @@ def motion_failure(request: str, now: Response, error_class: int) -> ControllerE
                 number=error_class,
             ),
             code=error_class,
-            remedy=tr("Nothing was repeated. {remedy}", remedy=_remedy(error_class)),
+            remedy=tr("Nothing was repeated. Connect again when the other client has ended."),
         )
     kind: type[ControllerError]
     fault = error_class // 100 in _FAULTS or now.group_state == GroupState.ERRORSTOP
@@ -110,7 +110,9 @@ def motion_failure(request: str, now: Response, error_class: int) -> ControllerE
             meaning=_meaning(error_class, now),
         ),
         code=error_class,
-        remedy=tr("Nothing was repeated. {remedy}", remedy=_remedy(error_class)),
+        remedy=_remedy(error_class)
+        if error_class == ErrorClass.HEARTBEAT_LOST
+        else tr("Nothing was repeated. {remedy}", remedy=_remedy(error_class)),
     )
 
 
@@ -148,6 +150,8 @@ def _remedy(error_class: int, raw_error: int = 0) -> str:
         ErrorClass.NO_ORIENTATION_IMAGE: tr(
             "Use a kinematics with ISMKinematicsWithOrientationImage."
         ),
-        ErrorClass.HEARTBEAT_LOST: tr("It continues only while a program waits: check the PC."),
+        ErrorClass.HEARTBEAT_LOST: tr(
+            "Nobody waited, or PC or network was too slow: close programs and start again."
+        ),
     }
     return remedies.get(error_class) or tr("Check the status before you continue.")

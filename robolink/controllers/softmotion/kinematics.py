@@ -236,10 +236,7 @@ def _incompatible(what: str) -> RejectedError:
     return RejectedError(
         what,
         code=ErrorClass.TOOL_INCOMPATIBLE,
-        remedy=tr(
-            "Nothing was sent. Couple an orientation kinematics in the PLC, or mount the "
-            "tip on that line."
-        ),
+        remedy=tr("Nothing was sent. Couple an orientation kinematics, or mount the tip in line."),
     )
 
 
@@ -259,14 +256,10 @@ def _parts(space: OrientationSpace, shift: tuple[float, float, float]) -> str:
 
 def _why(space: OrientationSpace) -> str:
     if space.dof is OrientationDof.THREE:
-        return tr(
-            "How its flange is turned is not known beforehand, so it cannot be said "
-            "where a shift would lead."
-        )
+        return tr("How its flange will be turned is not known.")
     x, y, z = space.v_u
     line = _AXES.get((abs(x), abs(y), abs(z))) or f"({x:.3f}, {y:.3f}, {z:.3f})"
     return tr(
-        "Its flange turns about its {line} as the machine moves, so only a shift along {line} "
-        "stays where it is.",
+        "Its flange turns about its {line}: only shifts along it stay fixed.",
         line=line,
     )

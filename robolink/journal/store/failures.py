@@ -35,18 +35,22 @@ _POSTGRESQL: Final = {
 }
 
 
-def journal_error(error: Exception, name: str, consequence: str) -> JournalError:
+def journal_error(error: Exception, name: str, consequence: str, then: str = "") -> JournalError:
     """Return the error to show for an error of the database.
 
     Args:
         error: As the driver or the system raised it.
         name: Which journal, as a person is told.
         consequence: What it means for the controller, one sentence.
+        then: What to do once the journal can be used again; a new one does not know of it.
     """
-    cause, remedy = _sentences(_reason(error), " ".join(str(error).split()))
+    reason, text = _reason(error), " ".join(str(error).split())
+    if reason == "damaged":
+        return damaged_error(text, name, consequence)
+    cause, remedy = _sentences(reason, text)
     return JournalError(
         tr("The journal {name} cannot be used: {cause}.", name=name, cause=cause),
-        remedy=joined(" ", filter(None, (remedy, consequence))),
+        remedy=joined(" ", filter(None, (consequence, remedy, then))),
     )
 
 
@@ -61,7 +65,7 @@ def damaged_error(found: str, name: str, consequence: str) -> JournalError:
     cause = tr("it is damaged ({text})", text=found.rstrip("."))
     return JournalError(
         tr("The journal {name} cannot be used: {cause}.", name=name, cause=cause),
-        remedy=joined(" ", filter(None, (_move_it_away(), consequence))),
+        remedy=joined(" ", filter(None, (consequence, _move_it_away()))),
     )
 
 
@@ -81,39 +85,39 @@ def _reason(error: BaseException) -> str:
 
 
 def _sentences(reason: str, text: str) -> tuple[str, str]:
-    elsewhere = tr("Or name another place in ROBOLINK_JOURNAL.")
     match reason:
         case "full":
             return tr("the disk is full"), tr("Free space there, then repeat the command.")
         case "disk":
             cause = tr("the disk reported an error ({text})", text=text)
-            return cause, tr("Check the disk and the space on it. {elsewhere}", elsewhere=elsewhere)
+            return cause, tr(
+                "Check the disk and its space, or name another place in ROBOLINK_JOURNAL."
+            )
         case "forbidden":
             cause = tr("this user may not write or open it ({text})", text=text)
-            remedy = tr("Make the file and its folder writable. {elsewhere}", elsewhere=elsewhere)
-            return cause, remedy
+            return cause, tr(
+                "Make file and folder writable, or name another place in ROBOLINK_JOURNAL."
+            )
         case "locked":
             remedy = tr("Wait until it has finished, or end it; then repeat the command.")
             return tr("another program keeps it locked"), remedy
-        case "damaged":
-            return tr("it is damaged ({text})", text=text), _move_it_away()
         case "foreign":
             cause = tr("it is not a journal ({text})", text=text)
-            return cause, tr("Move it away. {elsewhere}", elsewhere=elsewhere)
+            return cause, tr("Move it away, or name another place in ROBOLINK_JOURNAL.")
         case "denied":
             cause = tr("the database does not let this user write ({text})", text=text)
-            return cause, tr("Give the user that right. {elsewhere}", elsewhere=elsewhere)
+            return cause, tr("Give the user that right, or name another place in ROBOLINK_JOURNAL.")
         case "unreachable":
             cause = tr("the database cannot be reached ({text})", text=text)
             return cause, tr("Check that its server runs, the address, its name and the network.")
         case _:
-            return text, tr("Check the file or the database. {elsewhere}", elsewhere=elsewhere)
+            return text, tr(
+                "Check the file or the database, or name another place in ROBOLINK_JOURNAL."
+            )
 
 
 def _move_it_away() -> str:
     return tr(
-        "Save the readable part with {export} and move the file away; robolink then "
-        "creates a new one. The file also held the unfinished jobs: check the robot's "
-        "selected tool and its tool offsets by hand.",
+        "Save it with {export}, move it away, then check the selected tool and offsets by hand.",
         export=remedy_word(RemedyWord.EXPORT_JOURNAL),
     )

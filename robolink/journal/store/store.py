@@ -124,11 +124,12 @@ class Store:
         """Whether it outlives this process."""
         return bool(self._place.path or self._place.url)
 
-    def write(self, consequence: str = "") -> AbstractContextManager[Tables]:
+    def write(self, consequence: str = "", then: str = "") -> AbstractContextManager[Tables]:
         """Run a block as one durable transaction; an exception undoes all of it.
 
         Args:
             consequence: What a failure means for the controller, one sentence.
+            then: What to do once the journal can be used again.
 
         Raises:
             JournalError: It is not stored.
@@ -138,7 +139,7 @@ class Store:
                 tr("The journal {name} was opened for reading only.", name=self._place.name),
                 remedy=tr("Open it for writing to add to it."),
             )
-        return self._use(consequence, writing=True)
+        return self._use(consequence, then, writing=True)
 
     def read(self, consequence: str = "") -> AbstractContextManager[Tables]:
         """Run a block that only reads, and leave nothing open.
@@ -186,7 +187,7 @@ class Store:
                 self._backend = None
 
     @contextmanager
-    def _use(self, consequence: str, *, writing: bool) -> Iterator[Tables]:
+    def _use(self, consequence: str, then: str = "", *, writing: bool) -> Iterator[Tables]:
         if writing:
             checkpoint(Checkpoint.COMMIT, "before")
         with self._lock:
@@ -212,7 +213,7 @@ class Store:
                 raise damaged_error(str(error), self._place.name, consequence) from error
             except self._failures as error:
                 self._drop()
-                raise journal_error(error, self._place.name, consequence) from error
+                raise journal_error(error, self._place.name, consequence, then) from error
         if writing:
             checkpoint(Checkpoint.COMMIT, "after")
 

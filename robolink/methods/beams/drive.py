@@ -166,7 +166,7 @@ def require_reached(
         "run_up_too_short",
         tr(
             "The tip met beam {beam} too near to where it started or stopped to have "
-            "{speed:g} mm/s at both edges: it is far from where expected.",
+            "{speed:g} mm/s at both edges: it is far from where it was expected.",
             beam=crossing.beam + 1,
             speed=plan.crossing_mm_s,
         ),

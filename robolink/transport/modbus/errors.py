@@ -42,6 +42,17 @@ def unanswered(
     identity: str, request: ModbusRequest, held: bytes, *, serial: bool
 ) -> TransportTimeoutError:
     """Return the error for an answer that did not come, or not whole."""
+    if serial and (noise := _noise(held)):
+        return TransportTimeoutError(
+            tr(
+                "{identity} sent only {count} bytes of its answer.",
+                identity=identity,
+                count=len(held),
+            ),
+            remedy=noise,
+            request=describe(request),
+            raw=held,
+        )
     if held:
         what = tr(
             "{identity} sent only {count} bytes of its answer: {request}.",
@@ -57,7 +68,7 @@ def unanswered(
         "Check cable and power of the PLC and the unit ({unit}), then try again.", unit=request.unit
     )
     if serial:
-        remedy = _noise(held) or tr(
+        remedy = tr(
             "Check the PLC's cable and power, baud rate and unit ({unit}), then try again.",
             unit=request.unit,
         )
@@ -173,14 +184,14 @@ def refused(identity: str, request: ModbusRequest, code: int) -> RobolinkError:
 
     A refusal that leaves open whether a write was done is no ``RejectedError``.
     """
+    name, remedy = _told(code, request.unit)
     what = tr(
         "{identity} refused with Modbus exception {code} ({name}): {request}.",
         identity=identity,
         code=code,
-        name=_name(code),
+        name=name,
         request=describe(request),
     )
-    remedy = _remedy(code, request.unit)
     shown = describe(request)
     if code == _GATEWAY_NO_PATH:
         return ConnectError(what, remedy=remedy, request=shown)
@@ -191,34 +202,57 @@ def refused(identity: str, request: ModbusRequest, code: int) -> RobolinkError:
     return RejectedError(what, code=code, remedy=remedy, request=shown)
 
 
-def _name(code: int) -> str:
-    names = {
-        1: tr("illegal function"),
-        2: tr("illegal data address"),
-        3: tr("illegal data value"),
-        4: tr("server device failure"),
-        5: tr("acknowledged, not finished"),
-        6: tr("server busy"),
-        7: tr("negative acknowledge"),
-        8: tr("memory parity error"),
-        _GATEWAY_NO_PATH: tr("gateway path unavailable"),
-        _GATEWAY_NO_ANSWER: tr("gateway target is silent"),
-    }
-    return names.get(code, tr("not in the standard"))
+def _told(code: int, unit: int) -> tuple[str, str]:
+    """Return the name of an exception code, and what to do."""
+    match code:
+        case 1:
+            told = (
+                tr("illegal function"),
+                tr("Check that the PLC's Modbus device offers this kind of register."),
+            )
+        case 2:
+            told = (
+                tr("illegal data address"),
+                tr("Check the URL's addresses (40001 is 0) and the PLC's Modbus area sizes."),
+            )
+        case 3:
+            told = (
+                tr("illegal data value"),
+                tr("Raise the PLC's register limit, or state it in the URL (most_registers=50)."),
+            )
+        case 4:
+            told = tr("server device failure"), _unclear()
+        case 5:
+            told = tr("acknowledged, not finished"), _unclear()
+        case 6:
+            told = (
+                tr("server busy"),
+                tr("Wait until the PLC has finished what it does, then try again."),
+            )
+        case 7:
+            told = tr("negative acknowledge"), _unclear()
+        case 8:
+            told = tr("memory parity error"), _unclear()
+        case 0x0A:
+            told = (
+                tr("gateway path unavailable"),
+                tr(
+                    "The gateway knows no unit {unit}: give another one with unit= in the URL.",
+                    unit=unit,
+                ),
+            )
+        case 0x0B:
+            told = (
+                tr("gateway target is silent"),
+                tr(
+                    "Check unit= in the URL ({unit}), and power and cable of that device.",
+                    unit=unit,
+                ),
+            )
+        case _:
+            told = tr("not in the standard"), _unclear()
+    return told
 
 
-def _remedy(code: int, unit: int) -> str:
-    remedies = {
-        1: tr("Check that the PLC's Modbus device offers this kind of register."),
-        2: tr("Check the addresses (40001 is address 0) and the PLC's Modbus area sizes."),
-        3: tr("Raise the PLC's register limit, or state it in the URL (most_registers=50)."),
-        6: tr("Wait until the PLC has finished what it does, then try again."),
-        _GATEWAY_NO_PATH: tr(
-            "The gateway knows no unit {unit}: give another one with unit= in the URL.", unit=unit
-        ),
-        _GATEWAY_NO_ANSWER: tr(
-            "Check unit= in the URL ({unit}), and power and cable of that device.",
-            unit=unit,
-        ),
-    }
-    return remedies.get(code, tr("Look at the PLC; read its state before anything else."))
+def _unclear() -> str:
+    return tr("Look at the PLC; read its state before anything else.")

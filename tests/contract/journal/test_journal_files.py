@@ -240,7 +240,7 @@ def test_what_may_not_be_written_is_read(public, open_anew, of_folder, of_file, 
     def write():
         open_anew(str(public)).log("cell").begin(marker("b"))
 
-    refused(write, public, "may not write", "Make the file and its folder writable", "was not sent")
+    refused(write, public, "may not write", "Make file and folder writable", "was not sent")
     reader = open_anew(str(public), read_only=True)
     assert reader.verify() == ChainVerification(200, ())
     assert [known.operation for known in reader.log("cell").open_markers()] == ["left open"]

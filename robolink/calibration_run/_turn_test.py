@@ -30,7 +30,7 @@ from robolink.calibration_run._acceptance import require_proved
 from robolink.calibration_run._plan import ToolPlan
 from robolink.calibration_run._records import decision_entry, verification_entry
 from robolink.errors import CalibrationError, ConfigError, VerifyError
-from robolink.messages import first_sentence, joined, tr
+from robolink.messages import Translated, first_sentence, in_english, joined, tr
 from robolink.methods import find_method
 from robolink.model import Controller, EntryKind, require_engineer
 from robolink.procedures import TOUCH_CODES
@@ -379,10 +379,18 @@ def touches_counting(
         tell(error)
         raise VerifyError(
             tr("The new tip was not tested. {cause}", cause=first_sentence(error.what)),
-            remedy=tr("Remove the cause, then measure again."),
+            remedy=_after_a_write(error.remedy),
             code=error.code,
             controller=controller.identity,
         ) from error
+
+
+def _after_a_write(remedy: str) -> str:
+    """Return what to do without "Nothing was written", which touches before a write begin with."""
+    stands = tr("Nothing was written.")
+    shown = remedy.removeprefix(stands).lstrip()
+    english = in_english(remedy).removeprefix(in_english(stands)).lstrip()
+    return shown if shown == english else Translated(shown, english)
 
 
 def told_of_contradiction(proof: VerifyResult, judgement: TurnJudgement) -> str:

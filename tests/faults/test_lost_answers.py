@@ -331,12 +331,18 @@ def seed_that_bends_digits(position):
 
 @pytest.mark.fault("F07")
 @pytest.mark.parametrize(
-    "query", ["Print Speed(1)", "Print SpeedS(2)", "Print Power", "Print Tool"]
+    ("query", "before"),
+    [
+        ("Print Tool", ""),
+        ("Print Power, Speed", ""),
+        pytest.param("Print Power, Speed", "0 ", id="Speed(1)"),
+        pytest.param("Print Power, Speed", "0 5 5 5 50 ", id="SpeedS(2)"),
+    ],
 )
 @pytest.mark.parametrize("which", [0, 1])
-def test_what_is_put_back_is_read_twice_before_it_is_trusted(serve, query, which):
+def test_what_is_put_back_is_read_twice_before_it_is_trusted(serve, query, before, which):
     """One digit is altered into another digit: only the second reading shows it."""
-    position = len('#Execute,"')
+    position = len('#Execute,"' + before)
     fault = Fault(FaultAction.GARBLE_REPLY, which, match=query, position=position)
     simulator = EpsonSimulator(seed=seed_that_bends_digits(position))
     simulator.faults.add(fault)

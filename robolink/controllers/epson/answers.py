@@ -1,5 +1,7 @@
 """The meaning of the controller's answers: refusals, status flags, commands not sent."""
 
+from typing import Final
+
 from robolink.errors import (
     NotReadyError,
     NotReadyReason,
@@ -12,6 +14,9 @@ from robolink.protocols.epson_text import ErrorCode, Refusal, StatusFlags
 NOT_EXECUTED = frozenset({10, 11, 12, 13, 14, 15, 16, 20, 21})
 """Refusals that show that nothing was carried out (docs/reference/epson.md 1.6); 19 and 99 do not
 show it."""
+
+NOT_NOW: Final = frozenset({20, 21})
+"""Refusals that mean only that the controller is busy (docs/reference/epson.md 1.6)."""
 
 
 def rejected(refusal: Refusal, *, controller: str, request: str = "") -> RejectedError:

@@ -230,9 +230,8 @@ class EpsonController(ControllerCore):
         with self._link.lock.held(name, calming=not on, leased=False):
             self._link.window.require_ready(name)
             self._link.session.exchange(name, str(self.robot_number()))
-            if on:
-                group.settings.slow_down(MotionProfile())
-            if group.motors_on() is not on:
+            found = group.settings.slow_down(MotionProfile()).motors_on if on else group.motors_on()
+            if found is not on:
                 raise ReadBackError(
                     tr("The motors are not on.") if on else tr("The motors are not off."),
                     remedy=tr("Nothing was repeated. Check the controller."),

@@ -1,6 +1,5 @@
 """The robot arm of an EPSON controller: where it is, and how to move it."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Final
 
@@ -61,18 +60,20 @@ class EpsonGroup(MotionGroupCore):
 
     def pose(self) -> Pose:
         """Read the measured position of the selected tool (RealPos)."""
-        window = self._link.window
-        window.require_ready("Print RealPos")
-        return read_position(window, spel.print_real_position())
+        window, query = self._link.window, spel.print_real_position()
+        with window.proving_ready(query):
+            return read_position(window, query)
 
     def motors_on(self) -> bool:
         """Read whether the motors are on."""
-        return spel.parse_integer(self._link.window.printed(spel.print_motor())) != 0
+        (motor,) = self._link.window.printed_numbers(spel.print_motor())
+        return spel.parse_integer(motor) != 0
 
     def joints(self) -> spel.PrintedWhere:
         """Read the commanded position in all three notations (Where)."""
-        self._link.window.require_ready("Where")
-        return spel.parse_where(self._link.window.printed(spel.where()))
+        window, query = self._link.window, spel.where()
+        with window.proving_ready(query):
+            return spel.parse_where(window.printed(query))
 
     def move_to(self, target: Pose, profile: MotionProfile, *, box: WorkBox) -> EpsonMotion:
         """Start one movement; see :class:`robolink.model.MotionGroup`."""
@@ -84,18 +85,10 @@ class EpsonGroup(MotionGroupCore):
     ) -> EpsonMotionUntilInput:
         """Start a straight movement until an input switches; see the model."""
         require_target(target, box)
-        link, window = self._link, self._link.window
         statement = self._statement_until(target, edge)
-
-        def look_at_input() -> None:
-            link.preferences.require_real_inputs(statement)
-            # Read through Execute, so that it shows what the next statement will see.
-            on = spel.parse_integer(window.printed(spel.print_input(edge.number))) != 0
-            edge.require_ahead(on, controller=link.identity, request=statement)
-
         profile = MotionProfile(Path.STRAIGHT, speed_mm_s=speed_mm_s)
-        motion = self._start(target, profile, statement, last_look=look_at_input)
-        return EpsonMotionUntilInput(motion, edge, link)
+        motion = self._start(target, profile, statement, edge)
+        return EpsonMotionUntilInput(motion, edge, self._link)
 
     def requests_until(
         self, target: Pose, edge: InputEdge, *, speed_mm_s: float
@@ -135,7 +128,7 @@ class EpsonGroup(MotionGroupCore):
         with self._link.asked(purpose):
             self._require_supervision()
             self._link.window.require_ready(purpose)
-            self._require_motors()
+            _require_motors(self.motors_on())
 
     def terms(self) -> MotionTerms:
         """Read what a person must know before the robot moves."""
@@ -200,8 +193,7 @@ class EpsonGroup(MotionGroupCore):
         target: Pose,
         profile: MotionProfile,
         statement: spel.Statement,
-        *,
-        last_look: Callable[[], None] = lambda: None,
+        edge: InputEdge | None = None,
     ) -> EpsonMotion:
         link, window = self._link, self._link.window
         try:
@@ -209,18 +201,24 @@ class EpsonGroup(MotionGroupCore):
                 # Checked before power and speed are set for the movement.
                 link.markers.require_settled(statement)
                 self._require_supervision()
-                window.require_ready(statement)
+                with window.proving_ready(statement):
+                    found = self.settings.look(edge)
                 link.preferences.require_real_motion(statement)
-                self._require_motors()
-                found = spel.parse_integer(window.printed(spel.print_selected_tool()))
-                self._require_tool(target, found)
+                if edge is not None:
+                    link.preferences.require_real_inputs(statement)
+                _require_motors(found.motors_on)
+                self._require_tool(target, found.tool)
                 singular = self._singular
                 if singular is not None:
                     singular.require_clear(self._flagged(target), profile.path)
-                self.settings.slow_down(profile)
-                last_look()
+                    found = self.settings.look(edge)
+                found = self.settings.slowed(profile, found, edge)
+                _require_motors(found.motors_on)
+                if edge is not None:
+                    on = bool(found.sensed)
+                    edge.require_ahead(on, controller=link.identity, request=statement)
                 with link.uninterrupted():
-                    self._current = self._started(target, statement, found)
+                    self._current = self._started(target, statement, found.tool)
                 return self._current
         except (KeyboardInterrupt, StoppedError):
             # The caller gets no motion object to wait on.
@@ -288,10 +286,11 @@ class EpsonGroup(MotionGroupCore):
             )
         self._link.window.require_abort()
 
-    def _require_motors(self) -> None:
-        if not self.motors_on():
-            raise NotReadyError(
-                tr("The motors are off."),
-                reason=NotReadyReason.MOTORS_OFF,
-                remedy=tr("Run 'robolink robot motors on' when the cell is clear."),
-            )
+
+def _require_motors(on: bool) -> None:
+    if not on:
+        raise NotReadyError(
+            tr("The motors are off."),
+            reason=NotReadyReason.MOTORS_OFF,
+            remedy=tr("Run 'robolink robot motors on' when the cell is clear."),
+        )

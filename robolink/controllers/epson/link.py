@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from typing import Final
 
 from robolink.controllers.driver_link import DriverLink
-from robolink.controllers.epson.answers import NOT_EXECUTED
+from robolink.controllers.epson.answers import NOT_EXECUTED, NOT_NOW
 from robolink.controllers.epson.session import EpsonSession
 from robolink.controllers.epson.window import CommandWindow
 from robolink.errors import (
@@ -175,9 +175,6 @@ _UNSET: Final = frozenset({"", "0"})
 
 _QUERY: Final = spel.print_robot_serial()
 
-_NOT_NOW: Final = frozenset({20, 21})
-"""Refusals that mean only that the controller is busy (docs/reference/epson.md 1.6)."""
-
 
 def name_from(number: Sequence[str], robots: Sequence[str]) -> str:
     """Return the name of a controller, empty if no number is set.
@@ -250,7 +247,7 @@ class IdentityReader:
         except BusyError as error:
             raise _BusyNow from error
         except RejectedError as error:
-            if error.code in _NOT_NOW:
+            if error.code in NOT_NOW:
                 raise _BusyNow from error
             return None
         return tuple(field.strip() for field in fields)
@@ -271,7 +268,7 @@ class IdentityReader:
             self._window.require_ready(_QUERY)
             text = self._window.printed(_QUERY).strip()
         except ControllerError as error:
-            told = isinstance(error, RejectedError) and error.code not in _NOT_NOW
+            told = isinstance(error, RejectedError) and error.code not in NOT_NOW
             return Identity(place, address, place, certain=told)
         return Identity(place if text in _UNSET else f"epson:{text}", address, place)
 

@@ -7,12 +7,14 @@ Source: docs/reference/spel.md 7.1.
 Power and speed: set and read back, remembered and put back.
 """
 
+from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import Final
 
 from robolink.controllers.epson.link import EpsonLink
 from robolink.controllers.epson.session import PendingExecute
-from robolink.controllers.epson.singularities import read_position
+from robolink.controllers.epson.singularities import printed_pose
 from robolink.controllers.motion_group import not_ended_in_time, stopped_before_edge
 from robolink.errors import (
     ControllerFaultError,
@@ -26,13 +28,16 @@ from robolink.errors import (
     UnclearAnswerError,
 )
 from robolink.messages import tr
-from robolink.model import InputEdge, Marker, MotionOutcome, MotionProfile, Pose
+from robolink.model import InputEdge, Marker, MotionOutcome, MotionProfile, Path, Pose
 from robolink.protocols import spel
 from robolink.protocols.epson_text import ErrorCode, Refusal
 from robolink.timing import Deadline
 
-POLL_S = 0.1
-"""Interval between status reads while the robot moves, in s."""
+WATCH_S: Final = 0.4
+"""Interval between two looks at the flags while the robot moves, in s: emergency stop, guard and
+fault show within half a second. The end shows by itself, as the answer of the movement."""
+
+_END_POLL_S: Final = 0.1
 
 
 class EpsonMotion:
@@ -107,12 +112,14 @@ class EpsonMotion:
             if deadline.expired:
                 return False
             try:
+                session.await_pending(wait_s=min(WATCH_S, deadline.remaining_s()))
+                if self._pending.answer is not None or deadline.expired:
+                    continue
                 status = self._link.window.status()
                 if status.emergency_stop or status.guard_open or status.fault:
                     # The controller ends the statement by itself; its answer must follow soon.
                     self._end_within(session.timeout_s)
                     break
-                session.await_pending(wait_s=min(POLL_S, deadline.remaining_s()))
             except (TransportError, RemoteProtocolError):
                 if self._pending.answer is None:
                     raise
@@ -131,7 +138,7 @@ class EpsonMotion:
                     controller=session.identity,
                     request=self.statement,
                 )
-            session.await_pending(wait_s=min(POLL_S, deadline.remaining_s()))
+            session.await_pending(wait_s=min(_END_POLL_S, deadline.remaining_s()))
 
     def _take_answer(self) -> None:
         with self._link.session.uninterrupted():
@@ -191,9 +198,12 @@ class EpsonMotionUntilInput:
             met, position = spel.print_position_found(), spel.print_found_position()
         else:
             met, position = spel.print_till_on(), spel.print_real_position()
-        if not spel.parse_boolean(self._link.window.printed(met)):
+        (switched, tool), point = self._link.window.printed_before_point(
+            met, spel.print_selected_tool(), point=position
+        )
+        if not spel.parse_boolean(switched):
             return None
-        return read_position(self._link.window, position)
+        return printed_pose(point, tool=spel.parse_integer(tool))
 
 
 _SLACK = 0.0005
@@ -210,45 +220,141 @@ class PowerAndSpeed:
     speed_s_mm_s: tuple[float, float, float]
 
 
+@dataclass(frozen=True, slots=True)
+class ArmState:
+    """What a movement depends on, as one look shows it.
+
+    Attributes:
+        tool: The selected tool.
+        motors_on: Whether the motors are on.
+        power_high: Whether the power mode is high.
+        speed_percent: Speed of joint movements.
+        speed_mm_s: SpeedS of straight movements.
+        sensed: Whether the input that is to end the movement is on; ``None`` if there is none.
+    """
+
+    tool: int
+    motors_on: bool
+    power_high: bool
+    speed_percent: int
+    speed_mm_s: float
+    sensed: bool | None = None
+
+    def differences(self, profile: MotionProfile) -> Iterator[spel.Statement]:
+        """Yield what would make a movement one in Power Low, with the speed of its profile.
+
+        A straight movement goes by SpeedS, a joint movement by Speed (docs/reference/spel.md 7.2).
+        """
+        if self.power_high:
+            yield spel.power_low()
+        if profile.path is Path.STRAIGHT:
+            if abs(self.speed_mm_s - profile.speed_mm_s) > _SLACK:
+                yield spel.speed_s(profile.speed_mm_s)
+        elif self.speed_percent != profile.speed_percent:
+            yield spel.speed(profile.speed_percent)
+
+
 class Settings:
     """Reads, limits and restores power and speed."""
 
     def __init__(self, link: EpsonLink) -> None:
         self._link = link
         self._window = link.window
+        self._set_after = link.session.settings_reset
 
     def read(self) -> PowerAndSpeed:
         """Read the present power and speed."""
-        speed = (self._speed_percent(1), self._speed_percent(2), self._speed_percent(3))
-        speed_s = (self._speed_s_mm_s(1), self._speed_s_mm_s(2), self._speed_s_mm_s(3))
-        return PowerAndSpeed(self.power_high(), speed, speed_s)
+        each = (1, 2, 3)
+        told = self._window.printed_numbers(
+            spel.print_power(), *map(spel.print_speed, each), *map(spel.print_speed_s, each)
+        )
+        power, a, b, c, *straight = told
+        d, e, f = map(spel.parse_number, straight)
+        percent = (spel.parse_integer(a), spel.parse_integer(b), spel.parse_integer(c))
+        return PowerAndSpeed(spel.parse_integer(power) != 0, percent, (d, e, f))
+
+    def look(self, edge: InputEdge | None = None) -> ArmState:
+        """Read what a movement depends on.
+
+        What the moves of this driver go by is read; departure and approach values count for Jump
+        alone, which it never sends.
+
+        Args:
+            edge: What is to end it. Its input is read through Execute, so that it shows what the
+                next statement will see.
+        """
+        tool, motor, power, percent, straight, *sensed = self._window.printed_numbers(
+            spel.print_selected_tool(),
+            spel.print_motor(),
+            spel.print_power(),
+            spel.print_speed(1),
+            spel.print_speed_s(1),
+            *([spel.print_input(edge.number)] if edge else []),
+        )
+        return ArmState(
+            tool=spel.parse_integer(tool),
+            motors_on=spel.parse_integer(motor) != 0,
+            power_high=spel.parse_integer(power) != 0,
+            speed_percent=spel.parse_integer(percent),
+            speed_mm_s=spel.parse_number(straight),
+            sensed=spel.parse_integer(sensed[0]) != 0 if sensed else None,
+        )
 
     def statements(self, profile: MotionProfile) -> tuple[spel.Statement, ...]:
-        """Return what :meth:`slow_down` sends."""
+        """Return what sets Power Low and both speeds of a profile."""
         return (
             spel.power_low(),
             spel.speed(profile.speed_percent),
             spel.speed_s(profile.speed_mm_s),
         )
 
-    def slow_down(self, profile: MotionProfile) -> None:
-        """Set Power Low and the profile's speeds, and confirm it.
+    def slow_down(self, profile: MotionProfile, edge: InputEdge | None = None) -> ArmState:
+        """Set Power Low and both speeds of a profile, and confirm it with a look.
 
-        Motor On and Reset put them back, a login and Abort perhaps too (docs/reference/spel.md
-        6.3), so this is done anew before each move. What the moves of this driver go by is read
-        back; departure and approach values count for Jump alone, which it never sends.
+        Args:
+            profile: The movement.
+            edge: As for :meth:`look`.
 
         Raises:
             NotReadyError: The controller does not show what was set; nothing may move.
         """
-        for statement in self.statements(profile):
+        # Counted before: what another thread stops meanwhile is set anew once more.
+        resets = self._link.session.settings_reset
+        state = self._confirmed(profile, self.statements(profile), edge)
+        self._set_after = resets
+        return state
+
+    def slowed(
+        self, profile: MotionProfile, found: ArmState, edge: InputEdge | None = None
+    ) -> ArmState:
+        """Return a state with Power Low and the speed of a profile; what differs is set.
+
+        Motor On and Reset put them back, Abort perhaps too (docs/reference/spel.md 6.3). So after
+        one of these they are set anew, whatever is read.
+
+        Args:
+            profile: The movement.
+            found: What the last look showed.
+            edge: As for :meth:`look`.
+
+        Raises:
+            NotReadyError: As :meth:`slow_down`.
+        """
+        if self._set_after != self._link.session.settings_reset:
+            return self.slow_down(profile, edge)
+        differences = tuple(found.differences(profile))
+        return self._confirmed(profile, differences, edge) if differences else found
+
+    def _confirmed(
+        self,
+        profile: MotionProfile,
+        statements: Iterable[spel.Statement],
+        edge: InputEdge | None,
+    ) -> ArmState:
+        for statement in statements:
             self._window.command(statement)
-        speed_percent, speed_mm_s = self._speed_percent(1), self._speed_s_mm_s(1)
-        if (
-            self.power_high()
-            or speed_percent != profile.speed_percent
-            or abs(speed_mm_s - profile.speed_mm_s) > _SLACK
-        ):
+        state = self.look(edge)
+        if any(state.differences(profile)):
             raise NotReadyError(
                 tr("The controller does not confirm low power and the speed that was set."),
                 reason=NotReadyReason.HIGH_POWER,
@@ -256,6 +362,7 @@ class Settings:
                 controller=self._link.identity,
                 request=spel.power_low(),
             )
+        return state
 
     def restore(self, before: PowerAndSpeed) -> None:
         """Restore ``before`` and confirm it; nothing is sent if it is set already.
@@ -283,10 +390,5 @@ class Settings:
 
     def power_high(self) -> bool:
         """Read the power mode."""
-        return spel.parse_integer(self._window.printed(spel.print_power())) != 0
-
-    def _speed_percent(self, which: int) -> int:
-        return spel.parse_integer(self._window.printed(spel.print_speed(which)))
-
-    def _speed_s_mm_s(self, which: int) -> float:
-        return spel.parse_number(self._window.printed(spel.print_speed_s(which)))
+        (power,) = self._window.printed_numbers(spel.print_power())
+        return spel.parse_integer(power) != 0

@@ -49,6 +49,8 @@ from robolink.timing import Deadline
 
 _CALM: Final = frozenset({"stop", "abort", "pause", "resetalm", "setmotorsoff"})
 _SESSION: Final = frozenset({"login", "logout"})
+_SETS_BACK: Final = frozenset({"abort", "reset", "setmotorson"})
+"""Requests that put power and speed back, or may (docs/reference/spel.md 6.3)."""
 
 _LOOKS: Final = re.compile(r"(Print .*|Where|TLSet|Base|Here|RealPos)", re.ASCII)
 _RESTORES: Final = re.compile(r"(Tool [0-9]+|Power (Low|High)|SpeedS? [0-9., ]+)", re.ASCII)
@@ -120,6 +122,8 @@ class EpsonSession(EpsonConversation):
         place: Where it was reached, the same for each spelling of the URL.
         exchanges: Requests sent so far.
         latch: Refuses requests while a stop is active.
+        settings_reset: How many requests were sent after which power and speed are set anew,
+            whatever is read.
 
     Args:
         line: An open line; the session owns it from here on.
@@ -135,6 +139,7 @@ class EpsonSession(EpsonConversation):
         self._gate.open()
         self._pending: PendingExecute | None = None
         self.latch = StopLatch(self.identity)
+        self.settings_reset = 0
 
     @property
     def pending(self) -> PendingExecute | None:
@@ -209,6 +214,12 @@ class EpsonSession(EpsonConversation):
             self._transport.wait_readable(deadline=Deadline.after(self.clock, wait_s))
             self._collect()
 
+    def disowned(self, answer: str) -> RemoteProtocolError:
+        """End the session, and return the error for an answer to another question."""
+        error = _unasked(repr(answer))
+        self._end(error)
+        return error
+
     def close(self) -> None:
         """Close the connection. Idempotent."""
         super().close()
@@ -236,6 +247,8 @@ class EpsonSession(EpsonConversation):
         checkpoint(Checkpoint.HELD, what)
         self._check_usable(request)
         self.latch.admit(command_class_of(request), what)
+        if request.name.lower() in _SETS_BACK:
+            self.settings_reset += 1
         if self._pending is not None and request.name == "Abort":
             # From here on, any end of the statement counts as requested.
             self._pending.abort_requested = True
@@ -288,15 +301,17 @@ class EpsonSession(EpsonConversation):
         ):
             pending.answer = event
             return
-        raise RemoteProtocolError(
-            tr(
-                "The controller sent an answer that robolink did not ask for: {event}.",
-                event="***" if hidden else repr(event)[:_SHOWN],
-            ),
-            remedy=tr(
-                "robolink closed the connection. Connect again, and look for a second program."
-            ),
-        )
+        raise _unasked("***" if hidden else repr(event))
+
+
+def _unasked(answer: str) -> RemoteProtocolError:
+    return RemoteProtocolError(
+        tr(
+            "The controller sent an answer that robolink did not ask for: {event}.",
+            event=answer[:_SHOWN],
+        ),
+        remedy=tr("robolink closed the connection. Connect again, and look for a second program."),
+    )
 
 
 def log_in(line: EpsonLine, password: Secret | None, *, timeout_s: float) -> EpsonSession:

@@ -22,8 +22,8 @@ from robolink.protocols import spel
 
 def read_position(window: CommandWindow, query: spel.Statement) -> Pose:
     """Read the position that ``query`` prints, of the selected tool."""
-    tool = spel.parse_integer(window.printed(spel.print_selected_tool()))
-    return _printed_pose(window, query, tool=tool)
+    (tool,), point = window.printed_before_point(spel.print_selected_tool(), point=query)
+    return printed_pose(point, tool=spel.parse_integer(tool))
 
 
 class EpsonPoints:
@@ -57,7 +57,7 @@ class EpsonPoints:
         if wanted:
             self._window.require_ready(wanted[0][1])
         return {
-            number: _printed_pose(self._window, spel.print_point(number), tool=None)
+            number: printed_pose(self._window.printed(spel.print_point(number)), tool=None)
             if self._taught(query)
             else None
             for number, query in wanted
@@ -67,8 +67,9 @@ class EpsonPoints:
         return spel.parse_boolean(self._window.printed(query))
 
 
-def _printed_pose(window: CommandWindow, query: spel.Statement, *, tool: int | None) -> Pose:
-    point = spel.parse_point(window.printed(query))
+def printed_pose(text: str, *, tool: int | None) -> Pose:
+    """Return a printed position, of a tool where it is known."""
+    point = spel.parse_point(text)
     x_mm, y_mm, z_mm, u_deg, *rest = point.coordinates
     v_deg, w_deg = rest or (0.0, 0.0)
     return Pose(

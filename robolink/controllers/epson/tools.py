@@ -69,8 +69,8 @@ class EpsonToolTable(ToolTableCore):
 
         Source: docs/reference/epson.md 3.1.
         """
-        self._window.require_ready("Print Tool")
-        return super().selected()
+        with self._window.proving_ready("Print Tool"):
+            return super().selected()
 
     def _set(self, tool: int, requested: ToolOffset | None, expected: Expected) -> ToolReceipt:
         name = f"TLClr {tool}" if requested is None else f"TLSet {tool}"
@@ -122,7 +122,8 @@ class EpsonToolTable(ToolTableCore):
         self._window.command(spel.select_tool(tool))
 
     def _selected(self) -> int:
-        return spel.parse_integer(self._window.printed(spel.print_selected_tool()))
+        (tool,) = self._window.printed_numbers(spel.print_selected_tool())
+        return spel.parse_integer(tool)
 
     def _known(self, lowest: int) -> str:
         return tr("Choose a tool from {lowest} to 15.", lowest=lowest)

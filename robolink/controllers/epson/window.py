@@ -6,6 +6,7 @@ from functools import lru_cache
 
 from robolink.controllers.epson.answers import (
     NOT_EXECUTED,
+    NOT_NOW,
     rejected,
     require_ready,
     status_from_flags,
@@ -23,10 +24,13 @@ from robolink.messages import tr
 from robolink.model import (
     ControllerStatus,
 )
+from robolink.protocols import spel
 from robolink.protocols.epson_text import Refusal, Reply, parse_status
 from robolink.protocols.spel import Statement
 
 _NOT_READY = 20
+_FIRST_QUESTION, _QUESTIONS = 9, 90
+"""Questions are numbered 10 to 99, of the same length each."""
 
 
 class CommandWindow:
@@ -40,6 +44,9 @@ class CommandWindow:
     def __init__(self, session: EpsonSession) -> None:
         self._session = session
         self._was_ready = False
+        self._gap: str | None = None
+        self._gap_known = False
+        self._asked = 0
 
     def status(self) -> ControllerStatus:
         """Read the flags; allowed at any time after the login."""
@@ -84,12 +91,13 @@ class CommandWindow:
         Execute needs what :meth:`require_ready` looks for (docs/reference/epson.md 1.2), so an
         answer proves it, and later than the flags could. So they are read first only until they
         once were right: nothing is sent to a controller that was not seen ready. They are read
-        again when a query is refused, to name what is missing.
+        again when a query is refused, to name what is missing; and before each query where no list
+        can be read, since only a list shows whose answer it is.
 
         Raises:
             NotReadyError: Names the condition.
         """
-        if not self._was_ready:
+        if not self._was_ready or (self._gap_known and self._gap is None):
             self.require_ready(request)
         try:
             yield
@@ -132,6 +140,52 @@ class CommandWindow:
                 request=query,
             )
         raise self.failure(query, answer, asked=True)
+
+    def printed_numbers(self, *queries: Statement) -> tuple[str, ...]:
+        """Print several numbers at one moment; one by one where lists cannot be read.
+
+        Raises:
+            RejectedError, ControllerFaultError: As for :meth:`command`.
+            RemoteProtocolError: The answer is another question's.
+        """
+        listed = self._listed(*queries)
+        told = listed and spel.split_numbers(listed, self._gap or "", len(queries))
+        return told or tuple(map(self.printed, queries))
+
+    def printed_before_point(
+        self, *numbers: Statement, point: Statement
+    ) -> tuple[tuple[str, ...], str]:
+        """Print numbers and a point; see :meth:`printed_numbers`."""
+        listed = self._listed(*numbers, point)
+        told = listed and spel.split_before_point(listed, self._gap or "", len(numbers))
+        return told or (tuple(map(self.printed, numbers)), self.printed(point))
+
+    def _listed(self, *queries: Statement) -> str | None:
+        """Print a list, and return it; ``None`` where this controller's lists cannot be read.
+
+        A number at its end shows that it answers this question: Remote Ethernet has no other sign
+        of that (docs/reference/epson.md 1.1), and all looks ask for the same.
+        """
+        if self._gap_of_lists() is None:
+            return None
+        self._asked = self._asked % _QUESTIONS + 1
+        own = _FIRST_QUESTION + self._asked
+        text = self.printed(spel.print_several(*queries, spel.print_number(own)))
+        listed = spel.before_last_number(text, own)
+        if listed is None:
+            raise self._session.disowned(text)
+        return listed
+
+    def _gap_of_lists(self) -> str | None:
+        """Return what this controller prints for a comma, learnt once a connection."""
+        if not self._gap_known:
+            try:
+                self._gap = spel.gap_in_known_numbers(self.printed(spel.print_known_numbers()))
+            except RejectedError as error:
+                if error.code in NOT_NOW:
+                    raise
+            self._gap_known = True
+        return self._gap
 
     def check(self, statement: Statement, answer: Reply | Refusal) -> None:
         """Raise unless ``answer`` says that ``statement`` ran."""

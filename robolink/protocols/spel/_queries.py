@@ -20,6 +20,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Final, Literal
 
+from robolink.errors import LocalProtocolError
 from robolink.messages import tr
 from robolink.protocols.spel._statements import LAST_TOOL, Statement, check_range
 from robolink.protocols.spel._values import NUMBER, decimal, parse_integer, unreadable
@@ -31,6 +32,39 @@ exist."""
 _LAST_SPEED = 3
 _LAST_JOINT = 6
 _LAST_POINT = 999
+
+
+_PRINT: Final = "Print "
+
+
+def print_several(*queries: Statement) -> Statement:
+    """Several values in one statement, with commas between (docs/reference/spel.md 3.2).
+
+    Raises:
+        LocalProtocolError: One of them is not a ``Print``.
+
+    Example:
+        >>> from robolink.protocols import spel
+        >>> spel.print_several(spel.print_selected_tool(), spel.print_speed(1))
+        'Print Tool, Speed(1)'
+    """
+    for query in queries:
+        if not query.startswith(_PRINT):
+            raise LocalProtocolError(tr("{query!r} prints nothing that a list takes.", query=query))
+    return Statement(_PRINT + ", ".join(query.removeprefix(_PRINT) for query in queries))
+
+
+def print_number(number: int) -> Statement:
+    """A number that is known, by which the answer is recognized."""
+    return Statement(f"{_PRINT}{number}")
+
+
+def print_known_numbers() -> Statement:
+    """Three numbers that are known: they show what this controller prints for a comma.
+
+    :func:`gap_in_known_numbers` reads the answer.
+    """
+    return Statement("Print 1, 22, 333")
 
 
 def print_selected_tool() -> Statement:

@@ -111,6 +111,61 @@ def parse_boolean(text: str) -> bool:
     raise unreadable(tr("True or False"), text)
 
 
+_KNOWN: Final = re.compile(r"1(?P<gap>[ \t,;]+)22(?P=gap)333")
+_SEPARATORS: Final = " \t,;"
+_LAST: Final = re.compile(r"(.*?)[ \t,;]+([0-9]+)[ \t]*", re.ASCII | re.DOTALL)
+
+
+def gap_in_known_numbers(text: str) -> str | None:
+    """Return what stands between two numbers of a list; ``None`` if a list cannot be read.
+
+    What a comma of ``Print`` shows is not documented (docs/reference/spel.md 3.2). So it is learnt
+    from ``Print 1, 22, 333``: the same blanks, commas or semicolons twice, and nothing else.
+
+    Example:
+        >>> from robolink.protocols.spel import gap_in_known_numbers
+        >>> gap_in_known_numbers("1 22 333")
+        ' '
+        >>> gap_in_known_numbers("122333")
+    """
+    match = _KNOWN.fullmatch(text.strip(_BLANKS))
+    return match["gap"] if match else None
+
+
+def before_last_number(text: str, number: int) -> str | None:
+    """Return what a list shows before a number at its end; ``None`` if it has another end."""
+    match = _LAST.fullmatch(text.strip(_BLANKS))
+    return match[1] if match and match[2] == str(number) else None
+
+
+def split_numbers(text: str, gap: str, count: int) -> tuple[str, ...] | None:
+    """Return the numbers of a list as printed; ``None`` if it has another form.
+
+    Args:
+        text: What was printed.
+        gap: What stands between two, from :func:`gap_in_known_numbers`.
+        count: How many there are.
+    """
+    numbers = tuple(text.strip(_BLANKS).split(gap))
+    whole = len(numbers) == count and all(map(_NUMBER.fullmatch, numbers))
+    return numbers if whole else None
+
+
+def split_before_point(text: str, gap: str, count: int) -> tuple[tuple[str, ...], str] | None:
+    """Return numbers and the point after them as printed; ``None`` for another form.
+
+    The label of X shows where the point begins, whatever stands before it.
+
+    Args:
+        text: What was printed.
+        gap: As for :func:`split_numbers`.
+        count: How many numbers there are.
+    """
+    before, label, after = text.partition("X:")
+    numbers = split_numbers(before.rstrip(_SEPARATORS), gap, count)
+    return (numbers, label + after) if label and numbers else None
+
+
 def unreadable(wanted: str, text: str) -> RemoteProtocolError:
     """Return the error for a printed text that is not what was asked for."""
     return RemoteProtocolError(

@@ -94,7 +94,8 @@ class EpsonOptions:
         remote_timeout_s: Idle time after which error 19 is raised and the link cut; 0 never [D].
         point_coordinates: Stored points print six coordinates, or as many as given [open].
         true_value: What ``Print`` of True shows [open].
-        comma_blank: What a comma in Print leaves between items [open].
+        comma_blank: What a comma in Print leaves between items: a blank before numbers, always a
+            blank, nothing, a comma and a blank, or a tabulator [open].
         tool_listing: Layout of the TLSet listing [I].
         tlset_of_undefined: What the function TLSet(n) gives for an undefined tool [U].
         where_width: Width of the value field of Where [open].
@@ -194,7 +195,7 @@ class EpsonOptions:
     remote_timeout_s: float = 60.0
     point_coordinates: Literal["six", "given"] = "six"
     true_value: Literal[-1, 1] = -1
-    comma_blank: Literal["numeric", "always"] = "numeric"
+    comma_blank: Literal["numeric", "always", "nothing", "comma", "tab"] = "numeric"
     tool_listing: Literal["plain", "padded", "four"] = "plain"
     tlset_of_undefined: Literal["zeros", "error"] = "zeros"
     where_width: Literal[9, 8] = 9

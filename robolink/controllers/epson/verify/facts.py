@@ -207,7 +207,15 @@ def comma_blank(interview: Interview) -> Fact:
     """What a comma in Print leaves between two texts (docs/reference/spel.md 3.2)."""
 
     def read(text: str) -> tuple[str, OptionValue] | None:
-        shown = {"AB": (tr("nothing"), "numeric"), "A B": (tr("a blank"), "always")}
+        shown: dict[str, tuple[str, OptionValue]] = {
+            "A B": (tr("a blank"), "always"),
+            "A, B": (tr("a comma and a blank"), "comma"),
+            "A\tB": (tr("a tabulator"), "tab"),
+        }
+        if text == "AB":
+            numbers = interview.printed(spel.print_known_numbers())
+            gap = spel.gap_in_known_numbers(numbers or "")
+            return tr("nothing"), "nothing" if gap is None else "numeric"
         return shown.get(text)
 
     query = spel.print_two_texts()

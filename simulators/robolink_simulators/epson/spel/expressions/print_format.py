@@ -77,6 +77,9 @@ def point_line(number: int, point: Point, model: RobotModel) -> str:
     return f"P{number:<3} = XY({values} ) {flags}"
 
 
+_GAPS: Final = {"always": " ", "nothing": "", "comma": ", ", "tab": "\t"}
+
+
 def joined(
     values: Sequence[Value],
     options: EpsonOptions,
@@ -94,8 +97,8 @@ def joined(
         is_number = isinstance(value, (int, float))
         if is_number and not position and options.number_lead_blank:
             text += " "
-        if position and (is_number or options.comma_blank == "always"):
-            text += " "
+        if position:
+            text += _GAPS.get(options.comma_blank, " " if is_number else "")
         text += value_text(value, options, model)
     if len(text) > longest:
         raise out_of_range(f"Print of more than {longest} bytes")

@@ -1,0 +1,121 @@
+"""Every movement of the shipped recipes is proved on the wire, however a controller prints lists.
+
+The judge is held to its own promises: from a log that has all of them, one is taken at a time.
+"""
+
+from pathlib import Path
+
+import pytest
+from robolink_cli import main
+from robolink_simulators.cell.tip_switches import LightBeam
+from robolink_simulators.epson.options import EpsonOptions
+
+from robolink.model import ToolOffset
+from tests.contract._movement_promises import Speeds, broken_promises, movements
+from tests.contract._sensor_cell import sensor_cell
+
+pytestmark = pytest.mark.simulator_only
+
+EXAMPLES = Path(__file__).parents[2] / "examples" / "recipes"
+SPEEDS = {
+    "scara-pin": Speeds(5, {20.0}),
+    "two-nozzles": Speeds(5, {20.0}),
+    "needle-beams": Speeds(10, {60.0, 8.0}),
+}
+MOST_REQUESTS = {"needle-beams": 450}
+
+
+def log_of(folder, monkeypatch, example, comma="numeric"):
+    monkeypatch.setenv("ROBOLINK_STATE_DIR", str(folder))
+    with sensor_cell(seed=3, options=EpsonOptions(comma_blank=comma)) as cell:
+        cell.simulator.machine.motors_on = True
+        cell.simulator.machine.tools.set(2, ToolOffset(12.4, -3.7, -20.0))
+        cell.simulator.world.change_nozzle(2)
+        for number, heading_deg in ((3, 2.0), (4, 91.0)):
+            beam = LightBeam((175.0, 488.0, -106.0), heading_deg, radius_mm=0.1)
+            cell.simulator.world.connect(number, beam, latency_s=0.002, noise_mm=0.003)
+        words = ("recalibrate", str(EXAMPLES / f"{example}.toml"), "--assist", cell.url)
+        assert main.run(["-c", cell.url, *words, "--nozzle", "N-7", "--lot", "L", "--yes"]) == 0
+        return list(cell.simulator.log)
+
+
+@pytest.mark.parametrize(
+    ("example", "comma"),
+    [
+        ("scara-pin", "numeric"),
+        ("needle-beams", "numeric"),
+        ("scara-pin", "nothing"),
+        pytest.param("two-nozzles", "numeric", marks=pytest.mark.soak),
+        pytest.param("needle-beams", "nothing", marks=pytest.mark.soak),
+        pytest.param("needle-beams", "comma", marks=pytest.mark.soak),
+        pytest.param("needle-beams", "tab", marks=pytest.mark.soak),
+        pytest.param("needle-beams", "always", marks=pytest.mark.soak),
+    ],
+)
+def test_every_movement_of_a_recipe_is_proved(tmp_path, monkeypatch, example, comma):
+    log = log_of(tmp_path, monkeypatch, example, comma)
+    assert movements(log) > 30
+    assert broken_promises(log, SPEEDS[example]) == []
+    requests = sum(direction == ">" for _, direction, _ in log)
+    assert comma == "nothing" or requests <= MOST_REQUESTS.get(example, requests)
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory):
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        return log_of(tmp_path_factory.mktemp("good"), monkeypatch, "scara-pin")
+
+
+LOOK, POSE, MOVE = "Print Tool, Motor", "RealPos", '"Move '
+
+
+def last(log, text, before=None):
+    """Return the place of the last request with a text, before a place."""
+    end = len(log) if before is None else before
+    return max(n for n, (_, way, what) in enumerate(log[:end]) if way == ">" and text in what)
+
+
+def without(log, text):
+    """Leave out a request before the last straight movement, and its answer."""
+    at = last(log, text, last(log, MOVE))
+    return log[:at] + log[at + 2 :]
+
+
+def answered(log, old, new):
+    """Change the answer to the look before the last straight movement."""
+    at = last(log, LOOK, last(log, MOVE)) + 1
+    at_ns, way, text = log[at]
+    assert old in text
+    return [*log[:at], (at_ns, way, text.replace(old, new, 1)), *log[at + 1 :]]
+
+
+def inserted(log, request, answer, text):
+    """Put another exchange in front of a request before the last straight movement."""
+    at = last(log, text, last(log, MOVE) + 1)
+    return [*log[:at], (log[at][0], ">", request), (log[at][0], "<", answer), *log[at:]]
+
+
+def unwatched(log):
+    """Leave out all looks at the flags."""
+    at = {n + k for n, (_, _, text) in enumerate(log) if text == "$GetStatus" for k in (0, 1)}
+    return [line for n, line in enumerate(log) if n not in at]
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "why"),
+    [
+        (lambda log: without(log, LOOK), "not read: Motor"),
+        (lambda log: without(without(log, POSE), POSE), "was not looked at"),
+        (lambda log: answered(log, '"0 1 0', '"2 1 0'), "tool 2 was read, 0 was selected"),
+        (lambda log: answered(log, " 1 0 ", " 0 0 "), "the motors are off"),
+        (lambda log: answered(log, " 1 0 ", " 1 1 "), "power is high"),
+        (lambda log: answered(log, " 20 ", " 200 "), "speed 200 mm/s"),
+        (lambda log: inserted(log, "$Abort", "#Abort,0", LOOK), "were not set anew"),
+        (lambda log: inserted(log, '$Execute,"SpeedS 9.0"', "#Execute,0", MOVE), "not read: Tool"),
+        (unwatched, "nobody looked for"),
+    ],
+)
+def test_the_judge_finds_each_promise_that_is_missing(good, spoilt, why):
+    assert broken_promises(good, SPEEDS["scara-pin"]) == []
+    found = broken_promises(spoilt(good), SPEEDS["scara-pin"])
+    assert any(why in line for line in found), found

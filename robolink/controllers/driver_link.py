@@ -11,8 +11,8 @@ MOVE   Go, Move                                    OutcomeUnknownError; never se
 STOP   Abort, Stop                                 may be repeated
 =====  ==========================================  =======================================
 
-Speed, SpeedS, Power and the motors need no marker: they are set and read back before each
-move, and a lost answer leaves nothing that the next connection would not set again.
+Speed, SpeedS, Power and the motors need no marker: they are read before each move,
+and a lost answer leaves nothing that the next move would not set again.
 
 Signs of life of an open block: that somebody is at work, although nothing is sent.
 

@@ -97,9 +97,10 @@ class Path(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class MotionProfile:
-    """How fast to move. Power is always low; these are set and read back before a move.
+    """How fast to move. Power is always low.
 
-    ``speed_percent`` rules joint moves, ``speed_mm_s`` straight ones.
+    ``speed_percent`` rules joint moves, ``speed_mm_s`` straight ones; it is read before each move,
+    and set where it differs.
 
     Raises:
         ConfigError: There is no such path, or a speed is no number.

@@ -145,6 +145,11 @@ def split_numbers(text: str, gap: str, count: int) -> tuple[str, ...] | None:
         text: What was printed.
         gap: What stands between two, from :func:`gap_in_known_numbers`.
         count: How many there are.
+
+    Example:
+        >>> from robolink.protocols.spel import split_numbers
+        >>> split_numbers("1 1 0 5 20", " ", 5)
+        ('1', '1', '0', '5', '20')
     """
     numbers = tuple(text.strip(_BLANKS).split(gap))
     whole = len(numbers) == count and all(map(_NUMBER.fullmatch, numbers))
@@ -160,6 +165,11 @@ def split_before_point(text: str, gap: str, count: int) -> tuple[tuple[str, ...]
         text: What was printed.
         gap: As for :func:`split_numbers`.
         count: How many numbers there are.
+
+    Example:
+        >>> from robolink.protocols.spel import split_before_point
+        >>> split_before_point("-1 2 X:  300.000 Y:  100.000", " ", 2)
+        (('-1', '2'), 'X:  300.000 Y:  100.000')
     """
     before, label, after = text.partition("X:")
     numbers = split_numbers(before.rstrip(_SEPARATORS), gap, count)

@@ -285,7 +285,7 @@ def _on_epson(seed: int, speed: float, operator: DemoOperator) -> DemonstratedCh
             done = _Cell("epson", "T6-602S", simulator, operator).change(controller)
     done.show()
     say()
-    say(tr("sent on the wire (left out: reads, and low power and speed before each move):"))
+    say(tr("sent on the wire (left out: reads, and low power and speed):"))
     for line in wire.of_writes():
         say(f"  {line}")
     return done

@@ -27,6 +27,7 @@ def test_a_list_is_read_as_it_was_printed_or_not_at_all(gap, numbers, own):
     if gap.strip(" ,;\t") or not gap:
         assert learnt is None
         return
+    assert learnt is not None
     assert learnt == gap
     listed = before_last_number(gap.join((*numbers, str(own))) + "\r\n", own)
     assert listed is not None

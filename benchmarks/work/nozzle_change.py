@@ -1,6 +1,7 @@
-"""A whole simulated two-pose nozzle change on ``sim://``: wall time and time-warp factor."""
+"""A whole simulated two-pose nozzle change on ``sim://``: wall time, time-warp factor, requests."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from statistics import median
 from time import perf_counter_ns
 
@@ -11,8 +12,12 @@ from robolink_simulators.hosting.in_process.epson import simulator_named, unregi
 import robolink
 from benchmarks.table import Amount, Figure
 from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
+from robolink.model import MotionProfile, Path, WorkBox
 
 ROUNDS = 9
+WANTED = {"a movement": 5.0, "a whole change": 170.0}
+"""Requests: of a movement its proof, itself, the looks at the flags, and the position after it."""
+WAY_MM = 20.0
 WHAT = {
     0: "two-pose nozzle change on sim://",
     20: "the same, of a controller that answers after 20 ms",
@@ -24,8 +29,8 @@ def measure_nozzle_change() -> Iterator[Figure]:
     """Yield wall milliseconds, simulated seconds and their ratio, by how fast answers come."""
     for answer_ms, what in WHAT.items():
         runs = [_change(seed, answer_ms) for seed in range(ROUNDS + 1)][1:]
-        wall_s = median(wall for wall, _ in runs)
-        simulated_s = median(simulated for _, simulated in runs)
+        wall_s = median(wall for wall, _, _ in runs)
+        simulated_s = median(simulated for _, simulated, _ in runs)
         yield Figure(
             what,
             Amount(wall_s * 1000, "ms"),
@@ -33,14 +38,41 @@ def measure_nozzle_change() -> Iterator[Figure]:
             Amount(simulated_s * 1000, "ms"),
             wall_s / simulated_s,
         )
+    asked = {"a movement": _movement(), "a whole change": median(each for _, _, each in runs)}
+    for what, requests in asked.items():
+        yield Figure(
+            f"requests of {what}",
+            Amount(requests, ""),
+            "wanted",
+            Amount(WANTED[what], ""),
+            requests / WANTED[what],
+            1.0,
+        )
 
 
-def _change(seed: int, answer_ms: int) -> tuple[float, float]:
+def _movement() -> int:
+    """Return how many requests a straight movement takes, the second of its speed."""
+    with robolink.connect("epson+sim://bench-movement?seed=1") as controller:
+        controller.motors(True)
+        group = controller.groups[0]
+        asked = 0
+        for _ in range(2):
+            asked = controller.exchanges
+            here = group.pose()
+            target = replace(here, z_mm=here.z_mm + WAY_MM)
+            group.move_to(target, MotionProfile(Path.STRAIGHT), box=WorkBox()).wait(timeout_s=60)
+        requests = controller.exchanges - asked
+    unregister("bench-movement")
+    return requests
+
+
+def _change(seed: int, answer_ms: int) -> tuple[float, float, int]:
     name = f"bench-{seed}"
     url = f"epson+sim://{name}?seed={seed}&answer_ms={answer_ms}"
     with robolink.connect(url) as controller:
         eyes = InProcessEyes(simulator_named(name))
         controller.motors(True)
+        asked = controller.exchanges
         simulated_ns = controller.clock.now_ns()
         start = perf_counter_ns()
         NozzleChange(
@@ -50,5 +82,6 @@ def _change(seed: int, answer_ms: int) -> tuple[float, float]:
         ).run()
         wall_ns = perf_counter_ns() - start
         simulated_ns = controller.clock.now_ns() - simulated_ns
+        requests = controller.exchanges - asked
     unregister(name)
-    return wall_ns / 1e9, simulated_ns / 1e9
+    return wall_ns / 1e9, simulated_ns / 1e9, requests

@@ -52,9 +52,14 @@ class ShippedCell:
 
 
 @contextmanager
-def _touched(name: str) -> Iterator[ShippedCell]:
-    """Set up a SCARA with a pin, a second tool, and two beams."""
-    with sensor_cell(seed=3) as cell:
+def touched(name: str, **habits: Any) -> Iterator[ShippedCell]:
+    """Set up a SCARA with a pin, a second tool, and two beams.
+
+    Args:
+        name: The file of the recipe.
+        habits: Of its controller.
+    """
+    with sensor_cell(seed=3, **habits) as cell:
         simulator = cell.simulator
         simulator.machine.motors_on = True
         simulator.machine.tools.set(2, ToolOffset(12.4, -3.7, -20.0))
@@ -68,7 +73,7 @@ def _touched(name: str) -> Iterator[ShippedCell]:
 @contextmanager
 def _touched_once(name: str) -> Iterator[ShippedCell]:
     """Set up the same, with a full calibration on record and a longer needle since."""
-    with _touched(name) as cell:
+    with touched(name) as cell:
         words = ("--station", "PIN-07", "--count", "4", "--speed", "100", "--tool", "1", "--yes")
         done = run_command("-c", cell.url, "calibrate", "n-angle", *cell.more, *words)
         assert done.code == 0, done.err
@@ -102,9 +107,9 @@ def _on_a_plc(name: str, kinematics: str, seed: int, touches: str = "") -> Itera
 
 
 CELLS: Final[dict[str, Callable[[], AbstractContextManager[ShippedCell]]]] = {
-    "scara-pin": lambda: _touched("scara-pin.toml"),
-    "two-nozzles": lambda: _touched("two-nozzles.toml"),
-    "needle-beams": lambda: _touched("needle-beams.toml"),
+    "scara-pin": lambda: touched("scara-pin.toml"),
+    "two-nozzles": lambda: touched("two-nozzles.toml"),
+    "needle-beams": lambda: touched("needle-beams.toml"),
     "needle-one-touch": lambda: _touched_once("needle-one-touch.toml"),
     "pick-nozzle-camera": lambda: _seen("pick-nozzle-camera.toml"),
     "nozzle-and-camera": lambda: _seen("nozzle-and-camera.toml"),

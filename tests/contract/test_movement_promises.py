@@ -3,20 +3,14 @@
 The judge is held to its own promises: from a log that has all of them, one is taken at a time.
 """
 
-from pathlib import Path
-
 import pytest
-from robolink_cli import main
-from robolink_simulators.cell.tip_switches import LightBeam
 from robolink_simulators.epson.options import EpsonOptions
 
-from robolink.model import ToolOffset
 from tests.contract._movement_promises import Speeds, broken_promises, movements
-from tests.contract._sensor_cell import sensor_cell
+from tests.contract._shipped_cells import touched
 
 pytestmark = pytest.mark.simulator_only
 
-EXAMPLES = Path(__file__).parents[2] / "examples" / "recipes"
 SPEEDS = {
     "scara-pin": Speeds(5, {20.0}),
     "two-nozzles": Speeds(5, {20.0}),
@@ -27,15 +21,9 @@ MOST_REQUESTS = {"needle-beams": 450}
 
 def log_of(folder, monkeypatch, example, comma="numeric"):
     monkeypatch.setenv("ROBOLINK_STATE_DIR", str(folder))
-    with sensor_cell(seed=3, options=EpsonOptions(comma_blank=comma)) as cell:
-        cell.simulator.machine.motors_on = True
-        cell.simulator.machine.tools.set(2, ToolOffset(12.4, -3.7, -20.0))
-        cell.simulator.world.change_nozzle(2)
-        for number, heading_deg in ((3, 2.0), (4, 91.0)):
-            beam = LightBeam((175.0, 488.0, -106.0), heading_deg, radius_mm=0.1)
-            cell.simulator.world.connect(number, beam, latency_s=0.002, noise_mm=0.003)
-        words = ("recalibrate", str(EXAMPLES / f"{example}.toml"), "--assist", cell.url)
-        assert main.run(["-c", cell.url, *words, "--nozzle", "N-7", "--lot", "L", "--yes"]) == 0
+    with touched(f"{example}.toml", options=EpsonOptions(comma_blank=comma)) as cell:
+        done = cell.change(*cell.words)
+        assert done.code == 0, done.err
         return list(cell.simulator.log)
 
 

@@ -38,20 +38,14 @@ NOTES: Final = {
     "\nafter some ten writes, which takes the disk a little more than half the time.",
     "fleet": "Controllers are made when they are first used, so opening them is cheap; both states"
     "\nare shown. The client is a bare selector in a process of its own.",
-    "virtual-time": "The real driver, every check, a record in memory: a change is some 590"
-    "\nexchanges with the simulated controller and 25 movements, of which each is"
-    "\nannounced, limited, watched and recorded as on a real robot. The wanted"
-    "\nfigures come from toy cells that are asked once a simulated second, with a"
-    "\nwrite now and then; the last four lines are that work, done by the real driver"
-    "\n(a tool a minute is compared, written, read back and recorded), in one process"
-    "\nand divided among as many as there are CPUs: cells know nothing of each other."
-    "\nTo recalibrate a hundred cells in two processes takes half as long, too. Of the"
-    "\nexchanges 223 ask for the status, 78 for the tool in force, and some 190 set"
-    "\nor read back power, speed and motors before a movement; what is promised"
-    "\nbefore each movement rests on them, so all are sent. By a profile the"
-    "\nsimulated controller takes half of the time (a tenth of all: reading 26"
-    "\nstatements that are new each time), the protocol at both ends an eighth, the"
-    "\ndriver a tenth, the record a twentieth; no part stands out.",
+    "virtual-time": "The real driver, every check, a record in memory: a change is some 165"
+    "\nrequests to the simulated controller and 22 movements, of which each is"
+    "\nannounced, limited, watched and recorded as on a real robot. What is wanted of"
+    "\nfleets follows from what is wanted of one change. The last four lines are cells"
+    "\nthat are asked once a simulated second, with a write now and then, done by the"
+    "\nreal driver (a tool a minute is compared, written, read back and recorded), in"
+    "\none process and divided among as many as there are CPUs: cells know nothing of"
+    "\neach other.",
     "solvers": "Where lstsq with covariance is the floor, it starts from arrays. A calibration"
     "\ngets poses, each with a hand, a tool and a local: to read and compare these"
     "\ntakes 115 us for 1,000 poses on four axes, a quarter of the whole. Each side"

@@ -58,7 +58,8 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line(
         "markers",
         "robolink(robot, kinematics, seed, password, options, world, faults, speed, true_tool, "
-        "map, program): how the simulated cells of this test are to be (docs/testing.md)",
+        "answer_ms, map, program): how the simulated cells of this test are to be "
+        "(docs/testing.md)",
     )
 
 

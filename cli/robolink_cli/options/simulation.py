@@ -81,7 +81,7 @@ SECTIONS: Final[tuple[HelpSection, ...]] = (
             {
                 *("--robot", "--kinematics", "--param", "--map", "--seed", "--state", "--speed"),
                 "--most-registers",
-                "--exchange",
+                *("--exchange", "--answer-ms"),
                 *("--option", "--profile", "--world", "--password-env", "--replay", "--faults"),
             }
         ),
@@ -127,6 +127,17 @@ ExchangeTime = Annotated[
     ),
 ]
 
+AnswerTime = Annotated[
+    float,
+    NumberInside(min=0, max=10_000),
+    CliOption(
+        "--answer-ms",
+        metavar="MS",
+        help="How long after a request the answer leaves, in simulated milliseconds; a real "
+        "EPSON controller takes 5 to 50. What is requested begins at once.",
+    ),
+]
+
 AllowRemote = Annotated[bool, CliOption(help="Also listen where other machines can connect.")]
 
 FaultPlan = Annotated[
@@ -146,6 +157,7 @@ class SimulationOptions(NamedTuple):
     ] = None
     speed: Pace = 1.0
     exchange: ExchangeTime = None
+    answer_ms: AnswerTime = 0.0
     options: Annotated[
         tuple[str, ...],
         CliOption(

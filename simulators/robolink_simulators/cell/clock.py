@@ -93,6 +93,10 @@ class ScaledClock:
     def exchanged(self) -> None:
         """Learn that a request has come in; time passes anyway."""
 
+    def stepped(self, seconds: float) -> bool:  # noqa: ARG002 - it does not stand still
+        """Let simulated time pass at once where it stands still; False where it passes anyway."""
+        return False
+
     def now_ns(self) -> int:
         """Return the simulated time in nanoseconds."""
         passed_ns = self._base.now_ns() - self._origin_ns
@@ -201,6 +205,13 @@ class SteeredClock(ScaledClock):
         """Let pass what a request takes."""
         if self._exchange_s:
             self.advance(self._exchange_s)
+
+    def stepped(self, seconds: float) -> bool:
+        """See :meth:`ScaledClock.stepped`."""
+        if self._factor:
+            return False
+        self.advance(seconds)
+        return True
 
     def now_ns(self) -> int:
         """Return the simulated time in nanoseconds."""

@@ -26,6 +26,10 @@ NEW: Final[Mapping[str, int]] = MappingProxyType(
 """The counts of a newly made controller."""
 
 
+LONGEST_ANSWER_MS: Final = 10_000.0
+"""Longest answer time of a simulator in milliseconds; longer than any client waits."""
+
+
 @dataclass(frozen=True)
 class KeptMoment:
     """The state of a simulated controller and its world at an instant, for a restore.
@@ -44,8 +48,12 @@ class HostedDevice(ABC):
 
     Args:
         seed: Decides the world and every scatter.
+        answer_ms: How long after a request arrives its answer leaves, in simulated milliseconds.
+            What is requested begins on arrival; the answer to a movement leaves so long after
+            the end of it.
 
     Attributes:
+        answer_s: The same in simulated seconds. Faults that delay an answer add to it.
         lock: Held by whoever touches it while a host serves it.
         url: Where the first host serves it, empty when none does.
         now_ns: The instant last given; for others to read.
@@ -60,11 +68,20 @@ class HostedDevice(ABC):
         wire_time: By which it counts how long a client is silent.
         durable: Whether what it keeps outlives the process.
         kind: ``epson``, ``softmotion`` or ``plc``.
+
+    Raises:
+        ConfigError: The answer time is negative, or longer than :data:`LONGEST_ANSWER_MS`.
     """
 
     kind: ClassVar[str]
 
-    def __init__(self, seed: int) -> None:
+    def __init__(self, seed: int, *, answer_ms: float = 0.0) -> None:
+        if not 0 <= answer_ms <= LONGEST_ANSWER_MS:
+            raise ConfigError(
+                tr("A simulator cannot answer after {ms:g} ms.", ms=answer_ms),
+                remedy=tr("Give a time from 0 to {most:g} ms.", most=LONGEST_ANSWER_MS),
+            )
+        self.answer_s = answer_ms / 1000
         self.lock = threading.RLock()
         self.url, self.seed = "", seed
         self.watchers: list[Callable[[], None]] = []

@@ -51,6 +51,7 @@ class EpsonSimulator(SteppedController):
         state_path: File that keeps what the controller's flash keeps, the serial number too.
         faults: What is planned to go wrong.
         world: What goes wrong around the robot.
+        answer_ms: How long after a request arrives its answer leaves, in simulated milliseconds.
 
     The motors are on at first, as in a cell that stands ready; after a restart they are off.
 
@@ -101,8 +102,9 @@ class EpsonSimulator(SteppedController):
         state_path: Path | None = None,
         faults: Iterable[Fault] = (),
         world: WorldParameters | None = None,
+        answer_ms: float = 0.0,
     ) -> None:
-        super().__init__(seed)
+        super().__init__(seed, answer_ms=answer_ms)
         self.options = options or EpsonOptions()
         self.faults = FaultPlan(faults, seed, links=EPSON_LINKS)
         self.durable = state_path is not None

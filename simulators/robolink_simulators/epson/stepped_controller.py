@@ -90,8 +90,8 @@ class SteppedController(RequestService, ABC):
     _links: OpenLinks
     _companion: Companion | None
 
-    def __init__(self, seed: int) -> None:
-        super().__init__(seed)
+    def __init__(self, seed: int, *, answer_ms: float = 0.0) -> None:
+        super().__init__(seed, answer_ms=answer_ms)
         self._begun = False
         # Time until which everything is done: a transport asks for the same instant repeatedly.
         self._settled_ns = -1

@@ -84,9 +84,23 @@ class FaultPlan(CountedFaults[Fault]):
         """
         return cls(drawn_faults(seed, kind, rates), seed, links={kind})
 
-    def departures(self, reply: bytes, faults: Iterable[Fault]) -> list[Departure]:
-        """Return what is sent instead of ``reply``, in order, when ``faults`` meet it."""
-        leaving: list[Departure] = [(0.0, reply)]
+    def departures(
+        self, reply: bytes, faults: Iterable[Fault], *, after_s: float = 0.0
+    ) -> list[Departure]:
+        """Return what is sent instead of ``reply``, in order, when ``faults`` meet it.
+
+        Args:
+            reply: The reply.
+            faults: What it meets.
+            after_s: When it would leave without them, in seconds from now.
+
+        Example:
+            >>> from robolink_simulators.faults import Fault, FaultAction, FaultPlan
+            >>> late = Fault(FaultAction.DELAY, seconds=0.5)
+            >>> FaultPlan().departures(b"#Stop,0", [late], after_s=0.25)
+            [(0.75, b'#Stop,0')]
+        """
+        leaving: list[Departure] = [(after_s, reply)]
         for fault in faults:
             leaving = self._met(leaving, fault)
         self._before = reply

@@ -177,6 +177,7 @@ class PlcSimulator(HostedDevice):
         seed: Other tools.
         most_registers: How many registers it gives in one read; more is refused with exception 3,
             as servers do that give 61 or 50.
+        answer_ms: How long after a request arrives its answer leaves, in simulated milliseconds.
 
     Example:
         >>> from pathlib import Path
@@ -199,8 +200,9 @@ class PlcSimulator(HostedDevice):
         unit: int = 1,
         seed: int = 1,
         most_registers: int = MOST_REGISTERS_READ,
+        answer_ms: float = 0.0,
     ) -> None:
-        super().__init__(seed)
+        super().__init__(seed, answer_ms=answer_ms)
         self.most_registers = most_registers
         self.register_map = register_map
         self.unit = unit
@@ -324,9 +326,10 @@ class PlcSimulator(HostedDevice):
         self.log.add(self.now_ns, "<", request.words)
         if self.on_reply is not None:
             self.on_reply(number, request.words)
-        leaving = self.faults.departures(reply, met)
+        leaving = self.faults.departures(reply, met, after_s=self.answer_s)
         if (again := actions.get(FaultAction.DUPLICATE_REQUEST)) is not None:
-            leaving.append((again.seconds, self._answer(request, frames, ignored=ignored)))
+            late_s = again.seconds + self.answer_s
+            leaving.append((late_s, self._answer(request, frames, ignored=ignored)))
         return leaving
 
     def _answer(self, request: PlcRequest, frames: Frames, *, ignored: bool) -> bytes:

@@ -88,7 +88,7 @@ class PlcLineHost(LineHost):
         if simulator.unit != _DEFAULT_UNIT:
             options["unit"] = str(simulator.unit)
         self.url = f"plc+modbus-rtu://{self.cable.near}?{urlencode(options)}&{map_option(map_file)}{_SIMULATED}"
-        simulator.keep_time(clock)
+        self.present(simulator)
 
 
 def plc_on_line(simulator: PlcSimulator) -> DeviceOnLine:

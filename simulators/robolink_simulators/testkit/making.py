@@ -18,7 +18,7 @@ from robolink_simulators.testkit.media import served
 from robolink_simulators.testkit.operator import written_map, written_recipe
 from robolink_simulators.testkit.served import OwnFolder, SimulatedCell
 
-_OF_ALL: Final = frozenset({"seed", "faults", "speed"})
+_OF_ALL: Final = frozenset({"seed", "faults", "speed", "answer_ms"})
 _OF_A_WORLD: Final = _OF_ALL | {"options", "world", "true_tool"}
 
 HEEDED: Final[Mapping[str, frozenset[str]]] = {
@@ -45,6 +45,7 @@ class CellRequest:
         world: What goes wrong around the robot by name, as ``robolink sim --world`` has them.
         faults: A fault plan: a file, or faults as a file has them, one mapping each.
         speed: Simulated seconds per real one, on a port; 0 lets time pass with requests alone.
+        answer_ms: How long after a request its answer leaves, in simulated milliseconds.
         true_tool: Where the tip of tool 1 really is: x, y, z in mm, and u, v, w in degrees.
         map: The map of a PLC with registers of its own.
         program: A folder with the program of a SoftMotion PLC, as ``expert plc export`` writes
@@ -59,6 +60,7 @@ class CellRequest:
     world: Mapping[str, object] | None = None
     faults: str | Path | tuple[Mapping[str, object], ...] | list[Mapping[str, object]] = ()
     speed: float | None = None
+    answer_ms: float = 0.0
     true_tool: tuple[float, ...] | None = None
     map: str | Path | None = None
     program: str | Path | None = None
@@ -162,6 +164,10 @@ def _speed(value: object) -> bool:
     return value is None or (number and 0 <= value <= FASTEST)  # type: ignore[operator]
 
 
+def _answer_ms(value: object) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
 def _faults(value: object) -> bool:
     listed = isinstance(value, (tuple, list)) and all(isinstance(it, Mapping) for it in value)
     return listed or isinstance(value, (str, Path))
@@ -176,6 +182,7 @@ _FORMS: Final[Mapping[str, tuple[Callable[[object], bool], str]]] = {
     "world": (_named, 'world={"eye_sigma_mm": 0.05}'),
     "faults": (_faults, 'faults=[{"action": "drop_reply", "match": "TLSet 2, XY"}]'),
     "speed": (_speed, "speed=20"),
+    "answer_ms": (_answer_ms, "answer_ms=20"),
     "true_tool": (_numbers, "true_tool=(12.4, -3.2, -20.1)"),
     "map": (_place, 'map="machine.toml"'),
     "program": (_place, 'program="our-plc"'),
@@ -225,6 +232,7 @@ def make_epson(
         password=Secret(request.password) if request.password else None,
         options=options_from_text(request.texts("options")),
         world=_world(request),
+        answer_ms=request.answer_ms,
     )
     time = _time(request, medium, clock)
     url = own.stack.enter_context(served(simulator, medium, clock=time))
@@ -260,6 +268,7 @@ def make_softmotion(
         seed=_seed(own, request),
         options=options_from_text(request.texts("options")),
         world=_world(request),
+        answer_ms=request.answer_ms,
         make_plc=plc_maker(None if request.program is None else Path(request.program)),
     )
     time = _time(request, medium, clock)
@@ -285,7 +294,7 @@ def make_plc(
     from robolink_simulators.plc import PlcSimulator
 
     path = written_map(own.folder) if request.map is None else Path(request.map)
-    simulator = PlcSimulator(load_map(path), seed=_seed(own, request))
+    simulator = PlcSimulator(load_map(path), seed=_seed(own, request), answer_ms=request.answer_ms)
     time = _time(request, medium, clock)
     url = own.stack.enter_context(served(simulator, medium, clock=time, map_file=path))
     return _furnished(own, simulator, time, {medium: url}, request, person=False)

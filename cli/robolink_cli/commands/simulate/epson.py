@@ -45,6 +45,7 @@ def make_epson(
     before: str | None,
     faults: Path | None,
     serial: str | None,
+    answer_ms: float,
     cell: str = "",
     **_placing: Any,  # noqa: ANN401 - other options
 ) -> EpsonSimulator:
@@ -63,6 +64,7 @@ def make_epson(
         options=habits(options, profile),
         state_path=state,
         world=world_from(world) if world else None,  # the default needs no check
+        answer_ms=answer_ms,
     )
     surroundings = ProjectSurroundings(vision, lines, folder, encoding, before)
     load_programs(simulator, programs, points, surroundings, cell=cell)

@@ -24,6 +24,7 @@ def make_plc(
     faults: Path | None,
     address: str | None,
     serial: str | None,
+    answer_ms: float,
     cell: str = "",
     **_placing: Any,  # noqa: ANN401 - other options
 ) -> PlcSimulator:
@@ -35,7 +36,11 @@ def make_plc(
         ConfigError: One of them makes no sense.
     """
     simulator = PlcSimulator(
-        load_map(map_file), unit=unit, seed=seed, most_registers=most_registers
+        load_map(map_file),
+        unit=unit,
+        seed=seed,
+        most_registers=most_registers,
+        answer_ms=answer_ms,
     )
     served = {LinkKind.PLC_RTU} if serial is not None else set()
     if address is not None or serial is None:

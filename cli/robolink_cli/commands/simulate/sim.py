@@ -13,6 +13,7 @@ from robolink_cli.options.simulation import (
     EXISTING_FILE,
     SECTIONS,
     AllowRemote,
+    AnswerTime,
     ExchangeTime,
     FaultPlan,
     ModbusPlaces,
@@ -49,6 +50,7 @@ def sim_plc(
     seed: Seed = 1,
     speed: Pace = 1.0,
     exchange: ExchangeTime = None,
+    answer_ms: AnswerTime = 0.0,
     faults: FaultPlan = None,
     allow_remote: AllowRemote = False,
     life: ServedLife,
@@ -68,6 +70,7 @@ def sim_plc(
         "seed": seed,
         "speed": speed,
         "exchange": exchange,
+        "answer_ms": answer_ms,
         "faults": faults,
         "allow_remote": allow_remote,
     }

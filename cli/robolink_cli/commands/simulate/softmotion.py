@@ -71,6 +71,7 @@ def make_softmotion(
     options: Sequence[str],
     world: Sequence[str],
     faults: Path | None,
+    answer_ms: float,
     cell: str = "",
     **placing: Any,  # noqa: ANN401 - other options
 ) -> SoftMotionSimulator:
@@ -91,6 +92,7 @@ def make_softmotion(
         state_path=state,
         world=world_from(world),
         make_plc=plc_maker(program),
+        answer_ms=answer_ms,
     )
     plan_faults(simulator, faults, _buses(**placing).kinds, cell=cell)
     return simulator

@@ -171,6 +171,7 @@ class RequestHandler(Protocol):
 
     options: EpsonOptions
     wire_time: WireTime
+    answer_s: float
 
     @property
     def now_ns(self) -> int:
@@ -396,7 +397,7 @@ class EpsonServerLink:
             if isinstance(event, Opening):
                 self._turned_on = True
                 if self._controller.options.rs232_eot_answer == "ack":
-                    self.push(_ACK)
+                    self._depart(((self._controller.answer_s, _ACK),))
             elif isinstance(event, (Request, BadRequest)) and self._turned_on:
                 yield event
 

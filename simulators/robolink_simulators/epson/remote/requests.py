@@ -123,7 +123,7 @@ def _on_the_wire(event: Request | BadRequest) -> bytes:
 class RequestService(HostedDevice, ABC):
     """Implements :class:`~robolink_simulators.epson.remote.link.RequestHandler`.
 
-    It answers all but an Execute at once.
+    It answers all but an Execute after its answer time.
 
     Attributes:
         options: The controller's habits.
@@ -283,8 +283,8 @@ class RequestService(HostedDevice, ABC):
         self.log.add(self.now_ns, "<", "***" if echoed else shown_reply(reply))
         if not exchange.faults:
             self.faults.remember(reply)
-            return ((0.0, reply),)
-        return self.faults.departures(reply, exchange.faults)
+            return ((self.answer_s, reply),)
+        return self.faults.departures(reply, exchange.faults, after_s=self.answer_s)
 
     def listening(self) -> None:
         """Look anew for the next event: a request has begun that silence may end."""

@@ -321,6 +321,8 @@ class CanopenHost(ClosedAtExit):
                 self._simulator.url = ""
 
     def _real_seconds(self, simulated: float) -> float:
+        if self._clock.stepped(simulated):
+            return 0.0
         return self._clock.real_seconds(self._clock.now_ns() + round(simulated * NS_PER_S))
 
     def _live(self) -> None:

@@ -81,13 +81,9 @@ class MailboxObjects:
         if index == SLOT_OBJECT and subindex:
             return self._given(self._read(slot_start(subindex), SLOT_WORDS))
         with self._simulator.lock:
-            command = self._simulator.plc.program.inbox.words
-            if index == COMMAND_OBJECT:
-                return packed(command)
-            if index == COMMAND_FIELDS_OBJECT and subindex:
-                start, count = self._fields[subindex - 1]
-                return packed(command[start : start + count])
-            return self._constant(subindex) if index == MAILBOX_OBJECT else None
+            content = self._unwatched(index, subindex)
+        self._answering.let_go(ServedAccess(delay_s=self._simulator.answer_s))
+        return content
 
     def write(self, *, index: int, subindex: int, od: object, data: bytes) -> None:  # noqa: ARG002 - canopen's own signature
         """Accept a client's write.
@@ -131,6 +127,16 @@ class MailboxObjects:
     def _given(self, served: ServedAccess, count: int | None = None) -> bytes:
         self._answering.let_go(served)
         return packed(served.words[:count])
+
+    def _unwatched(self, index: int, subindex: int) -> bytes | int | float | None:
+        """Return the content of an object whose reads are no exchange of the mailbox."""
+        command = self._simulator.plc.program.inbox.words
+        if index == COMMAND_OBJECT:
+            return packed(command)
+        if index == COMMAND_FIELDS_OBJECT and subindex:
+            start, count = self._fields[subindex - 1]
+            return packed(command[start : start + count])
+        return self._constant(subindex) if index == MAILBOX_OBJECT else None
 
     def _constant(self, subindex: int) -> int | float | None:
         plc = self._simulator.plc

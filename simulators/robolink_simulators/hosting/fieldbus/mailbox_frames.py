@@ -162,7 +162,8 @@ class MailboxFramesLink:
         if self._frames.shared and request.unit != self._device.unit:
             return
         if code := _refusal(request):
-            self._outbox.post(self._frames.refusal(request, code), self.now_ns)
+            frame = self._frames.refusal(request, code)
+            self._send(frame, self._device.registers.late(), asked_bytes)
             return
         served = self._carried_out(request)
         if self._gone(served):
@@ -173,6 +174,9 @@ class MailboxFramesLink:
             if refused is None
             else self._frames.refusal(request, refused.code)
         )
+        self._send(frame, served, asked_bytes)
+
+    def _send(self, frame: bytes, served: ServedAccess, asked_bytes: int) -> None:
         takes_ns = self._device.takes_ns(served.delay_s, asked_bytes + len(frame))
         self._depart(frame, served.met, self.now_ns + takes_ns)
 

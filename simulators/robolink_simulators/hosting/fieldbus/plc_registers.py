@@ -53,13 +53,17 @@ class PlcRegisters:
         """Counts the ends of all connections: starts, and pulled cables."""
         return self._simulator.plc.starts, self._simulator.plc.cuts
 
+    def late(self) -> ServedAccess:
+        """Return an answer without words that leaves after the PLC's answer time."""
+        return ServedAccess(delay_s=self._simulator.answer_s)
+
     def read(self, bank: Bank, address: int, count: int) -> ServedAccess:
         """Serve a client that reads registers."""
         with self._simulator.lock:
             now_ns = self._clock.now_ns()
             self._simulator.hear(now_ns)
             words = self._plain[bank][address : address + count]
-            served = ServedAccess()
+            served = self.late()
             for place, start, end in self._parts(bank, address, count):
                 first = place.first + start - place.start
                 if place.written:
@@ -77,7 +81,7 @@ class PlcRegisters:
             now_ns = self._clock.now_ns()
             self._simulator.hear(now_ns)
             self._plain[Bank.HOLDING][address : address + len(words)] = words
-            served = ServedAccess()
+            served = self.late()
             for place, start, end in self._parts(Bank.HOLDING, address, len(words)):
                 if place.written:
                     part = words[start - address : end - address]

@@ -13,14 +13,18 @@ from robolink_simulators.cell.world_parameters import from_options, plain
 from robolink_simulators.epson.device import EpsonSimulator
 from robolink_simulators.epson.options import option_names, options_from_text
 from robolink_simulators.faults import LinkKind, read_fault_file
-from robolink_simulators.hosting.in_process.named import NamedSimulators, seed_from_text
+from robolink_simulators.hosting.in_process.named import (
+    NamedSimulators,
+    answer_ms_from_text,
+    seed_from_text,
+)
 from robolink_simulators.hosting.in_process.transport import InProcessTransport
 from robolink_simulators.option_values import require_known
 from robolink_simulators.state_files import drawn_serial
 
 __all__ = ["register", "unregister"]
 
-_OWN_OPTIONS: Final = ("robot", "seed", "state", "split", "faults")
+_OWN_OPTIONS: Final = ("robot", "seed", "state", "split", "faults", "answer_ms")
 
 _named: Final = NamedSimulators[EpsonSimulator]("epson+sim")
 
@@ -35,9 +39,9 @@ def open_epson(
 
     Args:
         link_url: ``epson+sim://NAME``, with ``robot``, ``seed``, ``state`` (a file that keeps
-            the tools), ``faults`` (a fault plan, docs/fault-plans.md), ``split`` (1 cuts what
-            arrives into random pieces), ``world.NAME`` (see ``WorldParameters``) and any field
-            of ``EpsonOptions`` as options.
+            the tools), ``faults`` (a fault plan, docs/fault-plans.md), ``answer_ms`` (when an
+            answer leaves), ``split`` (1 cuts what arrives into random pieces), ``world.NAME``
+            (see ``WorldParameters``) and any field of ``EpsonOptions`` as options.
         timeout_s: Not needed; part of the contract of an opener.
         clock: A :class:`~robolink_simulators.cell.clock.ManualClock` becomes the clock of a new
             simulator. Any other clock is left aside: simulated time is the simulator's own.
@@ -84,6 +88,7 @@ def _made(name: str, options: Mapping[str, str]) -> EpsonSimulator:
         options=options_from_text(habits),
         state_path=Path(state) if state else None,
         world=from_options(options),
+        answer_ms=answer_ms_from_text(known.get("answer_ms", "0")),
     )
     if "faults" in known:
         file = read_fault_file(Path(known["faults"]))

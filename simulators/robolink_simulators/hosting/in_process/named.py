@@ -139,3 +139,18 @@ def seed_from_text(text: str) -> int:
             remedy=tr("Give for example seed=1."),
         )
     return int(text)
+
+
+def answer_ms_from_text(text: str) -> float:
+    """Return an answer time in milliseconds.
+
+    Raises:
+        ConfigError: It is no number.
+    """
+    try:
+        return float(text)
+    except ValueError as error:
+        raise ConfigError(
+            tr("The option {name} cannot be {value!r}.", name="answer_ms", value=text),
+            remedy=tr("Give for example answer_ms=20."),
+        ) from error

@@ -9,7 +9,11 @@ from robolink.transport import LinkUrl
 from robolink_simulators.cell.world_parameters import from_options, plain
 from robolink_simulators.faults import LinkKind, read_fault_file
 from robolink_simulators.hosting.in_process.mailbox_link import InProcessMailboxLink
-from robolink_simulators.hosting.in_process.named import NamedSimulators, seed_from_text
+from robolink_simulators.hosting.in_process.named import (
+    NamedSimulators,
+    answer_ms_from_text,
+    seed_from_text,
+)
 from robolink_simulators.option_values import require_known
 from robolink_simulators.softmotion.catalogue import parameter_names
 from robolink_simulators.softmotion.mailbox.option_text import (
@@ -24,7 +28,7 @@ from robolink_simulators.softmotion.mailbox.simulator import (
 
 __all__ = ["register", "unregister"]
 
-_OWN_OPTIONS: Final = ("kinematics", "seed", "state", "faults")
+_OWN_OPTIONS: Final = ("kinematics", "seed", "state", "faults", "answer_ms")
 
 _named: Final = NamedSimulators[SoftMotionSimulator]("softmotion+sim")
 
@@ -37,9 +41,9 @@ def open_softmotion(
     Args:
         link_url: ``softmotion+sim://NAME``, with ``kinematics`` (``+Kin_CAxis`` is written
             ``%2BKin_CAxis``), ``seed``, ``state`` (a file that keeps what is retained),
-            ``faults`` (a fault plan, docs/fault-plans.md), any parameter of the kinematics,
-            ``world.NAME`` (see ``WorldParameters``), and any field of ``GroupOptions`` and
-            ``MailboxOptions`` as options.
+            ``faults`` (a fault plan, docs/fault-plans.md), ``answer_ms`` (when an answer
+            leaves), any parameter of the kinematics, ``world.NAME`` (see ``WorldParameters``),
+            and any field of ``GroupOptions`` and ``MailboxOptions`` as options.
         timeout_s: Longest wait for an answer, in simulated time.
         clock: A :class:`~robolink_simulators.cell.clock.ManualClock` becomes the clock of a new
             simulator. Any other clock is left aside: simulated time is the simulator's own.
@@ -74,6 +78,7 @@ def _made(options: Mapping[str, str]) -> SoftMotionSimulator:
         options=options_from_text(habits),
         state_path=Path(state) if state else None,
         world=from_options(options),
+        answer_ms=answer_ms_from_text(options.get("answer_ms", "0")),
     )
     if "faults" in options:
         file = read_fault_file(Path(options["faults"]))

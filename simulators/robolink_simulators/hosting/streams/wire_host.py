@@ -46,6 +46,7 @@ class WireHost(ClosedAtExit):
         self._lock = lock
         self._woken = False
         self._now_ns = 0
+        self._answer_s = 0.0
         self.stopping = False
         self.due_s: float | None = None
         self.queued_s: float | None = None
@@ -63,6 +64,7 @@ class WireHost(ClosedAtExit):
             url: What it says of itself no more when this host is closed.
         """
         self._presented = simulator, url
+        self._answer_s = simulator.answer_s
         simulator.keep_time(self._clock)
         simulator.watchers.append(self.wake)
 
@@ -109,6 +111,9 @@ class WireHost(ClosedAtExit):
             self._now_ns = now_ns = self._clock.now_ns()
             if served is not None:
                 served(events, now_ns)
+                # Where time stands still, nothing else lets the answer time pass.
+                if self._answer_s and self._clock.stepped(self._answer_s):
+                    self._now_ns = now_ns = self._clock.now_ns()
             self._device.advance(now_ns)
 
     def answer(self) -> float | None:

@@ -130,7 +130,7 @@ class ServedAccess:
 
     Attributes:
         words: What was read; empty for a write.
-        delay_s: How much later than usual the answer leaves, in simulated time.
+        delay_s: How long after the request the answer leaves, in simulated seconds.
         answered: Whether an answer leaves at all.
         cut: Whether the link is cut then.
         met: The faults of this exchange that only the host can do: what becomes of frames, of
@@ -209,9 +209,18 @@ class WireFaults(CountedFaults[PlcFault]):
                 words = self._garbled(words, fault)
         return tuple(words)
 
-    def leaving(self, shown: str, words: Words, faults: Iterable[PlcFault]) -> ServedAccess:
-        """Return what is sent instead of an answer."""
-        served = ServedAccess(words)
+    def leaving(
+        self, shown: str, words: Words, faults: Iterable[PlcFault], *, after_s: float = 0.0
+    ) -> ServedAccess:
+        """Return what is sent instead of an answer.
+
+        Args:
+            shown: The request.
+            words: The answer.
+            faults: What it meets.
+            after_s: When it would leave without them, in seconds from now.
+        """
+        served = ServedAccess(words, delay_s=after_s)
         for fault in faults:
             match fault.action:
                 case PlcFaultAction.DELAY | PlcFaultAction.STALL:

@@ -55,6 +55,7 @@ class SoftMotionSimulator(HostedDevice):
         faults: What is planned to go wrong.
         world: What goes wrong around the robot.
         make_plc: Makes the controller, from machine, parameters and options.
+        answer_ms: How long after a request arrives its answer leaves, in simulated milliseconds.
 
     At first the machine stands ready: enabled, slot 1 defined and selected. With a state file
     of an earlier run it has just been switched on: without a tool and, in the profile
@@ -94,8 +95,9 @@ class SoftMotionSimulator(HostedDevice):
         faults: Iterable[PlcFault] = (),
         world: WorldParameters | None = None,
         make_plc: PlcMaker = Plc,
+        answer_ms: float = 0.0,
     ) -> None:
-        super().__init__(seed)
+        super().__init__(seed, answer_ms=answer_ms)
         self.durable = state_path is not None
         self.options = options or PlcOptions()
         self.faults = WireFaults(faults, seed)
@@ -313,7 +315,7 @@ class SoftMotionSimulator(HostedDevice):
         self.log.add(self.now_ns, "<", shown)
         if self.on_reply is not None:
             self.on_reply(number, shown)
-        return self.faults.leaving(shown, words, faults)
+        return self.faults.leaving(shown, words, faults, after_s=self.answer_s)
 
     def _take(self, first: int, words: Sequence[int], faults: Sequence[PlcFault]) -> Words:
         words = self.faults.arriving(words, faults)

@@ -132,7 +132,7 @@ BAD = {
     "journal export": (["golden.json"], "exists already"),
     "journal verify": (["all"], "Too many words"),
     "tool list": (["--timeout", "soon"], "soon"),
-    "demo": (["--speed", "0"], "0"),
+    "demo": (["--speed", "101"], "101"),
     "sim epson": (["--tcp", "nowhere"], "not an address to listen on"),
     "sim softmotion": (["--modbus-tcp", "nowhere"], "not an address to listen on"),
     "sim run": (["missing.toml"], "missing.toml"),

@@ -12,7 +12,12 @@ from pathlib import Path
 import pytest
 from robolink_cli import main
 from robolink_cli.commands.simulate.cells_file import KINDS, DeclaredKeys, read_cells
-from robolink_cli.commands.simulate.demo import AcceptedChange, DemoOperator, require_refused
+from robolink_cli.commands.simulate.demo import (
+    AcceptedChange,
+    DemoOperator,
+    DemoSettings,
+    require_refused,
+)
 from robolink_cli.commands.simulate.demo import _on_plc as on_plc
 from robolink_cli.commands.simulate.sim import sim
 from robolink_cli.commands.simulate.sim_run import SCHEMA, _tell_end, made
@@ -372,7 +377,7 @@ STORED = {"x_mm": 12.0, "y_mm": -3.5, "z_mm": -20.0}
 
 
 def test_a_careful_person_is_believed_and_a_believed_one_is_no_refusal():
-    change = on_plc(2, DemoOperator.CAREFUL)
+    change = on_plc(DemoSettings(2, 20.0, DemoOperator.CAREFUL, 0.0))
     assert isinstance(change, AcceptedChange)
     assert change.error_mm < 0.05
     with pytest.raises(RuntimeError, match="accepted the careless touches, on Kin_Scara3_Z"):
@@ -385,6 +390,30 @@ def test_who_stands_there_is_said_in_the_document(capsys):
     document = json.loads(capsys.readouterr().out)
     assert document["operator"] == "careful"
     assert [one["refused"] for one in document["controllers"]] == [None, None]
+
+
+@pytest.mark.parametrize("answer_ms", [pytest.param(0, marks=pytest.mark.soak), 20])
+def test_in_simulated_time_each_exchange_takes_the_answer_time(capsys, answer_ms):
+    assert main.run(["demo", "--json", "--speed", "0", "--answer-ms", str(answer_ms)]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["answer_ms"] == answer_ms
+    for one in document["controllers"]:
+        assert one["error_mm"] < 0.05
+        # While the robot moves, answers to the looks at it take no time of their own.
+        assert one["simulated_s"] > max(10, one["exchanges"] * answer_ms / 1000)
+
+
+@pytest.mark.soak
+def test_at_a_pace_of_real_time_no_simulated_seconds_are_told(capsys):
+    assert main.run(["demo", "--json", "--speed", "100", "--answer-ms", "5"]) == 0
+    scara, plc = json.loads(capsys.readouterr().out)["controllers"]
+    assert scara["simulated_s"] is None
+    assert plc["simulated_s"] > plc["exchanges"] * 0.005
+
+
+def test_a_pace_slower_than_real_time_is_refused(capsys):
+    assert main.run(["demo", "--speed", "0.5"]) == 2
+    assert "0, or from 1 to 100" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("seed", [1, pytest.param(3, marks=pytest.mark.soak)])

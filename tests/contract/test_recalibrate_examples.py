@@ -44,12 +44,16 @@ def test_the_error_to_the_truth_is_what_the_interval_leads_to_expect(cell, examp
     began_ns = cell.clock.now_ns()
     code = main.run(["-c", cell.url, *words, "--nozzle", "N-7", "--lot", "L", "--yes", "--json"])
     took_s = (cell.clock.now_ns() - began_ns) / 1e9
+    asked = cell.simulator.exchanges
     shown = capsys.readouterr()
     assert code == 0, shown.err
     with capsys.disabled():
         sys.stdout.write(f"\n{example} recipe, with proof: {took_s:.1f} s of robot time\n")
     assert took_s < MOST_S.get(example, took_s + 1)
-    for tool in json.loads(shown.out)["tools"]:
+    document = json.loads(shown.out)
+    assert document["took_s"] == pytest.approx(took_s, abs=0.2)
+    assert 0.9 * asked < document["exchanges"] < asked  # without connecting and logging out
+    for tool in document["tools"]:
         number, halves = tool["tool"], tool["fit"]["half_width95"]
         found = cell.simulator.machine.tools.get(number)
         true = cell.simulator.world.tips[number]

@@ -16,6 +16,7 @@ from robolink.model import AnsweredBy, Controller, ToolReceipt, json_fields
 from robolink.procedures import MeasurementContext
 from robolink.recipe import Answers, LoadedRecipe, require_answers
 from robolink.runner import Ask, Confirm, Notify, StepDone, TakenStep
+from robolink.timing import NS_PER_S
 from robolink.transaction import Order
 from robolink_cli.access.capabilities import io_of
 from robolink_cli.console.exit_codes import error_body, exit_code
@@ -221,7 +222,7 @@ class Recalibration:
                         document = self._plan(controller, run)
                     else:
                         self._consent(controller, run)
-                        document = self._told(controller, run, run.run())
+                        document = self._carried_out(controller, run)
         payload = with_order(document, order)
         self.events.emit("result", **payload)
         if not self.events.on:
@@ -386,6 +387,23 @@ class Recalibration:
                 for output in recipe.outputs
             ],
         }
+
+    def _carried_out(self, controller: Controller, run: RecipeRun) -> dict[str, object]:
+        """Run the recipe; return its document, with how long it took by the controller's clock."""
+        clock, answered = controller.clock, controller.exchanges
+        began_ns = clock.now_ns()
+        report = run.run()
+        took_s = round((clock.now_ns() - began_ns) / NS_PER_S, 1)
+        exchanges = controller.exchanges - answered
+        document = self._told(controller, run, report)
+        say(
+            tr(
+                "It took {seconds:.1f} s and {exchanges} requests.",
+                seconds=took_s,
+                exchanges=exchanges,
+            )
+        )
+        return {**document, "took_s": took_s, "exchanges": exchanges}
 
     def _told(
         self, controller: Controller, run: RecipeRun, report: ChangeReport

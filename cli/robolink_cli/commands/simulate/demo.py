@@ -8,11 +8,11 @@ from enum import StrEnum
 from typing import Annotated, Literal
 
 import click
-from robolink_simulators.cell.clock import ScaledClock
+from robolink_simulators.cell.clock import ManualClock, ScaledClock
 from robolink_simulators.cell.world_parameters import WorldParameters
 from robolink_simulators.control.assist import LEAST_THINKING_S, InProcessEyes
 from robolink_simulators.epson.device import EpsonSimulator
-from robolink_simulators.hosting.in_process.softmotion import simulator_named
+from robolink_simulators.hosting.in_process import epson, softmotion
 from robolink_simulators.hosting.streams.epson import serve_tcp
 from robolink_simulators.softmotion.mailbox.simulator import SoftMotionSimulator
 
@@ -29,10 +29,13 @@ from robolink.errors import CalibrationError, VerifyError
 from robolink.journal import memory_journal
 from robolink.messages import tr
 from robolink.model import Controller, ToolOffset, json_fields, json_value
+from robolink.timing import NS_PER_S
+from robolink.transport import parse_url
 from robolink_cli.console.numbers import NumberInside
 from robolink_cli.console.render import emit_json, json_is_on, say
 from robolink_cli.options.declaration import CliOption
 from robolink_cli.options.shared import json_option
+from robolink_cli.options.simulation import AnswerTime
 from robolink_cli.prompts.operator import AssistedOperator
 from robolink_cli.views.fit import report_payload, show_proposal, show_report
 
@@ -46,11 +49,14 @@ def demo(
     ] = 1,
     speed: Annotated[
         float,
-        NumberInside(1, 100),
+        NumberInside(0, 100),
         CliOption(
-            metavar="FACTOR", help="How many times faster than real time the simulation runs."
+            metavar="FACTOR",
+            help="How many times faster than real time the SCARA runs, 1 to 100. At 0, time "
+            "passes only while robolink waits, and the duration is shown.",
         ),
     ] = 20.0,
+    answer_ms: AnswerTime = 0.0,
     operator: Annotated[
         Literal["careful", "careless"],
         CliOption(
@@ -61,10 +67,14 @@ def demo(
 ) -> None:
     """Change the nozzle of a simulated EPSON SCARA, then of a simulated SoftMotion PLC.
 
-    The SCARA is reached over a TCP connection on this machine's loopback, the PLC through its
-    mailbox inside this process. No machine is touched.
+    The SCARA is reached over a TCP connection on this machine's loopback (with --speed 0 inside
+    this process), the PLC through its mailbox inside this process. No machine is touched.
     """
-    demonstrate(seed=seed, speed=speed, operator=DemoOperator(operator))
+    if 0 < speed < 1:
+        raise click.UsageError(tr("--speed is 0, or from 1 to 100."))
+    demonstrate(
+        DemoSettings(seed=seed, speed=speed, operator=DemoOperator(operator), answer_ms=answer_ms)
+    )
 
 
 TOOL = 1
@@ -79,17 +89,22 @@ class DemonstratedChange(ABC):
         kind: Kind of controller.
         robot: What moves.
         truth: Where the tip really is.
-        exchanges: Requests that it took.
+        exchanges: Requests that it took, with those of connecting.
+        simulated_s: How many seconds of simulated time passed meanwhile: movements, answers and
+            what the simulated person needed. ``None`` where simulated time runs along with real
+            time: that would measure this computer.
     """
 
     kind: str
     robot: str
     truth: ToolOffset
     exchanges: int
+    simulated_s: float | None
 
     def payload(self) -> dict[str, object]:
         """Return it as plain JSON."""
-        return {**json_fields(self, "kind", "robot", "truth", "exchanges"), **self.end()}
+        named = json_fields(self, "kind", "robot", "truth", "exchanges", "simulated_s")
+        return {**named, **self.end()}
 
     @abstractmethod
     def end(self) -> dict[str, object]:
@@ -98,6 +113,16 @@ class DemonstratedChange(ABC):
     @abstractmethod
     def show(self) -> None:
         """Show how it ended."""
+
+    def show_duration(self) -> None:
+        """Show how much simulated time passed, where that says something of the robot."""
+        if self.simulated_s is not None:
+            say(
+                tr(
+                    "It took {seconds:.1f} s of simulated time, the simulated person's included.",
+                    seconds=self.simulated_s,
+                )
+            )
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,6 +218,7 @@ class RefusedChange(DemonstratedChange):
         )
 
 
+_ROBOT = "T6-602S"
 _KINEMATICS = "Kin_Scara3_Z"
 
 _OF_INTEREST = tuple(f'> $Execute,"{word} ' for word in ("Tool", "TLSet", "Move", "Go"))
@@ -235,7 +261,38 @@ class WireLog:
         return shown
 
 
-def demonstrate(*, seed: int, speed: float, operator: DemoOperator) -> None:
+@dataclass(frozen=True, slots=True)
+class DemoSettings:
+    """What was typed.
+
+    Attributes:
+        seed: Of the simulated cells.
+        speed: How many times faster than real time the SCARA runs; 0 for simulated time alone.
+        operator: Who touches the pin.
+        answer_ms: How long after a request its answer leaves, in simulated milliseconds.
+    """
+
+    seed: int
+    speed: float
+    operator: DemoOperator
+    answer_ms: float
+
+    @property
+    def stays_share(self) -> float:
+        """Share of the touches at which the person leaves the tip where it is."""
+        return 1.0 if self.operator is DemoOperator.CARELESS else 0.0
+
+    def url(self, scheme: str, machine: str) -> str:
+        """Return the URL of a simulator in this process."""
+        url = f"{scheme}://demo-{self.seed}-{self.operator}?{machine}&seed={self.seed}"
+        if self.answer_ms:
+            url += f"&answer_ms={self.answer_ms:g}"
+        if self.stays_share:
+            url += f"&world.person_stays_share={self.stays_share:g}"
+        return url
+
+
+def demonstrate(given: DemoSettings) -> None:
     """Run the demonstration and show it, or return its document.
 
     Raises:
@@ -243,16 +300,16 @@ def demonstrate(*, seed: int, speed: float, operator: DemoOperator) -> None:
         RuntimeError: A careless one was believed, which is a defect, or a refusal left another tool
             in force.
     """
-    epson = _on_epson(seed, speed, operator)
+    scara = _on_epson(given)
     say()
-    plc = _on_plc(seed, operator)
-    both = (epson, plc)
-    if operator is DemoOperator.CARELESS:
+    both = (scara, _on_plc(given))
+    if given.operator is DemoOperator.CARELESS:
         require_refused(both)
     if json_is_on():
         document = {
             "simulated": True,
-            "operator": operator.value,
+            "operator": given.operator.value,
+            "answer_ms": given.answer_ms,
             "controllers": [one.payload() for one in both],
         }
         emit_json("robolink/demo/2", document)
@@ -271,19 +328,12 @@ def require_refused(changes: Sequence[DemonstratedChange]) -> None:
         )
 
 
-def _on_epson(seed: int, speed: float, operator: DemoOperator) -> DemonstratedChange:
-    """Change a nozzle on a simulated EPSON SCARA, over a real TCP connection."""
-    # The driver uses real time, and so does the simulated person.
-    share, thinks_s = _stays_share(operator), LEAST_THINKING_S
-    world = WorldParameters(person_stays_share=share, person_thinks_s=thinks_s)
-    simulator = EpsonSimulator("T6-602S", seed=seed, world=world)
+def _on_epson(given: DemoSettings) -> DemonstratedChange:
+    """Change a nozzle on a simulated EPSON SCARA, over TCP or in simulated time."""
     wire = WireLog()
-    with serve_tcp(simulator, clock=ScaledClock(speed)) as host:
-        _announce(tr("SIMULATED EPSON T6-602S, served at {url}", url=host.url), operator)
-        outcomes = memory_journal(host.url).log(host.url)
-        with robolink.connect(host.url, outcomes=outcomes, trace=wire) as controller:
-            done = _Cell("epson", "T6-602S", simulator, operator).change(controller)
+    done = _by_itself(given, wire) if given.speed == 0 else _over_tcp(given, wire)
     done.show()
+    done.show_duration()
     say()
     say(tr("sent on the wire (left out: reads, and low power and speed before each move):"))
     for line in wire.of_writes():
@@ -291,22 +341,51 @@ def _on_epson(seed: int, speed: float, operator: DemoOperator) -> DemonstratedCh
     return done
 
 
-def _on_plc(seed: int, operator: DemoOperator) -> DemonstratedChange:
+def _over_tcp(given: DemoSettings, wire: WireLog) -> DemonstratedChange:
+    """Change the nozzle over a real TCP connection."""
+    # The driver uses real time, and so does the simulated person.
+    share, thinks_s = given.stays_share, LEAST_THINKING_S
+    simulator = EpsonSimulator(
+        _ROBOT,
+        seed=given.seed,
+        world=WorldParameters(person_stays_share=share, person_thinks_s=thinks_s),
+        answer_ms=given.answer_ms,
+    )
+    with serve_tcp(simulator, clock=ScaledClock(given.speed)) as host:
+        _announce(tr("SIMULATED EPSON T6-602S, served at {url}", url=host.url), given.operator)
+        outcomes = memory_journal(host.url).log(host.url)
+        with robolink.connect(host.url, outcomes=outcomes, trace=wire) as controller:
+            return _Cell("epson", _ROBOT, simulator, given.operator).change(controller)
+
+
+def _by_itself(given: DemoSettings, wire: WireLog) -> DemonstratedChange:
+    """Change the nozzle in this process and in simulated time."""
+    url = given.url("epson+sim", f"robot={_ROBOT}")
+    _announce(tr("SIMULATED EPSON T6-602S, {url}", url=url), given.operator)
+    name = parse_url(url).host
+    try:
+        with robolink.connect(url, trace=wire) as controller:
+            cell = _Cell("epson", _ROBOT, epson.simulator_named(name), given.operator)
+            return cell.change(controller)
+    finally:
+        epson.unregister(name)
+
+
+def _on_plc(given: DemoSettings) -> DemonstratedChange:
     """Change a nozzle on a simulated SoftMotion PLC, in this process and in simulated time."""
-    name = f"demo-{seed}-{operator}"
-    url = f"softmotion+sim://{name}?kinematics={_KINEMATICS}&seed={seed}"
-    if operator is DemoOperator.CARELESS:
-        url += f"&world.person_stays_share={_stays_share(operator):g}"
-    _announce(tr("SIMULATED CODESYS SoftMotion PLC, {url}", url=url), operator)
-    with robolink.connect(url) as controller:
-        cell = _Cell("softmotion", _KINEMATICS, simulator_named(name), operator)
-        done = cell.change(controller)
+    url = given.url("softmotion+sim", f"kinematics={_KINEMATICS}")
+    _announce(tr("SIMULATED CODESYS SoftMotion PLC, {url}", url=url), given.operator)
+    name = parse_url(url).host
+    try:
+        with robolink.connect(url) as controller:
+            simulator = softmotion.simulator_named(name)
+            cell = _Cell("softmotion", _KINEMATICS, simulator, given.operator)
+            done = cell.change(controller)
+    finally:
+        softmotion.unregister(name)
     done.show()
+    done.show_duration()
     return done
-
-
-def _stays_share(operator: DemoOperator) -> float:
-    return 1.0 if operator is DemoOperator.CARELESS else 0.0
 
 
 def _announce(simulated: str, operator: DemoOperator) -> None:
@@ -339,9 +418,15 @@ class _Cell:
             if held is None or not controller.tools.same(held, before):
                 raise RuntimeError(tr("The refusal left another tool selected.")) from error
             return RefusedChange(
-                self.kind, self.robot, truth, controller.exchanges, error, in_force=held
+                self.kind, self.robot, truth, *self._spent(controller), error, in_force=held
             )
-        return AcceptedChange(self.kind, self.robot, truth, controller.exchanges, report)
+        return AcceptedChange(self.kind, self.robot, truth, *self._spent(controller), report)
+
+    def _spent(self, controller: Controller) -> tuple[int, float | None]:
+        """Return the exchanges since the cell was connected to, and their simulated seconds."""
+        clock = controller.clock  # that of a simulator in this process began at 0
+        simulated = isinstance(clock, ManualClock)
+        return controller.exchanges, clock.now_ns() / NS_PER_S if simulated else None
 
     def _report(self, controller: Controller) -> ToolReport:
         controller.motors(True)

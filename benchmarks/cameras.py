@@ -15,10 +15,12 @@ from typing import Any, Final
 from robolink.calibration import BoardDrawing, CalibrationResult
 from robolink.methods import BoardSource, CameraAffineSource, CameraSource
 from robolink.model import ToolOffset
+from robolink.timing import NS_PER_S
 from tests.contract._camera_cell import camera_station, cell_of, furnish, run_source
 from tests.contract._sensor_cell import SensorCell
 
 CELLS: Final = 80
+ANSWERS_MS: Final = (0, 20)
 
 
 @dataclass
@@ -84,8 +86,18 @@ SOURCES: Final[dict[str, Callable[[SensorCell], tuple[Any, ToolOffset]]]] = {
 }
 
 
+def change_s(kind: str, name: str, answer_ms: float) -> float:
+    """Return how long a change with its turn test takes, by how fast the controller answers."""
+    with cell_of(kind) as cell:
+        cell.simulator.answer_s = answer_ms / 1000
+        source, _ = SOURCES[name](cell)
+        began_ns = cell.clock.now_ns()
+        run_source(cell, source)
+        return (cell.clock.now_ns() - began_ns) / NS_PER_S
+
+
 def main(cells: int) -> None:
-    """Measure in so many cells with each source, and print a line for each."""
+    """Measure in so many cells with each source, and print two lines for each."""
     for name, source_for in SOURCES.items():
         tally = Tally()
         for seed in range(1, cells + 1):
@@ -93,6 +105,9 @@ def main(cells: int) -> None:
                 source, truth = source_for(cell)
                 tally.add(run_source(cell, source, write=False).proposal.result, truth)
         print(tally.line(name))
+        for answer_ms in ANSWERS_MS:
+            epson_s, plc_s = (change_s(kind, name, answer_ms) for kind in ("epson", "softmotion"))
+            print(f"  answers after {answer_ms:2} ms: EPSON {epson_s:.1f} s, PLC {plc_s:.1f} s")
 
 
 if __name__ == "__main__":

@@ -13,25 +13,32 @@ from benchmarks.table import Amount, Figure
 from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
 
 ROUNDS = 9
+WHAT = {
+    0: "two-pose nozzle change on sim://",
+    20: "the same, of a controller that answers after 20 ms",
+}
+"""What is measured, by the answer time in milliseconds."""
 
 
 def measure_nozzle_change() -> Iterator[Figure]:
-    """Yield wall milliseconds, simulated seconds and their ratio."""
-    runs = [_change(seed) for seed in range(ROUNDS + 1)][1:]
-    wall_s = median(wall for wall, _ in runs)
-    simulated_s = median(simulated for _, simulated in runs)
-    yield Figure(
-        "two-pose nozzle change on sim://",
-        Amount(wall_s * 1000, "ms"),
-        "its simulated time",
-        Amount(simulated_s * 1000, "ms"),
-        wall_s / simulated_s,
-    )
+    """Yield wall milliseconds, simulated seconds and their ratio, by how fast answers come."""
+    for answer_ms, what in WHAT.items():
+        runs = [_change(seed, answer_ms) for seed in range(ROUNDS + 1)][1:]
+        wall_s = median(wall for wall, _ in runs)
+        simulated_s = median(simulated for _, simulated in runs)
+        yield Figure(
+            what,
+            Amount(wall_s * 1000, "ms"),
+            "its simulated time",
+            Amount(simulated_s * 1000, "ms"),
+            wall_s / simulated_s,
+        )
 
 
-def _change(seed: int) -> tuple[float, float]:
+def _change(seed: int, answer_ms: int) -> tuple[float, float]:
     name = f"bench-{seed}"
-    with robolink.connect(f"epson+sim://{name}?seed={seed}") as controller:
+    url = f"epson+sim://{name}?seed={seed}&answer_ms={answer_ms}"
+    with robolink.connect(url) as controller:
         eyes = InProcessEyes(simulator_named(name))
         controller.motors(True)
         simulated_ns = controller.clock.now_ns()

@@ -4,7 +4,7 @@ A simulated controller runs in real time; its needle differs from the stored off
 sees the tip and brings it to within 0.02 mm, at a touch and at each touch of the turn test. A held
 key counts once; in a line every character and ENTER count. ``--lines`` uses the earlier dialogue
 (git worktree of the commit before the wizard, on PYTHONPATH); ``--pictures FOLDER`` keeps the
-screens.
+screens; ``--answer-ms MS`` lets the controller answer so late.
 """
 
 import argparse
@@ -150,11 +150,13 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("--lines", action="store_true")
     parser.add_argument("--pictures", type=Path)
+    parser.add_argument("--answer-ms", type=float, default=0.0)
     said = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:
         os.environ["ROBOLINK_STATE_DIR"] = folder
         simulator = EpsonSimulator(seed=7, options=EpsonOptions(remote_timeout_s=0.0))
         clock = ScaledClock(1.0, prepare(simulator))
+        simulator.answer_s = said.answer_ms / 1000
         with serve_tcp(simulator, clock=clock) as host:
             command = "recalibrate" if said.lines else "change"
             words = [command, str(RECIPE), "-c", host.url]

@@ -1,0 +1,140 @@
+"""A simulated cell for each shipped recipe, in virtual time, with a nozzle to measure in it."""
+
+import os
+import shutil
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Final
+
+from robolink_simulators.cell.tip_switches import LightBeam, TouchPlate
+from robolink_simulators.cell.world_parameters import WorldParameters
+from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
+from robolink_simulators.testkit.media import served
+
+from robolink.model import ToolOffset
+from tests._commands import Ended, run_command
+from tests.contract._camera_cell import cell_of, furnish
+from tests.contract._sensor_cell import sensor_cell
+
+EXAMPLES: Final = Path(__file__).parents[2] / "examples" / "recipes"
+BEAMS_MM: Final = (175.0, 488.0, -106.0)
+PIN_MM_OF_THE_NEEDLE: Final = 0.35
+"""By how much the needle of the one-touch recipe is longer than the one before."""
+
+
+@dataclass(frozen=True)
+class ShippedCell:
+    """A cell in which a shipped recipe can be carried out.
+
+    Attributes:
+        simulator: What answers.
+        url: Where.
+        recipe: The file.
+        more: What the command needs besides.
+    """
+
+    simulator: Any
+    url: str
+    recipe: Path
+    more: tuple[str, ...]
+
+    def change(self, *words: str) -> Ended:
+        """Carry the recipe out."""
+        return run_command("-c", self.url, "change", str(self.recipe), *self.more, *words)
+
+    @property
+    def words(self) -> tuple[str, ...]:
+        """What lets the change run with nobody there, its result as a document."""
+        return ("--nozzle", "N-7", "--lot", "L", "--yes", "--json")
+
+
+@contextmanager
+def _touched(name: str) -> Iterator[ShippedCell]:
+    """Set up a SCARA with a pin, a second tool, and two beams."""
+    with sensor_cell(seed=3) as cell:
+        simulator = cell.simulator
+        simulator.machine.motors_on = True
+        simulator.machine.tools.set(2, ToolOffset(12.4, -3.7, -20.0))
+        simulator.world.change_nozzle(2)
+        for number, heading_deg in ((3, 2.0), (4, 91.0)):
+            beam = LightBeam(BEAMS_MM, heading_deg, radius_mm=0.1)
+            simulator.world.connect(number, beam, latency_s=0.002, noise_mm=0.003)
+        yield ShippedCell(simulator, cell.url, EXAMPLES / name, ("--assist", cell.url))
+
+
+@contextmanager
+def _touched_once(name: str) -> Iterator[ShippedCell]:
+    """Set up the same, with a full calibration on record and a longer needle since."""
+    with _touched(name) as cell:
+        words = ("--station", "PIN-07", "--count", "4", "--speed", "100", "--tool", "1", "--yes")
+        done = run_command("-c", cell.url, "calibrate", "n-angle", *cell.more, *words)
+        assert done.code == 0, done.err
+        tips = cell.simulator.world.tips
+        longer_mm = tips[1].z_mm - PIN_MM_OF_THE_NEEDLE
+        tips[1] = replace(tips[1], x_mm=tips[1].x_mm + 0.25, z_mm=longer_mm)
+        yield cell
+
+
+@contextmanager
+def _seen(name: str) -> Iterator[ShippedCell]:
+    """Set up a SCARA above a camera."""
+    with cell_of("epson", seed=1) as cell:
+        cell.simulator.machine.motors_on = True
+        furnish(cell, board_held=name == "held-board.toml")
+        yield ShippedCell(cell.simulator, cell.url, EXAMPLES / name, ("--sensor", cell.url))
+
+
+@contextmanager
+def _on_a_plc(name: str, kinematics: str, seed: int, touches: str = "") -> Iterator[ShippedCell]:
+    """Set up a PLC; ``touches`` says what a person touches there, a pin unless given."""
+    leaning = {"plane_lean_deg": 20.0, "plane_lean_toward_deg": 30.0}
+    world: dict[str, Any] = {"person_touches": touches} if touches else {}
+    world |= leaning if touches == "plane" else {}
+    simulator = SoftMotionSimulator(kinematics, seed=seed, world=WorldParameters(**world))
+    if kinematics == "Kin_Gantry3":
+        simulator.world.connect(5, TouchPlate(33.0), noise_mm=0.002)
+    with served(simulator) as url:
+        person = () if kinematics == "Kin_Gantry3" else ("--assist", url)
+        yield ShippedCell(simulator, url, EXAMPLES / name, person)
+
+
+CELLS: Final[dict[str, Callable[[], AbstractContextManager[ShippedCell]]]] = {
+    "scara-pin": lambda: _touched("scara-pin.toml"),
+    "two-nozzles": lambda: _touched("two-nozzles.toml"),
+    "needle-beams": lambda: _touched("needle-beams.toml"),
+    "needle-one-touch": lambda: _touched_once("needle-one-touch.toml"),
+    "pick-nozzle-camera": lambda: _seen("pick-nozzle-camera.toml"),
+    "nozzle-and-camera": lambda: _seen("nozzle-and-camera.toml"),
+    "held-board": lambda: _seen("held-board.toml"),
+    "five-axes-pivot": lambda: _on_a_plc("five-axes-pivot.toml", "Kin_5Axes", 1),
+    "gantry-touch-probe": lambda: _on_a_plc("gantry-touch-probe.toml", "Kin_Gantry3", 1),
+    "leaning-plate": lambda: _on_a_plc("leaning-plate.toml", "Kin_5Axes", 4, "plane"),
+    "sphere": lambda: _on_a_plc("sphere.toml", "Kin_5Axes", 4, "sphere"),
+}
+"""The cell of each shipped recipe that moves a robot; by ``pendant-points`` nothing moves."""
+
+
+@contextmanager
+def shipped_cell(name: str, answer_ms: float = 0.0) -> Iterator[ShippedCell]:
+    """Set up the cell of a shipped recipe; its record is forgotten with it.
+
+    Args:
+        name: Of the recipe.
+        answer_ms: How long after a request the simulator's answer leaves, from the change on.
+    """
+    before = os.environ.get("ROBOLINK_STATE_DIR")
+    folder = tempfile.mkdtemp(prefix="robolink-shipped-")
+    os.environ["ROBOLINK_STATE_DIR"] = folder
+    try:
+        with CELLS[name]() as cell:
+            cell.simulator.answer_s = answer_ms / 1000
+            yield cell
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        if before is None:
+            del os.environ["ROBOLINK_STATE_DIR"]
+        else:
+            os.environ["ROBOLINK_STATE_DIR"] = before

@@ -1,0 +1,50 @@
+"""Prints how long each shipped recipe takes, by how fast the controller answers.
+
+python -m tests.contract.robot_time [RECIPE ...]
+
+Each is carried out in simulated time, with its turn test; what the simulated person needs is in it.
+Where a person touches, the stop above the pin is drawn anew each time, so the seconds scatter: the
+median of a few runs is printed.
+"""
+
+import sys
+from statistics import median
+from typing import Final
+
+from tests.contract._shipped_cells import CELLS, shipped_cell
+
+ANSWERS_MS: Final = (0, 5, 20, 50)
+RUNS: Final = 3
+
+
+def measured(name: str, answer_ms: float) -> tuple[float, int]:
+    """Return the seconds and the requests of one change by a shipped recipe."""
+    with shipped_cell(name, answer_ms) as cell:
+        done = cell.change(*cell.words)
+        if done.code:
+            sys.exit(f"{name} at {answer_ms} ms: exit code {done.code}\n{done.err}")
+        document = done.document
+        return document["took_s"], document["exchanges"]
+
+
+def main(names: list[str]) -> None:
+    """Print the table."""
+    heads = " | ".join(f"{answer_ms} ms" for answer_ms in ANSWERS_MS)
+    _show(f"| recipe | requests at 0 ms, at 20 ms | {heads} |")
+    _show(f"|---|---:|{'---:|' * len(ANSWERS_MS)}")
+    for name in names or CELLS:
+        found = {
+            answer_ms: [measured(name, answer_ms) for _ in range(RUNS)] for answer_ms in ANSWERS_MS
+        }
+        took = " | ".join(f"{median(s for s, _ in runs):.1f} s" for runs in found.values())
+        asked = ", ".join(f"{median(n for _, n in found[answer_ms]):,}" for answer_ms in (0, 20))
+        _show(f"| `{name}` | {asked} | {took} |")
+
+
+def _show(line: str) -> None:
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

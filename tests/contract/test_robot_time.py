@@ -29,6 +29,7 @@ def test_every_shipped_recipe_that_moves_a_robot_has_its_cell_and_its_seconds():
     assert set(CELLS) == shipped - NOTHING_MOVES == set(told())
 
 
+@pytest.mark.soak
 def test_a_change_waits_for_the_answers_of_most_of_its_requests():
     (quick_s, _), (slow_s, exchanges) = (measured("needle-one-touch", ms) for ms in (0, 50))
     # While the robot moves, answers to the looks at it take no time of their own.

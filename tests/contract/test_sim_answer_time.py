@@ -3,16 +3,19 @@
 import socket
 import struct
 import time
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import replace
 
+import canopen
 import pytest
 from robolink_cli.commands.simulate.cells_file import read_cells
 from robolink_cli.commands.simulate.sim import sim
-from robolink_simulators.cell.clock import ScaledClock, SteeredClock
+from robolink_simulators.cell.clock import ManualClock, ScaledClock, SteeredClock
 from robolink_simulators.device.hosted import LONGEST_ANSWER_MS
 from robolink_simulators.epson import EpsonOptions, EpsonSimulator
 from robolink_simulators.faults import Fault, FaultAction
+from robolink_simulators.hosting.fieldbus.canopen_objects import object_dictionary
+from robolink_simulators.hosting.in_process.mailbox_link import InProcessMailboxLink
 from robolink_simulators.hosting.streams.epson import serve_tcp
 from robolink_simulators.plc import PlcSimulator
 from robolink_simulators.softmotion.mailbox import SoftMotionSimulator
@@ -20,7 +23,7 @@ from robolink_simulators.testkit.media import MEDIA, served
 from robolink_simulators.testkit.operator import written_map
 
 import robolink
-from robolink.errors import ConfigError
+from robolink.errors import ConfigError, TransportBrokenError
 from robolink.model import MotionProfile, WorkBox
 from robolink.register_maps import load_map
 from robolink.timing import NS_PER_S
@@ -167,6 +170,42 @@ def test_what_the_mailbox_does_not_serve_is_answered_after_that_time_too(asked):
             client.sendall(struct.pack(">HHHB", 1, 0, 1 + len(asked), 1) + asked)
             assert client.recv(256)
             assert time.monotonic() - began_s >= ANSWER_S
+
+
+def test_an_object_of_a_can_node_that_never_changes_is_read_after_that_time_too():
+    simulator = SoftMotionSimulator(answer_ms=ANSWER_MS)
+    network = canopen.Network()
+    with served(simulator, "can") as url, ExitStack() as stack:
+        link = parse_url(url)
+        network.connect(interface="virtual", channel=link.host)
+        stack.callback(network.disconnect)
+        node = network.add_node(int(link.options["node"]), object_dictionary(5))
+        for index, subindex in ((0x2102, 1), (0x2110, 1), (0x1018, 1)):
+            began_s = time.monotonic()
+            assert node.sdo.upload(index, subindex)
+            assert time.monotonic() - began_s >= ANSWER_S
+
+
+def test_a_request_that_a_plc_with_a_map_gets_twice_is_answered_twice_after_that_time(tmp_path):
+    simulator, _ = made("plc", tmp_path)
+    simulator.faults.add(Fault(FaultAction.DUPLICATE_REQUEST, seconds=0.1))
+    link = simulator.connect(0)
+    link.receive(bytes.fromhex("000100000006010300640002"), 0)
+    for at_ms in (ANSWER_MS, 100 + ANSWER_MS):
+        simulator.advance(at_ms * 1_000_000 - 1)
+        assert link.outgoing() == b""
+        simulator.advance(at_ms * 1_000_000)
+        assert link.outgoing()
+
+
+def test_a_cable_that_is_pulled_before_the_answer_leaves_brings_none():
+    simulator, clock = SoftMotionSimulator(seed=3, answer_ms=ANSWER_MS), ManualClock()
+    link = InProcessMailboxLink("a PLC", simulator, clock, timeout_s=3.0)
+    assert link.read_head()
+    at_ns = clock.now_ns() + ANSWER_MS * 1_000_000 // 2
+    simulator._mishaps.plan_at(at_ns, simulator.panel.cut_link)
+    with pytest.raises(TransportBrokenError):
+        link.read_head()
 
 
 def test_a_planned_delay_is_added_to_it():

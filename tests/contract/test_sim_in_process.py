@@ -55,7 +55,7 @@ def test_a_named_simulator_is_shared_by_name(name):
 @pytest.mark.parametrize(
     ("query", "words"),
     [
-        ("colour=red", "robot, seed, state, split, faults, terminator"),
+        ("colour=red", "robot, seed, state, split, faults, answer_ms"),
         ("seed=x", "whole number"),
         ("robot=R2D2", "no simulated robot"),
         ("split=2", "split"),

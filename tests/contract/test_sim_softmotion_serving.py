@@ -61,7 +61,7 @@ def test_a_named_plc_is_shared_by_name_and_made_as_its_url_says(name, tmp_path):
 @pytest.mark.parametrize(
     ("query", "words"),
     [
-        ("colour=red", "kinematics, seed, state, faults, dArmLength1"),
+        ("colour=red", "kinematics, seed, state, faults, answer_ms"),
         ("kinematics=Kin_Nowhere", "no kinematics"),
         ("dArmLength1=long", "decimal number"),
         ("seed=x", "whole number"),

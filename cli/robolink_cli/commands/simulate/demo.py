@@ -114,6 +114,16 @@ class DemonstratedChange(ABC):
     def show(self) -> None:
         """Show how it ended."""
 
+    def show_duration(self) -> None:
+        """Show how much simulated time passed, where that says something of the robot."""
+        if self.simulated_s is not None:
+            say(
+                tr(
+                    "It took {seconds:.1f} s of simulated time, the simulated person's included.",
+                    seconds=self.simulated_s,
+                )
+            )
+
 
 @dataclass(frozen=True, slots=True)
 class AcceptedChange(DemonstratedChange):
@@ -330,6 +340,7 @@ def _on_epson(given: DemoSettings) -> DemonstratedChange:
     wire = WireLog()
     done = _by_itself(given, wire) if given.speed == 0 else _over_tcp(given, wire)
     done.show()
+    done.show_duration()
     say()
     say(tr("sent on the wire (left out: reads, and low power and speed):"))
     for line in wire.of_writes():
@@ -380,6 +391,7 @@ def _on_plc(given: DemoSettings) -> DemonstratedChange:
     finally:
         softmotion.unregister(name)
     done.show()
+    done.show_duration()
     return done
 
 

@@ -125,18 +125,11 @@ class InProcessMailboxLink:
                     controller=self._identity,
                 )
             self._clock.advance(self._exchange_s / 2)
-            if pulled := self._cuts != self._simulator.plc.cuts:
-                served = ServedAccess(answered=False)
-            else:
-                served = serve(self._clock.now_ns())  # the simulator catches up before it serves
-            if pulled or served.cut or served.meets(PlcFaultAction.RESET):
-                raise self._ended(
-                    TransportBrokenError(
-                        tr("{identity} cut the connection.", identity=self._identity),
-                        remedy=tr("Connect again."),
-                        controller=self._identity,
-                    )
-                )
+            if self._pulled:
+                raise self._broken()
+            served = serve(self._clock.now_ns())  # the simulator catches up before it serves
+            if served.cut or served.meets(PlcFaultAction.RESET):
+                raise self._broken()
             silent = not served.answered or served.meets(PlcFaultAction.HALF_OPEN)
             if silent or served.delay_s > self._timeout_s:
                 self._pass(self._timeout_s)
@@ -149,9 +142,25 @@ class InProcessMailboxLink:
                 )
             if served.delay_s:
                 self._pass(served.delay_s)
+                if self._pulled:  # the answer does not arrive any more
+                    raise self._broken()
             # Events due in this half happen, each at its time, before the next request.
             self._clock.advance(self._exchange_s / 2)
             return served.words
+
+    @property
+    def _pulled(self) -> bool:
+        """Whether somebody has pulled the cable since this link was opened."""
+        return self._cuts != self._simulator.plc.cuts
+
+    def _broken(self) -> RobolinkError:
+        return self._ended(
+            TransportBrokenError(
+                tr("{identity} cut the connection.", identity=self._identity),
+                remedy=tr("Connect again."),
+                controller=self._identity,
+            )
+        )
 
     def _pass(self, seconds: float) -> None:
         self._clock.advance(seconds)

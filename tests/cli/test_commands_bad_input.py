@@ -3,6 +3,7 @@
 import json
 import re
 import socket
+from typing import Any
 
 import pytest
 from robolink_cli import main
@@ -285,18 +286,30 @@ TARGET = re.compile(r"XY\(([-\d.]+),")
 
 
 def cut_during_move(cell: NozzleCell, nth: int) -> list[bool]:
-    """Cut the cable at the first status request after the ``nth`` move was sent.
+    """Cut the cable as the ``nth`` move begins; of every second one at the first request after it.
 
-    The returned list tells afterwards whether the arm was moving then: the shortest jogs may have
-    ended, and been answered, by that time.
+    The returned list tells afterwards whether the arm was moving then. A longer move is asked about
+    while it lasts; a shorter one has ended, and was answered, by that time.
     """
     moving: list[bool] = []
+    arm = cell.simulator.machine.arm
+    started = arm.on_started
+
+    def cut(begins: bool = False) -> None:
+        cell.simulator.on_request, arm.on_started = None, started
+        cell.simulator.panel.cut_link()
+        moving.append(begins or arm.next_change() is not None)
+
+    def begun(*motion: Any) -> None:
+        started(*motion)
+        if cell.moves_requested == nth and nth % 2:
+            cut(begins=True)
+
+    arm.on_started = begun
 
     def hold(_number: int, request: str) -> None:
-        if cell.moves_requested == nth and request == "$GetStatus":
-            cell.simulator.on_request = None
-            cell.simulator.panel.cut_link()
-            moving.append(cell.simulator.machine.arm.next_change() is not None)
+        if cell.moves_requested == nth and not MOVE.match(request):
+            cut()
 
     cell.simulator.on_request = hold
     return moving

@@ -178,6 +178,14 @@ def _sent_in_part(transport: Any, data: bytes, **_named: object) -> None:
     transport._socket.send(data[:1])
 
 
+def _not_looked(settings: Any, edge: object = None) -> Any:
+    """Believe the settings that a movement wants."""
+    from robolink.controllers.epson.movement import ArmState
+
+    (tool,) = settings._window.printed_numbers("Print Tool")
+    return ArmState(int(tool), True, False, 5, 20.0, None if edge is None else False)
+
+
 _ITSELF: Final[Mapping[str, StandIn]] = {
     "robolink.controllers.DriverLink.carry_out": _carried_out,
     "robolink.controllers.MotionGroupCore._marked": _moved_unmarked,
@@ -199,6 +207,7 @@ _ITSELF: Final[Mapping[str, StandIn]] = {
     "robolink.stop_latch.StopLatch.restoring": _open,
     "robolink.stop_latch.StopLatch.calming": _calmed,
     "robolink.controllers.epson.preserve.EpsonPreserver._restore_more": _nothing,
+    "robolink.controllers.epson.movement.Settings.look": _not_looked,
     "robolink.controllers.connect_when_reachable": _knocking,
     "robolink.transaction.Settler.examine": _settled_unread,
     "robolink.controllers.PolledGroup.halt": lambda group: group._send_stop(),

@@ -202,7 +202,7 @@ class EpsonGroup(MotionGroupCore):
                 link.markers.require_settled(statement)
                 self._require_supervision()
                 with window.proving_ready(statement):
-                    found = self.settings.look(edge)
+                    found = self.settings.look()
                 link.preferences.require_real_motion(statement)
                 if edge is not None:
                     link.preferences.require_real_inputs(statement)
@@ -211,7 +211,7 @@ class EpsonGroup(MotionGroupCore):
                 singular = self._singular
                 if singular is not None:
                     singular.require_clear(self._flagged(target), profile.path)
-                    found = self.settings.look(edge)
+                    found = self.settings.look()
                 found = self.settings.slowed(profile, found, edge)
                 _require_motors(found.motors_on)
                 if edge is not None:

@@ -14,7 +14,7 @@ from typing import Final
 
 from robolink.controllers.epson.link import EpsonLink
 from robolink.controllers.epson.session import PendingExecute
-from robolink.controllers.epson.singularities import printed_pose
+from robolink.controllers.epson.singularities import printed_pose, read_position
 from robolink.controllers.motion_group import not_ended_in_time, stopped_before_edge
 from robolink.errors import (
     ControllerFaultError,
@@ -194,16 +194,19 @@ class EpsonMotionUntilInput:
         """Wait for the end; see :class:`robolink.model.MotionUntilInput`."""
         if self._motion.wait(timeout_s=timeout_s) is not MotionOutcome.ARRIVED:
             raise stopped_before_edge(self._link.identity, self._motion.statement)
+        window, tool = self._link.window, spel.print_selected_tool()
         if self._edge.run_on:
-            met, position = spel.print_position_found(), spel.print_found_position()
-        else:
-            met, position = spel.print_till_on(), spel.print_real_position()
-        (switched, tool), point = self._link.window.printed_before_point(
-            met, spel.print_selected_tool(), point=position
+            # FindPos of nothing found is an error of the controller (docs/reference/spel.md 7.1).
+            (met,) = window.printed_numbers(spel.print_position_found())
+            if not spel.parse_boolean(met):
+                return None
+            return read_position(window, spel.print_found_position())
+        (met, selected), point = window.printed_before_point(
+            spel.print_till_on(), tool, point=spel.print_real_position()
         )
-        if not spel.parse_boolean(switched):
+        if not spel.parse_boolean(met):
             return None
-        return printed_pose(point, tool=spel.parse_integer(tool))
+        return printed_pose(point, tool=spel.parse_integer(selected))
 
 
 _SLACK = 0.0005
@@ -329,6 +332,8 @@ class Settings:
     ) -> ArmState:
         """Return a state with Power Low and the speed of a profile; what differs is set.
 
+        Before a search the last look shows the input, too.
+
         Motor On and Reset put them back, Abort perhaps too (docs/reference/spel.md 6.3). So after
         one of these they are set anew, whatever is read.
 
@@ -343,7 +348,9 @@ class Settings:
         if self._set_after != self._link.session.settings_reset:
             return self.slow_down(profile, edge)
         differences = tuple(found.differences(profile))
-        return self._confirmed(profile, differences, edge) if differences else found
+        if not differences and edge is None:
+            return found
+        return self._confirmed(profile, differences, edge)
 
     def _confirmed(
         self,

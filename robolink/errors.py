@@ -51,6 +51,8 @@ from enum import StrEnum
 from types import TracebackType
 from typing import TYPE_CHECKING
 
+from robolink.messages import listed
+
 __all__ = [
     "AmbiguousPosesError",
     "BusyError",
@@ -129,10 +131,16 @@ class RobolinkError(Exception):
         self.raw = raw
 
     def __str__(self) -> str:
-        return f"{self.what} {self.remedy}".rstrip()
+        between = "\n" if "\n" in self.what else " "  # below a list, not on its last line
+        return f"{self.what}{between}{self.remedy}".rstrip()
 
     def __reduce__(self) -> tuple[object, ...]:
         return (_restored, (type(self), self.args, vars(self)))
+
+    def advise(self, sentence: str) -> None:
+        """Add what was left, or what else to do, on a line of its own; empty adds nothing."""
+        if sentence:
+            self.remedy = listed(self.remedy, [sentence]) if self.remedy else sentence
 
     def concern(self, controller: str, request: str = "") -> None:
         """Name the controller and the request, unless they were named nearer to the cause."""

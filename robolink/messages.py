@@ -20,6 +20,7 @@ __all__ = [
     "install",
     "joined",
     "known_names",
+    "listed",
     "plain",
     "spoken",
     "tr",
@@ -94,6 +95,25 @@ def joined(between: str, sentences: Iterable[str]) -> str:
     return text if text == english else Translated(text, english)
 
 
+LIST_LINE: Final = "    "
+"""Begins each line of a list."""
+
+
+def listed(sentence: str, lines: Iterable[str]) -> str:
+    """Return a sentence with a list below it, a line each; both keep their English.
+
+    Findings, causes, commands and long names are listed, so that the sentence stays short.
+
+    Example:
+        >>> from robolink.messages import listed
+        >>> print(listed("needle.toml has 2 errors:", ["line 1: x is missing", "line 2: y is 0"]))
+        needle.toml has 2 errors:
+            line 1: x is missing
+            line 2: y is 0
+    """
+    return joined(f"\n{LIST_LINE}", (sentence, *lines))
+
+
 def first_sentence(text: str) -> str:
     """Return the first sentence of a text on one line; like the text, it keeps its English."""
     cut, english = _first(text), _first(in_english(text))
@@ -104,6 +124,13 @@ def _first(text: str) -> str:
     flat = " ".join(text.split())
     ends = [at + 1 for stop in (". ", "? ", "! ", *_WIDE_STOPS) if (at := flat.find(stop)) >= 0]
     return flat[: min(ends)] if ends else flat
+
+
+def without(sentence: str, text: str) -> str:
+    """Return a text less the sentence that it begins with; like the text, it keeps its English."""
+    rest = text.removeprefix(sentence).lstrip()
+    english = in_english(text).removeprefix(in_english(sentence)).lstrip()
+    return rest if rest == english else Translated(rest, english)
 
 
 def in_english(text: str) -> str:

@@ -2,6 +2,7 @@
 
 import os
 import re
+import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
@@ -12,7 +13,8 @@ from robolink import errors
 from robolink.interrupts import EndedBy, Interrupted, ended_by
 from robolink.messages import joined, tr
 from robolink_cli.command_map import RENAMED
-from robolink_cli.console.output import hand_over, sentences, show
+from robolink_cli.console.error_lines import error_lines
+from robolink_cli.console.output import hand_over, sentences, show, terminal_width
 from robolink_cli.console.render import dumps
 
 if TYPE_CHECKING:
@@ -204,16 +206,12 @@ def report(error: BaseException, *, as_json: bool, typed: Sequence[str] = ()) ->
         show(sentences(error.message), beside=True)
     else:
         what, remedy = _sentences(error, typed)
-        show(sentences(f"robolink: {what}"), beside=True)
         stands, next_command = _stands(error, typed)
-        _tell(stands, joined(" ", filter(None, (remedy, next_command))))
+        # Behind a list of commands a sentence has a line of its own.
+        do = joined("\n  " if "\n" in remedy else " ", filter(None, (remedy, next_command)))
+        width = terminal_width(sys.stderr)
+        show(error_lines(what, stands, do, width=width), beside=True)
     return code
-
-
-def _tell(*lines: str) -> None:
-    """Show what stands, and below it what to do."""
-    for line in filter(None, lines):
-        show(sentences(f"  {line}"), beside=True)
 
 
 def is_cut_off(error: BaseException) -> bool:

@@ -1,0 +1,77 @@
+"""The form of an error on a screen: what happened, what stands, what to do.
+
+In a sentence a long path or URL is shown by its name. It is listed whole on a line of its own
+below, as findings are: there it can be copied, and the sentence can be read.
+"""
+
+import re
+from typing import Final
+
+from robolink.messages import LIST_LINE
+from robolink_cli.console.output import visible
+from robolink_cli.console.tables import columns, within
+
+LONGEST_NAME: Final = 32
+"""Longest path or URL, in columns, that a sentence holds."""
+
+_ENDS: Final = ".,:;?!)]}\u3002\uff0c\uff1a\uff1b\uff01\uff1f\uff09\u3001\u201d"
+"""Signs that end a sentence or a part of one, and no path."""
+
+_NAMES: Final = (
+    r"(?P<command>'robolink [^']*')|"
+    r"(?<![A-Za-z0-9_.~:/\\+-])"
+    r"(?:[a-z][a-z0-9+.-]*://|~?/|[A-Za-z]:[\\/]|\\\\)"
+    r"[^\s'\"\u3002\uff0c\uff1a\uff1b\uff01\uff1f\uff08\uff09\u3001\u201c\u201d]+"
+)
+"""Pattern for a URL, an absolute path, or a quoted command, which stays whole."""
+
+_CONTINUED: Final = r"\s+\S*[/\\]"
+"""Pattern for what follows a part of a path that holds a blank."""
+
+
+def error_lines(what: str, *rest: str, width: int) -> str:
+    """Return what is shown of an error.
+
+    Args:
+        what: What happened.
+        rest: What stands and what to do, each without its indent; empty ones are left out.
+        width: Columns of the terminal; 0 leaves each sentence as it is, for a file or a program.
+
+    Example:
+        >>> from robolink_cli.console.error_lines import error_lines
+        >>> path = "/home/kowalski/.local/share/robolink/journal.db"
+        >>> print(error_lines(f"{path} is empty.", "Give another file.", width=80))
+        robolink: journal.db is empty.
+            /home/kowalski/.local/share/robolink/journal.db
+          Give another file.
+    """
+    # Each by itself: a return at the end of one is no line end with the next.
+    what, *rest_shown = map(visible, (what, *filter(None, rest)))
+    parts = [f"robolink: {what}", *(f"  {one}" for one in rest_shown)]
+    if width:
+        parts = [within(_long_names_below(one), width) for one in parts]
+    return "\n".join(parts)
+
+
+def _long_names_below(text: str) -> str:
+    """Return a text with the long names of its sentence listed whole below it."""
+    sentence, line_end, listed = text.partition("\n")
+    whole = []
+
+    def named(found: "re.Match[str]") -> str:
+        name = found[0].rstrip(_ENDS)
+        beyond = sentence[found.start() + len(name) :]
+        if found["command"] or columns(name) <= LONGEST_NAME or re.match(_CONTINUED, beyond):
+            return found[0]
+        whole.append(f"{LIST_LINE}{name}")
+        return _short(name) + found[0][len(name) :]
+
+    sentence = re.sub(_NAMES, named, sentence)
+    return "\n".join([sentence, *dict.fromkeys(whole)]) + line_end + listed
+
+
+def _short(name: str) -> str:
+    """Return the last part of a path, the address in a URL, of a still too long name its ends."""
+    _, is_url, address = name.partition("://")
+    last = address.partition("?")[0] if is_url else re.split(r"[/\\]", name.rstrip("/\\"))[-1]
+    return last if columns(last) <= LONGEST_NAME else f"{last[:20]}...{last[-8:]}"

@@ -167,14 +167,12 @@ def _explained(error: BaseException) -> BaseException:
     if exit_code(error) != BUG:
         return error
     from robolink.errors import ConfigError
-    from robolink.messages import joined
-    from robolink_cli.unfit_packages import cannot_run, unfit_packages
+    from robolink_cli.unfit_packages import cannot_run, how_to_fit, unfit_packages
 
     unfit = unfit_packages()
     if not unfit:
         return error
-    remedy = joined(" ", (remark.remedy for remark in unfit))
-    told = ConfigError(cannot_run(unfit, error), remedy=remedy)
+    told = ConfigError(cannot_run(unfit, error), remedy=how_to_fit(unfit))
     told.__cause__ = error
     return told
 

@@ -10,10 +10,11 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import Final
 
-from robolink.messages import first_sentence, tr
+from robolink.messages import first_sentence, listed, tr
 from robolink_cli.commands.computer.checkup import Level, Remark, check_versions
+from robolink_cli.console.error_lines import error_lines
 from robolink_cli.console.language import speaking_for
-from robolink_cli.console.output import tolerate_any_console, visible
+from robolink_cli.console.output import terminal_width, tolerate_any_console, visible
 
 MOST_NAMED = 8
 """Largest number of packages that the error lists."""
@@ -53,16 +54,27 @@ def cannot_run(unfit: Sequence[Remark], error: BaseException) -> str:
         unfit: Those packages, at least one.
         error: What the failure was.
     """
-    found = [f"    {one.subject}: {one.what}" for one in unfit[:MOST_NAMED]]
-    if len(unfit) > MOST_NAMED:
-        found.append("    " + tr("and {more} more", more=len(unfit) - MOST_NAMED))
-    return tr(
-        "robolink cannot work with the packages that are installed:\n{packages}\n"
-        "    {kind}: {error}",
-        packages="\n".join(found),
-        kind=type(error).__name__,
-        error=first_sentence(str(error)),
+    found = [f"{one.subject}: {one.what}" for one in unfit]
+    kind = type(error).__name__
+    return listed(
+        tr("robolink cannot work with the packages that are installed:"),
+        [*_most(found), f"{kind}: {first_sentence(str(error))}"],
     )
+
+
+def how_to_fit(unfit: Sequence[Remark]) -> str:
+    """Return what to do about unfit packages, a line each.
+
+    Args:
+        unfit: Those packages, at least one.
+    """
+    return listed(tr("Correct this first:"), _most([one.remedy for one in unfit]))
+
+
+def _most(lines: Sequence[str]) -> list[str]:
+    """Return so many lines as a person reads."""
+    more = len(lines) - MOST_NAMED
+    return [*lines[:MOST_NAMED], *([tr("and {more} more", more=more)] if more > 0 else [])]
 
 
 def answer_without_click(arguments: Sequence[str], error: Exception) -> int:
@@ -84,14 +96,15 @@ def answer_without_click(arguments: Sequence[str], error: Exception) -> int:
     with speaking_for(arguments):
         if "doctor" in arguments:
             return _examined(as_json="--json" in arguments)
-        lines = [cannot_run(unfit, error), *(remark.remedy for remark in unfit)]
+        what, remedy = cannot_run(unfit, error), how_to_fit(unfit)
         if "--json" in arguments:
-            told = {"kind": type(error).__name__, "what": lines[0], "remedy": " ".join(lines[1:])}
+            told = {"kind": type(error).__name__, "what": what, "remedy": remedy}
             body = {**told, **_NOTHING_BEGUN}
             document = {"schema": "robolink/error/1", "error": body, "exit_code": _NOT_RUNNABLE}
             sys.stdout.write(json.dumps(document, indent=2) + "\n")
         else:
-            sys.stderr.write(visible("\n  ".join([f"robolink: {lines[0]}", *lines[1:]])) + "\n")
+            lines = error_lines(what, remedy, width=terminal_width(sys.stderr))
+            sys.stderr.write(visible(lines) + "\n")
     return _NOT_RUNNABLE
 
 

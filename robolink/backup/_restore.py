@@ -12,7 +12,7 @@ from robolink.errors import (
     ToolIndexError,
     UndefinedToolError,
 )
-from robolink.messages import joined, tr
+from robolink.messages import tr
 from robolink.model import ControllerFacts, ToolOffset, ToolReceipt, ToolTable
 from robolink.remedy_words import RemedyWord, remedy_word
 
@@ -179,8 +179,7 @@ def restore(
         for change in plan.clears:
             receipts.append(_set(tools, change, tell))
     except RobolinkError as error:
-        sentences = (error.remedy, _where_it_ended(plan, receipts))
-        error.remedy = joined(" ", filter(None, sentences))
+        error.advise(_where_it_ended(plan, receipts))
         raise
     return tuple(receipts)
 

@@ -210,7 +210,7 @@ class AcceptanceCriteria:
             proposal: What is to be written.
             earlier_mm: Lengths in the plane of the corrections made since this nozzle was mounted,
                 oldest first.
-            remedy: What to do about an implausible change.
+            remedy: What else to do about an implausible change, one line.
 
         Raises:
             CalibrationError: ``diverging`` or ``implausible_change``.
@@ -238,12 +238,17 @@ class AcceptanceCriteria:
             raise CalibrationError(
                 "implausible_change",
                 tr(
-                    "The tip would move {change:.3f} mm; {limit:.3f} mm is allowed. Is the "
-                    "right nozzle mounted, and tight?",
+                    "The tip would move {change:.3f} mm; {limit:.3f} mm is allowed.",
                     change=change,
                     limit=self.limit_mm,
                 ),
-                remedy=joined(" ", filter(None, (remedy, self._way_past))),
+                remedy=joined(
+                    " ",
+                    filter(
+                        None,
+                        (tr("Is the right nozzle mounted, and tight?"), remedy, self._way_past),
+                    ),
+                ),
             )
 
     def verdicts(self, proposal: Proposal) -> tuple[LimitVerdict, ...]:
@@ -265,7 +270,7 @@ class AcceptanceCriteria:
     def _way_past(self) -> str:
         if not self.accepted_with:
             return ""
-        return tr("If the change is real, allow it with {option}.", option=self.accepted_with)
+        return tr("Allow a real change with {option}.", option=self.accepted_with)
 
     @property
     def tolerance(self) -> str:

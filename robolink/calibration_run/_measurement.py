@@ -18,7 +18,7 @@ from robolink.calibration_run._proposal import Listener, Moment, Proposal
 from robolink.calibration_run._records import calibration_entry, decision_entry, refusal_entry
 from robolink.calibration_run._repeatability import seating_of
 from robolink.errors import CalibrationError, ConfigError, RobolinkError
-from robolink.messages import joined, tr
+from robolink.messages import tr
 from robolink.methods import find_method
 from robolink.model import Controller, NewEntry, Pose, ToolOffset, says_it_is_simulated
 from robolink.procedures import MeasurementContext, touches_of
@@ -341,9 +341,10 @@ def _name_another_way(error: CalibrationError) -> None:
     """Add to the remedy how to measure a tool after an instrument has failed for good."""
     if error.code not in _INSTRUMENT:
         return
-    another = tr(
-        "If it failed: 'robolink calibrate two-pose' measures by touch, or with poses that "
-        "you type ({poses}).",
-        poses=remedy_word(RemedyWord.GIVEN_POSES),
+    error.advise(
+        tr(
+            "If it failed: 'robolink calibrate two-pose' measures by touch, or with poses that "
+            "you type ({poses}).",
+            poses=remedy_word(RemedyWord.GIVEN_POSES),
+        )
     )
-    error.remedy = joined(" ", (error.remedy, another))

@@ -10,7 +10,7 @@ from robolink.calibration_run._proposal import Proposal
 from robolink.calibration_run._records import next_steps, require_pin_in_base, touch_details
 from robolink.calibration_run._repeatability import touching_as_recorded
 from robolink.errors import ConfigError, RejectedError
-from robolink.messages import tr
+from robolink.messages import listed, tr
 from robolink.methods import LengthRule, TwoPoseSource, find_method
 from robolink.model import (
     AnsweredBy,
@@ -288,10 +288,9 @@ def require_contact_input(controller: Controller, touch: TouchPlan) -> None:
         inputs.read_input(touch.contact.number)
     except (ConfigError, RejectedError) as error:
         raise ConfigError(
-            tr(
-                "The contact input {number} cannot be read: {cause}",
-                number=touch.contact.number,
-                cause=error.what,
+            listed(
+                tr("The contact input {number} cannot be read:", number=touch.contact.number),
+                [error.what],
             ),
             remedy=tr("Nothing moved. Give the number of an input that the controller has."),
         ) from error

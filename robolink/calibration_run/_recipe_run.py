@@ -14,7 +14,7 @@ from robolink.calibration_run._recipe_listener import RecipeListener
 from robolink.calibration_run._recipe_plan import Reference, find_reference, located, plan_of
 from robolink.config import Cell
 from robolink.errors import ConfigError, NotAllowedError, RobolinkError
-from robolink.messages import joined, tr
+from robolink.messages import listed, tr
 from robolink.model import (
     AnsweredBy,
     Controller,
@@ -262,8 +262,7 @@ class RecipeRun:
         try:
             yield
         except RobolinkError as error:
-            sentences = (error.remedy, self._outputs_left(listener))
-            error.remedy = joined(" ", filter(None, sentences))
+            error.advise(self._outputs_left(listener))
             raise
         except KeyboardInterrupt:
             if said := self._outputs_left(listener):
@@ -392,10 +391,7 @@ def _require_able(
     found = beyond(recipe, able, other_sensor=other_sensor, writes=writes)
     if found:
         raise ConfigError(
-            tr(
-                "This controller lacks what the recipe needs:\n{lines}",
-                lines="\n".join(f"    {one}" for one in found),
-            ),
+            listed(tr("This controller lacks what the recipe needs:"), found),
             remedy=tr("Nothing was moved or written. Choose a recipe for this kind of controller."),
             controller=controller.identity,
         )

@@ -30,7 +30,7 @@ from robolink.calibration_run._acceptance import require_proved
 from robolink.calibration_run._plan import ToolPlan
 from robolink.calibration_run._records import decision_entry, verification_entry
 from robolink.errors import CalibrationError, ConfigError, VerifyError
-from robolink.messages import Translated, first_sentence, in_english, joined, tr
+from robolink.messages import joined, listed, tr, without
 from robolink.methods import find_method
 from robolink.model import Controller, EntryKind, require_engineer
 from robolink.procedures import TOUCH_CODES
@@ -200,29 +200,6 @@ def _kept(
     )
 
 
-def with_step(error: VerifyError, step: TurnTestStep, relearning: tuple[str, ...]) -> VerifyError:
-    """Return an error that says how to do the step that a person chose.
-
-    Args:
-        error: The refusal.
-        step: What was chosen.
-        relearning: As in :class:`Attended`.
-    """
-    if step is TurnTestStep.CHECK_MOUNT:
-        error.remedy = tr(
-            "Check the mount: is the nozzle tight and straight? Then start again and "
-            "measure the tip anew."
-        )
-    elif step is TurnTestStep.LEARN_STATION:
-        named = ", ".join(f"'robolink {command}'" for command in relearning)
-        error.next_commands = relearning
-        error.remedy = tr(
-            "Learn the station again with a known tip, then measure this tip anew: {commands}.",
-            commands=named,
-        )
-    return error
-
-
 def conclude_turn_test(
     controller: Controller,
     tool: int,
@@ -307,7 +284,7 @@ def conclude_turn_test(
             continue
         if step in KEEPING:
             return replace(shown, accurate_to_mm=accurate_mm)
-        raise with_step(_contradicted(controller, shown, judgement), step, attended.relearning)
+        raise _contradicted(controller, shown, judgement, step, attended.relearning)
 
 
 def _judged(claim: TurnClaim | None, tests: Sequence[VerifyResult]) -> VerifyResult:
@@ -378,19 +355,11 @@ def touches_counting(
             raise
         tell(error)
         raise VerifyError(
-            tr("The new tip was not tested. {cause}", cause=first_sentence(error.what)),
-            remedy=_after_a_write(error.remedy),
+            listed(tr("The new tip was not tested:"), [error.what]),
+            remedy=without(tr("Nothing was written."), error.remedy),
             code=error.code,
             controller=controller.identity,
         ) from error
-
-
-def _after_a_write(remedy: str) -> str:
-    """Return what to do without "Nothing was written", which touches before a write begin with."""
-    stands = tr("Nothing was written.")
-    shown = remedy.removeprefix(stands).lstrip()
-    english = in_english(remedy).removeprefix(in_english(stands)).lstrip()
-    return shown if shown == english else Translated(shown, english)
 
 
 def told_of_contradiction(proof: VerifyResult, judgement: TurnJudgement) -> str:
@@ -422,18 +391,28 @@ def _found(proof: VerifyResult, judgement: TurnJudgement) -> str:
 
 
 def _contradicted(
-    controller: Controller, proof: VerifyResult, judgement: TurnJudgement
+    controller: Controller,
+    proof: VerifyResult,
+    judgement: TurnJudgement,
+    step: TurnTestStep | None = None,
+    relearning: tuple[str, ...] = (),
 ) -> VerifyError:
+    """Return the refusal, with how to do the step that a person chose."""
     found = _found(proof, judgement)
-    if judgement.offers_wider:
-        what = found
+    doubt = tr("Was the camera turned, or its lens changed?")
+    what = found if judgement.offers_wider else joined(" ", (found, doubt))
+    if step is TurnTestStep.CHECK_MOUNT:
+        remedy = tr("Is the nozzle tight and straight? Start again and measure the tip anew.")
+    elif step is TurnTestStep.LEARN_STATION:
+        remedy = listed(
+            tr("Learn the station again with a known tip, then measure this tip anew:"),
+            [f"'robolink {command}'" for command in relearning],
+        )
+    elif judgement.offers_wider:
         remedy = tr("Check that nozzle and station are tight, learn the station, measure again.")
     else:
-        what = joined(" ", (found, tr("Was the camera turned, or its lens changed?")))
         remedy = tr("Measure the camera ('robolink calibrate camera-affine'), then the tool again.")
-    return VerifyError(
-        what,
-        remedy=remedy,
-        code=judgement.code,
-        controller=controller.identity,
-    )
+    error = VerifyError(what, remedy=remedy, code=judgement.code, controller=controller.identity)
+    if step is TurnTestStep.LEARN_STATION:
+        error.next_commands = relearning
+    return error

@@ -16,7 +16,7 @@ from robolink.config._files import config_files, read_document
 from robolink.errors import ConfigError
 from robolink.files.durable import file_name, make_folder, state_folder, write_whole
 from robolink.files.named import read_named
-from robolink.messages import first_sentence, tr
+from robolink.messages import listed, tr
 from robolink.model import PersonRole
 
 _KIND = "cells"
@@ -97,11 +97,7 @@ def reach_cell(name: str) -> Reach:
                 doubt=" ".join(doubts),
             )
     raise ConfigError(
-        tr(
-            "No address is known for the cell {name!r}:\n{lines}",
-            name=name,
-            lines="\n".join(f"    {first_sentence(doubt)}" for doubt in doubts),
-        )
+        listed(tr("No address is known for the cell {name!r}:", name=name), doubts)
         if doubts
         else tr("No address is known for the cell {name!r}.", name=name),
         remedy=tr(

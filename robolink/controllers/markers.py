@@ -24,7 +24,7 @@ from robolink.errors import (
     StoppedError,
     TransportError,
 )
-from robolink.messages import in_english, tr
+from robolink.messages import in_english, listed, tr
 from robolink.model import Ledger, Marker, MarkerKind, NewEntry, OutcomeLog, new_operation
 from robolink.package_log import PackageLog
 from robolink.remedy_words import RemedyWord, remedy_word
@@ -447,10 +447,12 @@ class MarkerStore:
         # The link is lost with the answer, and so is everything under way on it.
         self._under_way.clear()
         doubt = OutcomeUnknownError(
-            tr(
-                "No clear answer came to {request!r}: it may or may not have run ({cause}).",
-                request=request,
-                cause=error.what,
+            listed(
+                tr(
+                    "No clear answer came to {request!r}: it may or may not have run.",
+                    request=request,
+                ),
+                [error.what],
             ),
             remedy=tr(
                 "Not sent again; the robot stays blocked. Look at it. Next: 'robolink recover'."

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 
 from robolink.controllers.driver_link import DriverLink
 from robolink.errors import ConfigError, JournalError, RobolinkError
-from robolink.messages import joined, tr
+from robolink.messages import tr
 from robolink.model import (
     EntryKind,
     Finding,
@@ -134,8 +134,7 @@ class Preserver:
             self.restore(marker)
         except RobolinkError as second:
             if isinstance(error, RobolinkError):
-                left = _unrestored(second, tool_before(marker))
-                error.remedy = joined(" ", filter(None, (error.remedy, left)))
+                error.advise(_unrestored(second, tool_before(marker)))
 
 
 def tool_before(marker: Marker) -> int:

@@ -12,7 +12,7 @@ from typing import Final
 
 from robolink.errors import ConfigError
 from robolink.files.named import read_named
-from robolink.messages import tr
+from robolink.messages import listed, tr
 
 __all__ = [
     "FileKind",
@@ -107,22 +107,16 @@ class FileKind:
 
     def refusal(self, path: Path, problems: Sequence[Problem]) -> ConfigError:
         """Return the error that lists the problems of one file, the first forty of them."""
-        shown = [f"    {problem}" for problem in problems[:MOST_SHOWN]]
+        shown = [str(problem) for problem in problems[:MOST_SHOWN]]
         if len(problems) > MOST_SHOWN:
-            shown.append("    " + tr("and {more} more", more=len(problems) - MOST_SHOWN))
-        lines = "\n".join(shown)
+            shown.append(tr("and {more} more", more=len(problems) - MOST_SHOWN))
         named = self.named(path)
-        return ConfigError(
-            tr(
-                "{file} has {count} errors:\n{lines}",
-                file=named,
-                count=len(problems),
-                lines=lines,
-            )
+        head = (
+            tr("{file} has {count} errors:", file=named, count=len(problems))
             if len(problems) > 1
-            else tr("{file} has an error:\n{lines}", file=named, lines=lines),
-            remedy=self.wrong_remedy(),
+            else tr("{file} has an error:", file=named)
         )
+        return ConfigError(listed(head, shown), remedy=self.wrong_remedy())
 
     def _unreadable(self, path: Path, cause: str) -> ConfigError:
         return ConfigError(

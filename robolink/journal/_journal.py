@@ -290,7 +290,5 @@ _KINDS: Final = {str(kind): kind for kind in EntryKind}
 def _too_new(location: str) -> JournalError:
     return JournalError(
         tr("The journal {name} was made by a newer robolink.", name=location),
-        remedy=tr(
-            "Verify it with the newer version; this one does not know all fields of an entry."
-        ),
+        remedy=tr("Verify it with that version: this one does not know all fields of an entry."),
     )

@@ -307,7 +307,7 @@ class BoardSource(RoundSource):
     @property
     def remedy(self) -> str:
         """What to do when a measurement makes the board jump."""
-        return tr("Check that the board is held as drawn, and the marks that the camera found.")
+        return tr("Is the board held as drawn? Did the camera find the right marks?")
 
     def procedure(self, stored: ToolOffset | None, here: Pose) -> "Procedure[CameraRound]":
         """Return the steps of a measurement; see :class:`~robolink.procedures.MovingSource`."""

@@ -259,10 +259,7 @@ class CameraSource(RoundSource):
     @property
     def remedy(self) -> str:
         """What to do when a measurement makes the tip jump."""
-        return tr(
-            "Look at the picture: did the camera find the tip, and is it clean? Was the "
-            "camera moved?"
-        )
+        return tr("Did the camera find the tip, and is it clean? Was the camera moved?")
 
     def places(self, tool: ToolOffset, angles_deg: Sequence[float]) -> list[Place]:
         """Return the tip at every angle."""

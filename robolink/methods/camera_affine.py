@@ -287,9 +287,7 @@ class CameraAffineSource(LookSource):
     @property
     def remedy(self) -> str:
         """What to do when a measurement makes the tip jump."""
-        return tr(
-            "Look at the pictures: did the camera find the tip in all of them, and is it clean?"
-        )
+        return tr("Did the camera find the tip in all pictures, and is it clean?")
 
     def found_station(self, result: CalibrationResult, tool: int) -> Found | None:
         """Return what a kept measurement shows about the camera, ``None`` without a name."""

@@ -289,15 +289,12 @@ class PointsSource:
         """What to do when they make the tip jump."""
         if self.found is not None and self.found.better is not None:
             return tr(
-                "The poses fit tool {better} much better than tool {taught}: if they were taught "
-                "with it, give {taught_tool} {better}.",
+                "The poses fit tool {better} better. Taught with it? Give {taught_tool} {better}.",
                 taught_tool=remedy_word(RemedyWord.TAUGHT_TOOL),
                 better=self.found.better.tool,
-                taught=self._taught_tool,
             )
         return tr(
-            "Check that all poses touched the same point and with which tool they were taught "
-            "({taught_tool}).",
+            "Did all poses touch one point, taught with that tool ({taught_tool})?",
             taught_tool=remedy_word(RemedyWord.TAUGHT_TOOL),
         )
 

@@ -31,7 +31,7 @@ from typing import (
 
 from robolink.deprecation import read_without_schema
 from robolink.errors import DocumentError, RobolinkError
-from robolink.messages import tr
+from robolink.messages import listed, tr
 from robolink.model._arguments import plain_number, shown
 from robolink.model._json_values import from_fields
 
@@ -391,7 +391,7 @@ def _made(kind: type, document: Mapping[str, Any], at: str, *, older: bool) -> A
     except (TypeError, ValueError, RobolinkError) as error:
         said = error.what if isinstance(error, RobolinkError) else str(error)
         raise DocumentError(
-            tr("{field} cannot be made of this document: {why}", field=at, why=said),
+            listed(tr("{field} cannot be made of this document:", field=at), [said]),
             remedy=_what_to_do(),
         ) from error
 

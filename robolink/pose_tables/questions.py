@@ -37,17 +37,13 @@ def which_columns(numeric: Sequence[bool], rows: Sequence[Sequence[float]] = ())
         rows: The numbers of those that do, to see which readings make rotations.
     """
     readings = _readings(sum(numeric), rows)
-    written = "; ".join(dict.fromkeys(_placed(reading, numeric) for reading in readings))
+    written = tuple(dict.fromkeys(_placed(reading, numeric) for reading in readings))
     what = tr("it has no line that names its {count} columns", count=len(numeric))
     columns = remedy_word(RemedyWord.COLUMNS)
     if not written:
         return OpenQuestion("columns", what, tr("Name each with {columns}.", columns=columns))
-    remedy = tr(
-        "Name each with {columns}, such as {readings}; '-' skips one, or a joint value.",
-        columns=columns,
-        readings=written,
-    )
-    return OpenQuestion("columns", what, remedy)
+    way = tr("Name each with {columns}; '-' skips one, or a joint value. Such as:", columns=columns)
+    return OpenQuestion("columns", what, way, written)
 
 
 def _readings(count: int, rows: Sequence[Sequence[float]]) -> list[str]:
@@ -94,17 +90,16 @@ def which_rotation(heads: Sequence[ColumnHead], numeric: Sequence[bool] = ()) ->
         for places, reading in _turns(heads, turning, known)
     ]
     if not readings:
-        remedy = tr(
+        way = tr(
             "Add a column u (turn about Z in degrees), or name each with {columns}.",
             columns=remedy_word(RemedyWord.COLUMNS),
         )
-        return OpenQuestion("columns", what, remedy)
-    remedy = tr(
-        "Name each with {columns}, such as {readings}; '-' skips one.",
+        return OpenQuestion("columns", what, way)
+    way = tr(
+        "Name each with {columns}; '-' skips one. Such as:",
         columns=remedy_word(RemedyWord.COLUMNS),
-        readings="; ".join(dict.fromkeys(readings)),
     )
-    return OpenQuestion("columns", what, remedy)
+    return OpenQuestion("columns", what, way, tuple(dict.fromkeys(readings)))
 
 
 def _turns(
@@ -137,15 +132,11 @@ def _typed(head: ColumnHead, turn: str) -> str:
 
 def which_rule(letters: Sequence[str]) -> OpenQuestion:
     """Ask by which rule three angles turn."""
-    readings = "; ".join(f"{rule.name}: {rule.formula}" for rule in rules_for(letters))
     return OpenQuestion(
         "euler",
         tr("its angles {letters} may turn in several ways", letters=", ".join(letters).upper()),
-        tr(
-            "Say which with {euler}: {readings}.",
-            euler=remedy_word(RemedyWord.EULER),
-            readings=readings,
-        ),
+        tr("Say which with {euler}:", euler=remedy_word(RemedyWord.EULER)),
+        tuple(f"{rule.name}: {rule.formula}" for rule in rules_for(letters)),
     )
 
 
@@ -163,8 +154,9 @@ def which_angle_unit(
         >>> from robolink.pose_tables.questions import which_angle_unit
         >>> from robolink.pose_tables.values import ColumnHead, LengthUnit
         >>> heads = [ColumnHead("x"), ColumnHead("y"), ColumnHead("u")]
-        >>> which_angle_unit(heads, ["u"], 3.14).remedy
-        'Name the columns with their unit with columns: x,y,u_deg; x,y,u_rad.'
+        >>> asked = which_angle_unit(heads, ["u"], 3.14)
+        >>> asked.way, asked.readings
+        ('Name the columns with their unit with columns:', ('x,y,u_deg', 'x,y,u_rad'))
     """
     readings = [
         _named(
@@ -182,10 +174,10 @@ def which_angle_unit(
         "columns",
         tr("its angles may be degrees or radians"),
         tr(
-            "Name the columns with their unit with {columns}: {names}.",
+            "Name the columns with their unit with {columns}:",
             columns=remedy_word(RemedyWord.COLUMNS),
-            names="; ".join(readings),
         ),
+        tuple(readings),
     )
 
 

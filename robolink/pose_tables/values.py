@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from robolink.errors import AmbiguousPosesError, CalibrationError, ConfigError
-from robolink.messages import joined, tr
+from robolink.messages import listed, tr
 from robolink.model import Pose
 
 
@@ -233,12 +233,14 @@ class OpenQuestion:
     Attributes:
         about: ``columns``, ``length`` or ``euler``.
         what: What is not said, the second half of a sentence.
-        remedy: How to say it, with the readings there are.
+        way: How to say it; ends with a colon where there are readings.
+        readings: What can be meant, the likeliest first.
     """
 
     about: str
     what: str
-    remedy: str
+    way: str
+    readings: tuple[str, ...] = ()
 
 
 class UnclearText(Exception):
@@ -265,18 +267,15 @@ def refused(path: Path, cause: UnusableText) -> ConfigError | CalibrationError:
 
 def unclear(path: Path, questions: Sequence[OpenQuestion]) -> AmbiguousPosesError:
     """Return the error for a file that leaves something open."""
-    if len(questions) > 1:
-        what = tr(
-            "{path} leaves {count} questions open:\n{lines}",
-            path=path,
-            count=len(questions),
-            lines="\n".join(f"    {question.what}" for question in questions),
-        )
-    else:
-        whats = joined("; ", (question.what for question in questions))
-        what = tr("{path} is not clear: {what}.", path=path, what=whats)
     return AmbiguousPosesError(
-        what,
+        listed(tr("{path} is not clear:", path=path), [question.what for question in questions]),
         asks=tuple(question.about for question in questions),
-        remedy=joined(" ", (question.remedy for question in questions)),
+        remedy=listed(
+            tr("Choose what is meant:"),
+            [
+                line
+                for question in questions
+                for line in (question.way, *(f"  {one}" for one in question.readings))
+            ],
+        ),
     )

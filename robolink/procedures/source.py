@@ -257,7 +257,7 @@ class TipSource(Protocol):
 
     @property
     def remedy(self) -> str:
-        """What to do when a measurement makes the tip jump."""
+        """What to do when a measurement makes the tip jump, one line: the nozzle is asked about."""
 
     def measure(
         self, context: MeasurementContext, tool: int, stored: ToolOffset | None

@@ -9,7 +9,7 @@ from dataclasses import replace
 from typing import Final
 
 from robolink.errors import CalibrationError, ConfigError, DeclinedError, JournalError
-from robolink.messages import first_sentence, tr
+from robolink.messages import listed, tr
 from robolink.model import Controller, DigitalIo, InputEdge, MotionGroup, Pose
 from robolink.runner._jog_steps import parse_steps
 from robolink.runner._prompt_context import GuidedOperator, Operator, Question, TouchSubject, regard
@@ -257,10 +257,9 @@ class PlaceQuestion:
 
     def _gets_nowhere(self, error: ConfigError) -> DeclinedError:
         return DeclinedError(
-            tr(
-                "{count} jogs in a row were refused; the last one: {cause}",
-                count=MOST_REFUSED,
-                cause=first_sentence(error.what),
+            listed(
+                tr("{count} jogs in a row were refused; the last one:", count=MOST_REFUSED),
+                filter(None, (error.what, error.remedy)),
             ),
             remedy=tr("The robot is where the last jog left it; start again."),
             controller=self._controller.identity,

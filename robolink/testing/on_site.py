@@ -22,7 +22,7 @@ from robolink.errors import (
     RobolinkError,
 )
 from robolink.interrupts import InterruptGate
-from robolink.messages import first_sentence, tr
+from robolink.messages import listed, tr
 from robolink.model import (
     Controller,
     EntryKind,
@@ -220,9 +220,7 @@ def _put_back(connect: Connect, kept: _Kept, tool: int | None, ledgers: list[Led
                 _once_free(controller, lambda: controller.resolver.settle(finding))
     except RobolinkError as error:
         raise OutcomeUnknownError(
-            tr(
-                "The checks could not restore everything: {cause}", cause=first_sentence(error.what)
-            ),
+            listed(tr("The checks could not restore everything:"), [error.what]),
             remedy=tr("Do not start the cell. Next: 'robolink recover'."),
             controller=error.controller,
         ) from error

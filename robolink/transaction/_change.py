@@ -26,7 +26,7 @@ from robolink.errors import (
     ToolError,
     TransportError,
 )
-from robolink.messages import joined, tr
+from robolink.messages import tr
 from robolink.model import (
     ANY,
     Account,
@@ -350,12 +350,13 @@ class ToolChange:
         except LeaseLostError as lost:
             refusal = refusal or lost
         if isinstance(error, RobolinkError):
-            sentences = (result.sentence for result in done)
-            error.remedy = joined(" ", filter(None, (error.remedy, *sentences)))
+            for result in done:
+                error.advise(result.sentence)
         elif refusal is not None and (error is None or isinstance(error, Exception)):
             # To the caller that leaves the block, the old values are back.
-            others = (result.sentence for result in done if result.error is None)
-            refusal.remedy = joined(" ", filter(None, (refusal.remedy, *others)))
+            for result in done:
+                if result.error is None:
+                    refusal.advise(result.sentence)
             raise refusal from error
 
     def _proved_begun(self) -> Iterator[Step]:
@@ -405,7 +406,7 @@ class ToolChange:
             return
         sentence = left_unverified(stand, marked=self._marker is not None)
         self._tell(sentence)
-        error.remedy = joined(" ", filter(None, (error.remedy, sentence)))
+        error.advise(sentence)
 
     def _record(self, done: Sequence[PutBack]) -> None:
         entries = [result.entry for result in done]

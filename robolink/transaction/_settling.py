@@ -17,7 +17,7 @@ from robolink.errors import (
     OutcomeUnknownError,
     RobolinkError,
 )
-from robolink.messages import in_english, joined, tr
+from robolink.messages import in_english, joined, listed, tr
 from robolink.model import (
     Controller,
     EntryKind,
@@ -198,13 +198,12 @@ class Settler:
             return
         self._controller.outcomes.append(*entries)
         raise OutcomeUnknownError(
-            tr(
-                "{count} tools could not be restored:\n{lines}",
-                count=len(failures),
-                lines="\n".join(f"    {result.sentence}" for result in failures),
-            )
-            if len(failures) > 1
-            else joined(" ", (result.sentence for result in failures)),
+            listed(
+                tr("{count} tools could not be restored:", count=len(failures))
+                if len(failures) > 1
+                else tr("A tool could not be restored:"),
+                [result.sentence for result in failures],
+            ),
             remedy=tr(
                 "The change stays open. Look at the controller. Values: robolink journal list"
             ),
@@ -478,9 +477,7 @@ class _Recovering:
         try:
             self._settler.settle(finding)
         except RobolinkError as error:
-            error.remedy = " ".join(
-                (error.remedy, tr("You can run 'robolink recover' again."))
-            ).strip()
+            error.advise(tr("You can run 'robolink recover' again."))
             raise
         self._settled.append(finding)
 

@@ -144,7 +144,7 @@ VERBS = (
     "Add|Ask|Check|Choose|Close|Connect|Correct|Give|Install|Name|Press|Put|Read|Remove|Run|See|Set|"
     "Switch|Turn|Type|Use|Wait|Write"
 )
-DOES = re.compile(rf"\b({VERBS})\b|Did you mean|(: |[Nn]ext: )robolink |docs/")
+DOES = re.compile(rf"\b({VERBS})\b|Did you mean|(: |[Nn]ext: )robolink |: press |docs/")
 """Ways to say what to do: a verb, a command to type, or a page to read."""
 
 UNPLAIN = re.compile(
@@ -160,8 +160,8 @@ LONGEST_SENTENCE = 24
 CODES = {2, 3, 5}
 
 
-LISTED = re.compile(r"(?<=:)(\n    .*)+")
-"""The faults of a file, a line each, below what happened."""
+LISTED = re.compile(r"(\n    .*)+")
+"""Findings and what was added on the way up, a line each, below their sentence."""
 
 MOST_LISTED = 11
 
@@ -177,7 +177,8 @@ def faults(one: Answer) -> list[str]:
         f"ends with {one.code}": one.code not in CODES,
         "shows something on stdout": one.out != "",
         "does not begin with what happened": not what.startswith("robolink: "),
-        "does not end a sentence": not what.endswith((".", "?") if not listed else ":"),
+        "does not end a sentence": not what.endswith((".", "?", ":"))
+        or (what.endswith(":") and f"{what}\n    " not in one.err),
         "does not say what to do": not DOES.search(do),
         "is in parts that stand": not 1 <= len(rest) <= 2,
         f"takes {len(told.lines)} lines": len(told.lines) > LINES,
@@ -229,6 +230,7 @@ def test_each_answer_says_what_happened_what_stands_and_what_to_do(found):
         ("robolink: The file was not opened.\n  Name another.\n", "is not plain"),
         ("robolink: " + "No file. " * 30 + "\n  Name another.\n", "takes 5 lines"),
         ("robolink: No\n  Name another.\n", "does not end a sentence"),
+        ("robolink: No file:\n  Name another.\n", "does not end a sentence"),
         ("robolink: KeyError: 1.\n  Name another.\n", "is not plain"),
         ("robolink: No.\n  Nothing moved.\n  Wait.\n  Name it.\n", "is in parts that stand"),
         ("robolink: 2 errors:\n" + "    a: bad\n" * 12 + "  Correct it.\n", "lists too much"),

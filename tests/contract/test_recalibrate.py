@@ -373,7 +373,7 @@ def test_a_jump_takes_an_engineer(cell, recipe, tmp_path, monkeypatch):
 
     refused = run("--operator", "anna")
     assert refused.code == 7
-    assert "If the change is real, allow it with --accept-jump." in refused.err
+    assert "Allow a real change with --accept-jump." in refused.err
     assert run("--operator", "4711", "--accept-jump", "5").code == 9
     assert run("--accept-jump", "5").code == 9
     assert run("--operator", "eve").code == 2

@@ -99,7 +99,7 @@ def test_enter_alone_in_the_proof_brings_the_old_value_back(cell):
     has_habit(cell, person_stays_share=1, person_stays_from_touch=3)
     done = cell.calibrate("two-pose")
     check_refused(cell, done, "not_touched", exit_code=8)
-    assert "The new tip was not tested. Touch 1 was not made" in done.document["error"]["what"]
+    assert "The new tip was not tested:\n    Touch 1 was not made" in done.document["error"]["what"]
     assert cell.recorded(EntryKind.ROLLED_BACK)
 
 

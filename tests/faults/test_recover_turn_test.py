@@ -264,7 +264,7 @@ def test_a_group_of_axes_is_tested_too(tmp_path):
     ("said", "tests", "told"),
     [
         ({}, 1, "The old value of tool 1 is back."),
-        ({5: "3"}, 1, "Then start again and measure the tip anew."),
+        ({5: "3"}, 1, "Start again and measure the tip anew."),
         pytest.param({5: "2"}, 2, "up to 0.0", marks=pytest.mark.soak),
     ],
     ids=["ENTER", "mount", "once more"],

@@ -283,7 +283,7 @@ def test_what_json_cannot_hold_is_refused_by_its_place(value, said):
         ({"x_mm": "1"}, "ToolOffset.x_mm is '1'"),
         ({"x_mm": True}, "ToolOffset.x_mm is True"),
         ({"x_mm": None}, "ToolOffset.x_mm is None"),
-        ({"x_mm": "NaN"}, "ToolOffset cannot be made.*x_mm is not a number"),
+        ({"x_mm": "NaN"}, "ToolOffset cannot be made.*\n.*x_mm is not a number"),
         ({"x_mm": 10**400}, "ToolOffset.x_mm is 1000"),
     ],
 )

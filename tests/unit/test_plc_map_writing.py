@@ -265,7 +265,7 @@ def test_a_look_that_is_refused_after_the_request_leaves_the_outcome_unknown(com
             return read(address, count)
 
         commit_bit.client.read_discrete = read_discrete
-        with pytest.raises(OutcomeUnknownError, match=r"accepted the value\. server busy"):
+        with pytest.raises(OutcomeUnknownError, match=r"accepted the value:\n    server busy"):
             controller.tools.write(1, NEW, expected=ANY)
         assert len(controller.outcomes.open_markers()) == 1
         assert controller.tools.read(1) == NEW

@@ -180,8 +180,10 @@ def test_after_each_jog_a_person_reads_that_it_is_done_how_far_and_where(control
 
 def test_steps_that_are_refused_in_a_row_end_the_question_and_move_nothing(simulator, controller):
     typist = Typist("z-5", "z-5", "z-5", "z-5", "z-5")
-    with pytest.raises(DeclinedError, match=f"{MOST_REFUSED} jogs in a row were refused"):
+    with pytest.raises(DeclinedError, match=f"{MOST_REFUSED} jogs in a row were refused") as ended:
         runner_with(controller, typist, below_mm=7).run(ask_for_pose("Jog."))
+    _, _, remedy = ended.value.what.split("\n    ")
+    assert typist.shown[-1].endswith(f". {remedy}"), "what to do about the last jog is not lost"
     assert simulator.machine.arm.moves_started == 1
     assert typist.polled == 1 + MOST_REFUSED
 

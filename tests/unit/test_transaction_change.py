@@ -126,7 +126,7 @@ def test_an_error_says_that_the_old_value_is_back(cell, controller):
         with ToolChange(controller, wanted(1), verify=True) as change:
             change.write()
             raise VerifyError("It drifts.", remedy="Measure again.")
-    assert failed.value.remedy == "Measure again. The old value of tool 1 is back."
+    assert failed.value.remedy == "Measure again.\n    The old value of tool 1 is back."
     assert cell.tools == OLD
 
 
@@ -143,7 +143,7 @@ def test_a_write_that_did_not_take_takes_the_others_back(cell, controller):
     cell.simulator.faults.add(Fault(FaultAction.IGNORE_WRITE, match="TLSet 2"))
     with pytest.raises(ReadBackError) as failed:
         change_tools(controller, wanted(1, 2))
-    assert "Tool 2 holds its old value. The old value of tool 1 is" in failed.value.remedy
+    assert "Tool 2 holds its old value.\n    The old value of tool 1 is" in failed.value.remedy
     assert cell.tools == OLD
     assert cell.writes == 2
     assert cell.journal.open_markers() == ()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 import click
 
 from robolink.errors import ConfigError, NotReadyError
-from robolink.messages import joined, tr
+from robolink.messages import tr
 from robolink.model import Controller
 from robolink_cli.access.capabilities import require_epson
 from robolink_cli.access.cell import (
@@ -337,8 +337,9 @@ def find_tools(controller: Controller, *, published: bool) -> "ToolState":
         try:
             return read_tools(controller)
         except NotReadyError as error:
-            hint = tr("With the companion program in the project, you can use --published now.")
-            error.remedy = joined(" ", (error.remedy, hint))
+            error.advise(
+                tr("With the companion program in the project, you can use --published now.")
+            )
             raise
     found = require_epson(controller, tr("published tools")).published_tools()
     if found is None:

@@ -3,7 +3,7 @@
 from contextlib import suppress
 
 from robolink.errors import JournalError, LeaseHeldError, RobolinkError
-from robolink.messages import in_english, joined, tr
+from robolink.messages import in_english, listed, tr
 from robolink.stopping import leave_note
 from robolink.transport import parse_url
 from robolink_cli.access.cell import which_cell
@@ -93,10 +93,9 @@ class Telling:
         try:
             log.look()
         except LeaseHeldError as held:
-            error.what = joined(" ", (error.what, held.what))
+            error.what = listed(error.what, [held.what])
             error.remedy = tr(
-                "The stop is not confirmed: press the emergency stop, or stop the robot at "
-                "that computer; only that one can."
+                "The stop is not confirmed: press the emergency stop, or stop at that computer."
             )
 
     def _noted(self) -> list[str]:

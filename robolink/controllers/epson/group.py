@@ -278,9 +278,8 @@ class EpsonGroup(MotionGroupCore):
                 tr("The remote time-out of this controller is stated as 0 (never)."),
                 reason=NotReadyReason.NO_REMOTE_TIMEOUT,
                 remedy=tr(
-                    "Set a time-out on the controller's Remote Ethernet page and state it "
-                    "with {timeout}; without it, nothing stops a moving robot when the "
-                    "link is lost.",
+                    "Set one on the Remote Ethernet page and state it with {timeout}: without "
+                    "it, nothing stops a moving robot when the link is lost.",
                     timeout=remedy_word(RemedyWord.REMOTE_TIMEOUT),
                 ),
             )

@@ -29,7 +29,7 @@ from robolink.errors import (
     TransportError,
     TransportTimeoutError,
 )
-from robolink.messages import tr
+from robolink.messages import listed, tr
 from robolink.protocols import NEED_DATA, Role
 from robolink.protocols.epson_text import (
     EndOfStream,
@@ -298,11 +298,13 @@ class EpsonConversation:
         """Say where a time-out cut an answer: the controller is there, unlike without any."""
         if held := self._codec.bytes_held:
             raise TransportTimeoutError(
-                tr(
-                    "{identity} sent only {count} bytes of its answer: {request}.",
-                    identity=self.identity,
-                    count=len(held),
-                    request=as_shown(request),
+                listed(
+                    tr(
+                        "{identity} sent only {count} bytes of its answer.",
+                        identity=self.identity,
+                        count=len(held),
+                    ),
+                    [as_shown(request)],
                 ),
                 remedy=error.remedy,
                 request=as_shown(request),

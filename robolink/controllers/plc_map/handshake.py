@@ -16,7 +16,7 @@ from robolink.errors import (
     RejectedError,
     RobolinkError,
 )
-from robolink.messages import tr
+from robolink.messages import listed, tr
 from robolink.register_maps import Commit, CommitKind, Signal
 from robolink.stop_latch import CommandClass
 from robolink.timing import Deadline
@@ -189,6 +189,6 @@ class Handshake:
 
     def _unknown(self, why: str) -> OutcomeUnknownError:
         return OutcomeUnknownError(
-            tr("robolink could not confirm that the PLC accepted the value. {why}", why=why),
+            listed(tr("robolink could not confirm that the PLC accepted the value:"), [why]),
             remedy=tr("The request was not repeated. Look at the HMI, then 'robolink recover'."),
         )

@@ -17,7 +17,7 @@ from robolink.errors import (
     StoppedError,
     ToolError,
 )
-from robolink.messages import tr
+from robolink.messages import listed, tr
 from robolink.model import ToolOffset, angle_difference_deg, require_offset
 from robolink.register_maps import (
     ANGLES,
@@ -120,9 +120,9 @@ class OffsetValues:
             self.numbers(slot.components, words, largest_mm=self._map.largest_mm)
         except RemoteProtocolError as error:
             raise LimitError(
-                tr(
-                    "{cause} After the write it would read like that, so nothing was sent.",
-                    cause=error.what,
+                listed(
+                    tr("Nothing was sent, because after the write it would read like this:"),
+                    [error.what],
                 ),
                 remedy=tr("Write 0 in place of so small a number."),
             ) from error
@@ -355,10 +355,12 @@ class Slots:
                 restored = self._restored(slot, kept)
             if not restored:
                 raise OutcomeUnknownError(
-                    tr(
-                        "{refusal} robolink could not restore the registers of tool {tool}.",
-                        refusal=error.what,
-                        tool=slot.tool,
+                    listed(
+                        tr(
+                            "robolink could not restore the registers of tool {tool} after this:",
+                            tool=slot.tool,
+                        ),
+                        [error.what],
                     ),
                     remedy=tr("Look at the tool on the HMI, then run 'robolink recover'."),
                     request=error.request,

@@ -14,7 +14,7 @@ from typing import Final
 from robolink.controllers.softmotion.answers import DISPOSSESSED, Ended, describe
 from robolink.controllers.softmotion.wire import MailboxWire
 from robolink.errors import Concerning, LeaseHeldError, LeaseLostError, RejectedError
-from robolink.messages import joined, tr
+from robolink.messages import listed, tr
 from robolink.model import ClientRun, OutcomeLog
 from robolink.protocols.mailbox import Command, CommandState, ErrorClass, Opcode
 from robolink.timing import Deadline, local_label
@@ -105,7 +105,7 @@ class Ownership:
         try:
             self._ask(insist=insist)
         except LeaseHeldError as held:
-            run = self._run_of(held)
+            run = self._run_of(held.holder)
             if run is None or run.lives is not False or not patient:
                 raise
             self._outwait(held, run)
@@ -176,7 +176,7 @@ class Ownership:
             try:
                 self.take()
             except LeaseHeldError as held:
-                run = self._run_of(held)
+                run = self._run_of(held.holder)
                 if waited or (run is not None and run.lives is not None):
                     raise  # its owner lives, or the silence has been waited out
                 self._wait_for_silence(held)
@@ -218,8 +218,8 @@ class Ownership:
         if self._outcomes is not None:
             self._outcomes.forget_client(f"{self._wire.owner:08X}")
 
-    def _run_of(self, held: LeaseHeldError) -> ClientRun | None:
-        return None if self._outcomes is None else self._outcomes.run_of(held.holder)
+    def _run_of(self, holder: str) -> ClientRun | None:
+        return None if self._outcomes is None else self._outcomes.run_of(holder)
 
     def _lost_error(self, request: str) -> LeaseLostError:
         return LeaseLostError(
@@ -231,30 +231,27 @@ class Ownership:
         )
 
     def _held_by(self, holder: int) -> LeaseHeldError:
-        error = LeaseHeldError("")
-        error.holder = f"{holder:08X}"
-        run = self._run_of(error)
-        insist = tr("A person at the cell can take it over: 'robolink robot take-ownership'.")
+        run = self._run_of(f"{holder:08X}")
         if run is None:
-            error.what = tr(
+            what = tr(
                 "Another program (client {holder:08X}) commands the PLC {identity}.",
                 holder=holder,
                 identity=self._wire.identity,
             )
-            error.remedy = tr(
+            remedy = tr(
                 "Close the other program; {seconds:.0f} s after its last signal the "
                 "mailbox is free.",
                 seconds=SILENCE_S,
             )
         else:
-            error.what = tr(
+            what = tr(
                 "{who} has commanded the PLC {identity} since {since} (client {holder:08X}).",
                 who=run.who,
                 identity=self._wire.identity,
                 since=local_label(run.since),
                 holder=holder,
             )
-            error.remedy = (
+            remedy = (
                 tr("Wait until it has finished, or end it.")
                 if run.lives
                 else tr(
@@ -262,7 +259,9 @@ class Ownership:
                     seconds=SILENCE_S,
                 )
             )
-        error.remedy = joined(" ", (error.remedy, insist))
+        insist = tr("A person at the cell can take it over: 'robolink robot take-ownership'.")
+        error = LeaseHeldError(what, remedy=listed(remedy, [insist]))
+        error.holder = f"{holder:08X}"
         return error
 
     def _wait_for_silence(self, held: LeaseHeldError) -> None:

@@ -3,7 +3,7 @@
 from typing import Final
 
 from robolink.errors import JournalError
-from robolink.messages import joined, tr
+from robolink.messages import joined, listed, tr
 from robolink.remedy_words import RemedyWord, remedy_word
 
 # Result codes of SQLite (https://www.sqlite.org/rescode.html), the low byte.
@@ -49,7 +49,7 @@ def journal_error(error: Exception, name: str, consequence: str, then: str = "")
         return damaged_error(text, name, consequence)
     cause, remedy = _sentences(reason, text)
     return JournalError(
-        tr("The journal {name} cannot be used: {cause}.", name=name, cause=cause),
+        listed(tr("The journal {name} cannot be used:", name=name), [cause]),
         remedy=joined(" ", filter(None, (consequence, remedy, then))),
     )
 
@@ -64,7 +64,7 @@ def damaged_error(found: str, name: str, consequence: str) -> JournalError:
     """
     cause = tr("it is damaged ({text})", text=found.rstrip("."))
     return JournalError(
-        tr("The journal {name} cannot be used: {cause}.", name=name, cause=cause),
+        listed(tr("The journal {name} cannot be used:", name=name), [cause]),
         remedy=joined(" ", filter(None, (consequence, _move_it_away()))),
     )
 

@@ -9,7 +9,7 @@ from typing import Final
 from robolink.errors import JournalError
 from robolink.journal.store import statements
 from robolink.journal.store.connection import DatabaseConnection
-from robolink.messages import tr
+from robolink.messages import listed, tr
 from robolink.remedy_words import RemedyWord, remedy_word
 
 _FIRST_TABLES: Final = """
@@ -138,9 +138,9 @@ def newer_error(name: str, found: int) -> JournalError:
             found=found,
             own=len(MIGRATIONS),
         ),
-        remedy=tr(
-            "Nothing was written. Install the newer robolink, or read it: {export}",
-            export=remedy_word(RemedyWord.EXPORT_JOURNAL),
+        remedy=listed(
+            tr("Nothing was written. Install the newer robolink. Until then, read it with:"),
+            [remedy_word(RemedyWord.EXPORT_JOURNAL)],
         ),
     )
 

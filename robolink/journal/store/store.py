@@ -226,7 +226,7 @@ class Store:
             self._file = self._file_now()
         elif to_write and self._file_now() != self._file:
             raise JournalError(
-                tr("The journal {name} was moved or deleted while in use.", name=self._place.name),
+                tr("The journal {name} was moved or deleted.", name=self._place.name),
                 remedy=tr(
                     "Put it back. Otherwise the next command creates a new one without a "
                     "record of unfinished jobs."

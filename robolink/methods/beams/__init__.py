@@ -295,7 +295,7 @@ class BeamsSource(InputSource[BeamsParameters]):
     @property
     def remedy(self) -> str:
         """What to do when a measurement makes the tip jump."""
-        return tr("Were the beams moved since the reference was recorded, or does the needle lean?")
+        return tr("Were the beams moved since the reference, or does the needle lean?")
 
     def told_by(self, context: MeasurementContext) -> Self:
         """Return the source with the run-up and the step of a crossing."""

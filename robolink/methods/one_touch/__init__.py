@@ -189,7 +189,7 @@ class OneTouchSource(ProvesAgain):
     @property
     def remedy(self) -> str:
         """What to do when a measurement makes the tip jump."""
-        return tr("Was the pin bumped, or is the nozzle loose? A full calibration will show it.")
+        return tr("Was the pin bumped? A full calibration will show it.")
 
     def measure(
         self,

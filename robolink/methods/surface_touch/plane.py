@@ -90,7 +90,7 @@ class PlaneTouchSource(SurfaceTouchSource[PlaneSurvey, "PlaneTouchResult"]):
     @property
     def remedy(self) -> str:
         """What to do when a measurement makes the tip jump."""
-        return tr("Check that all touches were on the same flat surface, and that it is fixed.")
+        return tr("Were all touches on the same flat surface, and is it fixed?")
 
     def proof_of(self, basis: ProofBasis) -> "PlaneTest":
         """Return the test in other tilts; see :meth:`~robolink.procedures.ProvesAgain.proof_of`.

@@ -97,7 +97,7 @@ class SphereTouchSource(SurfaceTouchSource[SphereSurvey, "SphereTouchResult"]):
     @property
     def remedy(self) -> str:
         """What to do when a measurement makes the tip jump."""
-        return tr("Check that all touches were on the same sphere, and that it is fixed.")
+        return tr("Were all touches on the same sphere, and is it fixed?")
 
     def proof_of(self, basis: ProofBasis) -> "SphereTest":
         """Return the test in other tilts; see :meth:`~robolink.procedures.ProvesAgain.proof_of`.

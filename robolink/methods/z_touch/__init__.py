@@ -189,7 +189,7 @@ class ZTouchSource(InputSource[ZTouchParameters]):
     @property
     def remedy(self) -> str:
         """What to do when a measurement makes the tip jump."""
-        return tr("Clean tip and surface, and check that the nozzle is tight.")
+        return tr("Clean tip and surface.")
 
     def told_by(self, context: MeasurementContext) -> Self:
         """Return the source with the robot's braking and the step of reported edges."""

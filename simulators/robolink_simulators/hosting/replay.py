@@ -200,8 +200,7 @@ def read_recording(path: Path) -> tuple[Dialogue, ...]:
         if link and not kind.startswith("epson+"):
             raise ConfigError(
                 tr(
-                    "{path} is a recording of {controller}; only one of an EPSON controller can "
-                    "be replayed.",
+                    "{path} records {controller}; only an EPSON controller can be replayed.",
                     path=path,
                     controller=dialogue.controller,
                 ),

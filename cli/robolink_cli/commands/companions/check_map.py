@@ -370,8 +370,7 @@ class MapComparison:
             if self._given(answer, value):
                 made = [compare_test(self._map, values.found, now, value, answer)]
         except MapDiffersError as error:  # the map does not show where the write went
-            away = tr("At the HMI, put {key} back to what it was.", key=value)
-            error.remedy = joined(" ", (error.remedy, away))
+            error.advise(tr("At the HMI, put {key} back to what it was.", key=value))
             raise
         except (ConfigError, DeclinedError):
             self._put_back(value, values.found.get(value), now.get(value))
@@ -438,15 +437,11 @@ class MapComparison:
     def _taken_back(self, error: MapDiffersError) -> MapDiffersError:
         held = revoke(self._name, self._map)
         if held is not None:
-            error.remedy = joined(
-                " ",
-                (
-                    tr(
-                        "The confirmation by {by} of {at} is withdrawn.",
-                        by=held.by,
-                        at=local_label(held.at),
-                    ),
-                    error.remedy,
-                ),
+            error.advise(
+                tr(
+                    "The confirmation by {by} of {at} is withdrawn.",
+                    by=held.by,
+                    at=local_label(held.at),
+                )
             )
         return error

@@ -17,7 +17,7 @@ from robolink_simulators.control.cell import AnySimulator
 from robolink_simulators.hosting.garbage import RareFullCollections
 
 from robolink.errors import ConfigError, ConnectError, RobolinkError
-from robolink.messages import joined, tr
+from robolink.messages import listed, tr
 from robolink_cli.commands.simulate.cells_file import PlannedCell
 from robolink_cli.commands.simulate.service import Termination, announce, controlled
 from robolink_cli.commands.simulate.simulated_kind import ServedCell
@@ -100,7 +100,7 @@ def made(cells: Sequence[PlannedCell]) -> Mapping[str, AnySimulator]:
         try:
             simulators[cell.name] = cell.kind.make(**cell.given)
         except RobolinkError as error:
-            raise ConfigError(_of_cell(cell, error), remedy=error.remedy) from error
+            raise _of_cell(cell, error) from error
     return simulators
 
 
@@ -145,8 +145,10 @@ def run_cells(path: Path, cells: Sequence[PlannedCell], life: ServedLife) -> Non
 def _served(stack: ExitStack, cell: PlannedCell, simulator: AnySimulator) -> ServedCell:
     try:
         return cell.kind.serve(stack, simulator, cell.given, person=cell.assist)
-    except (ConfigError, ConnectError) as error:
-        raise type(error)(_of_cell(cell, error), remedy=error.remedy) from error
+    except ConfigError as error:
+        raise _of_cell(cell, error) from error
+    except ConnectError as error:
+        raise ConnectError(_cannot_run(cell, error), remedy=error.remedy) from error
 
 
 def _failure(
@@ -155,12 +157,16 @@ def _failure(
     """Return why a cell cannot continue, ``None`` as long as all can."""
     for cell in cells:
         if (failed := simulators[cell.name].failure) is not None:
-            return ConfigError(_of_cell(cell, failed), remedy=failed.remedy)
+            return _of_cell(cell, failed)
     return None
 
 
-def _of_cell(cell: PlannedCell, error: RobolinkError) -> str:
-    return joined(": ", (cell.name, error.what))
+def _of_cell(cell: PlannedCell, error: RobolinkError) -> ConfigError:
+    return ConfigError(_cannot_run(cell, error), remedy=error.remedy)
+
+
+def _cannot_run(cell: PlannedCell, error: RobolinkError) -> str:
+    return listed(tr("The simulated cell {name} cannot run:", name=cell.name), [error.what])
 
 
 def _told(path: Path, about: Mapping[str, Mapping[str, object]], control: str) -> list[str]:

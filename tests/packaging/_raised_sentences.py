@@ -7,15 +7,20 @@ of one table) is never put together.
 """
 
 import ast
+import re
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import islice, product
 from pathlib import Path
 
+from robolink.messages import LIST_LINE
 from tests.packaging._source_modules import Chosen, Node, Scope, branch_of, called, named, together
 from tests.packaging._source_values import DEEPEST, Values
 
 SENTENCE_MAKERS = ("tr", "declared", "spoken")
+OF_ANOTHER = " ".join(["words of another error"] * 6)
+"""Two lines: so many an error may take for what happened, and so many for what to do."""
+
 MOST_AT_ONCE = 400
 """So many sentences of one expression are followed."""
 
@@ -97,12 +102,18 @@ class Sentences(Values):
                 return self._named(name, scope)
             case ast.Call():
                 return self._called(node, scope)
+            case ast.Attribute(attr="what" | "remedy", value=of) if self._is_error(of, scope):
+                return [Said(OF_ANOTHER)]
             case ast.Attribute(attr="strerror"):
                 return [Said(self._fill("{cause}", {}))]
             case ast.Attribute() | ast.Subscript():
                 return self._alternatives(node, scope, lambda one, where: self.said(one, where))
             case _:
                 return None
+
+    def _is_error(self, node: Node, scope: Scope) -> bool:
+        said = [annotation for annotation, _ in self._annotations(node, scope)]
+        return bool(said) and all(re.fullmatch(r"[\w\s().,|]*Error\W*", one) for one in said)
 
     def _part(self, part: Node, scope: Scope) -> list[Said] | None:
         if not isinstance(part, ast.FormattedValue):
@@ -167,6 +178,11 @@ class Sentences(Values):
         name = called(call)
         if isinstance(call.func, ast.Name) and name in SENTENCE_MAKERS:
             return self._sentence(call, scope)
+        if name == "listed" and isinstance(call.func, ast.Name):
+            head = self.said(call.args[0], scope)
+            return head and [Said(f"{one.text}\n{LIST_LINE}...", one.chosen) for one in head]
+        if name in ("without", "first_sentence") and isinstance(call.func, ast.Name):
+            return self.said(call.args[-1], scope)  # all of it, at the most
         if name == "joined" and isinstance(call.func, ast.Name):
             return self._joined(call.args[0], call.args[1], scope)
         if name == "known_names":
@@ -229,7 +245,8 @@ class Sentences(Values):
             found = self.said(node, scope)
         finally:
             self._far = before
-        return found if found and all(" " in one.text for one in found) else None
+        is_word = isinstance(node, ast.Call) and called(node) == "remedy_word"
+        return found if found and (is_word or all(" " in one.text for one in found)) else None
 
     def _joined(self, between: Node, parts: Node, scope: Scope) -> list[Said] | None:
         sign = str(between.value) if isinstance(between, ast.Constant) else " "

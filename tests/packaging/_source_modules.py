@@ -80,6 +80,7 @@ class Module:
         self.classes: dict[str, ast.ClassDef] = {}
         self.calls: list[tuple[ast.Call, ast.FunctionDef | None, str]] = []
         self._branches: dict[Node, dict[Node, Chosen]] = {}
+        self._had: dict[Node, dict[str, list[str]]] = {}
         self._read(self.tree, "", None)
 
     def _read(self, node: Node, owner: str, within: ast.FunctionDef | None) -> None:
@@ -103,6 +104,11 @@ class Module:
 
     def has(self, kind: ast.ClassDef) -> dict[str, list[str]]:
         """Return what a class has, each with what its type is said to be."""
+        if kind not in self._had:
+            self._had[kind] = self._what_has(kind)
+        return self._had[kind]
+
+    def _what_has(self, kind: ast.ClassDef) -> dict[str, list[str]]:
         found: dict[str, list[str]] = defaultdict(list)
         for node in ast.walk(kind):
             match node:

@@ -42,6 +42,7 @@ class Values:
         self._cut = 0
         self._heirs: dict[str, list[tuple[Module, ast.ClassDef]]] = defaultdict(list)
         self._makers: dict[str, set[str]] = defaultdict(set)
+        self._fulfilled: dict[ast.ClassDef, list[tuple[Module, ast.ClassDef]]] = {}
         for module in self.modules.values():
             for kind in module.classes.values():
                 for base in kind.bases:
@@ -83,7 +84,9 @@ class Values:
                     yield from self._of_name(attr, Scope(module, module.tree))
                     return
                 for module, kind in self.kinds(of, scope, attr):
-                    yield from self._of_self(attr, Scope(module, kind, kind.name))
+                    for one, where, chosen in self._of_self(attr, Scope(module, kind, kind.name)):
+                        if getattr(one, "attr", "") != attr:  # else it is what another one says
+                            yield one, where, chosen
             case ast.Subscript(value=table, slice=index):
                 yield from self._items(table, index, scope)
 
@@ -223,7 +226,7 @@ class Values:
             kind = module.classes[owner]
             yield module, kind
             for base in kind.bases:
-                name = getattr(base, "id", "")
+                name = named(base)
                 origin, one = module.imported.get(name, (module.name, name))
                 there = self._defining(origin, one)
                 if there is not None:
@@ -244,11 +247,33 @@ class Values:
             for name in re.findall(r"\w+", annotation):
                 origin, one = where.module.imported.get(name, (where.module.name, name))
                 module = self._defining(origin, one)
-                if module is None or one not in module.classes or one in seen:
+                if module is None or one in seen:
                     continue
                 seen.add(one)
-                if any(attr in owner.has(kind) for owner, kind in self._family(one, module)):
+                if one not in module.classes:
+                    top = Scope(module, module.tree)  # an alias, perhaps
+                    annotations += [(ast.unparse(of), top) for of, *_ in self._assigned(one, top)]
+                elif any(attr in owner.has(kind) for owner, kind in self._family(one, module)):
                     yield module, module.classes[one]
+                    yield from self._fulfilling(module.classes[one])
+
+    def _fulfilling(self, protocol: ast.ClassDef) -> list[tuple[Module, ast.ClassDef]]:
+        """Return the classes that have all that a protocol names."""
+        if not any(named(one) == "Protocol" for one in protocol.bases):
+            return []
+        if protocol not in self._fulfilled:
+            names = {one.name for one in protocol.body if isinstance(one, ast.FunctionDef)}
+            self._fulfilled[protocol] = [
+                (module, kind)
+                for module in self.modules.values()
+                for kind in module.classes.values()
+                if kind is not protocol and names <= self._names_in(kind, module)
+            ]
+        return self._fulfilled[protocol]
+
+    def _names_in(self, kind: ast.ClassDef, module: Module) -> set[str]:
+        family = self._family(kind.name, module)
+        return {one for owner, base in family for one in owner.has(base)}
 
     def _annotations(self, node: Node, scope: Scope) -> Iterator[tuple[str, Scope]]:
         match node:

@@ -11,16 +11,19 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from babel.messages.pofile import read_po
+from robolink_cli.console.error_lines import LONGEST_NAME, error_lines
 from robolink_cli.console.shell_words import SHELL_WAYS
-from robolink_cli.console.tables import SCREEN, within
+from robolink_cli.console.tables import SCREEN
 
-from robolink import errors
+from robolink import errors, locale
 from robolink.controllers.softmotion.answers import motion_failure, refused
+from robolink.messages import LIST_LINE
 from robolink.protocols.mailbox import Command, ErrorClass, Opcode, Response
 from robolink.remedy_words import RemedyWord
 from robolink.transport.modbus.errors import refused as refused_by_modbus
 from robolink.transport.modbus.frames import Area, ModbusRequest
-from tests.packaging._raised_sentences import Said, Sentences
+from tests.packaging._raised_sentences import OF_ANOTHER, Said, Sentences
 from tests.packaging._source_modules import called, together
 
 pytestmark = pytest.mark.soak
@@ -30,39 +33,29 @@ SHIPPED = ("robolink", "cli", "simulators")
 KINDS = {name for name in errors.__all__ if name.endswith("Error")}
 MOST_LINES = 3
 
-SHORT = 42
-"""So much of an expression names an error in the list of those that differ."""
-
-LIST = Path(__file__).with_name("error_sentences.txt")
-
-
-def listed(head, end=""):
-    """Return the errors of one part of the list, each with why it stands there."""
-    part = LIST.read_text(encoding="utf-8").partition(f"\n{head}\n")[2]
-    lines = (part.partition(f"\n\n{end}\n")[0] if end else part).splitlines()
-    return {name: why.strip() for name, why in zip(lines[::2], lines[1::2], strict=True)}
-
-
-LONGER = listed("LONGER", end="NOT FOLLOWED")
-NOT_FOLLOWED = listed("NOT FOLLOWED")
-
 OFFSET = "X 12.324 Y -3.729 Z -20.000 U 0.000"
-URL = "epson+tcp://192.168.0.1:5000"
+URL = "epson+tcp://192.168.100.100:5000"
+PATH = "/home/kowalski/needle-line3.toml"
+assert len(URL) == len(PATH) == LONGEST_NAME, "they are to be as long as a sentence may hold"
+
 LIKELY = {
     **dict.fromkeys(("before", "expected", "found", "now", "offset", "requested"), OFFSET),
     **dict.fromkeys(("controller", "identity", "url"), URL),
     **dict.fromkeys(("cause", "error"), "Connection reset by peer"),
     **dict.fromkeys(("count", "line", "most", "number", "read", "slot", "tool", "written"), "64"),
     "axes": "4",
+    "code": "2004",
     "axis": "X",
+    "better": "12",
     "baud": "9600",
-    "file": "/home/cell/needle.toml",
-    "folder": "/home/cell/robolink",
+    "file": PATH,
+    "folder": PATH,
     "holder": "K. Sato at cell-pc-3, process 4711",
     "names": "line3, line4, north, locked",
+    "option": "--accept-jump",
     "parity": "even",
     "password": "keyring, --password-file or ROBOLINK_PASSWORD",
-    "path": "/home/cell/robolink/needle.toml",
+    "path": PATH,
     "pose": "X 287.500 Y 103.250 Z -104.000 U 180.000",
     "request": "TLSet 1, XY(12.324,-3.729,-20.000,0.000)",
     "robot": "T6-602S",
@@ -85,8 +78,8 @@ OTHERWISE = {
     "Cell {cell} needs robot {expected}; at {url} there is {found}.": "C8-C901S",
     "Between touch {before} and {after} something moved by {shift:.2f} mm.": "3",
     "Station {id}: {what} must be known first.": "where it is",
+    "The journal {path} has form {found}; this robolink knows forms up to {own}.": "7",
     "{reference} (address {address}) of unit {unit}": "412290",
-    "The journal {name} has form {found}; this robolink knows forms up to {own}.": "7",
 }
 """Sentences whose names stand for something else than those of all others."""
 
@@ -102,15 +95,27 @@ SAID_ELSEWHERE = {
 }
 
 
+CHINESE = Path(locale.__file__).parent / "zh_CN" / "LC_MESSAGES" / "robolink.po"
+
+
+def in_chinese():
+    """Return all sentences in Chinese, by the English ones."""
+    with CHINESE.open("rb") as file:
+        return {one.id: one.string for one in read_po(file) if one.id}
+
+
 def filled(text, sentences):
     """Return a sentence with likely values, and with sentences where those are known."""
+    text = re.sub("(journal|操作记录) {name}", r"\1 {path}", text)
 
     def value(found):
         if found["name"] in sentences:
             return sentences[found["name"]]
+        if found["name"] == "seconds":
+            return LIKELY["seconds"]
         if re.search(r"[a-z]$", found["form"] or ""):
             return "10" if found["form"].endswith((".0f", "d")) else "-112.345"
-        if text in OTHERWISE and found["name"] in OTHER_NAMES:
+        if found["name"] in OTHER_NAMES and text in OTHERWISE:
             return OTHERWISE[text]
         if found["name"] in RemedyWord.__dict__:
             return SHELL_WAYS[getattr(RemedyWord, found["name"])].format_map(LIKELY)
@@ -119,9 +124,6 @@ def filled(text, sentences):
     said = re.sub(r"(?<!{){(?P<name>\w+)(![rs])?(?P<form>:[^{}]*)?}", value, text)
     return said.replace("{{", "{").replace("}}", "}")
 
-
-LISTED = re.compile(r"(?<=:)(\n    .*)+")
-"""What is wrong with a file, a line each; ``tests/cli/test_wrong_commands.py`` limits it."""
 
 STANDS = re.compile(r"[.;] ?[Nn]othing (was|is|moved|has)\b|, and nothing (was|moved)")
 """What stands, after what to do."""
@@ -140,11 +142,6 @@ class Raised:
     """What it can say: what happened, what to do; ``None`` where that is not followed."""
 
     @property
-    def named(self):
-        """The place without a line, which changes with each change above."""
-        return f"{self.kind} at {self.place}: {ast.unparse(self.what)[:SHORT].strip()}"
-
-    @property
     def is_passed_on(self):
         """Whether it says what another error says, and nothing of its own."""
         texts = [self.what, *([self.remedy] if self.remedy else [])]
@@ -155,10 +152,16 @@ class Raised:
         ) == 1
 
 
+@pytest.fixture(scope="module", params=["en", "zh"])
+def sources(request):
+    """The sources, in which sentences are followed, in either language."""
+    translated = in_chinese() if request.param == "zh" else {}
+    return Sentences(ROOT, SHIPPED, lambda text, known: filled(translated.get(text, text), known))
+
+
 @pytest.fixture(scope="module")
-def raised():
+def raised(sources):
     """All calls that make an error, with all that each can say."""
-    sources = Sentences(ROOT, SHIPPED, filled)
     kinds = KINDS | heirs(sources)
     found = []
     for module in sources.modules.values():
@@ -198,26 +201,50 @@ def heirs(sources):
 
 
 def shown(what, do):
-    """Return what a terminal shows of an error."""
-    return within(f"robolink: {LISTED.sub('', what)}" + f"\n  {do}" * bool(do), SCREEN)
+    """Return what a terminal shows of an error, without what it lists."""
+    lines = error_lines(what, do, width=SCREEN).split("\n")
+    return "\n".join(line for line in lines if not line.startswith(LIST_LINE))
 
 
 def test_an_error_takes_three_lines(raised):
-    long = {}
-    for one in raised:
-        for what, do in one.pairs or ():
-            if shown(what, do).count("\n") >= MOST_LINES:
-                long[one.named] = f"{one.place}:{one.line}\n{shown(what, do)}"
-    assert not [text for name, text in long.items() if name not in LONGER], "\n".join(
-        text for name, text in long.items() if name not in LONGER
-    )
-    assert sorted(LONGER) == sorted(long), "some are short by now: take them out"
+    long = {
+        f"{one.place}:{one.line}\n{shown(what, do)}"
+        for one in raised
+        if not one.is_passed_on
+        for what, do in one.pairs or ()
+        if shown(what, do).count("\n") >= MOST_LINES
+    }
+    assert not long, "\n".join(sorted(long))
 
 
 def test_each_error_is_followed_to_its_sentences(raised):
-    """None is left out but what only passes on another error, or is listed with its reason."""
-    lost = {one.named for one in raised if not one.pairs and not one.is_passed_on}
-    assert sorted(lost) == sorted(NOT_FOLLOWED)
+    """None is left out but what only passes on another error."""
+    lost = [f"{one.place}:{one.line}" for one in raised if not one.pairs and not one.is_passed_on]
+    assert lost == []
+
+
+def test_what_is_added_to_an_error_later_is_listed_or_takes_a_line(sources):
+    """So an error of three lines stays one, whatever is added on its way up."""
+    found, long = 0, []
+    for module in sources.modules.values():
+        for function in module.functions.values() if module.name != "robolink.errors" else ():
+            scope = sources.scope(module, function, "")
+            for node in scope.chosen:
+                match node:
+                    case ast.Assign(targets=[ast.Attribute(attr="what" | "remedy")]):
+                        found += 1
+                        texts = sources.said(node.value, scope)
+                        if not texts or any(map(adds_lines, texts)):
+                            long.append(f"{module.place}:{node.lineno}: {ast.unparse(node)}")
+    assert found >= 6, "the search finds nothing"
+    assert long == []
+
+
+def adds_lines(said):
+    """Return whether a text takes more than one line, or more than what was said before."""
+    lines = shown("", said.text.replace(OF_ANOTHER, "")).split("\n")[1:]
+    own = [line for line in lines if line.strip()]
+    return len(own) > 1 or (OF_ANOTHER in said.text and own != [])
 
 
 def test_what_stands_comes_before_what_to_do(raised):

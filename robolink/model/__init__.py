@@ -81,6 +81,7 @@ if TYPE_CHECKING:
     from robolink.model._ledger import Account as Account
     from robolink.model._ledger import Ledger as Ledger
     from robolink.model._ledger import describe_outcome as describe_outcome
+    from robolink.model._ledger import outcome_sentences as outcome_sentences
     from robolink.model._ledger import settling_command as settling_command
     from robolink.model._movement import InputEdge as InputEdge
     from robolink.model._movement import Motion as Motion
@@ -158,7 +159,7 @@ else:
                 "OrientationSpace RotationMatrix combined_space is_custom "
                 "kinematics_class kinematics_object"
             ),
-            "_ledger": "Account Ledger describe_outcome settling_command",
+            "_ledger": "Account Ledger describe_outcome outcome_sentences settling_command",
             "_movement": (
                 "InputEdge Motion MotionGroup MotionOutcome MotionProfile MotionTerms "
                 "MotionUntilInput Path WorkBox require_target"

@@ -279,16 +279,25 @@ def _plain(offset: ToolOffset | None) -> Components:
 def describe_outcome(outcome: ControllerOutcome, *, settles: bool = True) -> str:
     """Return what moved, what was written, which tool is selected, and how to recover the rest.
 
-    It claims nothing that was not looked at.
-
     Args:
         outcome: What stands.
         settles: Whether to say which command settles it; not where that is said besides.
     """
-    parts = [_movement(outcome), *_writes(outcome), _selection(outcome)]
+    parts = outcome_sentences(outcome)
     if settles and (command := settling_command(outcome)):
         parts.append(command)
     return joined(" ", parts)
+
+
+def outcome_sentences(outcome: ControllerOutcome) -> list[str]:
+    """Return what moved, what was written and which tool is selected, a sentence each.
+
+    They claim nothing that was not looked at.
+
+    Args:
+        outcome: What stands.
+    """
+    return [_movement(outcome), *_writes(outcome), _selection(outcome)]
 
 
 def settling_command(outcome: ControllerOutcome) -> str:

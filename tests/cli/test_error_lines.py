@@ -8,7 +8,7 @@ from inspect import getattr_static
 
 import pytest
 from robolink_cli.commands.computer.checkup import Level, Remark
-from robolink_cli.console.error_lines import LONGEST_NAME, error_lines
+from robolink_cli.console.error_lines import LONGEST_NAME, MOST_LINES, counted, error_lines
 from robolink_cli.console.shell_words import SHELL_WAYS
 from robolink_cli.console.tables import SCREEN
 from robolink_cli.unfit_packages import MOST_NAMED, cannot_run, how_to_fit
@@ -18,16 +18,17 @@ from robolink.calibration import Drift, TurnClaim, VerifyResult, solve_two_pose
 from robolink.calibration.quality.given_poses import ToolFit
 from robolink.calibration_run import AcceptanceCriteria, Proposal, conclude_turn_test
 from robolink.calibration_run._turn_test import Attended, touches_counting
+from robolink.controller_outcome import ControllerOutcome, ToolOutcome
 from robolink.controllers import SimpleController
 from robolink.controllers.driver_link import advise_emergency_stop
 from robolink.errors import CalibrationError, RobolinkError, TransportTimeoutError
 from robolink.journal.store.failures import damaged_error, journal_error
 from robolink.journal.store.migrations import newer_error
 from robolink.locale.languages import speak
-from robolink.messages import LIST_LINE, in_english, install, listed, tr
+from robolink.messages import LIST_LINE, in_english, install, joined, listed, tr
 from robolink.methods import CameraSource, PointsSource
 from robolink.methods.given_poses import PosesFound
-from robolink.model import Pose
+from robolink.model import Pose, outcome_sentences, settling_command
 from robolink.pose_tables import read_poses
 from robolink.remedy_words import speaking
 
@@ -62,8 +63,8 @@ def raised(act, *given, **named):
 
 def lines_of(error):
     """Return what a terminal shows, and how many lines of it count."""
-    lines = error_lines(error.what, error.remedy, width=SCREEN).split("\n")
-    return lines, sum(not line.startswith(LIST_LINE) for line in lines)
+    shown = error_lines(error.what, error.remedy, width=SCREEN)
+    return shown.split("\n"), counted(shown)
 
 
 def by_pose_files(better=None):
@@ -241,3 +242,43 @@ def test_a_long_name_is_listed_whole_and_named_in_the_sentence(text, shown):
 )
 def test_what_would_be_torn_or_is_typed_stays_whole(text):
     assert error_lines(text, width=200) == f"robolink: {text}"
+
+
+OUTCOMES = {
+    "looked": ControllerOutcome(selected=1, selected_before=1, selection_known=True),
+    "moved": ControllerOutcome(moved=True, selected=12, selected_before=1, selection_known=True),
+    "lost": ControllerOutcome(
+        moved=True,
+        moving=("Move XY(287.500, 103.250, -104.000, 180.000)",),
+        doubtful=("SetIO,8,1",),
+        left_open=True,
+    ),
+    "two tools": ControllerOutcome(
+        tools={
+            tool: ToolOutcome(
+                before=(12.335, -3.732, -20.0, 0.0, 0.0, 0.0),
+                requested=(12.5, -3.5, -20.0, 0.0, 0.0, 0.0),
+                holds=(12.5, -3.5, -20.0, 0.0, 0.0, 0.0),
+                known=tool == 1,
+            )
+            for tool in (1, 2)
+        },
+        carried_out=("SetIO,8,1", "SetIO,9,1"),
+        left_open=True,
+    ),
+}
+
+
+@pytest.mark.parametrize("outcome", OUTCOMES.values(), ids=OUTCOMES)
+@pytest.mark.parametrize(("what", "do"), [(1, 1), (1, 2), (2, 1), (2, 0), (1, 0)])
+def test_what_stands_is_listed_where_there_is_no_room(language, outcome, what, do):
+    happened, remedy = (" ".join(["It ended before."] * 4 * many) for many in (what, do))
+    stands, then = outcome_sentences(outcome), settling_command(outcome)
+    shown = error_lines(happened, remedy, stands=stands, then=then, width=SCREEN)
+    assert counted(shown) <= MOST_LINES, shown
+    flat = "".join(shown.split())
+    places = [flat.index("".join(one.split())) for one in (happened, *stands)]
+    assert places == sorted(places)
+    assert flat.endswith("".join((then or remedy or stands[-1]).split()))
+    at_once = error_lines(happened, remedy, stands=stands, then=then, width=0)
+    assert at_once.split("\n")[1].strip() == joined(" ", stands)

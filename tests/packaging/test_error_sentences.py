@@ -12,7 +12,7 @@ from typing import Any
 
 import pytest
 from babel.messages.pofile import read_po
-from robolink_cli.console.error_lines import LONGEST_NAME, error_lines
+from robolink_cli.console.error_lines import LONGEST_NAME, MOST_LINES, error_lines
 from robolink_cli.console.shell_words import SHELL_WAYS
 from robolink_cli.console.tables import SCREEN
 
@@ -31,8 +31,6 @@ pytestmark = pytest.mark.soak
 ROOT = Path(__file__).parents[2]
 SHIPPED = ("robolink", "cli", "simulators")
 KINDS = {name for name in errors.__all__ if name.endswith("Error")}
-MOST_LINES = 3
-
 OFFSET = "X 12.324 Y -3.729 Z -20.000 U 0.000"
 URL = "epson+tcp://192.168.100.100:5000"
 PATH = "/home/kowalski/needle-line3.toml"

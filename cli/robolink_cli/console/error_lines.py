@@ -5,11 +5,15 @@ below, as findings are: there it can be copied, and the sentence can be read.
 """
 
 import re
+from collections.abc import Iterable, Sequence
 from typing import Final
 
-from robolink.messages import LIST_LINE
+from robolink.messages import LIST_LINE, joined, listed
 from robolink_cli.console.output import visible
 from robolink_cli.console.tables import columns, within
+
+MOST_LINES: Final = 3
+"""So many lines of a screen an error takes, besides those of lists."""
 
 LONGEST_NAME: Final = 32
 """Longest path or URL, in columns, that a sentence holds."""
@@ -29,12 +33,18 @@ _CONTINUED: Final = r"\s+\S*[/\\]"
 """Pattern for what follows a part of a path that holds a blank."""
 
 
-def error_lines(what: str, *rest: str, width: int) -> str:
+def error_lines(
+    what: str, do: str = "", *, stands: Sequence[str] = (), then: str = "", width: int
+) -> str:
     """Return what is shown of an error.
+
+    Where it would take more than three lines, what stands is listed, and the next command too.
 
     Args:
         what: What happened.
-        rest: What stands and what to do, each without its indent; empty ones are left out.
+        do: What to do.
+        stands: What stands on the controller, sentence by sentence.
+        then: The sentence with the next command.
         width: Columns of the terminal; 0 leaves each sentence as it is, for a file or a program.
 
     Example:
@@ -45,17 +55,33 @@ def error_lines(what: str, *rest: str, width: int) -> str:
             /home/kowalski/.local/share/robolink/journal.db
           Give another file.
     """
-    # Each by itself: a return at the end of one is no line end with the next.
-    what, *rest_shown = map(visible, (what, *filter(None, rest)))
-    parts = [f"robolink: {what}", *(f"  {one}" for one in rest_shown)]
-    if width:
-        parts = [within(_long_names_below(one), width) for one in parts]
-    return "\n".join(parts)
+    what, do, then, *stands = map(visible, (what, do, then, *stands))
+    behind = "\n  " if "\n" in do else " "  # not behind the last line of a list
+    below = listed(what, stands)
+    sooner = joined(behind, filter(None, (do, then)))
+    later = listed(do, [then]) if do and then else sooner
+    shown = ""
+    for parts in ((what, joined(" ", stands), sooner), (below, sooner), (below, later)):
+        shown = _in_lines(parts, width)
+        if not width or counted(shown) <= MOST_LINES:
+            break
+    return shown
+
+
+def counted(shown: str) -> int:
+    """Return how many lines an error takes, besides those of lists."""
+    return sum(not line.startswith(LIST_LINE) for line in shown.split("\n"))
+
+
+def _in_lines(parts: Iterable[str], width: int) -> str:
+    first, *rest = filter(None, parts)
+    lines = [f"robolink: {first}", *(f"  {one}" for one in rest)]
+    return "\n".join(within(_long_names_below(one), width) if width else one for one in lines)
 
 
 def _long_names_below(text: str) -> str:
     """Return a text with the long names of its sentence listed whole below it."""
-    sentence, line_end, listed = text.partition("\n")
+    sentence, line_end, rest = text.partition("\n")
     whole = []
 
     def named(found: "re.Match[str]") -> str:
@@ -67,7 +93,7 @@ def _long_names_below(text: str) -> str:
         return _short(name) + found[0][len(name) :]
 
     sentence = re.sub(_NAMES, named, sentence)
-    return "\n".join([sentence, *dict.fromkeys(whole)]) + line_end + listed
+    return "\n".join([sentence, *dict.fromkeys(whole)]) + line_end + rest
 
 
 def _short(name: str) -> str:

@@ -201,16 +201,16 @@ def report(error: BaseException, *, as_json: bool, typed: Sequence[str] = ()) ->
     if as_json:
         hand_over(error_document(error, typed))
         if isinstance(error, KeyboardInterrupt):  # the reader may be another person
-            show(sentences(joined(" ", filter(None, _stands(error, typed)))), beside=True)
+            stands, next_command = _stands(error, typed)
+            show(sentences(joined(" ", filter(None, (*stands, next_command)))), beside=True)
     elif isinstance(error, NoArgsIsHelpError):
         show(sentences(error.message), beside=True)
     else:
         what, remedy = _sentences(error, typed)
         stands, next_command = _stands(error, typed)
-        # Behind a list of commands a sentence has a line of its own.
-        do = joined("\n  " if "\n" in remedy else " ", filter(None, (remedy, next_command)))
         width = terminal_width(sys.stderr)
-        show(error_lines(what, stands, do, width=width), beside=True)
+        lines = error_lines(what, remedy, stands=stands, then=next_command, width=width)
+        show(lines, beside=True)
     return code
 
 
@@ -293,8 +293,8 @@ def _plug_in(error: BaseException) -> "PlugInModule | None":
     return plug_in_module(error)
 
 
-def _stands(error: BaseException, typed: Sequence[str]) -> tuple[str, str]:
-    """Return what stands, and which command settles it.
+def _stands(error: BaseException, typed: Sequence[str]) -> tuple[list[str], str]:
+    """Return what stands, sentence by sentence, and which command settles it.
 
     Both are empty for a command that had no controller, or only looked.
     """
@@ -302,11 +302,11 @@ def _stands(error: BaseException, typed: Sequence[str]) -> tuple[str, str]:
 
     outcome = outcome_after(error)
     if outcome is UNTOUCHED:
-        return "", ""
-    from robolink.model import describe_outcome, settling_command  # --help needs none
+        return [], ""
+    from robolink.model import outcome_sentences, settling_command  # --help needs none
 
     told = next_of(settling_command(outcome), error, outcome, typed)
-    return describe_outcome(outcome, settles=False), told
+    return outcome_sentences(outcome), told
 
 
 def outcome_payload(outcome: "ControllerOutcome") -> dict[str, object]:

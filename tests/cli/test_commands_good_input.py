@@ -218,6 +218,7 @@ def test_the_demo_gives_truth_and_error_as_one_document(capsys):
         assert {"recovered", "truth", "error_mm", "drift_mm", "exchanges"} <= set(one)
         assert one["error_mm"] < 0.05
         assert one["exchanges"] > 100
+    assert document["controllers"][1]["exchanges"] <= 700
 
 
 def test_the_demo_shows_before_after_drift_and_what_was_sent_on_the_wire(capsys):

@@ -195,6 +195,9 @@ _ITSELF: Final[Mapping[str, StandIn]] = {
     "robolink.controllers.markers.MarkerStore.doubt": _open,
     "robolink.controllers.epson.line.EpsonConversation._end": _nothing,
     "robolink.controllers.softmotion.wire.MailboxWire.ended": _ended,
+    "robolink.controllers.softmotion.commands.CommandSender._allowed": (
+        lambda sender, draft, _require: sender._before(draft)
+    ),
     "robolink.controllers.ToolWrite.change": _changed,
     "robolink.controllers.ToolTableCore.require_writable": _nothing,
     "robolink.model.ChangeGuard.require": _nothing,

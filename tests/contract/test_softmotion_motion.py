@@ -111,18 +111,18 @@ def test_a_stop_from_another_thread_gets_in_holds_and_is_released_by_a_reset(
     target = above(group.pose(), 20.0)
     motion = group.move_to(target, SLOW, box=ANYWHERE)
     got_in: list[bool] = []
-    read_head = MailboxWire.read_head
+    pause = MailboxWire.pause
 
-    def stop_meanwhile(wire):
+    def stop_meanwhile(wire, seconds):
         if not got_in:
             got_in.append(False)
             stopper = threading.Thread(target=controller.stop)
             stopper.start()
             stopper.join(timeout=10)
             got_in[:] = [not stopper.is_alive()]
-        return read_head(wire)
+        pause(wire, seconds)
 
-    monkeypatch.setattr(MailboxWire, "read_head", stop_meanwhile)
+    monkeypatch.setattr(MailboxWire, "pause", stop_meanwhile)
     with pytest.raises(StoppedError):
         motion.wait(timeout_s=20)
     assert got_in == [True]

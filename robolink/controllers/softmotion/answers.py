@@ -1,4 +1,4 @@
-"""The meaning of a PLC's refusals and ends, in words, with their remedies."""
+"""What an answer of the PLC is about, and the meaning of its refusals and ends, with remedies."""
 
 from functools import lru_cache
 from typing import Final, NamedTuple
@@ -12,7 +12,9 @@ from robolink.errors import (
 from robolink.messages import tr
 from robolink.protocols.mailbox import (
     Command,
+    CommandState,
     ErrorClass,
+    Finished,
     GroupState,
     Opcode,
     Response,
@@ -59,6 +61,42 @@ def _in_words(opcode: int, name: str, operands: tuple[int, ...], pose: tuple[flo
     if pose:
         words.append("(" + " ".join(f"{value + 0.0:.6g}" for value in pose) + ")")
     return " ".join(word for word in words if word)
+
+
+def is_own(command: Command, now: Response) -> bool:
+    """Whether a snapshot acknowledges this very command: owner, number and opcode."""
+    return (now.ack_owner, now.ack_head, now.opcode_echo) == (
+        command.owner,
+        command.sequence,
+        command.opcode,
+    )
+
+
+def came_too_early(command: Command, before: Response, now: Response) -> bool:
+    """Whether the PLC held a command back, which it then never carries out.
+
+    Source: docs/reference/mailbox.md, "When a command counts".
+
+    Its number was in none of the ends when it was sent, so an end of that number is its own.
+    """
+    early = Finished(command.sequence, CommandState.ERROR, ErrorClass.BUSY)
+    return early in now.finished and early not in before.finished
+
+
+def has_taken(command: Command, now: Response) -> bool:
+    """Whether a take succeeded although the answer to it is already gone.
+
+    Another client that asked for the mailbox just after it was refused, and the answer to him
+    names the holder and the epoch.
+    """
+    take_command = command.opcode == Opcode.OWNERSHIP and command.operands[0] == 1
+    return (
+        take_command
+        and now.opcode_echo == Opcode.OWNERSHIP
+        and now.ack_owner != command.owner
+        and now.answer.holder == command.owner
+        and now.answer.epoch != 0
+    )
 
 
 def refused(command: Command, now: Response, error_class: int) -> RejectedError:

@@ -16,7 +16,7 @@ there the axes themselves are compared.
 """
 
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import replace
 from typing import Final
 
@@ -25,8 +25,11 @@ from robolink.checkpoints import Checkpoint, checkpoint
 from robolink.controllers.softmotion.answers import (
     DISPOSSESSED,
     Ended,
+    came_too_early,
     command_ended_early,
     describe,
+    has_taken,
+    is_own,
     motion_failure,
     refused,
 )
@@ -52,7 +55,6 @@ from robolink.protocols.mailbox import (
     Command,
     CommandState,
     ErrorClass,
-    Finished,
     Opcode,
     Response,
     Words,
@@ -99,8 +101,18 @@ _STILL: Final = 0.05
 """Largest change of a stopped axis within :data:`_LOOK_S`, in its units: drives hold a position
 within microns and millidegrees, and robolink moves no slower than 1 mm/s."""
 
+Require = Callable[[Response], None]
+"""Raises for a snapshot that does not allow a command."""
+
+InDoubt = Callable[[], AbstractContextManager[None]]
+"""Makes what surrounds all that leaves a doubt when it fails."""
+
 COMPLETION_S: Final = 10.0
 """Longest time from acknowledgement to end of a command that is not a movement, in s."""
+
+_ACCEPTANCE_S: Final = 0.001
+"""Shortest time in which a PLC usually accepts a block, in s: a part of its cycle. It is not asked
+before, but about a stop."""
 
 _WRITES: Final = 3
 _OVERTAKEN: Final = frozenset({Opcode.STOP, Opcode.HALT})
@@ -149,7 +161,7 @@ class CommandSender:
         What it returns raises like :meth:`carry_out`.
         """
         draft = Command(0, Opcode.STOP)
-        with self._naming(draft), self._wire.uninterrupted():
+        with self._naming(draft), self._wire.uninterrupted(), self._wire.ahead():
             command, now = self._send(draft)
 
         def done(now: Response) -> bool:
@@ -203,23 +215,33 @@ class CommandSender:
             raise command_ended_early(end.command)
         return end.now
 
-    def start(self, draft: Command) -> Command:
-        """Send a movement or a jog and return it as accepted; raises like the other.
+    def start(
+        self, draft: Command, require: Require, in_doubt: InDoubt
+    ) -> tuple[Command, Response]:
+        """Send a movement or a jog; return it as accepted, with the snapshot that shows that.
+
+        Args:
+            draft: The movement or jog.
+            require: Refuses what a snapshot does not allow; nothing is sent then.
+            in_doubt: Surrounds what leaves a doubt when it fails: all from the block on.
 
         Raises:
             KeyboardInterrupt: Ctrl-C came before a movement was sent; it was not.
+            RobolinkError: As ``require``, and as :meth:`carry_out`.
         """
         # A caller that starts a movement is present; at most four start before it has to wait on
         # one.
         with self._naming(draft), self._wire.uninterrupted(), self._wire.attended():
             self._possess(draft)
-            command, now = self._send(draft, ride=draft.opcode != Opcode.JOG)
+            ride = draft.opcode != Opcode.JOG
+            command, now = self._send(draft, require, in_doubt, ride=ride)
             if now.state == CommandState.ERROR:
                 self._wire.motions.forget(command.sequence)
                 raise self._refusal(command, now, now.error_class)
             # On a slow line the answer took time; a caller that waits now gets the full time again.
-            self._wire.beat()
-            return command
+            with in_doubt():
+                self._wire.beat()
+            return command, now
 
     def motion_failure(self, request: str, now: Response, error_class: int) -> ControllerError:
         """Return the error for a movement or jog of ours that did not end as it should.
@@ -272,7 +294,7 @@ class CommandSender:
             if not has_ended(now.state):
                 return None
             return Ended(command, now.state, now.error_class, now)
-        if _has_taken(command, now):
+        if has_taken(command, now):
             return Ended(command, CommandState.DONE, ErrorClass.NONE, now)
         if now.ack_owner != command.owner:
             raise self._wire.ended(self._overtaken(command, now))
@@ -283,38 +305,61 @@ class CommandSender:
             raise self._unseen(command)
         return end or Ended(command, CommandState.DONE, ErrorClass.NONE, now)
 
-    def _send(self, draft: Command, *, ride: bool = False) -> tuple[Command, Response]:
+    def _send(
+        self,
+        draft: Command,
+        require: Require | None = None,
+        in_doubt: InDoubt = nullcontext,
+        *,
+        ride: bool = False,
+    ) -> tuple[Command, Response]:
         """Write a command and return it with the snapshot that acknowledges it."""
         request = describe(draft)
         with self._exchanging(request):
-            before = self._before(draft)
-            self._require_able(draft, before)
+            before = self._allowed(draft, require)
             command = self._addressed(draft, before)
             words = self._encode(command)
             if ride and self._wire.interrupted:
                 raise KeyboardInterrupt  # held back until here: no movement starts after it
             if ride:
                 self._wire.motions.begin(command.sequence)
-            for _ in range(_WRITES):
-                try:
-                    self._wire.latch.admit(command_class_of(command), request)
-                    self._wire.write(words)
-                except (RejectedError, StoppedError):
-                    self._wire.motions.forget(command.sequence)
-                    raise
-                try:
-                    before, accepted = self._await_acknowledgement(command, before)
-                except RejectedError:
-                    self._wire.motions.forget(command.sequence)
-                    raise
-                if accepted:
-                    return command, before
-            raise self._wire.ended(
-                RemoteProtocolError(
-                    tr("{request!r} arrived damaged each time.", request=describe(command)),
-                    remedy=tr("Look for a gateway that changes registers, or a bad line."),
-                )
+            with in_doubt():
+                return command, self._accepted(command, before, words)
+
+    def _accepted(self, command: Command, before: Response, words: Words) -> Response:
+        """Write a block, and return the snapshot that acknowledges it."""
+        for _ in range(_WRITES):
+            try:
+                self._wire.latch.admit(command_class_of(command), describe(command))
+                self._wire.write(words)
+            except (RejectedError, StoppedError):
+                self._wire.motions.forget(command.sequence)
+                raise
+            try:
+                before, accepted = self._await_acknowledgement(command, before)
+            except RejectedError:
+                self._wire.motions.forget(command.sequence)
+                raise
+            if accepted:
+                return before
+        raise self._wire.ended(
+            RemoteProtocolError(
+                tr("{request!r} arrived damaged each time.", request=describe(command)),
+                remedy=tr("Look for a gateway that changes registers, or a bad line."),
             )
+        )
+
+    def _allowed(self, draft: Command, require: Require | None) -> Response:
+        """Return the snapshot from before a command, which allows it (docs/reference/rules.md 1).
+
+        It is taken under the lock, after the marker and after every other command of this client;
+        only the latch is asked between it and the block. No snapshot of before allows anything.
+        """
+        before = self._before(draft)
+        self._require_able(draft, before)
+        if require is not None:
+            require(before)
+        return before
 
     def _before(self, draft: Command) -> Response:
         """Return a snapshot from before a command.
@@ -341,11 +386,13 @@ class CommandSender:
         """Return the snapshot that shows the acknowledgement, or the damage, of a block."""
         deadline = Deadline.after(self._wire.clock, self._wire.timeout_s)
         now = before
+        if not command.only_ends:
+            self._wire.pause(_ACCEPTANCE_S)
         while True:
             now = self._snapshots.news(now)
-            if is_own(command, now) or _has_taken(command, now):
+            if is_own(command, now) or has_taken(command, now):
                 return now, True
-            if _came_too_early(command, before, now):
+            if came_too_early(command, before, now):
                 raise refused(command, now, ErrorClass.BUSY)
             if (now.ack_head, now.ack_owner) != (before.ack_head, before.ack_owner):
                 raise self._wire.ended(self._overtaken(command, now))
@@ -427,42 +474,6 @@ class CommandSender:
             ),
             remedy=tr("Find the other client; only one at a time may command this mailbox."),
         )
-
-
-def is_own(command: Command, now: Response) -> bool:
-    """Whether a snapshot acknowledges this very command: owner, number and opcode."""
-    return (now.ack_owner, now.ack_head, now.opcode_echo) == (
-        command.owner,
-        command.sequence,
-        command.opcode,
-    )
-
-
-def _came_too_early(command: Command, before: Response, now: Response) -> bool:
-    """Whether the PLC held a command back, which it then never carries out.
-
-    Source: docs/reference/mailbox.md, "When a command counts".
-
-    Its number was in none of the ends when it was sent, so an end of that number is its own.
-    """
-    early = Finished(command.sequence, CommandState.ERROR, ErrorClass.BUSY)
-    return early in now.finished and early not in before.finished
-
-
-def _has_taken(command: Command, now: Response) -> bool:
-    """Whether a take succeeded although the answer to it is already gone.
-
-    Another client that asked for the mailbox just after it was refused, and the answer to him
-    names the holder and the epoch.
-    """
-    take_command = command.opcode == Opcode.OWNERSHIP and command.operands[0] == 1
-    return (
-        take_command
-        and now.opcode_echo == Opcode.OWNERSHIP
-        and now.ack_owner != command.owner
-        and now.answer.holder == command.owner
-        and now.answer.epoch != 0
-    )
 
 
 def _still(before: Response, now: Response) -> bool:

@@ -1,9 +1,12 @@
 """The axis group behind one mailbox: where its tip is, and how to move it."""
 
 import math
+from contextlib import suppress
+from functools import partial
 
 from robolink.controllers.motion_group import MotionGroupCore
 from robolink.controllers.softmotion.answers import describe
+from robolink.controllers.softmotion.commands import Require
 from robolink.controllers.softmotion.condition import (
     require_beats,
     require_enabled,
@@ -23,7 +26,15 @@ from robolink.controllers.softmotion.movement import (
     run_up_mm,
     up_to_an_edge,
 )
-from robolink.errors import ConfigError, ControllerError, ReadBackError, StoppedError
+from robolink.errors import (
+    ConfigError,
+    ControllerError,
+    NotReadyError,
+    ReadBackError,
+    RemoteProtocolError,
+    StoppedError,
+    TransportError,
+)
 from robolink.messages import tr
 from robolink.model import (
     InputEdge,
@@ -150,9 +161,9 @@ class SoftMotionGroup(MotionGroupCore):
             LimitError: The tip came out of the box; the jog was ended there.
             OutcomeUnknownError: An earlier job is unfinished, or no answer came.
         """
-        watch = JogWatch(self._mailbox, jog, box)
+        watch = JogWatch(self._mailbox, jog, box, self._require_startable)
         with self._mailbox.lock.held(watch.request):
-            self._require_startable(watch.draft, watch.request)
+            self._prepare(watch.draft, watch.request, self._require_startable)
             return watch.run(duration_s)
 
     def stop(self) -> None:
@@ -199,13 +210,18 @@ class SoftMotionGroup(MotionGroupCore):
     def _start(self, target: Pose, draft: Command) -> SoftMotionMotion:
         """Start a movement inside the limits; see the model."""
         mailbox, request = self._mailbox, describe(draft)
+
+        def require(now: Response) -> None:
+            self._require_startable(now)
+            require_tool_known(now)
+            self._require_tool(target, now.tool_slot)
+
         try:
             with mailbox.lock.held(request):
                 mailbox.wire.motions.require_room(request)
-                now = self._require_startable(draft, request)
-                require_tool_known(now)
+                now = self._prepare(draft, request, require)
                 with mailbox.uninterrupted():
-                    motion = self._started(target, draft, now.tool_slot)
+                    motion = self._started(target, draft, require, selected=now.tool_slot)
                     self._current = [*(m for m in self._current if not m.settled), motion]
                 return motion
         except (KeyboardInterrupt, StoppedError):
@@ -213,19 +229,33 @@ class SoftMotionGroup(MotionGroupCore):
             self.abort_unfinished()
             raise
 
-    def _started(self, target: Pose, draft: Command, selected: int) -> SoftMotionMotion:
+    def _started(
+        self, target: Pose, draft: Command, require: Require, *, selected: int
+    ) -> SoftMotionMotion:
         mailbox, request = self._mailbox, describe(draft)
         marker = self._marked(target, request, selected=selected)
-        with mailbox.markers.doubt(request):
-            try:
-                command = mailbox.commands.start(draft)
-            except (ControllerError, ConfigError, StoppedError, KeyboardInterrupt):
-                mailbox.markers.clear(marker)  # it was not sent, or was refused
-                raise
-        return SoftMotionMotion(target, command, marker, mailbox)
+        in_doubt = partial(mailbox.markers.doubt, request)
+        queued = mailbox.wire.motions.going
+        try:
+            command, now = mailbox.commands.start(draft, require, in_doubt)
+        except (
+            ControllerError,
+            ConfigError,
+            StoppedError,
+            KeyboardInterrupt,
+            TransportError,
+            RemoteProtocolError,
+        ):
+            mailbox.markers.clear(marker)  # it was not sent, or was refused
+            raise
+        return SoftMotionMotion(target, command, marker, mailbox, accepted=now, queued=queued)
 
-    def _require_startable(self, draft: Command, request: str) -> Response:
-        """Refuse what may not start now; see the module ``link``.
+    def _prepare(self, draft: Command, request: str, require: Require) -> Response:
+        """Refuse early what may not start now, and own the mailbox; return what was looked at.
+
+        It spares a marker, and allows nothing: what is required is required again of the snapshot
+        just before the block (``CommandSender``). So the snapshot of this step will do, but for a
+        refusal, which needs a new one.
 
         Raises:
             ConfigError: The line is too slow for any movement.
@@ -236,12 +266,26 @@ class SoftMotionGroup(MotionGroupCore):
         mailbox = self._mailbox
         require_beats(mailbox.wire.whole_look_s)
         self._require_settled(request)
+        known = mailbox.snapshots.of_this_step()
+        if known is not None and mailbox.wire.epoch:
+            with suppress(NotReadyError):
+                require(known)
+                return known
         now = mailbox.prepare(draft, request)
+        require(now)
+        return now
+
+    def _require_startable(self, now: Response) -> None:
+        """Refuse a movement or jog that the state of the machine forbids.
+
+        Raises:
+            NotReadyError: The group, its drives, the machine or another movement forbid it.
+        """
+        require_permit(now)
         require_enabled(now)
         require_power(now)
-        if not mailbox.wire.motions.unfinished:
+        if not self._mailbox.wire.motions.going:
             require_still(now)
-        return now
 
     def _require_settled(self, request: str) -> None:
         """Refuse ``request``, before the mailbox is taken, while a job is unfinished."""

@@ -6,9 +6,11 @@ A link carries one exchange at a time, and on a slow serial line one read of the
 takes a quarter of a second (docs/reference/softmotion.md 4.2). A thread that reads and reads would
 keep the waiter from beating for longer than the PLC bears. So while somebody waits on a movement,
 every other thread is let in by the waiter alone: one exchange, just after a beat, before the
-waiter's own. Then no two exchanges lie between two beats.
+waiter's own. Then no two exchanges lie between two beats. On a network, where an exchange takes
+milliseconds, the others also have the wire while the waiter pauses between two looks.
 """
 
+import math
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import TracebackType
@@ -29,12 +31,24 @@ without one.
 The rest of that half second is left for a computer that is busy.
 """
 
+PAUSED_BEAT_S: Final = 0.08
+"""Usual interval between beats where there is no look between them, in s; the longest is
+:data:`MOST_OVER` times that."""
+
+MOST_OVER: Final = 1.25
+"""Factor by which an interval may be longer than usual, so that none ends just before another."""
+
 MOST_LOOK_S: Final = 0.4
 """Longest time on the line for a whole look and a beat, in s. On a slower line nothing may move: no
 beat would arrive within the PLC's 0.5 s, part of which the PLC and the adapters need."""
 
 IDLE_BEAT_S: Final = 1.0
 """Interval between beats at rest, in s: an owner that is silent for 10 s may be replaced."""
+
+
+def shared_out(whole_s: float, usual_s: float) -> float:
+    """Return the length of equal intervals that a time has room for, of about the usual one."""
+    return whole_s / max(1, math.ceil(whole_s / usual_s - (MOST_OVER - 1)))
 
 
 class PlcHeartbeat:
@@ -106,6 +120,7 @@ class Turns:
         self._waiters = 0
         self._waiting = 0
         self._let_in = 0
+        self._pausing = False
         self._inside = 0
         self._sign_s = 0.0
 
@@ -132,6 +147,20 @@ class Turns:
                     self._waiters -= 1
                     self._changed.notify_all()
 
+    @contextmanager
+    def pausing(self) -> Iterator[None]:
+        """Let other threads have the wire, one exchange at a time, while the waiter pauses."""
+        try:
+            with self._changed:
+                self._pausing = True
+                self._changed.notify_all()
+            yield
+        finally:
+            with self._changed:
+                self._pausing = False
+                self._changed.wait_for(self._nobody_inside, _LONGEST_EXCHANGE_S)
+                self._sign_s = _now_s()
+
     def let_one_in(self) -> bool:
         """Let another thread have one exchange and wait for its end; False if none wants it."""
         with self._changed:
@@ -151,7 +180,7 @@ class Turns:
             self._waiting += 1
             try:
                 # Real time: a clock that does not advance would block this thread for ever.
-                while self._waiters and not self._let_in:
+                while self._waiters and not self._let_in and not self._free_in_a_pause():
                     left_s = self._sign_s + _PATIENCE_S - _now_s()
                     if left_s <= 0:
                         break
@@ -171,6 +200,9 @@ class Turns:
         with self._changed:
             self._inside -= 1
             self._changed.notify_all()
+
+    def _free_in_a_pause(self) -> bool:
+        return self._pausing and not self._inside
 
     def _nobody_inside(self) -> bool:
         return not self._inside and not (self._let_in and self._waiting)

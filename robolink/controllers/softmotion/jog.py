@@ -1,6 +1,7 @@
 """Jogging: the group moves along chosen axes for a time, watched, and is stopped."""
 
 from collections.abc import Iterable
+from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Final
 
@@ -8,8 +9,9 @@ from robolink.controllers.softmotion.answers import (
     DISPOSSESSED,
     command_ended_early,
     describe,
+    is_own,
 )
-from robolink.controllers.softmotion.commands import is_own
+from robolink.controllers.softmotion.commands import Require
 from robolink.controllers.softmotion.condition import is_moving
 from robolink.controllers.softmotion.mailbox import Mailbox
 from robolink.controllers.softmotion.movement import factors, straight
@@ -108,11 +110,13 @@ class JogWatch:
         mailbox: Where it is commanded.
         jog: Which way.
         box: Where the tip may be meanwhile.
+        require: Refuses what a snapshot does not allow.
     """
 
-    def __init__(self, mailbox: Mailbox, jog: Jog, box: WorkBox) -> None:
+    def __init__(self, mailbox: Mailbox, jog: Jog, box: WorkBox, require: Require) -> None:
         self._mailbox = mailbox
         self._box = box
+        self._require = require
         self._end_draft = Command(0, Opcode.JOG, operands=(0, 0, jog.system, 0))
         self.draft = jog.draft(unit_um=mailbox.unit_um)
         self.request = describe(self.draft)
@@ -164,7 +168,7 @@ class JogWatch:
             self._marker = marker
             mailbox.wire.motions.jogging = True
             try:
-                self._command = mailbox.commands.start(self.draft)
+                self._command, _ = mailbox.commands.start(self.draft, self._require, nullcontext)
             except (ControllerError, ConfigError, StoppedError):
                 mailbox.wire.motions.jogging = False
                 mailbox.markers.clear(marker)

@@ -1,5 +1,7 @@
 """A movement of an axis group: the PLC accepts it, and heartbeats keep it going.
 
+When it is likely to end, which decides how often the waiter looks, and nothing else.
+
 How fast: the four numbers that go with a movement or a jog.
 
 Source: docs/reference/softmotion.md 2.3.
@@ -10,11 +12,11 @@ from contextlib import suppress
 from typing import Final
 
 from robolink.controllers.motion_group import stopped_before_edge
-from robolink.controllers.softmotion.answers import describe
-from robolink.controllers.softmotion.commands import is_own
+from robolink.controllers.softmotion.answers import describe, is_own
 from robolink.controllers.softmotion.condition import is_moving
+from robolink.controllers.softmotion.heartbeat import shared_out
 from robolink.controllers.softmotion.mailbox import Mailbox
-from robolink.controllers.softmotion.snapshots import LOOK_S
+from robolink.controllers.softmotion.snapshots import LOOK_S, POLL_S, poll_period_s
 from robolink.errors import (
     ConfigError,
     ControllerFaultError,
@@ -25,8 +27,19 @@ from robolink.errors import (
 )
 from robolink.messages import tr
 from robolink.model import Marker, MotionOutcome, MotionProfile, Path, Pose
-from robolink.protocols.mailbox import Command, CommandState, ErrorClass, Finished, Four, Opcode
-from robolink.timing import Deadline
+from robolink.protocols.mailbox import (
+    Command,
+    CommandState,
+    ErrorClass,
+    Finished,
+    Four,
+    GroupState,
+    Opcode,
+    Response,
+    Six,
+)
+from robolink.timing import NS_PER_S, Deadline
+from robolink.transport import MailboxHead
 
 _REST_S = 1.0
 """Longest time from the end of a movement to the stop of its group, in s."""
@@ -44,13 +57,35 @@ class SoftMotionMotion:
     Attributes:
         target: Where it goes.
         command: What was sent, with its number.
+
+    Args:
+        target: Where it goes.
+        command: What was sent, with its number.
+        marker: Of the movement.
+        mailbox: Where it was sent.
+        accepted: The snapshot that shows that the PLC accepted it.
+        queued: Whether it begins behind another movement.
     """
 
-    def __init__(self, target: Pose, command: Command, marker: Marker, mailbox: Mailbox) -> None:
+    def __init__(
+        self,
+        target: Pose,
+        command: Command,
+        marker: Marker,
+        mailbox: Mailbox,
+        *,
+        accepted: Response,
+        queued: bool,
+    ) -> None:
         self.target = target
         self.command = command
         self._marker = marker
         self._mailbox = mailbox
+        self._seen = accepted
+        self._begun_ns = mailbox.clock.now_ns()
+        # On a serial line beats are due all the time, and whole looks, which show the way, rare.
+        known = not queued and not mailbox.wire.whole_look_s and _foreseeable(command, accepted)
+        self._expected = ExpectedEnd(command, accepted, self._begun_ns) if known else None
         self._request = describe(command)
         self._halted = False
         self._end: Finished | None = None
@@ -139,29 +174,55 @@ class SoftMotionMotion:
         mailbox, sequence = self._mailbox, self.command.sequence
         if self.settled:
             return True
-        begun_ns = mailbox.wire.clock.now_ns()
-        slow = mailbox.wire.whole_look_s > 0
-        # On a slow line, the block that showed its acceptance, or a later one, must be enough.
-        now = mailbox.snapshots.latest if slow else mailbox.snapshots.take()
+        since_s = (mailbox.clock.now_ns() - self._begun_ns) / NS_PER_S
+        if since_s > _FIRST_LOOK_S and not mailbox.wire.whole_look_s:
+            self._seen = mailbox.snapshots.take()  # nobody has looked for a while
         while mailbox.wire.motions.end_of(sequence) is None:
-            if mailbox.wire.motions.missing(sequence, now):
+            if mailbox.wire.motions.missing(sequence, self._seen):
                 raise mailbox.wire.ended(self._vanished())
             if deadline.expired:
                 return False
-            wait_s = self._patience_s(deadline)
-            now = mailbox.snapshots.news(now, wait_s=wait_s, begun_ns=begun_ns)
+            self._seen = mailbox.snapshots.watched(self, wait_s=self._patience_s(deadline))
+            if self._on_course is not None:
+                self._on_course.saw(self._seen, mailbox.clock.now_ns())
         return True
 
+    def pause_s(self, now_ns: int) -> float:
+        """See :class:`~robolink.controllers.softmotion.snapshots.MotionWatch`."""
+        if self._on_course is not None:
+            return self._on_course.pause_s(now_ns)
+        return poll_period_s((now_ns - self._begun_ns) / NS_PER_S)
+
+    def foresees(self, head: MailboxHead) -> bool:
+        """See :class:`~robolink.controllers.softmotion.snapshots.MotionWatch`."""
+        seen = self._seen
+        if head[:4] == (seen.ack_head, seen.state, seen.error_class, seen.group_state):
+            return True
+        return (
+            (head.ack, head.error_class) == (self.command.sequence, ErrorClass.NONE)
+            and head.state in (CommandState.BUFFERED, CommandState.ACTIVE)
+            and head.group_state in (GroupState.STANDBY, GroupState.MOVING)
+        )
+
+    @property
+    def _on_course(self) -> "ExpectedEnd | None":
+        """When it is likely to end, as long as nothing here ends it early."""
+        return None if self._halted or self._mailbox.wire.latch.closed else self._expected
+
     def _patience_s(self, deadline: Deadline) -> float:
-        """Return how long to read the head alone while it shows nothing new.
+        """Return how long to do without a whole look while the head shows nothing unforeseen.
 
         Of a single movement it shows the end (it is the last command), and whatever else ends it:
         so on a slow line the whole block, which keeps the beat waiting, is read rarely.
         """
-        wire = self._mailbox.wire
-        if not wire.motions.alone:
-            return LOOK_S
-        return max(LOOK_S, min(_LOOKS_APART * wire.whole_look_s, deadline.remaining_s()))
+        wire, expected = self._mailbox.wire, self._on_course
+        if wire.whole_look_s and wire.motions.alone:
+            patience_s = max(LOOK_S, _LOOKS_APART * wire.whole_look_s)
+        elif expected is not None:
+            patience_s = expected.patience_s(wire.clock.now_ns())
+        else:
+            patience_s = LOOK_S
+        return min(patience_s, deadline.remaining_s())
 
     def _take_end(self) -> Finished:
         if self._end is None:
@@ -182,15 +243,102 @@ class SoftMotionMotion:
         """
         wire, snapshots = self._mailbox.wire, self._mailbox.snapshots
         deadline = Deadline.after(wire.clock, _REST_S)
-        now = snapshots.take()
+        now = self._seen if self._shows_end(self._seen) else snapshots.take()
         while is_moving(now) and not wire.motions.unfinished and not deadline.expired:
             now = snapshots.news(now, wait_s=deadline.remaining_s())
+
+    def _shows_end(self, now: Response) -> bool:
+        ends = self._mailbox.wire.motions.ends_in(now)
+        return any(end.sequence == self.command.sequence for end in ends)
 
     def _vanished(self) -> RemoteProtocolError:
         return RemoteProtocolError(
             tr("The PLC shows neither {request!r} nor how it ended.", request=self._request),
             remedy=tr("Another client has moved the group meanwhile."),
         )
+
+
+_FIRST_LOOK_S: Final = 0.05
+"""Time until the first look at a movement of which nothing is known, in s."""
+
+_LATE_S: Final = 0.012
+"""Time in s by which a PLC begins later and reports the end later: three cycles of 4 ms."""
+
+_SHORTEST_WATCH_S: Final = 0.004
+_WATCHES_PER_WAIT: Final = 20
+"""Number of looks, behind the expected end, in the time that the movement has taken."""
+
+
+class ExpectedEnd:
+    """When a movement is likely to end, for how often to look; nothing else follows from it.
+
+    A straight movement takes as long as its numbers say, unless it turns far, or the machine has an
+    override. A movement that brakes as it accelerates takes twice the time to its middle.
+
+    Args:
+        command: The movement.
+        start: A snapshot from its beginning.
+        now_ns: When that was taken.
+    """
+
+    def __init__(self, command: Command, start: Response, now_ns: int) -> None:
+        self._begun_ns = now_ns
+        self._start, self._target = start.tcp, command.pose
+        self._takes_s = 0.0
+        if command.opcode == Opcode.MOVE_LINEAR:
+            way = math.dist(start.tcp[:3], command.pose[:3])
+            self._takes_s = shortest_time_s(way, command.dynamics)
+        self._known = self._takes_s > 0
+        self._before = 0.0, 0.0
+
+    def saw(self, now: Response, now_ns: int) -> None:
+        """Learn from where the tip is now."""
+        if not all(map(math.isfinite, now.tcp)):
+            return
+        passed_s = (now_ns - self._begun_ns) / NS_PER_S
+        gone, left = _apart(self._start, now.tcp), _apart(now.tcp, self._target)
+        share = gone / (gone + left) if gone + left else 0.0
+        if share < _MIDDLE:
+            self._before = passed_s, share
+            if self._takes_s < 2 * passed_s:
+                self._takes_s, self._known = 2 * passed_s, False
+        elif not self._known:
+            before_s, before = self._before
+            at_s = before_s + (passed_s - before_s) * (_MIDDLE - before) / (share - before)
+            self._takes_s, self._known = 2 * at_s, True
+
+    def patience_s(self, now_ns: int) -> float:
+        """Return the time until the next whole look, in s.
+
+        There is one when the movement is likely to end, or ends at the earliest: until its middle
+        it takes as long again as it has taken.
+        """
+        left_s = self._left_s(now_ns)
+        if not self._known:
+            left_s = max(left_s, _FIRST_LOOK_S)
+        return shared_out(left_s, LOOK_S) if left_s > 0 else LOOK_S
+
+    def pause_s(self, now_ns: int) -> float:
+        """Return the time until the next look, in s; before the end a whole one will do."""
+        if not self._known or self._left_s(now_ns) > 0:
+            return math.inf
+        passed_s = (now_ns - self._begun_ns) / NS_PER_S
+        return min(max(passed_s / _WATCHES_PER_WAIT, _SHORTEST_WATCH_S), POLL_S)
+
+    def _left_s(self, now_ns: int) -> float:
+        return self._takes_s + _LATE_S - (now_ns - self._begun_ns) / NS_PER_S
+
+
+def _foreseeable(command: Command, start: Response) -> bool:
+    """Whether it can be told when a movement will end: no edge is foreseen."""
+    whole = command.opcode in (Opcode.MOVE_LINEAR, Opcode.MOVE_DIRECT)
+    return whole and all(map(math.isfinite, start.tcp))
+
+
+def _apart(one: Six, other: Six) -> float:
+    """Return how far apart two frames are: lengths and angles together, to compare ways by."""
+    turns = (math.remainder(a - b, 360.0) for a, b in zip(one[3:], other[3:], strict=True))
+    return math.hypot(math.dist(one[:3], other[:3]), *turns)
 
 
 class SoftMotionMotionUntilInput:
@@ -248,6 +396,7 @@ cycle in which the edge is seen (the companion's program does), and the mailbox 
 cycle time."""
 
 _UM_PER_MM: Final = 1000.0
+_MIDDLE: Final = 0.5
 
 
 def factors(percent: int) -> Four:
@@ -306,6 +455,20 @@ def run_up_mm(speed_mm_s: float) -> float:
     else:
         took_s = velocity / acceleration + acceleration / jerk
     return velocity * took_s / 2
+
+
+def shortest_time_s(distance: float, dynamics: Four) -> float:
+    """Return how long a straight movement takes at least, from rest to rest.
+
+    Args:
+        distance: Of its way, in the PLC's units.
+        dynamics: Its numbers. The jerk does not count: whether a group keeps it is up to its
+            profile (docs/reference/softmotion.md 2.3).
+    """
+    velocity, acceleration, *_ = dynamics
+    if distance >= velocity**2 / acceleration:
+        return distance / velocity + velocity / acceleration
+    return 2 * math.sqrt(distance / acceleration)
 
 
 def dynamics_of(profile: MotionProfile, *, unit_um: float) -> Four:

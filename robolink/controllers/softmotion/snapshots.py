@@ -11,9 +11,9 @@ F70).
 """
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Final, TypeVar
+from typing import Final, Protocol, TypeVar
 
-from robolink.controllers.softmotion.heartbeat import FROZEN_S, PlcHeartbeat
+from robolink.controllers.softmotion.heartbeat import FROZEN_S, MOST_OVER, PlcHeartbeat
 from robolink.controllers.softmotion.wire import MailboxWire
 from robolink.errors import (
     ConnectError,
@@ -36,7 +36,7 @@ from robolink.protocols.mailbox import (
     find_probe,
 )
 from robolink.timing import NS_PER_S, Deadline
-from robolink.transport import MailboxLink
+from robolink.transport import MailboxHead, MailboxLink
 
 PASSING: Final = frozenset({BlockFault.TORN, BlockFault.CRC})
 """Faults of a block read during a change; the next reading may be free of them."""
@@ -114,9 +114,28 @@ follows at once.
 LOOK_S: Final = 0.3
 """Longest time between two snapshots while waiting for something, in s."""
 
+
+class MotionWatch(Protocol):
+    """Somebody who waits for the end of a movement."""
+
+    def pause_s(self, now_ns: int) -> float:
+        """Return the time from look to look, in s."""
+
+    def foresees(self, head: MailboxHead) -> bool:
+        """Whether the head shows nothing but what is on its way, so that no snapshot is needed."""
+
+
+STEP_S: Final = 0.05
+"""Longest time for which a snapshot belongs to the present step, in s."""
+
 _READS: Final = 3
 
 T = TypeVar("T")
+
+
+def poll_period_s(waited_s: float) -> float:
+    """Return the time between two looks, in s, after waiting so long."""
+    return min(max(waited_s / _POLLS_PER_WAIT, _SHORTEST_POLL_S), POLL_S)
 
 
 class Snapshots:
@@ -131,6 +150,7 @@ class Snapshots:
         self._heartbeat = PlcHeartbeat()
         self._met: Response | None = None
         self._latest: Response | None = None
+        self._step: tuple[int, int, Response] | None = None
 
     @property
     def latest(self) -> Response:
@@ -179,12 +199,26 @@ class Snapshots:
             TransportBrokenError: The PLC has started anew, or runs another program.
             TransportError: The session is over.
         """
+        asked_ns, commands = self._wire.clock.now_ns(), self._wire.commands
         now = self._whole(self._wire.read_response, self._read_block, tr("The response block"))
         self._require_met(now)
         self._heartbeat.note(now.plc_heartbeat, self._wire.clock.now_ns())
         self._wire.motions.note(now)
-        self._latest = now
+        self._latest, self._step = now, (asked_ns, commands, now)
         return now
+
+    def of_this_step(self) -> Response | None:
+        """Return the snapshot that this step has read already; ``None`` where a new one is due.
+
+        It is no older than :data:`STEP_S`, and this client has sent no command since. It spares a
+        reading, but allows nothing: what allows a command is read after its marker, just before
+        the block (:class:`~robolink.controllers.softmotion.commands.CommandSender`).
+        """
+        if self._step is None:
+            return None
+        asked_ns, commands, now = self._step
+        old = self._wire.clock.now_ns() - asked_ns > STEP_S * NS_PER_S
+        return None if old or commands != self._wire.commands else now
 
     def slot(self, number: int, *, keep: bool = False) -> Slot:
         """Read one tool slot as :meth:`slots` does.
@@ -241,8 +275,7 @@ class Snapshots:
             self._heartbeat.note(head.heartbeat, now_ns)
             if head[:4] != known or now_ns >= until_ns:
                 break
-            waited_s = (now_ns - begun_ns) / NS_PER_S
-            period_s = min(max(waited_s / _POLLS_PER_WAIT, _SHORTEST_POLL_S), POLL_S)
+            period_s = poll_period_s((now_ns - begun_ns) / NS_PER_S)
             # Not beyond the end of the wait, when a jog is released.
             took_ns = now_ns - looked_ns
             pause_ns = min(period_s * NS_PER_S - took_ns, until_ns - now_ns)
@@ -251,8 +284,38 @@ class Snapshots:
             if pause_ns > took_ns:
                 clock.sleep(pause_ns / NS_PER_S)
             looked_ns = clock.now_ns()
+        return self._fresh()
+
+    def watched(self, watch: MotionWatch, *, wait_s: float = LOOK_S) -> Response:
+        """Return a snapshot once something unforeseen shows, or ``wait_s`` has passed.
+
+        Args:
+            watch: Says when to look, and what is foreseen.
+            wait_s: Longest wait for something unforeseen.
+
+        Raises:
+            TransportTimeoutError: The PLC's heartbeat stands still; the session is over.
+        """
+        clock = self._wire.clock
+        over, took_s = Deadline.after(clock, wait_s), 0.0
+        while True:
+            pause_s = max(0.0, watch.pause_s(clock.now_ns()) - took_s)
+            left_s = over.remaining_s()
+            self._wire.pause(left_s if left_s < MOST_OVER * pause_s else pause_s)
+            if over.expired:
+                break  # the snapshot shows what the head would
+            asked_ns = clock.now_ns()
+            head = self._wire.read_head()
+            took_s = (clock.now_ns() - asked_ns) / NS_PER_S
+            self._heartbeat.note(head.heartbeat, clock.now_ns())
+            if not watch.foresees(head):
+                break
+        return self._fresh()
+
+    def _fresh(self) -> Response:
+        """Return a snapshot of a PLC that runs."""
         now = self.take()
-        if self._heartbeat.frozen(clock.now_ns()):
+        if self._heartbeat.frozen(self._wire.clock.now_ns()):
             raise self._wire.ended(
                 TransportTimeoutError(
                     tr("The heartbeat of {identity} has stopped.", identity=self._wire.identity),

@@ -18,7 +18,12 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from typing import Final, TypeVar
 
 from robolink.checkpoints import Checkpoint, checkpoint
-from robolink.controllers.softmotion.heartbeat import ClientHeartbeat, Turns
+from robolink.controllers.softmotion.heartbeat import (
+    PAUSED_BEAT_S,
+    ClientHeartbeat,
+    Turns,
+    shared_out,
+)
 from robolink.errors import (
     BusyError,
     RemoteProtocolError,
@@ -55,7 +60,12 @@ class MotionTracker:
     @property
     def unfinished(self) -> bool:
         """Whether something of ours may be moving, so that the PLC wants our heartbeat."""
-        return self.jogging or None in self._ends.values()
+        return self.jogging or self.going
+
+    @property
+    def going(self) -> bool:
+        """Whether the end of a movement of ours was not seen."""
+        return None in self._ends.values()
 
     @property
     def alone(self) -> bool:
@@ -97,14 +107,18 @@ class MotionTracker:
 
     def note(self, now: Response) -> None:
         """Search a snapshot for ends."""
-        if None not in self._ends.values():
+        if not self.going:
             return
-        ends = [end for end in now.finished if end.sequence]
-        if now.ack_owner == self._owner and has_ended(now.state):
-            ends.append(Finished(now.ack_head, now.state, now.error_class))
-        for end in ends:
-            if has_ended(end.state) and self._ends.get(end.sequence, end) is None:
+        for end in self.ends_in(now):
+            if self._ends.get(end.sequence, end) is None:
                 self._ends[end.sequence] = end
+
+    def ends_in(self, now: Response) -> list[Finished]:
+        """Return the ends of movements that a snapshot shows."""
+        ends = [end for end in now.finished if end.sequence]
+        if now.ack_owner == self._owner:
+            ends.append(Finished(now.ack_head, now.state, now.error_class))
+        return [end for end in ends if has_ended(end.state)]
 
     def missing(self, sequence: int, now: Response) -> bool:
         """Whether a snapshot shows neither the movement nor its end."""
@@ -152,6 +166,7 @@ class MailboxWire:
         latch: Refuses commands while a stop is active.
         timeout_s: Longest wait for the PLC to acknowledge a command.
         exchanges: Requests sent so far.
+        commands: Command blocks among them.
         look_back: Looks over another link at what ended the session; ``None`` before the
             meeting.
     """
@@ -170,7 +185,7 @@ class MailboxWire:
         self.motions = MotionTracker(owner)
         self.latch = StopLatch(link.identity)
         self.timeout_s = timeout_s
-        self.exchanges = 0
+        self.exchanges = self.commands = 0
         self.look_back: Callable[[MailboxLink], RobolinkError | None] | None = None
 
     @property
@@ -222,6 +237,7 @@ class MailboxWire:
         self._require_alive()
         with self._turn(), self._gate:
             self.exchanges += 1
+            self.commands += 1
             try:
                 self._link.write_command(words)
                 return
@@ -276,6 +292,24 @@ class MailboxWire:
         is unfinished is none of its business.
         """
         if self.epoch and not self.motions.unfinished and self.alive:
+            self.beat()
+
+    def pause(self, seconds: float) -> None:
+        """Exchange nothing but beats for a time; on a network other threads may exchange.
+
+        A stop of this process ends the pause of who waits on a movement.
+        """
+        if not self._attends:
+            self.clock.sleep(seconds)
+            return
+        stopped = self.latch.closed
+        part_s = shared_out(seconds, PAUSED_BEAT_S)
+        over = Deadline.after(self.clock, seconds)
+        while True:
+            with nullcontext() if self.whole_look_s else self._turns.pausing():
+                self.clock.sleep(min(part_s, over.remaining_s()))
+            if over.expired or (self.latch.closed and not stopped):
+                return
             self.beat()
 
     @property

@@ -33,28 +33,28 @@ EPSON SET_THEN_UNDO points: * 174, commit 16, commit after 8, wire sent 29, proc
 EPSON MOVE_AND_LEAVE requests: * 29, Move_ 1, Login 1, Print Tool 6
 EPSON MOVE_AND_LEAVE points: * 156, commit 8, commit after 4, wire sent 29, procedure 3,
     question 1, Tool_ 1, Move_ 5, lock Move 1
-SOFTMOTION CHANGE_NOZZLE requests: * 1700, WRITE_TOOL 1, SELECT_TOOL 2, MOVE_LINEAR 20,
-    MOVE_DIRECT 3, OWNERSHIP 2, read_slot 6, read_response 308, beat 294
-SOFTMOTION CHANGE_NOZZLE points: * 2298, commit 134, commit after 67, wire sent 30, procedure
-    30, question 18, step 16, WRITE_TOOL 5, SELECT_TOOL 12, MOVE_LINEAR 100, MOVE_DIRECT 15,
-    lock 2103 20, lock 5205 1
-SOFTMOTION SET_TOOL requests: * 30, WRITE_TOOL 1, OWNERSHIP 2, read_slot 4, read_response 8
-SOFTMOTION SET_TOOL points: * 53, commit 4, commit after 2, wire sent 3, procedure 1, question
-    1, WRITE_TOOL 5, lock 5205 1
-SOFTMOTION SET_TWO requests: * 42, WRITE_TOOL 2, OWNERSHIP 2, read_slot 9, read_response 12
-SOFTMOTION SET_TWO points: * 81, commit 12, commit after 6, wire sent 4, procedure 2, question
-    1, WRITE_TOOL 10, lock 5205 2
+SOFTMOTION CHANGE_NOZZLE requests: * 616, WRITE_TOOL 1, SELECT_TOOL 2, MOVE_LINEAR 17,
+    MOVE_DIRECT 3, OWNERSHIP 2, read_slot 6, read_response 226, beat 289
+SOFTMOTION CHANGE_NOZZLE points: * 1150, commit 144, commit after 72, wire sent 27, procedure
+    30, question 15, step 16, WRITE_TOOL 6, SELECT_TOOL 12, MOVE_LINEAR 85, MOVE_DIRECT 15, lock
+    2103 17, lock 5205 1
+SOFTMOTION SET_TOOL requests: * 27, WRITE_TOOL 1, OWNERSHIP 2, read_slot 4, read_response 11
+SOFTMOTION SET_TOOL points: * 55, commit 4, commit after 2, wire sent 3, procedure 3, question
+    1, WRITE_TOOL 6, lock 5205 1
+SOFTMOTION SET_TWO requests: * 42, WRITE_TOOL 2, OWNERSHIP 2, read_slot 9, read_response 19
+SOFTMOTION SET_TWO points: * 91, commit 12, commit after 6, wire sent 4, procedure 5, question
+    1, WRITE_TOOL 12, lock 5205 2
 SOFTMOTION SELECT_TOOL requests: * 7, read_response 4
 SOFTMOTION SELECT_TOOL points: * 13, procedure 1, question 1, SELECT_TOOL 1
-SOFTMOTION UNDO requests: * 42, WRITE_TOOL 1, OWNERSHIP 2, read_slot 10, read_response 14
-SOFTMOTION UNDO points: * 88, commit 16, commit after 8, wire sent 4, procedure 3, question 1,
-    WRITE_TOOL 5, lock 5205 1
-SOFTMOTION SET_THEN_UNDO requests: * 50, WRITE_TOOL 3, OWNERSHIP 2, read_slot 10, read_response
-    15
-SOFTMOTION SET_THEN_UNDO points: * 102, commit 16, commit after 8, wire sent 5, procedure 3,
-    question 3, WRITE_TOOL 15, lock 5205 3
-SOFTMOTION MOVE_AND_LEAVE requests: * 38, MOVE_LINEAR 1, OWNERSHIP 2, read_response 18
-SOFTMOTION MOVE_AND_LEAVE points: * 80, commit 8, commit after 4, wire sent 4, procedure 3,
+SOFTMOTION UNDO requests: * 46, WRITE_TOOL 1, OWNERSHIP 2, read_slot 10, read_response 22
+SOFTMOTION UNDO points: * 106, commit 18, commit after 9, wire sent 4, procedure 7, question 1,
+    WRITE_TOOL 6, lock 5205 1
+SOFTMOTION SET_THEN_UNDO requests: * 49, WRITE_TOOL 3, OWNERSHIP 2, read_slot 10, read_response
+    22
+SOFTMOTION SET_THEN_UNDO points: * 115, commit 16, commit after 8, wire sent 5, procedure 10,
+    question 3, WRITE_TOOL 18, lock 5205 3
+SOFTMOTION MOVE_AND_LEAVE requests: * 39, MOVE_LINEAR 1, OWNERSHIP 2, read_response 18
+SOFTMOTION MOVE_AND_LEAVE points: * 81, commit 8, commit after 4, wire sent 4, procedure 3,
     question 1, SELECT_TOOL 1, MOVE_LINEAR 5, lock 2103 1
 EPSON_SERIAL CHANGE_NOZZLE requests: * 165, TLSet 6, Tool_ 2, Move_ 17, Go_ 3, Login 1, Print
     Tool 65
@@ -77,89 +77,89 @@ EPSON_SERIAL SET_THEN_UNDO points: * 170, commit 16, commit after 8, wire sent 2
 EPSON_SERIAL MOVE_AND_LEAVE requests: * 28, Move_ 1, Login 1, Print Tool 6
 EPSON_SERIAL MOVE_AND_LEAVE points: * 152, commit 8, commit after 4, wire sent 29, procedure 3,
     question 1, Tool_ 1, Move_ 5, lock Move 1
-MODBUS_TCP CHANGE_NOZZLE requests: * 1357, WRITE_TOOL 1, SELECT_TOOL 2, MOVE_LINEAR 20,
-    MOVE_DIRECT 3, OWNERSHIP 2, read_slot 6, read_response 283, beat 290
-MODBUS_TCP CHANGE_NOZZLE points: * 1930, commit 134, commit after 67, wire sent 30, procedure
-    30, question 18, step 16, WRITE_TOOL 5, SELECT_TOOL 12, MOVE_LINEAR 100, MOVE_DIRECT 15,
+MODBUS_TCP CHANGE_NOZZLE requests: * 559, WRITE_TOOL 1, SELECT_TOOL 2, MOVE_LINEAR 20,
+    MOVE_DIRECT 3, OWNERSHIP 2, read_slot 6, read_response 224, beat 264
+MODBUS_TCP CHANGE_NOZZLE points: * 1092, commit 152, commit after 76, wire sent 30, procedure
+    33, question 18, step 16, WRITE_TOOL 6, SELECT_TOOL 12, MOVE_LINEAR 100, MOVE_DIRECT 15,
     lock 2103 20, lock 5205 1
-MODBUS_TCP SET_TOOL requests: * 20, WRITE_TOOL 1, OWNERSHIP 2, read_slot 4, read_response 8
-MODBUS_TCP SET_TOOL points: * 43, commit 4, commit after 2, wire sent 3, procedure 1, question
-    1, WRITE_TOOL 5, lock 5205 1
-MODBUS_TCP SET_TWO requests: * 31, WRITE_TOOL 2, OWNERSHIP 2, read_slot 9, read_response 12
-MODBUS_TCP SET_TWO points: * 70, commit 12, commit after 6, wire sent 4, procedure 2, question
-    1, WRITE_TOOL 10, lock 5205 2
+MODBUS_TCP SET_TOOL requests: * 23, WRITE_TOOL 1, OWNERSHIP 2, read_slot 4, read_response 11
+MODBUS_TCP SET_TOOL points: * 51, commit 4, commit after 2, wire sent 3, procedure 3, question
+    1, WRITE_TOOL 6, lock 5205 1
+MODBUS_TCP SET_TWO requests: * 38, WRITE_TOOL 2, OWNERSHIP 2, read_slot 9, read_response 19
+MODBUS_TCP SET_TWO points: * 87, commit 12, commit after 6, wire sent 4, procedure 5, question
+    1, WRITE_TOOL 12, lock 5205 2
 MODBUS_TCP SELECT_TOOL requests: * 6, read_response 4
 MODBUS_TCP SELECT_TOOL points: * 12, procedure 1, question 1, SELECT_TOOL 1
-MODBUS_TCP UNDO requests: * 34, WRITE_TOOL 1, OWNERSHIP 2, read_slot 10, read_response 14
-MODBUS_TCP UNDO points: * 80, commit 16, commit after 8, wire sent 4, procedure 3, question 1,
-    WRITE_TOOL 5, lock 5205 1
-MODBUS_TCP SET_THEN_UNDO requests: * 37, WRITE_TOOL 3, OWNERSHIP 2, read_slot 10, read_response
-    15
-MODBUS_TCP SET_THEN_UNDO points: * 89, commit 16, commit after 8, wire sent 5, procedure 3,
-    question 3, WRITE_TOOL 15, lock 5205 3
-MODBUS_TCP MOVE_AND_LEAVE requests: * 29, MOVE_LINEAR 1, OWNERSHIP 2, read_response 17
-MODBUS_TCP MOVE_AND_LEAVE points: * 70, commit 8, commit after 4, wire sent 4, procedure 3,
+MODBUS_TCP UNDO requests: * 42, WRITE_TOOL 1, OWNERSHIP 2, read_slot 10, read_response 22
+MODBUS_TCP UNDO points: * 102, commit 18, commit after 9, wire sent 4, procedure 7, question 1,
+    WRITE_TOOL 6, lock 5205 1
+MODBUS_TCP SET_THEN_UNDO requests: * 44, WRITE_TOOL 3, OWNERSHIP 2, read_slot 10, read_response
+    22
+MODBUS_TCP SET_THEN_UNDO points: * 110, commit 16, commit after 8, wire sent 5, procedure 10,
+    question 3, WRITE_TOOL 18, lock 5205 3
+MODBUS_TCP MOVE_AND_LEAVE requests: * 28, MOVE_LINEAR 1, OWNERSHIP 2, read_response 16
+MODBUS_TCP MOVE_AND_LEAVE points: * 68, commit 8, commit after 4, wire sent 4, procedure 3,
     question 1, SELECT_TOOL 1, MOVE_LINEAR 5, lock 2103 1
-MODBUS_RTU CHANGE_NOZZLE requests: * 1197, WRITE_TOOL 1, SELECT_TOOL 2, MOVE_LINEAR 20,
-    MOVE_DIRECT 3, OWNERSHIP 2, read_slot 6, read_response 204, beat 362
-MODBUS_RTU CHANGE_NOZZLE points: * 1694, commit 140, commit after 70, wire sent 30, procedure
-    30, question 18, step 16, WRITE_TOOL 5, SELECT_TOOL 12, MOVE_LINEAR 100, MOVE_DIRECT 15,
+MODBUS_RTU CHANGE_NOZZLE requests: * 1159, WRITE_TOOL 1, SELECT_TOOL 2, MOVE_LINEAR 20,
+    MOVE_DIRECT 3, OWNERSHIP 2, read_slot 6, read_response 193, beat 354
+MODBUS_RTU CHANGE_NOZZLE points: * 1675, commit 164, commit after 82, wire sent 30, procedure
+    33, question 18, step 16, WRITE_TOOL 6, SELECT_TOOL 12, MOVE_LINEAR 100, MOVE_DIRECT 15,
     lock 2103 20, lock 5205 1
-MODBUS_RTU SET_TOOL requests: * 21, WRITE_TOOL 1, OWNERSHIP 2, read_slot 4, read_response 8
-MODBUS_RTU SET_TOOL points: * 43, commit 4, commit after 2, wire sent 3, procedure 1, question
-    1, WRITE_TOOL 5, lock 5205 1
-MODBUS_RTU SET_TWO requests: * 32, WRITE_TOOL 2, OWNERSHIP 2, read_slot 9, read_response 12
-MODBUS_RTU SET_TWO points: * 70, commit 12, commit after 6, wire sent 4, procedure 2, question
-    1, WRITE_TOOL 10, lock 5205 2
+MODBUS_RTU SET_TOOL requests: * 24, WRITE_TOOL 1, OWNERSHIP 2, read_slot 4, read_response 11
+MODBUS_RTU SET_TOOL points: * 51, commit 4, commit after 2, wire sent 3, procedure 3, question
+    1, WRITE_TOOL 6, lock 5205 1
+MODBUS_RTU SET_TWO requests: * 39, WRITE_TOOL 2, OWNERSHIP 2, read_slot 9, read_response 19
+MODBUS_RTU SET_TWO points: * 87, commit 12, commit after 6, wire sent 4, procedure 5, question
+    1, WRITE_TOOL 12, lock 5205 2
 MODBUS_RTU SELECT_TOOL requests: * 7, read_response 4
 MODBUS_RTU SELECT_TOOL points: * 12, procedure 1, question 1, SELECT_TOOL 1
-MODBUS_RTU UNDO requests: * 35, WRITE_TOOL 1, OWNERSHIP 2, read_slot 10, read_response 14
-MODBUS_RTU UNDO points: * 80, commit 16, commit after 8, wire sent 4, procedure 3, question 1,
-    WRITE_TOOL 5, lock 5205 1
-MODBUS_RTU SET_THEN_UNDO requests: * 38, WRITE_TOOL 3, OWNERSHIP 2, read_slot 10, read_response
-    15
-MODBUS_RTU SET_THEN_UNDO points: * 89, commit 16, commit after 8, wire sent 5, procedure 3,
-    question 3, WRITE_TOOL 15, lock 5205 3
+MODBUS_RTU UNDO requests: * 43, WRITE_TOOL 1, OWNERSHIP 2, read_slot 10, read_response 22
+MODBUS_RTU UNDO points: * 102, commit 18, commit after 9, wire sent 4, procedure 7, question 1,
+    WRITE_TOOL 6, lock 5205 1
+MODBUS_RTU SET_THEN_UNDO requests: * 45, WRITE_TOOL 3, OWNERSHIP 2, read_slot 10, read_response
+    22
+MODBUS_RTU SET_THEN_UNDO points: * 110, commit 16, commit after 8, wire sent 5, procedure 10,
+    question 3, WRITE_TOOL 18, lock 5205 3
 MODBUS_RTU MOVE_AND_LEAVE requests: * 33, MOVE_LINEAR 1, OWNERSHIP 2, read_response 15, beat 5
 MODBUS_RTU MOVE_AND_LEAVE points: * 71, commit 8, commit after 4, wire sent 4, procedure 3,
     question 1, SELECT_TOOL 1, MOVE_LINEAR 5, lock 2103 1
-CANOPEN CHANGE_NOZZLE requests: * 807, WRITE_TOOL 1, SELECT_TOOL 2, MOVE_LINEAR 20, MOVE_DIRECT
-    3, OWNERSHIP 2, read_slot 6, read_response 269, snapshot 269, beat 232
-CANOPEN CHANGE_NOZZLE points: * 1391, commit 134, commit after 67, wire sent 30, procedure 30,
-    question 18, step 16, WRITE_TOOL 5, SELECT_TOOL 12, MOVE_LINEAR 100, MOVE_DIRECT 15, lock
+CANOPEN CHANGE_NOZZLE requests: * 754, WRITE_TOOL 1, SELECT_TOOL 2, MOVE_LINEAR 20, MOVE_DIRECT
+    3, OWNERSHIP 2, read_slot 6, read_response 224, snapshot 224, beat 268
+CANOPEN CHANGE_NOZZLE points: * 1128, commit 152, commit after 76, wire sent 30, procedure 33,
+    question 18, step 16, WRITE_TOOL 6, SELECT_TOOL 12, MOVE_LINEAR 100, MOVE_DIRECT 15, lock
     2103 20, lock 5205 1
-CANOPEN SET_TOOL requests: * 24, WRITE_TOOL 1, OWNERSHIP 2, read_slot 4, read_response 8,
-    snapshot 8
-CANOPEN SET_TOOL points: * 45, commit 4, commit after 2, wire sent 3, procedure 1, question 1,
-    WRITE_TOOL 5, lock 5205 1
-CANOPEN SET_TWO requests: * 38, WRITE_TOOL 2, OWNERSHIP 2, read_slot 9, read_response 12,
-    snapshot 12
-CANOPEN SET_TWO points: * 72, commit 12, commit after 6, wire sent 4, procedure 2, question 1,
-    WRITE_TOOL 10, lock 5205 2
+CANOPEN SET_TOOL requests: * 30, WRITE_TOOL 1, OWNERSHIP 2, read_slot 4, read_response 11,
+    snapshot 11
+CANOPEN SET_TOOL points: * 54, commit 4, commit after 2, wire sent 3, procedure 3, question 1,
+    WRITE_TOOL 6, lock 5205 1
+CANOPEN SET_TWO requests: * 52, WRITE_TOOL 2, OWNERSHIP 2, read_slot 9, read_response 19,
+    snapshot 19
+CANOPEN SET_TWO points: * 92, commit 12, commit after 6, wire sent 4, procedure 5, question 1,
+    WRITE_TOOL 12, lock 5205 2
 CANOPEN SELECT_TOOL requests: * 9, read_response 4, snapshot 4
 CANOPEN SELECT_TOOL points: * 13, procedure 1, question 1, SELECT_TOOL 1
-CANOPEN UNDO requests: * 43, WRITE_TOOL 1, OWNERSHIP 2, read_slot 10, read_response 14, snapshot
-    14
-CANOPEN UNDO points: * 84, commit 16, commit after 8, wire sent 4, procedure 3, question 1,
-    WRITE_TOOL 5, lock 5205 1
-CANOPEN SET_THEN_UNDO requests: * 46, WRITE_TOOL 3, OWNERSHIP 2, read_slot 10, read_response 15,
-    snapshot 15
-CANOPEN SET_THEN_UNDO points: * 93, commit 16, commit after 8, wire sent 5, procedure 3,
-    question 3, WRITE_TOOL 15, lock 5205 3
-CANOPEN MOVE_AND_LEAVE requests: * 39, MOVE_LINEAR 1, OWNERSHIP 2, read_response 17, snapshot 17
-CANOPEN MOVE_AND_LEAVE points: * 74, commit 8, commit after 4, wire sent 4, procedure 3,
+CANOPEN UNDO requests: * 59, WRITE_TOOL 1, OWNERSHIP 2, read_slot 10, read_response 22, snapshot
+    22
+CANOPEN UNDO points: * 107, commit 18, commit after 9, wire sent 4, procedure 7, question 1,
+    WRITE_TOOL 6, lock 5205 1
+CANOPEN SET_THEN_UNDO requests: * 60, WRITE_TOOL 3, OWNERSHIP 2, read_slot 10, read_response 22,
+    snapshot 22
+CANOPEN SET_THEN_UNDO points: * 114, commit 16, commit after 8, wire sent 5, procedure 10,
+    question 3, WRITE_TOOL 18, lock 5205 3
+CANOPEN MOVE_AND_LEAVE requests: * 37, MOVE_LINEAR 1, OWNERSHIP 2, read_response 16, snapshot 16
+CANOPEN MOVE_AND_LEAVE points: * 72, commit 8, commit after 4, wire sent 4, procedure 3,
     question 1, SELECT_TOOL 1, MOVE_LINEAR 5, lock 2103 1
-REGISTER_MAP SET_TOOL requests: * 26, fc16 1, fc5 2, fc3 10
-REGISTER_MAP SET_TOOL points: * 28, commit 4, commit after 2, wire sent 3, procedure 1, question
+REGISTER_MAP SET_TOOL requests: * 31, fc16 1, fc5 2, fc3 14
+REGISTER_MAP SET_TOOL points: * 36, commit 4, commit after 2, wire sent 3, procedure 3, question
     1, fc16 1, fc5 2
-REGISTER_MAP SET_TWO requests: * 54, fc16 2, fc5 4, fc3 24
-REGISTER_MAP SET_TWO points: * 63, commit 12, commit after 6, wire sent 6, procedure 2, question
+REGISTER_MAP SET_TWO requests: * 64, fc16 2, fc5 4, fc3 32
+REGISTER_MAP SET_TWO points: * 74, commit 12, commit after 6, wire sent 6, procedure 5, question
     1, fc16 2, fc5 4
-REGISTER_MAP UNDO requests: * 55, fc16 2, fc5 4, fc3 24
-REGISTER_MAP UNDO points: * 67, commit 16, commit after 8, wire sent 6, procedure 2, question 1,
+REGISTER_MAP UNDO requests: * 65, fc16 2, fc5 4, fc3 32
+REGISTER_MAP UNDO points: * 79, commit 16, commit after 8, wire sent 6, procedure 6, question 1,
     fc16 2, fc5 4
-REGISTER_MAP SET_THEN_UNDO requests: * 75, fc16 3, fc5 6, fc3 30
-REGISTER_MAP SET_THEN_UNDO points: * 88, commit 16, commit after 8, wire sent 9, procedure 3,
+REGISTER_MAP SET_THEN_UNDO requests: * 96, fc16 3, fc5 6, fc3 48
+REGISTER_MAP SET_THEN_UNDO points: * 113, commit 16, commit after 8, wire sent 9, procedure 10,
     question 3, fc16 3, fc5 6
 PROGRAM PRODUCE requests: * 14, HELLO 1, BEGIN 1, POSE 5, SOLVE 1, WROTE 1, PROOF 2, JUDGE 1,
     KEPT 1

@@ -198,6 +198,11 @@ def test_what_is_added_on_the_way_up_is_listed_in_its_order():
     assert alone.remedy == "Mend it."
 
 
+def test_an_error_without_words_still_says_what_to_do():
+    assert error_lines("", "Wait.", width=SCREEN) == "robolink: \n  Wait."
+    assert error_lines("", width=0) == "robolink: "
+
+
 def test_a_remedy_stands_below_a_list_in_a_traceback():
     assert str(RobolinkError("2 errors:\n    a\n    b", remedy="Mend it.")).endswith("b\nMend it.")
 

@@ -113,7 +113,9 @@ class Sentences(Values):
 
     def _is_error(self, node: Node, scope: Scope) -> bool:
         said = [annotation for annotation, _ in self._annotations(node, scope)]
-        return bool(said) and all(re.fullmatch(r"[\w\s().,|]*Error\W*", one) for one in said)
+        return bool(said) and all(
+            re.fullmatch(r"[\w\s().,|]*(Error|Exception)\W*", one) for one in said
+        )
 
     def _part(self, part: Node, scope: Scope) -> list[Said] | None:
         if not isinstance(part, ast.FormattedValue):

@@ -74,8 +74,8 @@ def counted(shown: str) -> int:
 
 
 def _in_lines(parts: Iterable[str], width: int) -> str:
-    first, *rest = filter(None, parts)
-    lines = [f"robolink: {first}", *(f"  {one}" for one in rest)]
+    first, *rest = parts
+    lines = [f"robolink: {first}", *(f"  {one}" for one in rest if one)]
     return "\n".join(within(_long_names_below(one), width) if width else one for one in lines)
 
 

@@ -12,7 +12,7 @@ from robolink.controllers import Jog
 from robolink.model import MotionOutcome, MotionProfile, Path, ToolOffset, WorkBox
 from robolink.protocols.mailbox import Bits, GroupState, Opcode, next_number
 from tests.contract._softmotion_cell import BACKENDS, LINKS, QUICK, above, served
-from tests.contract._wire_promises import (
+from tests.contract._softmotion_wire_promises import (
     MOVES,
     RIDES,
     WireLog,

@@ -6,7 +6,7 @@ The judge is held to its own promises: from a log that has all of them, one is t
 import pytest
 from robolink_simulators.epson.options import EpsonOptions
 
-from tests.contract._movement_promises import Speeds, broken_promises, movements
+from tests.contract._epson_wire_promises import Speeds, broken_promises, movements
 from tests.contract._shipped_cells import touched
 
 pytestmark = pytest.mark.simulator_only

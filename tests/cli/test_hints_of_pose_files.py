@@ -64,17 +64,16 @@ def shown(tmp_path, capsys):
 
 
 def hints_in(remedy):
-    """Return the options that a remedy names, as typed."""
+    """Return the options that a remedy names, as typed: behind the option, or on lines below it."""
     found = []
-    columns = re.search(r"--columns(?:, such as|:) (.+?)(?::|;? '-'|\. |\.$)", remedy)
-    if columns:
-        found += [("--columns", one.strip()) for one in columns[1].split(";")]
-    euler = re.search(r"--euler: (.+?)\.(?: |$)", remedy)
-    if euler:
-        found += [("--euler", one.split(":")[0].strip()) for one in euler[1].split(";")]
-    length = re.search(r"--length: (.+?)\.(?: |$)", remedy)
-    if length:
-        found += [("--length", one) for one in re.findall(r"\w+", length[1]) if one != "or"]
+    option = ""
+    for line in remedy.splitlines():
+        named = re.search(r"(--\w+)", line)
+        if named is None:
+            found += [(option, line.strip().split(":")[0])] if option else []
+            continue
+        option, (_, _, behind) = named[1], line.partition(f"{named[1]}:")
+        found += [(option, one) for one in re.findall(r"\w+", behind) if one != "or"]
     return found
 
 

@@ -180,7 +180,7 @@ def test_one_that_can_keep_its_state_no_longer_says_so_and_ends(
     error = json.loads(told.out)["error"]
     assert "cannot save its state" in error["what"]
     assert str(kept) in error["what"]
-    assert error["what"].startswith("a: ") == (what[1] == "run")
+    assert error["what"].startswith("The simulated cell a cannot run:") == (what[1] == "run")
     assert error["remedy"]
     assert "Traceback" not in told.err
 

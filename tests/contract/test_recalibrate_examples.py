@@ -52,7 +52,8 @@ def test_the_error_to_the_truth_is_what_the_interval_leads_to_expect(cell, examp
     assert took_s < MOST_S.get(example, took_s + 1)
     document = json.loads(shown.out)
     assert document["took_s"] == pytest.approx(took_s, abs=0.2)
-    assert 0.9 * asked < document["exchanges"] < asked  # without connecting and logging out
+    # Without connecting, what comes before the consent, and logging out.
+    assert asked - 60 < document["exchanges"] < asked
     for tool in document["tools"]:
         number, halves = tool["tool"], tool["fit"]["half_width95"]
         found = cell.simulator.machine.tools.get(number)

@@ -281,7 +281,7 @@ def test_a_can_node_whose_heartbeat_is_lost_leaves_the_movement_unknown(tmp_path
         with robolink.connect(host.url, outcomes=outcomes) as controller:
             motion = lift(controller)
             host.close()
-            with pytest.raises(OutcomeUnknownError, match=r"MOVE_LINEAR.*heartbeat") as unknown:
+            with pytest.raises(OutcomeUnknownError, match=r"(?s)MOVE_LINEAR.*heartbeat") as unknown:
                 motion.wait(timeout_s=30)
     assert "robot stays blocked" in unknown.value.remedy
     assert [marker.request for marker in outcomes.open_markers()] == [unknown.value.request]

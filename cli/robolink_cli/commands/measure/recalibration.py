@@ -222,7 +222,7 @@ class Recalibration:
                         document = self._plan(controller, run)
                     else:
                         self._consent(controller, run)
-                        document = self._carried_out(controller, run)
+                        document = self._carried_out(controller, run, order)
         payload = with_order(document, order)
         self.events.emit("result", **payload)
         if not self.events.on:
@@ -388,8 +388,14 @@ class Recalibration:
             ],
         }
 
-    def _carried_out(self, controller: Controller, run: RecipeRun) -> dict[str, object]:
-        """Run the recipe; return its document, with how long it took by the controller's clock."""
+    def _carried_out(
+        self, controller: Controller, run: RecipeRun, order: Order | None
+    ) -> dict[str, object]:
+        """Run the recipe; return its document, with how long it took by the controller's clock.
+
+        The result of an order is what its record holds, the same however often it is delivered: the
+        record is made before the robot has come to its end.
+        """
         clock, answered = controller.clock, controller.exchanges
         began_ns = clock.now_ns()
         report = run.run()
@@ -403,6 +409,8 @@ class Recalibration:
                 exchanges=exchanges,
             )
         )
+        if order is not None:
+            return document
         return {**document, "took_s": took_s, "exchanges": exchanges}
 
     def _told(

@@ -120,16 +120,27 @@ class Crossing:
         Raises:
             CalibrationError: ``no_crossing`` when it ran along the beam.
         """
+        return math.copysign(1.0, self.across(beam))
+
+    def across(self, beam: Beam) -> float:
+        """Return by how much the travel led across ``beam``, in mm per mm, to its left above 0.
+
+        What shifts a crossing along its travel shifts it by this share across the beam.
+
+        Raises:
+            CalibrationError: ``no_crossing`` when it ran along the beam.
+        """
         nx, ny = beam.normal
         dx, dy = self.exit.x_mm - self.entry.x_mm, self.exit.y_mm - self.entry.y_mm
-        across = nx * dx + ny * dy
-        if abs(across) <= _ALONG_THE_BEAM * math.hypot(dx, dy):
+        way_mm = math.hypot(dx, dy)
+        across_mm = nx * dx + ny * dy
+        if abs(across_mm) <= _ALONG_THE_BEAM * way_mm:
             raise CalibrationError(
                 "no_crossing",
                 tr("One pass went along beam {beam} instead of across it.", beam=self.beam + 1),
                 remedy=tr("Drive the tip straight across each beam."),
             )
-        return math.copysign(1.0, across)
+        return across_mm / way_mm
 
 
 @refuses_by_name

@@ -218,11 +218,13 @@ def solve_crossed_beams(
         moved_mm=tuple(fit.x[system.moved].tolist()),
         step_mm=step_mm,
     )
-    # The crossings of the shaft add unknowns used only by them, so they check no other crossing.
-    own = system.width - system.lean.start if shaft else 0
+    # The crossings of the shaft add unknowns used only by them, so they check no other crossing,
+    # unless both have their lags in common.
+    own = system.width - system.lean.start if shaft and not system.one_lag else 0
+    checked = len(crossings) if not system.one_lag else len(a)
     result = judged(
         result,
-        fit.residuals[: len(crossings), None],
+        fit.residuals[:checked, None],
         fit.unit_covariance[:2, :2],
         unknowns=a.shape[1] - own,
         sigma_mm=sigma_mm,
@@ -322,7 +324,9 @@ class _System:
     """One equation a crossing: n (middle + A (t + l h) + c (t_z + h)) + direction lag = distance.
 
     Columns: t (2), a lag for each beam driven both ways; with ``moved`` by how far each beam lies
-    from where it was; with a shaft its lean l (2), and lags of its own.
+    from where it was; with a shaft its lean l (2), and lags of its own. Where nothing else checks
+    the crossings of the tip, those of the shaft do, by lags in common: as both are driven both
+    ways, neither t nor l depends on that, and a lag that differs widens the interval.
 
     Attributes:
         crossings: Those of the tip, then those of the shaft.
@@ -340,6 +344,7 @@ class _System:
     moved: slice
     lean: slice
     width: int
+    one_lag: bool = False
 
     @classmethod
     def of(
@@ -357,10 +362,14 @@ class _System:
         lags = [own.get(crossing.beam) for crossing in crossings]
         lean = start + (2 if moved else 0)
         everything, above, width = list(crossings), [0.0] * len(crossings), lean
+        one_lag = False
         if shaft is not None:
             both = _two_ways(shaft.crossings, beams)
-            width += 2 + sum(both)
-            own = {beam: lean + 2 + sum(both[:beam]) for beam in (0, 1) if both[beam]}
+            one_lag = len(crossings) == lean and all(both) and all(two_ways)
+            width += 2
+            if not one_lag:
+                width += sum(both)
+                own = {beam: lean + 2 + sum(both[:beam]) for beam in (0, 1) if both[beam]}
             lags += [own.get(crossing.beam) for crossing in shaft.crossings]
             everything += shaft.crossings
             above = [shaft.above_mm] * len(crossings)
@@ -373,6 +382,7 @@ class _System:
             moved=slice(start, lean),
             lean=slice(lean, lean + (0 if shaft is None else 2)),
             width=width,
+            one_lag=one_lag,
         )
 
     def equations(self, height: TipHeight | None) -> tuple[Floats, Floats, Floats]:
@@ -389,7 +399,7 @@ class _System:
             per_height[row] = -nx * plane.axis[0] - ny * plane.axis[1]
             lag = self.lag_columns[row]
             if lag is not None:
-                a[row, lag] = -crossing.direction_over(beam)
+                a[row, lag] = -crossing.across(beam)
             if self.moved.stop > self.moved.start:
                 a[row, self.moved.start + crossing.beam] = -1.0
             if self.lean.stop > self.lean.start:

@@ -183,13 +183,21 @@ class Measuring:
 
         return self._attempt(plan, measure)
 
-    def go_to(self, pose: Pose | None, purpose: str) -> None:
-        """Drive the flange to ``pose``: up, over, down; nowhere without one."""
+    def go_to(self, pose: Pose | None, purpose: str, *, turn: bool = True) -> None:
+        """Drive the flange to ``pose``: up, over, down; nowhere without one.
+
+        Args:
+            pose: Where to.
+            purpose: What for.
+            turn: Whether it takes the U of that pose, too; else it keeps its own.
+        """
         if pose is None:
             return
         controller = self._context.controller
         controller.tools.select(0)
-        self._context.run(journey(pose, purpose, controller.groups[0].pose()))
+        here = controller.groups[0].pose()
+        goal = pose if turn else replace(pose, u_deg=here.u_deg)
+        self._context.run(journey(goal, purpose, here))
 
     def _attempt(
         self, plan: ToolPlan, measure: Callable[[ToolOffset | None], CalibrationResult]

@@ -148,7 +148,8 @@ class NozzleChange:
             measured = [(one, measuring.propose(one)) for one in self._plan.tools]
             proposals = self._agreed(context, measuring, measured, write=write)
             reports = self._write(context, proposals) if write else _unwritten(proposals)
-            measuring.go_to(self._plan.safe, tr("Moving to the safe pose."))
+            turn_back = self._plan.turn_back
+            measuring.go_to(self._plan.safe, tr("Moving to the safe pose."), turn=turn_back)
             self._listener.moment(Moment.END, context)
             return self._report(reports)
 

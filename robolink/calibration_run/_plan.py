@@ -174,6 +174,7 @@ class ChangePlan:
         ask_before_write: Whether a person accepts the proposals before anything is written, and
             is asked about what a measurement offers, such as a pose to be taken again.
         safe: Flange pose to which the robot goes first and last.
+        turn_back: Whether it turns back to the U of that pose at the end; else it keeps its own.
         attended: Whether a person may be asked what a measurement leaves open; ``None`` for where
             the write is asked too.
         agreed_by: How the write was agreed to in advance, for the record, where it is not asked;
@@ -184,6 +185,7 @@ class ChangePlan:
     limits: Limits = field(default_factory=Limits)
     ask_before_write: bool = True
     safe: Pose | None = None
+    turn_back: bool = True
     attended: bool | None = None
     agreed_by: AnsweredBy | None = AnsweredBy.PROGRAM
 

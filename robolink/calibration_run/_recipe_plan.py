@@ -122,6 +122,7 @@ def plan_of(
         ask_before_write=ask_before_write,
         agreed_by=agreed_by,
         safe=safe.pose if safe else None,
+        turn_back=recipe.poses.turn_back,
     )
 
 

@@ -222,6 +222,13 @@ def room(draft: Draft) -> Iterator[Problem]:
             )
 
 
+def turning_back(draft: Draft) -> Iterator[Problem]:
+    """Check that there is a pose to which U could turn back."""
+    poses = draft.poses
+    if poses is not None and poses.safe is None and "turn_back" in poses.model_fields_set:
+        yield Problem("poses.turn_back", tr("has no effect without safe"))
+
+
 def _together(box: Box, poses: list[FlangePose]) -> Iterator[Problem]:
     wide = any(
         abs(a.x_mm - b.x_mm) > 2 * box.sideways_mm or abs(a.y_mm - b.y_mm) > 2 * box.sideways_mm
@@ -354,6 +361,7 @@ _CHECKS: Final[tuple[Callable[[Draft], Iterator[Problem]], ...]] = (
     standstill,
     upright,
     room,
+    turning_back,
     verification,
     refusals,
     moments,

@@ -102,6 +102,9 @@ class Poses(Table):
 
     safe: FlangePose | None = None
     """Flange pose to which the robot moves first and last: up, across, down."""
+    turn_back: bool = True
+    """Whether U turns back to that of the safe pose at the end; if false, the robot ends at the
+    place of the safe pose with the U of the last turn test, and whatever moves it next turns it."""
 
 
 class PoseFile(Table):

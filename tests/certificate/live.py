@@ -392,6 +392,13 @@ def beams(cell: Any, rng: random.Random, turn_deg: float = 0.0, **plan: Any) -> 
     )
 
 
+def beams_once(cell: Any, rng: random.Random) -> Any:
+    """Two crossed beams, once around them: the procedure of the shipped recipe."""
+    cell.mount_beams(cell.beams(radius_mm=0.1), **BEAM_NOISE)
+    plan = BeamsParameters(repeats=1, test_turn_deg=90.0, crossing_mm_s=8.0, aside_mm=2.1)
+    return BeamsSource(cell.station, plan)
+
+
 def beams_turned(cell: Any, rng: random.Random) -> Any:
     """The same at two angles."""
     return beams(cell, rng, rng.choice((90.0, 180.0)))
@@ -477,6 +484,7 @@ COURSES: Final[tuple[Course, ...]] = (
             Course("one-touch", kind, opened, one_touch, ("touch_mm", "place_mm")),
             Course("points", kind, opened, points, ("touch_mm",), proves=False),
             Course("beams", kind, opened, beams, ("place_mm", "bend_deg")),
+            Course("beams once", kind, opened, beams_once, ("place_mm", "bend_deg")),
             Course("beams --turn", kind, opened, beams_turned, ("place_mm", "bend_deg")),
             Course("z-touch", kind, opened, z_touch, ("plate_mm",)),
             Course("camera", kind, opened, camera, (*_SEEN, "place_mm")),

@@ -30,6 +30,7 @@ _PLANE: Final = ("touch_mm", "place_mm", "tip_image_px")
 
 _COSTLY: Final[Mapping[str, float]] = {
     "beams on PLC": 0.5,
+    "beams once on PLC": 0.5,
     "beams --turn on PLC": 0.4,
     "z-touch on PLC": 0.5,
     "plane-touch on PLC": 0.5,
@@ -146,7 +147,7 @@ def _anywhere(rng: random.Random, half: float, count: int, *, beyond: bool) -> t
 # Faults that a turn test can see.
 
 
-_MOVES: Final = ("beams", "camera, one look", "one-touch")
+_MOVES: Final = ("beams", "beams once", "camera, one look", "one-touch")
 """Methods that rely on the place of a station, so that a moved one turns into drift."""
 
 _BUMPS: Final = ("two-pose", "n-angle", "n-angle, contact input")

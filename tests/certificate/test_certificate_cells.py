@@ -194,6 +194,10 @@ CELLS = (
         Cell("moved by 0.08", "beams on EPSON", TAKEN_BACK, CONTRADICTED[:1], moved(0.08)),
         Cell("moved by 0.05", "beams on PLC", TAKEN_BACK, CONTRADICTED, moved(0.05)),
         Cell("moved by 0.08", "beams on PLC", TAKEN_BACK, CONTRADICTED, moved(0.08)),
+        # Turned by 90 degrees, moved beams show by 1.4 times what they were moved; by 180, twice.
+        Cell("moved by 0.05", "beams once on EPSON", TAKEN_BACK, CONTRADICTED, moved(0.05)),
+        Cell("moved by 0.08", "beams once on EPSON", TAKEN_BACK, CONTRADICTED[:1], moved(0.08)),
+        Cell("moved by 0.08", "beams once on PLC", TAKEN_BACK, CONTRADICTED, moved(0.08)),
         Cell("moved by 0.08", "beams --turn on EPSON", WITHIN, (), moved(0.08), times=1.2),
     ),
     Cell(
@@ -252,6 +256,7 @@ CELLS = (
             for course in (
                 "beams on EPSON",
                 "beams on PLC",
+                "beams once on EPSON",
                 "beams --turn on EPSON",
                 "camera on EPSON",
                 "camera, one look on EPSON",
@@ -276,9 +281,16 @@ CELLS = (
         *(
             Cell(f"bent by {lean:g} degrees", course, WITHIN, BENT[lean], bent(lean), times=1.2)
             for lean in (0.5, 1.0, 1.9)
-            for course in ("beams on EPSON", "beams on PLC", "beams --turn on EPSON")
+            for course in (
+                "beams on EPSON",
+                "beams on PLC",
+                "beams once on EPSON",
+                "beams once on PLC",
+                "beams --turn on EPSON",
+            )
         ),
         Cell("bent by 2.6 degrees", "beams on EPSON", REFUSED, ("bent_needle",), bent(2.6)),
+        Cell("bent by 2.6 degrees", "beams once on EPSON", REFUSED, ("bent_needle",), bent(2.6)),
     ),
     Cell("always 0.05 beside", "two-pose on EPSON", WITHIN, (), beside(0.05)),
     Cell(
@@ -422,6 +434,9 @@ def test_a_cell_in_which_the_tip_is_wrong_ends_as_it_must(cell):
         pytest.param("one-touch on EPSON", "(Z)", 0.4, id="one-touch"),
         pytest.param(ONE_BY_INPUT, "(X, Y, Z)", 0.1, id="one-touch, contact input"),
         pytest.param("beams on EPSON", "", 0.03, id="beams"),
+        pytest.param(
+            "beams once on EPSON", "(X, Y)", 0.032, id="beams once", marks=pytest.mark.soak
+        ),
         pytest.param("z-touch on EPSON", "", 0.05, id="z-touch"),
     ],
 )

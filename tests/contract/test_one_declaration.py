@@ -47,7 +47,12 @@ RELATIONS = [
     ("z-touch", {"speeds_mm_s": (2, 2), "input": 5}, "speeds_mm_s", "must differ by a factor"),
     ("z-touch", {"until_mm": 0.1, "input": 5}, "until_mm", "has nothing to leave out"),
     ("beams", {"search_mm": 6}, "aside_mm", "must be larger than"),
-    ("beams", {"repeats": 1, "retake": True}, "retake", "has no effect: nothing is repeated"),
+    (
+        "beams",
+        {"repeats": 1, "shaft_mm": 0, "retake": True},
+        "retake",
+        "has no effect: nothing is repeated",
+    ),
     ("beams", {"until_mm": 0.1}, "until_mm", "has nothing to leave out"),
     ("n-angle", {"angles_deg": (0, 90, 90)}, "angles_deg", "must not hold the same angle"),
     ("n-angle", {"angles_deg": (0, 90, 180), "count": 4}, "count", "excludes"),
@@ -125,7 +130,7 @@ def test_what_does_not_go_together_is_refused_in_the_same_words(name, values, wh
 
 
 HALVES = {"board": {"spacing_mm": 40.0, "turns_deg": (0.0,)}, "camera": {"turns_deg": (0.0,)}}
-HALVES |= {"z-touch": {"speeds_mm_s": (2.0, 1.0)}, "beams": {"repeats": 1, "turn_deg": 0.0}}
+HALVES |= {"z-touch": {"speeds_mm_s": (2.0, 1.0)}, "beams": {"repeats": 1, "shaft_mm": 0.0}}
 """A measurement with these leaves no residual; two-pose, points and one-touch never do."""
 
 NO_RESIDUAL = ("two-pose", "one-touch", "points", *HALVES)

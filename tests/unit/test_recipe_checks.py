@@ -46,6 +46,9 @@ y_mm = 80
 direction_deg = 88
 """
 )
+UNCHECKED = ("repeats = 1", "shaft_mm = 0")
+"""Four crossings, and none of the shaft that would check them."""
+
 TOUCH = (
     PIN.replace('"two-pose"', '"z-touch"\ninput = 5')
     .replace('"kept"', '"measured"')
@@ -125,23 +128,34 @@ def test_the_angles_are_those_of_the_method(text, where, what):
         (BEAMS.replace("= 88", "= 15"), "source.beams", "must cross at 20 degrees"),
         (with_(BEAMS, "[source]", "aside_mm = 2"), "source.aside_mm", "must be larger than"),
         (
+            with_(BEAMS, "[source]", "test_turn_deg = 90", "turn_deg = 180"),
+            "source.test_turn_deg",
+            "goes without turn_deg",
+        ),
+        (
+            with_(BEAMS, "[source]", "test_turn_deg = 80"),
+            "source.test_turn_deg",
+            "must be at least 90",
+        ),
+        (BEAMS + "[poses]\nturn_back = false\n", "poses.turn_back", "has no effect without safe"),
+        (
             with_(BEAMS, "[box]", "down_mm = 5", "up_mm = 5"),
             "source.lift_mm",
             "must leave room",
         ),
         (BEAMS.replace('z = "kept"', 'z = "measured"'), "z", 'cannot be "measured" with beams'),
         (
-            with_(with_(BEAMS, "[source]", "repeats = 1"), "[tolerances]", "rms_mm = 0.1"),
+            with_(with_(BEAMS, "[source]", *UNCHECKED), "[tolerances]", "rms_mm = 0.1"),
             "tolerances.rms_mm",
             "cannot be judged: crossings",
         ),
         (
-            with_(with_(BEAMS, "[source]", "repeats = 1"), "[tolerances]", "interval_mm = 0.1"),
+            with_(with_(BEAMS, "[source]", *UNCHECKED), "[tolerances]", "interval_mm = 0.1"),
             "tolerances.sigma_mm",
             "is missing: the measurement cannot check itself",
         ),
         (
-            with_(BEAMS, "[source]", "repeats = 1", "retake = true"),
+            with_(BEAMS, "[source]", *UNCHECKED, "retake = true"),
             "source.retake",
             "has no effect: nothing is repeated",
         ),

@@ -95,11 +95,28 @@ class BeamsParameters(SampledParameters):
             )
         ),
     ] = 0.0
+    test_turn_deg: Annotated[
+        float,
+        Ge(90),
+        Le(180),
+        DEGREES,
+        Option(metavar="DEG"),
+        Help(
+            declared(
+                "Turn of U for the turn test: 180 shows moved beams best, 90 takes the least time."
+            )
+        ),
+    ] = 180.0
     repeats: Annotated[
         int,
         Ge(1),
         Le(10),
-        Help(declared("How often to cross each beam both ways; once cannot be checked.")),
+        Help(
+            declared(
+                "How often to cross each beam both ways; once, only the crossings of the shaft "
+                "check those of the tip."
+            )
+        ),
     ] = 2
     search_mm: Annotated[
         float,
@@ -117,7 +134,12 @@ class BeamsParameters(SampledParameters):
         Ge(1),
         Le(50),
         MM,
-        Help(declared("How far from their crossing point the tip crosses each of the beams.")),
+        Help(
+            declared(
+                "How far from their crossing point the tip crosses the first beam; what it finds "
+                "there tells how near it may pass."
+            )
+        ),
     ] = 5.0
     dip_mm: Annotated[
         float, Ge(0.2), Le(20), MM, Help(declared("How far below the beams the end of the tip is."))
@@ -194,13 +216,23 @@ class BeamsParameters(SampledParameters):
                 ),
             )
 
+        if self.turn_deg and self.test_turn_deg != _HALF_A_TURN_DEG:
+            yield Problem(
+                "test_turn_deg",
+                tr(
+                    "goes without {other}: after two angles, the test is at the one farthest from "
+                    "both",
+                    other=check.spell("turn_deg"),
+                ),
+            )
+
     def room_mm(self) -> float:
         """Return how high the box has to be: lift, dip and shaft together."""
         return self.lift_mm + self.dip_mm + self.shaft_mm
 
     def no_residual(self) -> str:
         """Return why residuals cannot be judged, empty if they can."""
-        if self.repeats > 1 or self.turn_deg:
+        if self.repeats > 1 or self.turn_deg or self.shaft_mm:
             return ""
         return tr(
             "cannot be judged: crossings that are not repeated cannot check each "
@@ -325,16 +357,21 @@ class BeamsSource(InputSource[BeamsParameters]):
     def proof_of(self, basis: ProofBasis) -> "CrossingTest":
         """Return the test at another U; see :meth:`~robolink.procedures.ProvesAgain.proof_of`.
 
-        Its crossings are others than those that were measured, and as far from them as a turn goes:
-        90 degrees and more from each. Where the beams were found too it is about those places: with
-        two angles four unknowns take up all that four crossings say, and only a third angle
-        contradicts them (docs/reference/evidence.md 12).
+        Its crossings are others than those that were measured, and 90 degrees and more from each of
+        them: as far as the plan says, half a turn where it says nothing. Where the beams were found
+        too it is about those places: with two angles four unknowns take up all that four crossings
+        say, and only a third angle contradicts them (docs/reference/evidence.md 12).
         """
-        from robolink.calibration import moved_beams
+        from robolink.calibration import moved_beams, toward_zero
+        from robolink.methods.beams.loop import widths_mm  # numpy
         from robolink.methods.beams.procedure import CrossingTest  # numpy
 
         station, measured_deg = self.station, basis.measured_deg
+        angle_deg = toward_zero(measured_deg[-1], self.plan.test_turn_deg)
+        if self.plan.turn_deg:
+            angle_deg = farthest_from(measured_deg[0], measured_deg[-1])
         lean = getattr(basis.result, "lean", None)
+        lag_mm = getattr(basis.result, "lag_mm", ())
         return CrossingTest(
             **basis.common,
             beams=moved_beams(station.beams, getattr(basis.result, "moved_mm", ())),
@@ -342,9 +379,11 @@ class BeamsSource(InputSource[BeamsParameters]):
             inputs=station.inputs,
             off_when_broken=station.off_when_broken,
             plan=self.plan,
-            angles_deg=(farthest_from(measured_deg[0], measured_deg[-1]),),
+            angles_deg=(angle_deg,),
             lean=None if lean is None else (lean.x, lean.y),
             run_up_mm=basis.context.controller.groups[0].run_up_mm(self.plan.crossing_mm_s),
+            width_mm=widths_mm(basis.result.inputs, station.beams, lag_mm),
+            lag_mm=lag_mm,
         )
 
 
@@ -426,7 +465,8 @@ METHOD = Method(
         "what X and Y are repeatable to. At the end it names the one that fits worst, and "
         "you can repeat it.\n\n"
         "Declare the station in the cell file, or learn it with 'station learn'. "
-        "Afterwards the tip turns half a turn about itself and crosses the beams again."
+        "Afterwards the tip turns about itself, by half a turn if you do not say less, and "
+        "crosses the beams again."
     ),
     parameters=BeamsParameters,
     measures=("x_mm", "y_mm"),

@@ -20,7 +20,8 @@ from robolink.calibration import (
 )
 from robolink.errors import CalibrationError
 from robolink.messages import tr
-from robolink.methods.beams.drive import BeamDrive, BeamScan, BeamTravel
+from robolink.methods.beams.drive import BeamDrive
+from robolink.methods.beams.loop import BeamLoop, LoopScan, loop
 from robolink.model import Pose, ToolOffset
 from robolink.procedures import NO_OFFSET
 from robolink.runner import Procedure
@@ -176,7 +177,7 @@ class CrossingSampler:
         shaft: The crossings of the shaft.
     """
 
-    travel: BeamTravel
+    travel: BeamLoop
     first: BeamDrive
     turned: BeamDrive | None
     stored: ToolOffset | None
@@ -185,9 +186,10 @@ class CrossingSampler:
     shaft: list[Crossing] = field(default_factory=list)
 
     @property
-    def scans(self) -> list[BeamScan]:
+    def scans(self) -> list[LoopScan]:
         """All that are planned for the tip, in their order."""
-        return self.first.rounds() + (self.turned.rounds() if self.turned else [])
+        drives = [self.first] if self.turned is None else [self.first, self.turned]
+        return [scan for drive in drives for scan in loop(drive) * drive.plan.repeats]
 
     @property
     def known(self) -> str:
@@ -198,7 +200,7 @@ class CrossingSampler:
         """Say how many were taken."""
         return tr("{count} crossings", count=count)
 
-    def take(self, place: BeamScan) -> Procedure[Crossing]:
+    def take(self, place: LoopScan) -> Procedure[Crossing]:
         """Take one; see :class:`~robolink.procedures.Sampler`."""
         last = self.travel.last
         if last is not None and last.drive is not place.drive:
@@ -211,14 +213,13 @@ class CrossingSampler:
         last, plan = self.travel.last, self.first.plan
         if last is not None and plan.shaft_mm and not self.shaft:
             deep = replace(last.drive, deeper_mm=plan.shaft_mm)
-            self.shaft = yield from self.travel.through(deep.round(last.beam))
+            self.shaft = yield from self.travel.through(loop(deep, after=last))
         yield from self.travel.lifted()
 
     def solve(self, crossings: Sequence[Crossing]) -> BeamsResult:
         """Solve what was taken."""
-        at_first = crossings[: len(self.first.rounds())]
         plan, solver = self.first.plan, self._solver
-        known = self.turned is None or len(crossings) > len(at_first)
+        known = self.turned is None or len(crossings) > len(loop(self.first)) * plan.repeats
         result = solver.solved(
             crossings,
             self.shaft,
@@ -241,7 +242,7 @@ class CrossingSampler:
             region95_radius_mm=None if region_mm is None else times * region_mm,
         )
 
-    def foreseen(self, place: BeamScan) -> Crossing:
+    def foreseen(self, place: LoopScan) -> Crossing:
         """Return what would be taken there."""
         return Crossing(place.beam, place.start, place.end)
 
@@ -249,7 +250,7 @@ class CrossingSampler:
         """Return the standard deviation as a multiple of a single one's."""
         plan, shaft = self.first.plan, None
         if plan.shaft_mm:
-            scans = self.first.round()
+            scans = loop(self.first)
             shaft = self._solver.foreseen_shaft(
                 [self.foreseen(scan) for scan in scans], plan.shaft_mm
             )

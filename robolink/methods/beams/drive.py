@@ -204,6 +204,31 @@ def _rounded_up(length_mm: float) -> float:
 
 
 @dataclass(frozen=True, slots=True)
+class TipMet:
+    """What the beams showed of a tip, from its own place.
+
+    Attributes:
+        half_mm: Half of the way from edge to edge, for each beam.
+        lag_mm: By how much latency and braking shift both edges along a travel, for each beam.
+        spread_mm: How far beside its expected place the tip is at most, if nothing is wrong.
+    """
+
+    half_mm: tuple[float, ...]
+    lag_mm: tuple[float, ...]
+    spread_mm: float
+
+    @classmethod
+    def of(
+        cls, width_mm: Sequence[float], lag_mm: Sequence[float | None], spread_mm: float
+    ) -> "TipMet | None":
+        """Return what a measurement showed; nothing where it left something open."""
+        lags = tuple(lag for lag in lag_mm if lag is not None)
+        if len(lags) != len(width_mm) or min(width_mm, default=0.0) <= 0:
+            return None
+        return cls(tuple(width / 2 for width in width_mm), lags, spread_mm)
+
+
+@dataclass(frozen=True, slots=True)
 class BeamDrive:
     """The places of one frame that moves through the beams.
 
@@ -214,6 +239,8 @@ class BeamDrive:
         deeper_mm: How much deeper than planned it dips.
         told_run_up_mm: In what way it reaches the speed of a crossing, where the controller told
             it.
+        met: What the beams showed of the tip when it was measured, ``None`` for a tip that nobody
+            has measured.
     """
 
     station: BeamStation
@@ -222,6 +249,7 @@ class BeamDrive:
     tip: ToolOffset
     deeper_mm: float = 0.0
     told_run_up_mm: float | None = None
+    met: "TipMet | None" = None
 
     @property
     def safe_z_mm(self) -> float:
@@ -244,14 +272,6 @@ class BeamDrive:
     def round(self, first: int = 0) -> "list[BeamScan]":
         """Return the scans that cross both beams, both ways, starting with one of them."""
         return [BeamScan(self, beam, side) for beam in (first, 1 - first) for side in (1, -1)]
-
-    def rounds(self) -> "list[BeamScan]":
-        """Return the planned number of rounds.
-
-        Each begins with the beam with which the one before ended. That spares a way, and what
-        drifts evenly meanwhile is the same for both beams.
-        """
-        return [scan for number in range(self.plan.repeats) for scan in self.round(number % 2)]
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,11 +28,15 @@ from robolink.calibration import (
 )
 from robolink.methods.beams import BeamsParameters, BeamsSource
 from robolink.methods.beams.crossings import CrossingSampler
-from robolink.methods.beams.drive import BeamDrive, BeamTravel
+from robolink.methods.beams.drive import BeamDrive, BeamTravel, TipMet
+from robolink.methods.beams.loop import BeamLoop, loop
 from robolink.model import Pose, ToolOffset, checks_arguments
 from robolink.procedures import NO_OFFSET, PlacedProof, sample_sequentially
 from robolink.runner import Procedure
 from robolink.stations import BeamStation
+
+MOST_SPREAD_MM: Final = 0.1
+"""How far a tip is looked for beside its new place at first, in mm; then by the whole search."""
 
 REFERENCE_ASIDES_MM: Final = (-12.0, -6.0, 6.0, 12.0)
 """Places along a beam that give its direction accurately enough, in mm, in a sensor of 30 mm."""
@@ -49,7 +53,7 @@ def cross_beams(
     if plan.turn_deg:
         turned = replace(drive, frame=replace(here, u_deg=toward_zero(here.u_deg, plan.turn_deg)))
     crossings = CrossingSampler(
-        BeamTravel(here), drive, turned, stored, source.sigma_mm, source.step_mm
+        BeamLoop(here), drive, turned, stored, source.sigma_mm, source.step_mm
     )
     scans = crossings.scans
     first = yield from crossings.take(scans[0])
@@ -117,6 +121,7 @@ def verify_by_crossing(
     aside: ToolOffset = NO_OFFSET,
     lean: tuple[float, float] = (0.0, 0.0),
     run_up_mm: float | None = None,
+    met: TipMet | None = None,
 ) -> Procedure[VerifyResult]:
     """Turn about the new tip and cross the beams there again. Runs in the new tool.
 
@@ -131,6 +136,7 @@ def verify_by_crossing(
         lean: By how much the shaft lies beside the tip, X and Y of the frame in mm per mm above
             it: the beams see the shaft.
         run_up_mm: As for :func:`~robolink.methods.measure_beams`.
+        met: What the beams showed of the tip when it was measured: how near a crossing begins.
 
     The drift at an angle is how far from the place of the reference record the tip is found
     there. It ends lifted.
@@ -154,11 +160,11 @@ def verify_by_crossing(
         >>> shown.passed, [round(drift.distance_mm, 3) for drift in shown.drifts]
         (False, [0.2, 0.2])
     """
-    travel, drifts = BeamTravel(here), list[Drift]()
+    travel, drifts = BeamLoop(here), list[Drift]()
     for angle_deg in angles_deg:
         there = replace(here, u_deg=angle_deg)
-        drive = BeamDrive(station, plan, there, aside, told_run_up_mm=run_up_mm)
-        crossings = yield from travel.through(drive.round())
+        drive = BeamDrive(station, plan, there, aside, told_run_up_mm=run_up_mm, met=met)
+        crossings = yield from travel.through(loop(drive))
         yield from travel.lifted()
         found = solve_crossed_beams(_unturned(crossings), station.beams).offset
         plane = FlangePlane.of(drive.frame)
@@ -198,6 +204,8 @@ class CrossingTest(PlacedProof):
             it; ``None`` where it was not looked at, and is taken to be the tool's own Z axis.
         run_up_mm: In what way the tip reaches the speed of a crossing, where the controller told
             it.
+        width_mm, lag_mm: How wide each beam saw the tip when it was measured, and by how much a
+            crossing was shifted along its travel; empty where nothing says it.
     """
 
     method: ClassVar[str] = "beams"
@@ -211,6 +219,8 @@ class CrossingTest(PlacedProof):
     angles_deg: tuple[float, ...]
     lean: tuple[float, float] | None = None
     run_up_mm: float | None = None
+    width_mm: tuple[float, ...] = ()
+    lag_mm: tuple[float | None, ...] = ()
 
     def steps(self, here: Pose) -> Procedure[VerifyResult]:
         """Return the steps from wherever the frame is."""
@@ -223,6 +233,7 @@ class CrossingTest(PlacedProof):
             aside=seen_from(self.written, self.tip),
             lean=self._lean_in_frame(here),
             run_up_mm=self.run_up_mm,
+            met=TipMet.of(self.width_mm, self.lag_mm, min(self.tolerance_mm, MOST_SPREAD_MM)),
         )
 
     def _lean_in_frame(self, here: Pose) -> tuple[float, float]:

@@ -23,6 +23,7 @@ from robolink_simulators.device.hosted import HostedDevice
 
 from robolink.journal.store.store import Store, Tables
 from robolink.runner import Question
+from robolink.timing import NS_PER_S
 
 EVERYTHING: Final = os.environ.get("ROBOLINK_ALL_KILL_POINTS") == "1"
 """Whether all instants are disturbed, not only a sample."""
@@ -85,9 +86,10 @@ class WatchedClock(ManualClock):
 
     def sleep(self, seconds: float) -> None:
         """Let ``seconds`` pass, with a report after half of them."""
+        until_ns = self.now_ns() + round(seconds * NS_PER_S)
         super().sleep(seconds / 2)
         self.on_wait()
-        super().sleep(seconds / 2)
+        super().advance_to(until_ns)  # two halves of a nanosecond would be none
 
     def advance_to(self, now_ns: int) -> None:
         """Move the time forward to ``now_ns``, with a report halfway."""

@@ -138,6 +138,7 @@ def has_ended(state: int) -> bool:
 _LOG: Final = PackageLog(__package__)
 
 _READS: Final = 3
+_TICK_S: Final = 1e-6
 _LOOK_BACK_S: Final = 0.7
 """Longest time in s for a look at what ended the session: a request to a PLC that is gone ends
 within 1 s of its deadline, including this look (docs/reference/faults.md F11)."""
@@ -308,7 +309,8 @@ class MailboxWire:
         while True:
             with nullcontext() if self.whole_look_s else self._turns.pausing():
                 self.clock.sleep(min(part_s, over.remaining_s()))
-            if over.expired or (self.latch.closed and not stopped):
+            # A clock need not be able to wait for less than a tick.
+            if over.remaining_s() < _TICK_S or (self.latch.closed and not stopped):
                 return
             self.beat()
 

@@ -192,7 +192,10 @@ class EndRules:
         for tool in changed:
             self._on.hold(
                 "StateIsTold",
-                tool in foreign or tool in outcome.tools or code == UNKNOWN,
+                tool in foreign
+                or tool in outcome.tools
+                or code == UNKNOWN
+                or self._on.came_from_a_lost_write(tool, state.tools.get(tool)),
                 f"tool {tool} has changed, which {type(error).__name__} does not say",
             )
         selected = outcome.selected
@@ -285,20 +288,11 @@ class RestRules:
         if not self._on.books.trusted:
             self._on.staged |= self._on.plant.staged()
 
-    def _came_from_a_lost_write(self, tool: int, holds: ToolOffset | None) -> bool:
-        """Return whether a request activated a value that nobody could know to be waiting.
-
-        A write had ended between its registers and its request, and the disk lost the record of it.
-        A person must have been told, if the record could show it.
-        """
-        known, _ = self._on.books.value_of(tool)
-        return self._on.from_a_lost_write(tool, holds) and (tool in self._on.doubted or not known)
-
     def _agrees(self, tool: int, holds: ToolOffset | None, named: Sequence[BookedMarker]) -> None:
         known, value = self._on.books.value_of(tool)
         if tool in self._by_others and self._on.plant.same(self._by_others[tool], holds):
             return
-        if tool in self._on.plant.touched or named or self._came_from_a_lost_write(tool, holds):
+        if tool in self._on.plant.touched or named or self._on.came_from_a_lost_write(tool, holds):
             return
         self._on.hold(
             "BooksAgree",
@@ -334,7 +328,7 @@ class RestRules:
             self._agrees(tool, holds, ())
             if tool in self._on.plant.touched or self._on.plant.same(holds, before):
                 continue
-            if self._came_from_a_lost_write(tool, holds):
+            if self._on.came_from_a_lost_write(tool, holds):
                 continue
             self._on.hold("KeptOnProof", self._proved(tool, holds), f"tool {tool} keeps {holds}")
             if self._on.plant.calls_back and holds is not None:

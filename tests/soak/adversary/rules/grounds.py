@@ -128,6 +128,15 @@ class Grounds:
         staged = self.staged.get(tool)
         return staged is not None and self.plant.same(staged, holds)
 
+    def came_from_a_lost_write(self, tool: int, holds: ToolOffset | None) -> bool:
+        """Return whether a request activated a value that nobody could know to be waiting.
+
+        A write had ended between its registers and its request, and the disk lost the record of it.
+        A person must have been told, if the record could show it.
+        """
+        known, _ = self.books.value_of(tool)
+        return self.from_a_lost_write(tool, holds) and (tool in self.doubted or not known)
+
     def hold(self, rule: str, holds: bool, sentence: str) -> None:
         """Check a rule; ``sentence`` is the observation if it is broken."""
         self.story.checks[rule] += 1

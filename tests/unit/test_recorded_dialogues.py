@@ -200,7 +200,7 @@ def test_a_file_that_is_no_recording_is_a_mistake_of_the_person(tmp_path, conten
 def test_a_recording_of_a_plc_is_served_by_no_epson(tmp_path):
     path = tmp_path / "recording.jsonl"
     path.write_text(format_dialogue(Dialogue("softmotion+modbus-tcp://192.0.2.1", "now", ())))
-    with pytest.raises(ConfigError, match="only one of an EPSON controller"):
+    with pytest.raises(ConfigError, match="only an EPSON controller can be replayed"):
         read_recording(path)
 
 

@@ -179,6 +179,8 @@ class CommandWindow:
     def _gap_of_lists(self) -> str | None:
         """Return what this controller prints for a comma, learnt once a connection."""
         if not self._gap_known:
+            # An answer to nothing would teach a wrong form; it shows before the flags do.
+            self.status()
             try:
                 self._gap = spel.gap_in_known_numbers(self.printed(spel.print_known_numbers()))
             except RejectedError as error:

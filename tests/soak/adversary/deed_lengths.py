@@ -13,25 +13,25 @@ from typing import Final
 from tests.soak.adversary.history import CellKind, Deed
 
 _MEASURED: Final = """\
-EPSON CHANGE_NOZZLE requests: * 171, TLSet 6, Tool_ 2, Move_ 17, Go_ 3, Login 1, Print Tool 65
-EPSON CHANGE_NOZZLE points: * 1023, commit 128, commit after 64, wire sent 171, procedure 29,
+EPSON CHANGE_NOZZLE requests: * 172, TLSet 6, Tool_ 2, Move_ 17, Go_ 3, Login 1, Print Tool 65
+EPSON CHANGE_NOZZLE points: * 1028, commit 128, commit after 64, wire sent 172, procedure 29,
     question 15, step 16, TLSet 26, Tool_ 13, Move_ 85, lock Move 17, lock TLSet 2
 EPSON SET_TOOL requests: * 15, TLSet 4, Login 1
 EPSON SET_TOOL points: * 83, commit 4, commit after 2, wire sent 15, procedure 3, question 1,
     TLSet 18, Tool_ 1, lock TLSet 2
-EPSON SET_TWO requests: * 27, TLSet 7, Login 1, Print Tool 1
-EPSON SET_TWO points: * 153, commit 12, commit after 6, wire sent 27, procedure 5, question 1,
+EPSON SET_TWO requests: * 28, TLSet 7, Login 1, Print Tool 1
+EPSON SET_TWO points: * 158, commit 12, commit after 6, wire sent 28, procedure 5, question 1,
     TLSet 32, Tool_ 1, lock TLSet 3
-EPSON SELECT_TOOL requests: * 8, Login 1, Print Tool 2
-EPSON SELECT_TOOL points: * 42, wire sent 8, procedure 1, question 1, Tool_ 1
-EPSON UNDO requests: * 34, TLSet 9, Login 1, Print Tool 3
-EPSON UNDO points: * 196, commit 18, commit after 9, wire sent 34, procedure 7, question 1,
+EPSON SELECT_TOOL requests: * 9, Login 1, Print Tool 2
+EPSON SELECT_TOOL points: * 47, wire sent 9, procedure 1, question 1, Tool_ 1
+EPSON UNDO requests: * 35, TLSet 9, Login 1, Print Tool 3
+EPSON UNDO points: * 201, commit 18, commit after 9, wire sent 35, procedure 7, question 1,
     TLSet 38, Tool_ 2, lock TLSet 3
-EPSON SET_THEN_UNDO requests: * 29, TLSet 12, Login 1, Print Tool 1
-EPSON SET_THEN_UNDO points: * 174, commit 16, commit after 8, wire sent 29, procedure 10,
+EPSON SET_THEN_UNDO requests: * 30, TLSet 12, Login 1, Print Tool 1
+EPSON SET_THEN_UNDO points: * 179, commit 16, commit after 8, wire sent 30, procedure 10,
     question 3, TLSet 54, Tool_ 3, lock TLSet 6
-EPSON MOVE_AND_LEAVE requests: * 29, Move_ 1, Login 1, Print Tool 6
-EPSON MOVE_AND_LEAVE points: * 156, commit 8, commit after 4, wire sent 29, procedure 3,
+EPSON MOVE_AND_LEAVE requests: * 30, Move_ 1, Login 1, Print Tool 6
+EPSON MOVE_AND_LEAVE points: * 161, commit 8, commit after 4, wire sent 30, procedure 3,
     question 1, Tool_ 1, Move_ 5, lock Move 1
 SOFTMOTION CHANGE_NOZZLE requests: * 616, WRITE_TOOL 1, SELECT_TOOL 2, MOVE_LINEAR 17,
     MOVE_DIRECT 3, OWNERSHIP 2, read_slot 6, read_response 226, beat 289
@@ -56,26 +56,26 @@ SOFTMOTION SET_THEN_UNDO points: * 115, commit 16, commit after 8, wire sent 5, 
 SOFTMOTION MOVE_AND_LEAVE requests: * 39, MOVE_LINEAR 1, OWNERSHIP 2, read_response 18
 SOFTMOTION MOVE_AND_LEAVE points: * 81, commit 8, commit after 4, wire sent 4, procedure 3,
     question 1, SELECT_TOOL 1, MOVE_LINEAR 5, lock 2103 1
-EPSON_SERIAL CHANGE_NOZZLE requests: * 165, TLSet 6, Tool_ 2, Move_ 17, Go_ 3, Login 1, Print
+EPSON_SERIAL CHANGE_NOZZLE requests: * 166, TLSet 6, Tool_ 2, Move_ 17, Go_ 3, Login 1, Print
     Tool 65
-EPSON_SERIAL CHANGE_NOZZLE points: * 994, commit 128, commit after 64, wire sent 166, procedure
+EPSON_SERIAL CHANGE_NOZZLE points: * 999, commit 128, commit after 64, wire sent 167, procedure
     29, question 15, step 16, TLSet 26, Tool_ 13, Move_ 85, lock Move 17, lock TLSet 2
 EPSON_SERIAL SET_TOOL requests: * 14, TLSet 4, Login 1
 EPSON_SERIAL SET_TOOL points: * 79, commit 4, commit after 2, wire sent 15, procedure 3,
     question 1, TLSet 18, Tool_ 1, lock TLSet 2
-EPSON_SERIAL SET_TWO requests: * 26, TLSet 7, Login 1, Print Tool 1
-EPSON_SERIAL SET_TWO points: * 149, commit 12, commit after 6, wire sent 27, procedure 5,
+EPSON_SERIAL SET_TWO requests: * 27, TLSet 7, Login 1, Print Tool 1
+EPSON_SERIAL SET_TWO points: * 154, commit 12, commit after 6, wire sent 28, procedure 5,
     question 1, TLSet 32, Tool_ 1, lock TLSet 3
-EPSON_SERIAL SELECT_TOOL requests: * 9, Login 1, Print Tool 2
-EPSON_SERIAL SELECT_TOOL points: * 48, wire sent 10, procedure 1, question 1, Tool_ 1
-EPSON_SERIAL UNDO requests: * 33, TLSet 9, Login 1, Print Tool 3
-EPSON_SERIAL UNDO points: * 192, commit 18, commit after 9, wire sent 34, procedure 7, question
+EPSON_SERIAL SELECT_TOOL requests: * 10, Login 1, Print Tool 2
+EPSON_SERIAL SELECT_TOOL points: * 53, wire sent 11, procedure 1, question 1, Tool_ 1
+EPSON_SERIAL UNDO requests: * 34, TLSet 9, Login 1, Print Tool 3
+EPSON_SERIAL UNDO points: * 197, commit 18, commit after 9, wire sent 35, procedure 7, question
     1, TLSet 38, Tool_ 2, lock TLSet 3
-EPSON_SERIAL SET_THEN_UNDO requests: * 28, TLSet 12, Login 1, Print Tool 1
-EPSON_SERIAL SET_THEN_UNDO points: * 170, commit 16, commit after 8, wire sent 29, procedure 10,
+EPSON_SERIAL SET_THEN_UNDO requests: * 29, TLSet 12, Login 1, Print Tool 1
+EPSON_SERIAL SET_THEN_UNDO points: * 175, commit 16, commit after 8, wire sent 30, procedure 10,
     question 3, TLSet 54, Tool_ 3, lock TLSet 6
-EPSON_SERIAL MOVE_AND_LEAVE requests: * 28, Move_ 1, Login 1, Print Tool 6
-EPSON_SERIAL MOVE_AND_LEAVE points: * 152, commit 8, commit after 4, wire sent 29, procedure 3,
+EPSON_SERIAL MOVE_AND_LEAVE requests: * 29, Move_ 1, Login 1, Print Tool 6
+EPSON_SERIAL MOVE_AND_LEAVE points: * 157, commit 8, commit after 4, wire sent 30, procedure 3,
     question 1, Tool_ 1, Move_ 5, lock Move 1
 MODBUS_TCP CHANGE_NOZZLE requests: * 559, WRITE_TOOL 1, SELECT_TOOL 2, MOVE_LINEAR 20,
     MOVE_DIRECT 3, OWNERSHIP 2, read_slot 6, read_response 224, beat 264

@@ -117,6 +117,7 @@ def test_a_stop_while_the_settings_are_confirmed_has_them_set_once_more(served, 
     assert len(settings_in(sent(simulator, begun))) == 3
 
 
+@pytest.mark.remote_ethernet  # an answer over Remote RS232 has another form
 @pytest.mark.fault("F10")
 @pytest.mark.parametrize("stray", [b"1 1 0 5 20 98", b"1 1 0 5 20", b"7", b"1 X: 1.000"])
 def test_an_answer_to_another_look_is_recognized(serve, stray):

@@ -93,12 +93,15 @@ class EpsonGroup(MotionGroupCore):
     def requests_until(
         self, target: Pose, edge: InputEdge, *, speed_mm_s: float
     ) -> tuple[str, ...]:
-        """Return what :meth:`move_until_input` would send besides its reads."""
+        """Return the most that :meth:`move_until_input` would send besides its reads."""
         profile = MotionProfile(Path.STRAIGHT, speed_mm_s=speed_mm_s)
         return executes((*self.settings.statements(profile), self._statement_until(target, edge)))
 
     def requests_for(self, target: Pose, profile: MotionProfile) -> tuple[str, ...]:
-        """Return what :meth:`move_to` would send besides its reads, as sent on the wire."""
+        """Return the most that :meth:`move_to` would send besides its reads, as sent on the wire.
+
+        Power and speed are sent only where a look shows that they differ.
+        """
         return executes((*self.settings.statements(profile), self._statement_for(target, profile)))
 
     def obstacle(self, target: Pose, path: Path, *, start: Pose | None = None) -> str:

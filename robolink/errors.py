@@ -51,7 +51,7 @@ from enum import StrEnum
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from robolink.messages import listed
+from robolink.messages import joined, listed
 
 __all__ = [
     "AmbiguousPosesError",
@@ -137,10 +137,14 @@ class RobolinkError(Exception):
     def __reduce__(self) -> tuple[object, ...]:
         return (_restored, (type(self), self.args, vars(self)))
 
-    def advise(self, sentence: str) -> None:
-        """Add what was left, or what else to do, on a line of its own; empty adds nothing."""
+    def say_what_stands(self, sentence: str) -> None:
+        """List what was left on the controller, below what happened; empty adds nothing."""
         if sentence:
-            self.remedy = listed(self.remedy, [sentence]) if self.remedy else sentence
+            self.what = listed(self.what, [sentence])
+
+    def advise(self, sentence: str) -> None:
+        """Add what else to do, one line at the most, behind what to do; empty adds nothing."""
+        self.remedy = joined(" ", filter(None, (self.remedy, sentence)))
 
     def concern(self, controller: str, request: str = "") -> None:
         """Name the controller and the request, unless they were named nearer to the cause."""

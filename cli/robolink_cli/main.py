@@ -172,7 +172,7 @@ def _explained(error: BaseException) -> BaseException:
     unfit = unfit_packages()
     if not unfit:
         return error
-    told = ConfigError(cannot_run(unfit, error), remedy=how_to_fit(unfit))
+    told = ConfigError(cannot_run(unfit, error), remedy=how_to_fit())
     told.__cause__ = error
     return told
 

@@ -54,7 +54,7 @@ def cannot_run(unfit: Sequence[Remark], error: BaseException) -> str:
         unfit: Those packages, at least one.
         error: What the failure was.
     """
-    found = [f"{one.subject}: {one.what}" for one in unfit]
+    found = [f"{one.subject}: {one.what} {one.remedy}" for one in unfit]
     kind = type(error).__name__
     return listed(
         tr("robolink cannot work with the packages that are installed:"),
@@ -62,13 +62,9 @@ def cannot_run(unfit: Sequence[Remark], error: BaseException) -> str:
     )
 
 
-def how_to_fit(unfit: Sequence[Remark]) -> str:
-    """Return what to do about unfit packages, a line each.
-
-    Args:
-        unfit: Those packages, at least one.
-    """
-    return listed(tr("Correct this first:"), _most([one.remedy for one in unfit]))
+def how_to_fit() -> str:
+    """Return what to do about unfit packages; the list of :func:`cannot_run` says it of each."""
+    return tr("Correct what is listed, then run the command again.")
 
 
 def _most(lines: Sequence[str]) -> list[str]:
@@ -96,7 +92,7 @@ def answer_without_click(arguments: Sequence[str], error: Exception) -> int:
     with speaking_for(arguments):
         if "doctor" in arguments:
             return _examined(as_json="--json" in arguments)
-        what, remedy = cannot_run(unfit, error), how_to_fit(unfit)
+        what, remedy = cannot_run(unfit, error), how_to_fit()
         if "--json" in arguments:
             told = {"kind": type(error).__name__, "what": what, "remedy": remedy}
             body = {**told, **_NOTHING_BEGUN}

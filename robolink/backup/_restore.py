@@ -179,7 +179,7 @@ def restore(
         for change in plan.clears:
             receipts.append(_set(tools, change, tell))
     except RobolinkError as error:
-        error.advise(_where_it_ended(plan, receipts))
+        error.say_what_stands(_where_it_ended(plan, receipts))
         raise
     return tuple(receipts)
 

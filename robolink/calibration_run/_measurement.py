@@ -351,8 +351,7 @@ def _name_another_way(error: CalibrationError) -> None:
         return
     error.advise(
         tr(
-            "If it failed: 'robolink calibrate two-pose' measures by touch, or with poses that "
-            "you type ({poses}).",
+            "Or measure by touch: 'robolink calibrate two-pose', {poses} to type poses.",
             poses=remedy_word(RemedyWord.GIVEN_POSES),
         )
     )

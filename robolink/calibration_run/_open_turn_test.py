@@ -354,7 +354,7 @@ def _put_back_unless_kept(controller: Controller, marker: Marker) -> Iterator[No
         with controller.uninterrupted():
             told = _put_back(controller, marker)
         if isinstance(error, RobolinkError):
-            error.advise(told)
+            error.say_what_stands(told)
         raise
 
 

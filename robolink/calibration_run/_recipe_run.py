@@ -262,7 +262,7 @@ class RecipeRun:
         try:
             yield
         except RobolinkError as error:
-            error.advise(self._outputs_left(listener))
+            error.say_what_stands(self._outputs_left(listener))
             raise
         except KeyboardInterrupt:
             if said := self._outputs_left(listener):

@@ -375,15 +375,13 @@ def told_of_contradiction(proof: VerifyResult, judgement: TurnJudgement) -> str:
 def _found(proof: VerifyResult, judgement: TurnJudgement) -> str:
     if judgement.apart_mm is not None:
         return tr(
-            "Turn test: results at the same angle differ by {apart:.3f} mm, more than "
-            "their scatter.",
+            "Turn test: results at one angle are {apart:.3f} mm apart, beyond their scatter.",
             apart=judgement.apart_mm,
         )
     drift, limits = proof.drifts[judgement.worst], judgement.limits[judgement.worst]
     limit_mm = limits.accurate_mm if judgement.contradicts_accuracy else limits.repeatable_mm
     return tr(
-        "Turn test: {drift:.3f} mm off at U {u:.1f}; up to {limit:.3f} mm would agree with the "
-        "measurement.",
+        "Turn test: {drift:.3f} mm off at U {u:.1f}, not within {limit:.3f} mm.",
         drift=drift.distance_mm,
         u=drift.u_deg,
         limit=limit_mm,
@@ -400,13 +398,14 @@ def _contradicted(
     """Return the refusal, with how to do the step that a person chose."""
     found = _found(proof, judgement)
     doubt = tr("Was the camera turned, or its lens changed?")
-    what = found if judgement.offers_wider else joined(" ", (found, doubt))
+    known = judgement.offers_wider or step is TurnTestStep.LEARN_STATION
+    what = found if known else joined(" ", (found, doubt))
     if step is TurnTestStep.CHECK_MOUNT:
         remedy = tr("Is the nozzle tight and straight? Start again and measure the tip anew.")
     elif step is TurnTestStep.LEARN_STATION:
-        remedy = listed(
-            tr("Learn the station again with a known tip, then measure this tip anew:"),
-            [f"'robolink {command}'" for command in relearning],
+        remedy = tr(
+            "Run {commands}, then measure this tip anew.",
+            commands=joined(tr(", then "), [f"'robolink {one}'" for one in relearning]),
         )
     elif judgement.offers_wider:
         remedy = tr("Check that nozzle and station are tight, learn the station, measure again.")

@@ -134,7 +134,7 @@ class Preserver:
             self.restore(marker)
         except RobolinkError as second:
             if isinstance(error, RobolinkError):
-                error.advise(_unrestored(second, tool_before(marker)))
+                error.say_what_stands(_unrestored(second, tool_before(marker)))
 
 
 def tool_before(marker: Marker) -> int:

@@ -42,7 +42,7 @@ def which_columns(numeric: Sequence[bool], rows: Sequence[Sequence[float]] = ())
     columns = remedy_word(RemedyWord.COLUMNS)
     if not written:
         return OpenQuestion("columns", what, tr("Name each with {columns}.", columns=columns))
-    way = tr("Name each with {columns}; '-' skips one, or a joint value. Such as:", columns=columns)
+    way = tr("Name each with {columns}; '-' skips one, or a joint value.", columns=columns)
     return OpenQuestion("columns", what, way, written)
 
 
@@ -96,7 +96,7 @@ def which_rotation(heads: Sequence[ColumnHead], numeric: Sequence[bool] = ()) ->
         )
         return OpenQuestion("columns", what, way)
     way = tr(
-        "Name each with {columns}; '-' skips one. Such as:",
+        "Name each with {columns}; '-' skips one.",
         columns=remedy_word(RemedyWord.COLUMNS),
     )
     return OpenQuestion("columns", what, way, tuple(dict.fromkeys(readings)))
@@ -135,7 +135,7 @@ def which_rule(letters: Sequence[str]) -> OpenQuestion:
     return OpenQuestion(
         "euler",
         tr("its angles {letters} may turn in several ways", letters=", ".join(letters).upper()),
-        tr("Say which with {euler}:", euler=remedy_word(RemedyWord.EULER)),
+        tr("Say which with {euler}.", euler=remedy_word(RemedyWord.EULER)),
         tuple(f"{rule.name}: {rule.formula}" for rule in rules_for(letters)),
     )
 
@@ -156,7 +156,7 @@ def which_angle_unit(
         >>> heads = [ColumnHead("x"), ColumnHead("y"), ColumnHead("u")]
         >>> asked = which_angle_unit(heads, ["u"], 3.14)
         >>> asked.way, asked.readings
-        ('Name the columns with their unit with columns:', ('x,y,u_deg', 'x,y,u_rad'))
+        ('Name the columns and their unit with columns.', ('x,y,u_deg', 'x,y,u_rad'))
     """
     readings = [
         _named(
@@ -174,7 +174,7 @@ def which_angle_unit(
         "columns",
         tr("its angles may be degrees or radians"),
         tr(
-            "Name the columns with their unit with {columns}:",
+            "Name the columns and their unit with {columns}.",
             columns=remedy_word(RemedyWord.COLUMNS),
         ),
         tuple(readings),

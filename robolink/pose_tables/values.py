@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Final
 
 from robolink.errors import AmbiguousPosesError, CalibrationError, ConfigError
-from robolink.messages import listed, tr
+from robolink.messages import joined, listed, tr
 from robolink.model import Pose
 
 
@@ -233,7 +233,7 @@ class OpenQuestion:
     Attributes:
         about: ``columns``, ``length`` or ``euler``.
         what: What is not said, the second half of a sentence.
-        way: How to say it; ends with a colon where there are readings.
+        way: How to say it, a sentence.
         readings: What can be meant, the likeliest first.
     """
 
@@ -268,14 +268,14 @@ def refused(path: Path, cause: UnusableText) -> ConfigError | CalibrationError:
 def unclear(path: Path, questions: Sequence[OpenQuestion]) -> AmbiguousPosesError:
     """Return the error for a file that leaves something open."""
     return AmbiguousPosesError(
-        listed(tr("{path} is not clear:", path=path), [question.what for question in questions]),
-        asks=tuple(question.about for question in questions),
-        remedy=listed(
-            tr("Choose what is meant:"),
+        listed(
+            tr("{path} is not clear:", path=path),
             [
                 line
                 for question in questions
-                for line in (question.way, *(f"  {one}" for one in question.readings))
+                for line in (question.what, *(f"  {one}" for one in question.readings))
             ],
         ),
+        asks=tuple(question.about for question in questions),
+        remedy=joined(" ", [question.way for question in questions]),
     )

@@ -351,12 +351,12 @@ class ToolChange:
             refusal = refusal or lost
         if isinstance(error, RobolinkError):
             for result in done:
-                error.advise(result.sentence)
+                error.say_what_stands(result.sentence)
         elif refusal is not None and (error is None or isinstance(error, Exception)):
             # To the caller that leaves the block, the old values are back.
             for result in done:
                 if result.error is None:
-                    refusal.advise(result.sentence)
+                    refusal.say_what_stands(result.sentence)
             raise refusal from error
 
     def _proved_begun(self) -> Iterator[Step]:
@@ -406,7 +406,7 @@ class ToolChange:
             return
         sentence = left_unverified(stand, marked=self._marker is not None)
         self._tell(sentence)
-        error.advise(sentence)
+        error.say_what_stands(sentence)
 
     def _record(self, done: Sequence[PutBack]) -> None:
         entries = [result.entry for result in done]

@@ -144,7 +144,7 @@ VERBS = (
     "Add|Ask|Check|Choose|Close|Connect|Correct|Give|Install|Name|Press|Put|Read|Remove|Run|See|Set|"
     "Switch|Turn|Type|Use|Wait|Write"
 )
-DOES = re.compile(rf"\b({VERBS})\b|Did you mean|(: |[Nn]ext: )robolink |: press |docs/")
+DOES = re.compile(rf"\b({VERBS})\b|Did you mean|(: |[Nn]ext: )robolink |docs/")
 """Ways to say what to do: a verb, a command to type, or a page to read."""
 
 UNPLAIN = re.compile(
@@ -160,8 +160,8 @@ LONGEST_SENTENCE = 24
 CODES = {2, 3, 5}
 
 
-LISTED = re.compile(r"(\n    .*)+")
-"""Findings and what was added on the way up, a line each, below their sentence."""
+LISTED = re.compile(r"(?<=:)(\n    .*)+|\n    [^ ]+(?=\n)")
+"""Findings, a line each, below what announces them; or one whole path or URL."""
 
 MOST_LISTED = 11
 

@@ -74,7 +74,7 @@ def test_who_shares_no_journal_is_told_which_client_owns_the_mailbox(cell, other
     refused = bob(cell, other_pc)
     assert refused.how == "LeaseHeldError"
     assert f"(client {cell.owner:08X}) commands the PLC" in refused.said
-    assert "10 s after its last signal the mailbox is free" in refused.said
+    assert "Close it and wait 10 s" in refused.said
     assert ann.end().how == "done"
     assert cell.values_written() == [ANNS]
 

@@ -1,5 +1,8 @@
 """Every error that is raised, in the sources: three lines at its likely fill, and what to do.
 
+Only what happened may have a list below it: findings, what another error says, what stands. All
+else is counted. A path or URL of more than 32 columns stands whole below its sentence.
+
 ``tests/cli/test_wrong_commands.py`` holds the answers to wrong commands; this holds all others, as
 far as their sentences stand where they are raised.
 """
@@ -18,7 +21,7 @@ from robolink_cli.console.tables import SCREEN
 
 from robolink import errors, locale
 from robolink.controllers.softmotion.answers import motion_failure, refused
-from robolink.messages import LIST_LINE
+from robolink.messages import LIST_LINE, listed
 from robolink.protocols.mailbox import Command, ErrorClass, Opcode, Response
 from robolink.remedy_words import RemedyWord
 from robolink.transport.modbus.errors import refused as refused_by_modbus
@@ -76,7 +79,7 @@ OTHERWISE = {
     "Cell {cell} needs robot {expected}; at {url} there is {found}.": "C8-C901S",
     "Between touch {before} and {after} something moved by {shift:.2f} mm.": "3",
     "Station {id}: {what} must be known first.": "where it is",
-    "The journal {path} has form {found}; this robolink knows forms up to {own}.": "7",
+    "The journal {path} has form {found}, newer than {own}.": "7",
     "{reference} (address {address}) of unit {unit}": "412290",
 }
 """Sentences whose names stand for something else than those of all others."""
@@ -102,19 +105,22 @@ def in_chinese():
         return {one.id: one.string for one in read_po(file) if one.id}
 
 
-def filled(text, sentences):
+def filled(english, sentences, translated):
     """Return a sentence with likely values, and with sentences where those are known."""
-    text = re.sub("(journal|操作记录) {name}", r"\1 {path}", text)
+    text = re.sub("(journal|操作记录) {name}", r"\1 {path}", translated.get(english, english))
+    english = english.replace("journal {name}", "journal {path}")
 
     def value(found):
         if found["name"] in sentences:
             return sentences[found["name"]]
         if found["name"] == "seconds":
             return LIKELY["seconds"]
+        if (found["form"] or "").endswith("X"):
+            return "1A2B3C4D"
         if re.search(r"[a-z]$", found["form"] or ""):
             return "10" if found["form"].endswith((".0f", "d")) else "-112.345"
-        if found["name"] in OTHER_NAMES and text in OTHERWISE:
-            return OTHERWISE[text]
+        if found["name"] in OTHER_NAMES and english in OTHERWISE:
+            return OTHERWISE[english]
         if found["name"] in RemedyWord.__dict__:
             return SHELL_WAYS[getattr(RemedyWord, found["name"])].format_map(LIKELY)
         return LIKELY.get(found["name"], "needle-12")
@@ -154,7 +160,7 @@ class Raised:
 def sources(request):
     """The sources, in which sentences are followed, in either language."""
     translated = in_chinese() if request.param == "zh" else {}
-    return Sentences(ROOT, SHIPPED, lambda text, known: filled(translated.get(text, text), known))
+    return Sentences(ROOT, SHIPPED, lambda text, known: filled(text, known, translated))
 
 
 @pytest.fixture(scope="module")
@@ -199,9 +205,10 @@ def heirs(sources):
 
 
 def shown(what, do):
-    """Return what a terminal shows of an error, without what it lists."""
-    lines = error_lines(what, do, width=SCREEN).split("\n")
-    return "\n".join(line for line in lines if not line.startswith(LIST_LINE))
+    """Return what a terminal shows of an error, without what is listed below what happened."""
+    assert "\n" not in do, f"what to do is listed: {do}"
+    lines = error_lines(what.partition(f"\n{LIST_LINE}")[0], do, width=SCREEN).split("\n")
+    return "\n".join(line for line in lines if not line.startswith(LIST_LINE))  # a whole name
 
 
 def test_an_error_takes_three_lines(raised):
@@ -229,20 +236,35 @@ def test_what_is_added_to_an_error_later_is_listed_or_takes_a_line(sources):
             scope = sources.scope(module, function, "")
             for node in scope.chosen:
                 match node:
-                    case ast.Assign(targets=[ast.Attribute(attr="what" | "remedy")]):
+                    case ast.Assign(targets=[ast.Attribute(attr="what")], value=made):
+                        found += 1  # its list is not counted, so it may only grow by that
+                        assert called(made) == "listed", f"{module.place}:{node.lineno}"
+                        continue
+                    case ast.Assign(targets=[ast.Attribute(attr="remedy")]):
                         found += 1
                         texts = sources.said(node.value, scope)
-                        if not texts or any(map(adds_lines, texts)):
-                            long.append(f"{module.place}:{node.lineno}: {ast.unparse(node)}")
-    assert found >= 6, "the search finds nothing"
+                    case ast.Call(func=ast.Attribute(attr="advise"), args=[added]):
+                        found += 1
+                        texts = sources.said(added, scope)
+                    case _:
+                        continue
+                if not texts or any(map(adds_lines, texts)):
+                    long.append(f"{module.place}:{node.lineno}: {ast.unparse(node)}")
+    assert found >= 10, "the search finds nothing"
     assert long == []
 
 
 def adds_lines(said):
-    """Return whether a text takes more than one line, or more than what was said before."""
+    """Return whether a text takes more than one line besides what was said before."""
     lines = shown("", said.text.replace(OF_ANOTHER, "")).split("\n")[1:]
-    own = [line for line in lines if line.strip()]
-    return len(own) > 1 or (OF_ANOTHER in said.text and own != [])
+    return sum(line.strip() != "" for line in lines) > 1
+
+
+def test_what_to_do_is_found_where_it_is_listed_or_takes_two_lines():
+    with pytest.raises(AssertionError, match="is listed"):
+        adds_lines(Said(listed("Do this:", ["that"])))
+    assert adds_lines(Said("Do this and that. " * 6))
+    assert not adds_lines(Said(f"{OF_ANOTHER} Do this."))
 
 
 def test_what_stands_comes_before_what_to_do(raised):

@@ -29,6 +29,9 @@ _NAMES: Final = (
 )
 """Pattern for a URL, an absolute path, or a quoted command, which stays whole."""
 
+_SENTENCE_END: Final = r"(?<=[.?!]) |(?<=[\u3002\uff1f\uff01]) ?"
+"""Pattern for what stands between two sentences."""
+
 _CONTINUED: Final = r"\s+\S*[/\\]"
 """Pattern for what follows a part of a path that holds a blank."""
 
@@ -38,7 +41,9 @@ def error_lines(
 ) -> str:
     """Return what is shown of an error.
 
-    Where it would take more than three lines, what stands is listed, and the next command too.
+    Where it would take more than three lines, what stands is listed below what happened. Where it
+    still would, because more was advised on the way up, the last sentences of what to do give way:
+    the first, and the next command, are always shown, and JSON has all.
 
     Args:
         what: What happened.
@@ -56,15 +61,14 @@ def error_lines(
           Give another file.
     """
     what, do, then, *stands = map(visible, (what, do, then, *stands))
-    behind = "\n  " if "\n" in do else " "  # not behind the last line of a list
-    below = listed(what, stands)
-    sooner = joined(behind, filter(None, (do, then)))
-    later = listed(do, [then]) if do and then else sooner
-    shown = ""
-    for parts in ((what, joined(" ", stands), sooner), (below, sooner), (below, later)):
-        shown = _in_lines(parts, width)
+    steps = joined(" ", filter(None, (do, then)))
+    shown = _in_lines((what, joined(" ", stands), steps), width)
+    advised = re.split(_SENTENCE_END, do)
+    for many in range(len(advised), 0 if not then else -1, -1):
         if not width or counted(shown) <= MOST_LINES:
             break
+        steps = joined(" ", filter(None, (*advised[:many], then)))
+        shown = _in_lines((listed(what, stands), steps), width)
     return shown
 
 

@@ -351,11 +351,5 @@ def _prove_in_step(session: EpsonSession) -> None:
     except RejectedError:
         return  # a refusal is an answer too
     except (RemoteProtocolError, TransportTimeoutError) as error:
-        error.remedy = tr("Connect again.")
-        error.advise(
-            tr(
-                "If it happens twice, the controller writes numbers in another way: say "
-                "numbers=ascii_hex in the URL (docs/remote-rs232.md)."
-            )
-        )
+        error.remedy = tr("Connect again; if it happens twice, try numbers=ascii_hex in the URL.")
         raise

@@ -14,7 +14,7 @@ from typing import Final
 from robolink.controllers.softmotion.answers import DISPOSSESSED, Ended, describe
 from robolink.controllers.softmotion.wire import MailboxWire
 from robolink.errors import Concerning, LeaseHeldError, LeaseLostError, RejectedError
-from robolink.messages import listed, tr
+from robolink.messages import tr
 from robolink.model import ClientRun, OutcomeLog
 from robolink.protocols.mailbox import Command, CommandState, ErrorClass, Opcode
 from robolink.timing import Deadline, local_label
@@ -232,6 +232,7 @@ class Ownership:
 
     def _held_by(self, holder: int) -> LeaseHeldError:
         run = self._run_of(f"{holder:08X}")
+        insist = "'robolink robot take-ownership'"
         if run is None:
             what = tr(
                 "Another program (client {holder:08X}) commands the PLC {identity}.",
@@ -239,9 +240,9 @@ class Ownership:
                 identity=self._wire.identity,
             )
             remedy = tr(
-                "Close the other program; {seconds:.0f} s after its last signal the "
-                "mailbox is free.",
+                "Close it and wait {seconds:.0f} s, or at the cell type {command}.",
                 seconds=SILENCE_S,
+                command=insist,
             )
         else:
             what = tr(
@@ -252,15 +253,15 @@ class Ownership:
                 holder=holder,
             )
             remedy = (
-                tr("Wait until it has finished, or end it.")
+                tr("Wait, end it, or at the cell type {command}.", command=insist)
                 if run.lives
                 else tr(
-                    "If it has ended, try again in {seconds:.0f} s; then the mailbox is free.",
+                    "If it ended, wait {seconds:.0f} s; or at the cell type {command}.",
                     seconds=SILENCE_S,
+                    command=insist,
                 )
             )
-        insist = tr("A person at the cell can take it over: 'robolink robot take-ownership'.")
-        error = LeaseHeldError(what, remedy=listed(remedy, [insist]))
+        error = LeaseHeldError(what, remedy=remedy)
         error.holder = f"{holder:08X}"
         return error
 

@@ -9,7 +9,7 @@ from typing import Final
 from robolink.errors import JournalError
 from robolink.journal.store import statements
 from robolink.journal.store.connection import DatabaseConnection
-from robolink.messages import listed, tr
+from robolink.messages import tr
 from robolink.remedy_words import RemedyWord, remedy_word
 
 _FIRST_TABLES: Final = """
@@ -133,14 +133,14 @@ def newer_error(name: str, found: int) -> JournalError:
     """Return the error about tables that a newer robolink made."""
     return JournalError(
         tr(
-            "The journal {name} has form {found}; this robolink knows forms up to {own}.",
+            "The journal {name} has form {found}, newer than {own}.",
             name=name,
             found=found,
             own=len(MIGRATIONS),
         ),
-        remedy=listed(
-            tr("Nothing was written. Install the newer robolink. Until then, read it with:"),
-            [remedy_word(RemedyWord.EXPORT_JOURNAL)],
+        remedy=tr(
+            "Nothing was written. Install the newer robolink, or only read it: {export}.",
+            export=remedy_word(RemedyWord.EXPORT_JOURNAL),
         ),
     )
 

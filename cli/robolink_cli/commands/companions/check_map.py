@@ -437,7 +437,7 @@ class MapComparison:
     def _taken_back(self, error: MapDiffersError) -> MapDiffersError:
         held = revoke(self._name, self._map)
         if held is not None:
-            error.advise(
+            error.say_what_stands(
                 tr(
                     "The confirmation by {by} of {at} is withdrawn.",
                     by=held.by,

@@ -110,7 +110,6 @@ class RobolinkError(Exception):
         controller: Identity or URL of the controller concerned, without any password.
         request: The present request, for display.
         raw: The bytes that were read and could not be used.
-
     """
 
     def __init__(
@@ -139,8 +138,7 @@ class RobolinkError(Exception):
 
     def say_what_stands(self, sentence: str) -> None:
         """List what was left on the controller, below what happened; empty adds nothing."""
-        if sentence:
-            self.what = listed(self.what, [sentence])
+        self.what = listed(self.what, [sentence] if sentence else [])
 
     def advise(self, sentence: str) -> None:
         """Add what else to do, one line at the most, behind what to do; empty adds nothing."""

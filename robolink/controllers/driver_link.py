@@ -41,7 +41,7 @@ from robolink.errors import (
     RobolinkError,
     UnclearAnswerError,
 )
-from robolink.messages import first_sentence, in_english, joined, tr
+from robolink.messages import in_english, joined, tr
 from robolink.model import ChangeGuard, EntryKind, Marker, MarkerKind, NewEntry, OutcomeLog
 from robolink.package_log import PackageLog
 from robolink.stop_latch import StopLatch
@@ -369,5 +369,5 @@ def _naming_controller(method: Callable[..., T]) -> Callable[..., T]:
 def advise_emergency_stop(error: RobolinkError) -> RobolinkError:
     """Put what a person must do first in front of the error of a stop."""
     first = tr("The stop is not confirmed: press the emergency stop.")
-    error.remedy = joined(" ", filter(None, (first, first_sentence(error.remedy))))
+    error.remedy = joined(" ", filter(None, (first, error.remedy)))
     return error

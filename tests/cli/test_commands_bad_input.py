@@ -264,8 +264,7 @@ def test_an_implausible_change_is_refused_and_not_written(cell):
 def test_a_drift_beyond_the_tolerance_puts_the_old_value_back(cell):
     refused = cell.run(*cell.calibration, "--tolerance", "0.0001", "--json")
     check_refused_as_document(refused, 8, kind="VerifyError")
-    remedy = json.loads(refused.out)["error"]["remedy"]
-    assert "The old value of tool 1 is back." in remedy
+    assert "The old value of tool 1 is back." in json.loads(refused.out)["error"]["what"]
     assert cell.tool_1 == OLD_TIP
     assert cell.simulator.machine.flash_writes == 2
     cell.check_nothing_else_was_written()

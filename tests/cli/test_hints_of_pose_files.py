@@ -63,16 +63,16 @@ def shown(tmp_path, capsys):
     return show
 
 
-def hints_in(remedy):
-    """Return the options that a remedy names, as typed: behind the option, or on lines below it."""
+def hints_in(error):
+    """Return the options that an error names, as typed, in the order of its findings.
+
+    The readings stand below what is open, or behind the option.
+    """
     found = []
-    option = ""
-    for line in remedy.splitlines():
-        named = re.search(r"(--\w+)", line)
-        if named is None:
-            found += [(option, line.strip().split(":")[0])] if option else []
-            continue
-        option, (_, _, behind) = named[1], line.partition(f"{named[1]}:")
+    findings = re.findall(r"\n    \S.*((?:\n      .*)*)", error["what"])
+    sentences = re.findall(r"(--\w+)(?:: (.*?))?(?:[.;]|$)", error["remedy"])
+    for readings, (option, behind) in zip(findings, sentences, strict=True):
+        found += [(option, one.strip().split(":")[0]) for one in readings.splitlines() if one]
         found += [(option, one) for one in re.findall(r"\w+", behind) if one != "or"]
     return found
 
@@ -95,8 +95,8 @@ def test_each_hint_is_accepted_as_it_stands(shown, name):
             continue
         error = answer["error"]
         assert (code, error["kind"]) == (2, "AmbiguousPosesError"), (words, error)
-        hints = [(o, v) for o, v in hints_in(error["remedy"]) if (o, v) not in pairwise(words)]
-        assert hints, (words, error["remedy"])
+        hints = [(o, v) for o, v in hints_in(error) if (o, v) not in pairwise(words)]
+        assert hints, (words, error)
         by_option: dict[str, list[str]] = {}
         for option, value in hints:
             by_option.setdefault(option, []).append(value)

@@ -161,7 +161,7 @@ def test_a_command_that_such_a_package_breaks_is_no_defect(instead, name):
     assert document["exit_code"] == 2
     assert f"{name}: 1.0.3 is installed" in document["error"]["what"]
     assert "no such thing in this version" in document["error"]["what"]
-    assert f"python -m pip install '{name}" in document["error"]["remedy"]
+    assert f"python -m pip install '{name}" in document["error"]["what"]
 
 
 def test_where_every_package_fits_a_failure_stays_a_defect(instead):

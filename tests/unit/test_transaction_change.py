@@ -126,7 +126,8 @@ def test_an_error_says_that_the_old_value_is_back(cell, controller):
         with ToolChange(controller, wanted(1), verify=True) as change:
             change.write()
             raise VerifyError("It drifts.", remedy="Measure again.")
-    assert failed.value.remedy == "Measure again.\n    The old value of tool 1 is back."
+    assert failed.value.what == "It drifts.\n    The old value of tool 1 is back."
+    assert failed.value.remedy == "Measure again."
     assert cell.tools == OLD
 
 
@@ -143,7 +144,7 @@ def test_a_write_that_did_not_take_takes_the_others_back(cell, controller):
     cell.simulator.faults.add(Fault(FaultAction.IGNORE_WRITE, match="TLSet 2"))
     with pytest.raises(ReadBackError) as failed:
         change_tools(controller, wanted(1, 2))
-    assert "Tool 2 holds its old value.\n    The old value of tool 1 is" in failed.value.remedy
+    assert "Tool 2 holds its old value.\n    The old value of tool 1 is" in failed.value.what
     assert cell.tools == OLD
     assert cell.writes == 2
     assert cell.journal.open_markers() == ()
@@ -165,7 +166,7 @@ def test_what_somebody_else_wrote_is_left_alone_and_stays_open(cell, controller)
             change.write()
             cell.put(1, OTHER)
             raise VerifyError("It drifts.")
-    assert "It was left as it is." in failed.value.remedy
+    assert "It was left as it is." in failed.value.what
     assert cell.tools == {1: OTHER, 2: OLD[2]}
     assert cell.story(1)[-1] == "conflict"
     ((_, marker),) = cell.journal.open_markers()
@@ -179,7 +180,7 @@ def test_a_controller_in_error_keeps_the_change_open(cell, controller):
     cell.simulator.faults.add(fault)
     with pytest.raises(ControllerFaultError) as failed:
         change_tools(controller, wanted(1, 2))
-    assert failed.value.remedy.count("could not be written back") == 2
+    assert failed.value.what.count("could not be written back") == 2
     assert cell.tools == {1: NEW[1], 2: OLD[2]}
     controller.reset_fault()
     assert recover(controller).left == ()
@@ -195,7 +196,7 @@ def test_a_link_that_is_gone_leaves_the_change_to_recover(cell):
     sentence = (
         "Tool 1, 2 may hold the new value, which was never tested; 'robolink recover' restores"
     )
-    assert sentence in lost.value.remedy
+    assert sentence in lost.value.what
     assert sentence in told[0]
     kinds = {marker.kind for _, marker in cell.journal.open_markers()}
     assert kinds == {MarkerKind.SET, MarkerKind.CHANGE}

@@ -162,7 +162,7 @@ def test_an_instrument_that_failed_names_the_way_with_typed_poses(method):
     with changing(method, lines=False, break_at="check", breaks=blind) as (hand, cell):
         assert isinstance(hand.error, RobolinkError)
         assert hand.state.ended is not None
-        assert any("poses that you type" in line for line in hand.state.ended.lines)
+        assert any("to type poses" in line for line in hand.state.ended.lines)
         check_as_before(cell, before_of(method))
 
 

@@ -236,7 +236,7 @@ def test_what_is_added_to_an_error_later_is_listed_or_takes_a_line(sources):
             scope = sources.scope(module, function, "")
             for node in scope.chosen:
                 match node:
-                    case ast.Assign(targets=[ast.Attribute(attr="what")], value=made):
+                    case ast.Assign(targets=[ast.Attribute(attr="what")], value=ast.Call() as made):
                         found += 1  # its list is not counted, so it may only grow by that
                         assert called(made) == "listed", f"{module.place}:{node.lineno}"
                         continue

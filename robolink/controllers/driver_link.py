@@ -307,7 +307,9 @@ class DriverLink:
                 markers.leave_open(marker)
         if unclear is not None:
             # An answer over such a link is not relied on, so this ends as a failure in any case.
-            unclear.remedy = command.told_by(found) or unclear.remedy
+            if shown := command.told_by(found):
+                unclear.say_what_stands(shown)
+                unclear.remedy = tr("Nothing was repeated. Check the cable, then try again.")
             raise unclear
         return found
 

@@ -105,7 +105,7 @@ def test_a_tool_that_someone_changed_meanwhile_is_not_written(serve, simulator):
             restore(controller.tools, plan)
         assert controller.tools.read(15) == ToolOffset(5)
         assert controller.tools.read(1).matches(A, 0.0005)
-    assert "Restored before that: 1. Not restored: 15, 3." in caught.value.remedy
+    assert "Restored before that: 1. Not restored: 15, 3." in caught.value.what
 
 
 def test_an_answer_that_is_lost_says_which_tools_are_done(serve):
@@ -119,7 +119,7 @@ def test_an_answer_that_is_lost_says_which_tools_are_done(serve):
         plan = plan_restore(backup, read_tools(controller))
         with pytest.raises(OutcomeUnknownError) as caught:
             restore(controller.tools, plan)
-    assert "Restored before that: 1. Not restored: 15." in caught.value.remedy
+    assert "Restored before that: 1. Not restored: 15." in caught.value.what
 
 
 def test_a_running_program_lets_no_backup_be_taken(serve, simulator):

@@ -134,7 +134,7 @@ def test_a_value_that_somebody_else_writes_during_the_test_stays(later):
             later.finished(controller)
         assert machine.tools.get(1) == FOREIGN
         assert len(controller.outcomes.open_markers()) == 1
-    assert "stays open" in failed.value.remedy
+    assert "stays open" in failed.value.what
 
 
 def test_touches_that_were_not_made_end_the_test_as_failed(later):

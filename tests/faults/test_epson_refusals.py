@@ -156,7 +156,7 @@ def test_f19_a_write_that_the_controller_timed_out_is_read_and_not_called_refuse
     with host, relay, robolink.connect(url, timeout_s=2.0) as controller:
         with pytest.raises(UnclearAnswerError, match="neither that it ran nor") as unclear:
             controller.tools.write(1, NEW, expected=OLD)
-        assert "confirms that it ran" in unclear.value.remedy
+        assert "confirms that it ran" in unclear.value.what
         assert simulator.machine.tools.get(1) == NEW
         assert controller.outcomes.open_markers() == ()
     assert len(sent(simulator, "TLSet 1, XY")) == 1

@@ -18,7 +18,7 @@ from tests.faults._requests import changes
 UNREACHABLE = "postgresql+psycopg://nobody@127.0.0.1:1/journal"
 SAID = {
     "damaged": "it is damaged",
-    "newer": "this robolink knows forms up to",
+    "newer": "is newer: form ",
     "garbage": "it is not a journal",
     "unreachable": "the database cannot be reached",
 }

@@ -261,7 +261,7 @@ def test_a_write_whose_acknowledgement_was_garbled_is_told_as_that(serve, unclea
             change_tools(controller, [Wanted(1, NEW, old)], tell=told.append)
         assert simulator.machine.tools.get(1) == old
         assert controller.outcomes.open_markers() == ()
-    assert "it ran.\n    The old value of tool 1 is back." in str(caught.value)
+    assert "it ran.\n    The old value of tool 1 is back." in caught.value.what
     assert told == ["The old value of tool 1 is back."]
     assert len([text for _, _, text in simulator.log if WRITE in text]) == 2
 
@@ -275,7 +275,7 @@ def test_a_write_that_was_ignored_with_a_garbled_acknowledgement_is_told_as_that
             change_tools(controller, [Wanted(1, NEW, old)])
         assert simulator.machine.tools.get(1) == old
         assert controller.outcomes.open_markers() == ()
-    assert "did not run.\n    Tool 1 holds its old value." in str(caught.value)
+    assert "did not run.\n    Tool 1 holds its old value." in caught.value.what
 
 
 def test_a_tool_whose_first_definition_was_garbled_and_ignored_reads_as_undefined(serve, unclear):

@@ -218,7 +218,7 @@ def test_an_owner_that_died_is_named_and_displaced_after_its_silence(cell):
         with pytest.raises(LeaseHeldError, match="commands the PLC") as refusal:
             next_one.tools.write(3, NEW, expected=None)
         assert f"{cell.owner:08X}" in refusal.value.what
-        assert "10 s after its last sign" in refusal.value.remedy
+        assert "Close it and wait 10 s" in refusal.value.remedy
         cell.clock.advance(OWNER_SILENCE_S)
         recover(next_one)  # the dead client's leftovers are read first
         next_one.tools.write(3, NEW, expected=None)

@@ -111,7 +111,7 @@ def test_a_failed_verification_puts_the_old_tool_back(cell):
     cell.mount(dx_mm=0.4)
     with pytest.raises(VerifyError, match="Turn test failed") as failed:
         cell.change(listener=LooseNozzle(cell))
-    assert "The old value of tool 1 is back." in failed.value.remedy
+    assert "The old value of tool 1 is back." in failed.value.what
     cell.check_the_tool_is(STORED, writes=2)
     (verify,) = cell.recorded(EntryKind.VERIFY)
     assert verify.details["passed"] is False

@@ -91,7 +91,7 @@ BROKEN = {
     full_disk: ("the disk is full", "Free space there, then repeat the command."),
     read_only: ("this user may not write", "Make file and folder writable"),
     corrupt: ("it is damaged", "Save it with 'robolink journal export --read-only'"),
-    newer: ("this robolink knows forms up to", "Install the newer robolink"),
+    newer: ("is newer: form ", "Install the newer robolink"),
     locked: ("another program keeps it locked", "Wait until it has finished, or end it"),
 }
 

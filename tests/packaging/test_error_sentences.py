@@ -79,7 +79,7 @@ OTHERWISE = {
     "Cell {cell} needs robot {expected}; at {url} there is {found}.": "C8-C901S",
     "Between touch {before} and {after} something moved by {shift:.2f} mm.": "3",
     "Station {id}: {what} must be known first.": "where it is",
-    "The journal {path} has form {found}, newer than {own}.": "7",
+    "The journal {path} is newer: form {found}, not {own}.": "7",
     "{reference} (address {address}) of unit {unit}": "412290",
 }
 """Sentences whose names stand for something else than those of all others."""

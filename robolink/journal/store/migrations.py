@@ -133,7 +133,7 @@ def newer_error(name: str, found: int) -> JournalError:
     """Return the error about tables that a newer robolink made."""
     return JournalError(
         tr(
-            "The journal {name} has form {found}, newer than {own}.",
+            "The journal {name} is newer: form {found}, not {own}.",
             name=name,
             found=found,
             own=len(MIGRATIONS),

@@ -83,7 +83,7 @@ def test_one_of_the_future_is_read_as_far_as_it_is_understood_and_never_written(
     monkeypatch.setitem(LATER, newest + 1, ("ALTER TABLE entries ADD COLUMN witness TEXT",))
     path = file_of(newest + 1, tmp_path)
     before = held(path)
-    known = f"form {newest + 1}; this robolink knows forms up to {newest}"
+    known = f"is newer: form {newest + 1}, not {newest}"
     with pytest.raises(JournalError, match=known) as caught:
         open_anew(str(path))
     assert "Install the newer robolink" in caught.value.remedy

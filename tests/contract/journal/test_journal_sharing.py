@@ -189,7 +189,7 @@ def test_a_newer_journal_is_read_but_not_written(location, open_anew, monkeypatc
         newer.log(CELLS[0]).append(NewEntry(EntryKind.RAW, verdict="kept"))
     run(newer, "UPDATE entries SET kind = 'of the future'")
     own = len(MIGRATIONS)
-    sentence = f"form {own + 1}; this robolink knows forms up to {own}"
+    sentence = f"is newer: form {own + 1}, not {own}"
     with pytest.raises(JournalError, match=sentence):
         open_anew(location)
     reader = open_anew(location, read_only=True)

@@ -120,7 +120,7 @@ def test_a_command_without_a_marker_leaves_its_name_too(in_process):
 
 @pytest.mark.parametrize(
     ("holder", "advice"),
-    [(ELSEWHERE, "If it has ended, try again in 10 s"), (LIVES, "Wait until it has finished")],
+    [(ELSEWHERE, "If it ended, wait 10 s"), (LIVES, "Wait, end it, or")],
     ids=["cannot be seen from here", "lives"],
 )
 def test_where_nobody_is_known_to_have_ended_it_is_said_at_once_who_it_is(

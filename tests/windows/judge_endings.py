@@ -4,6 +4,7 @@ import time
 
 import pytest
 
+from tests.windows._consoles import PATIENCE_S
 from tests.windows.judge_needle_change import BOTH, jogging, scan
 
 
@@ -122,7 +123,7 @@ def once_it_is_silent(windows, state, folder, *words):
     Nothing on Windows proves that a process has ended but its silence of 10 s, and the controller,
     which takes one client, hears of the end of the killed one when wine closes its socket.
     """
-    end_s = time.monotonic() + 180
+    end_s = time.monotonic() + PATIENCE_S
     told = at_cell(windows, state, folder, *words)
     while time.monotonic() < end_s:
         if "Last response" not in told.stderr and "does not answer the login" not in told.stderr:

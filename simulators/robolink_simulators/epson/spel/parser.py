@@ -89,10 +89,17 @@ def _filler(node: object, marks: dict[Any, int], found: list[int]) -> Filler | N
     else:
         return None
     fillers = [_filler(part, marks, found) for part in parts]
-    if not any(fillers):
+    filled = [(place, fill) for place, fill in enumerate(fillers) if fill is not None]
+    if not filled:
         return None
-    both = tuple(zip(parts, fillers, strict=True))
-    return lambda numbers: make(*(part if fill is None else fill(numbers) for part, fill in both))
+
+    def with_numbers(numbers: Sequence[Literal]) -> object:
+        values = list(parts)
+        for place, fill in filled:
+            values[place] = fill(numbers)
+        return make(*values)
+
+    return with_numbers
 
 
 _PROGRAM_WORDS = """

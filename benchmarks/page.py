@@ -38,6 +38,9 @@ NOTES: Final = {
     "\nafter some ten writes, which takes the disk a little more than half the time.",
     "fleet": "Controllers are made when they are first used, so opening them is cheap; both states"
     "\nare shown. The client is a bare selector in a process of its own.",
+    "nozzle-change": "Simulated times and requests are the same on every machine. In the recipe"
+    "\nneedle-beams a needle is measured on two light beams, its shaft is checked and its"
+    "\nturn test made, without a person.",
     "virtual-time": "The real driver, every check, a record in memory: a change is some 165"
     "\nrequests to the simulated controller and 22 movements, of which each is"
     "\nannounced, limited, watched and recorded as on a real robot. What is wanted of"

@@ -135,12 +135,10 @@ class _Handler:
         """
         for number in numbers:
             self._watchers[number] -= 1
-            if signal.getsignal(number) != self._came:
+            if self._watchers[number] and not for_good:
                 continue
-            if for_good:
-                signal.signal(number, signal.SIG_IGN)
-            elif not self._watchers[number]:
-                signal.signal(number, _usual(number))
+            if signal.getsignal(number) == self._came:
+                signal.signal(number, signal.SIG_IGN if for_good else _usual(number))
 
     def begin_command(self) -> EndedBy | None:
         """Let one ending count from now on; return what has ended the command around it."""

@@ -1,4 +1,7 @@
-"""A whole simulated two-pose nozzle change on ``sim://``: wall time, time-warp factor, requests."""
+"""A whole simulated two-pose nozzle change on ``sim://``: wall time, time-warp factor, requests.
+
+And how long the shipped recipe for a needle on two light beams takes in simulated time.
+"""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -13,6 +16,7 @@ import robolink
 from benchmarks.table import Amount, Figure
 from robolink.calibration_run import ChangePlan, NozzleChange, ToolPlan
 from robolink.model import MotionProfile, Path, WorkBox
+from tests.contract.robot_time import measured
 
 ROUNDS = 9
 WANTED = {"a movement": 5.0, "a whole change": 170.0}
@@ -23,6 +27,15 @@ WHAT = {
     20: "the same, of a controller that answers after 20 ms",
 }
 """What is measured, by the answer time in milliseconds."""
+
+NEEDLE = "needle-beams"
+NEEDLE_WANTED = {
+    0: ("needle-beams, simulated time", 10.0),
+    20: ("needle-beams, simulated time, answers after 20 ms", 20.0),
+}
+"""What is measured and most seconds wanted, by the answer time in milliseconds."""
+NEEDLE_REQUESTS = 450
+"""Most requests wanted."""
 
 
 def measure_nozzle_change() -> Iterator[Figure]:
@@ -48,6 +61,22 @@ def measure_nozzle_change() -> Iterator[Figure]:
             requests / WANTED[what],
             1.0,
         )
+    yield from measured_needle()
+
+
+def measured_needle() -> Iterator[Figure]:
+    """Yield simulated seconds and requests of a needle that is changed and measured on its beams.
+
+    Turn test and all; its simulated time does not depend on the machine, so each is measured once.
+    """
+    requests = 0
+    for answer_ms, (what, wanted_s) in NEEDLE_WANTED.items():
+        took_s, requests = measured(NEEDLE, answer_ms)
+        wanted = Amount(wanted_s, "s")
+        yield Figure(what, Amount(took_s, "s"), "wanted", wanted, took_s / wanted_s, 1.0)
+    wanted = Amount(NEEDLE_REQUESTS, "")
+    ratio = requests / NEEDLE_REQUESTS
+    yield Figure(f"requests of {NEEDLE}", Amount(requests, ""), "wanted", wanted, ratio, 1.0)
 
 
 def _movement() -> int:

@@ -73,8 +73,17 @@ def measure_virtual_time() -> Iterator[Figure]:
     the cells measured here, by their number.
     """
     simulated_s, wall_s = changed(CELLS, CHANGES)
-    each_s = wall_s / (CELLS * CHANGES)
-    cell_s = simulated_s / (CELLS * CHANGES)
+    yield from of_fleets(simulated_s / (CELLS * CHANGES), wall_s / (CELLS * CHANGES))
+    yield from measured_asking()
+
+
+def of_fleets(cell_s: float, each_s: float) -> Iterator[Figure]:
+    """Yield the figures of one recalibration, and those of fleets, which follow from it.
+
+    Args:
+        cell_s: Simulated seconds of one recalibration.
+        each_s: Real seconds that it takes.
+    """
     yield Figure(
         "a recalibration in virtual time",
         Amount(each_s * 1000, "ms"),
@@ -94,7 +103,6 @@ def measure_virtual_time() -> Iterator[Figure]:
             wanted / times,
             1.0,
         )
-    yield from measured_asking()
 
 
 def changed(cells: int, changes: int) -> tuple[float, float]:

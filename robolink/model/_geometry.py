@@ -109,7 +109,8 @@ class Pose:
     posture: Posture | None = None
 
     def __post_init__(self) -> None:
-        require_numbers(self, "x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
+        if not _NUMBERS.issuperset(map(type, self.coordinates())):
+            require_numbers(self, "x_mm", "y_mm", "z_mm", "u_deg", "v_deg", "w_deg")
 
     def coordinates(self) -> tuple[float, float, float, float, float, float]:
         """Return x, y, z in mm and u, v, w in degrees."""

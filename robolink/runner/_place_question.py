@@ -12,7 +12,7 @@ from robolink.errors import CalibrationError, ConfigError, DeclinedError, Journa
 from robolink.messages import listed, tr
 from robolink.model import Controller, DigitalIo, InputEdge, MotionGroup, Pose
 from robolink.runner._jog_steps import parse_steps
-from robolink.runner._prompt_context import GuidedOperator, Operator, Question, TouchSubject, regard
+from robolink.runner._prompt_context import GuidedOperator, Operator, Question, TouchSubject
 from robolink.runner._steps import (
     OLDEST_READING_S,
     Ask,
@@ -92,7 +92,7 @@ class PlaceQuestion:
         self._contact = _ContactWatch(inputs_of(controller), edge) if edge else None
         self._asked_ns = 0
         self._steps = StepsTaken(controller.clock)
-        self._by_hand = isinstance(operator, GuidedOperator)
+        self._guided = operator if isinstance(operator, GuidedOperator) else None
 
     def answer(self) -> TouchedAt:
         """Ask until the person confirms the place; return the pose, and how it was taken.
@@ -131,7 +131,8 @@ class PlaceQuestion:
         subject = self._step.subject
         if isinstance(subject, TouchSubject):
             subject = replace(subject, types=self._typed is not None)
-        regard(self._operator, [subject])
+        if self._guided is not None:
+            self._guided.regard(subject)
         self._operator.ask(self._step.instruction, _QUESTIONS[self._step.shown])
         self._asked_ns = self._controller.clock.now_ns()
         if self._contact:
@@ -186,7 +187,7 @@ class PlaceQuestion:
         if not step.evidence:
             return None
         why = None
-        if self._by_hand:
+        if self._guided is not None:
             self._group.require_able(step.instruction)
             why = self._steps.too_soon()
             if why is None and not touch.typed:

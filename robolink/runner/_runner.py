@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from itertools import starmap
 from typing import Final, TypeVar
 
@@ -49,7 +48,6 @@ from robolink.runner._prompt_context import (
     OfferedChoice,
     Operator,
     awaited_line,
-    regard,
 )
 from robolink.runner._steps import (
     Ask,
@@ -178,6 +176,7 @@ class Runner:
         self._tool = tool
         self._group = group
         self._operator = operator
+        self._guided = operator if isinstance(operator, GuidedOperator) else None
         self._settings = settings
         self._on_step = on_step
         self._camera = camera
@@ -252,16 +251,16 @@ class Runner:
         before = self._group.pose()
         target, path = jog_target(before, steps, self._settings)
         after = self.move(target, path)
-        if isinstance(self._operator, GuidedOperator):
+        if self._guided is not None:
             longest = max(map(abs, parse_steps(steps).values()))
-            self._operator.regard(JogSubject(before, after, longest))
+            self._guided.regard(JogSubject(before, after, longest))
         else:
             self._operator.tell(way_in_words(before, after))
         return after
 
     def _take(self, step: TakenStep) -> StepDone:
-        if isinstance(step, (Notify, Confirm)):
-            regard(self._operator, [step.fit])
+        if isinstance(step, (Notify, Confirm)) and self._guided is not None:
+            self._guided.regard(step.fit)
         if isinstance(step, Notify):
             self._operator.tell(step.text)
             return StepDone(step)
@@ -281,8 +280,10 @@ class Runner:
             return self._look(step)
         if isinstance(step, Seek):
             return self._seek(step)
-        going = MoveSubject(step.target, step.path, self._settings.speed_mm_s, step.purpose)
-        regard(self._operator, [replace(going, then=step.then)])
+        if self._guided is not None:
+            speed_mm_s = self._settings.speed_mm_s
+            going = MoveSubject(step.target, step.path, speed_mm_s, step.purpose, step.then)
+            self._guided.regard(going)
         return self.move(step.target, step.path)
 
     def _obstacle(self, move: Move, start: Pose | None) -> str:

@@ -16,6 +16,8 @@ from benchmarks.pictures import Growth, picture
 from benchmarks.quiet import SPREAD, Floors
 from benchmarks.table import Amount, Figure
 from benchmarks.work.asked_cells import WRITE_S, lived, lived_apart
+from benchmarks.work.nozzle_change import measured_needle
+from benchmarks.work.virtual_time import of_fleets
 from robolink.journal import memory_journal
 from robolink.model import EntryKind
 
@@ -52,6 +54,26 @@ def test_a_fleet_is_divided_among_processes_and_is_as_fast_as_the_slowest():
     factors = lived_apart(3, 2, 4, processes=2)
     assert len(factors) == 4
     assert all(factor > 0 for factor in factors)
+
+
+def test_a_needle_on_its_beams_is_as_fast_as_is_wanted_on_any_machine():
+    motion, slow, requests = measured_needle()
+    wanted = [(one.against, str(one.floor), one.goal) for one in (motion, slow, requests)]
+    assert wanted == [("wanted", most, 1.0) for most in ("10.0 s", "20.0 s", "450 ")]
+    assert (motion.met, slow.met, requests.met) == (True, True, True)
+    # Each of some 230 answers takes 20 ms; what is said while the robot moves costs nothing.
+    assert motion.ours.value + 3.0 < slow.ours.value < motion.ours.value + 5.0
+
+
+@pytest.mark.parametrize("each_s", [0.0349, 0.035, 0.07])
+def test_what_is_wanted_of_a_fleet_follows_from_one_recalibration(each_s):
+    one, hundred, thousands = of_fleets(14.0, each_s)
+    assert (one.ours.value, str(one.floor)) == (pytest.approx(each_s * 1000), "35.0 ms")
+    for fleet, cells in ((hundred, 100), (thousands, 2000)):
+        assert fleet.ours.value == pytest.approx(14.0 / (cells * each_s))
+        assert fleet.floor.value == pytest.approx(14.0 / (cells * 0.035))
+        assert fleet.ratio == pytest.approx(one.ratio)
+        assert (fleet.goal, fleet.name[:4]) == (one.goal, f"{cells} "[:4])
 
 
 def test_a_case_is_measured_in_a_process_of_its_own():

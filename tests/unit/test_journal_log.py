@@ -164,9 +164,13 @@ def test_nothing_of_a_clear_that_fails_is_done(journal, log):
     assert kinds(journal) == ["intent"]
 
 
-@pytest.mark.parametrize(("column", "value"), [("kind", "'rotate'"), ("details", "'[1]'")])
+@pytest.mark.parametrize(
+    ("column", "value"),
+    [("kind", "'rotate'"), ("kind", "'move'"), ("details", "'[1]'"), ("request", "'Tool 0'")],
+)
 def test_a_marker_that_makes_no_sense_blocks_its_controller(journal, log, column, value):
     log.begin(marker("a"))
+    assert log.open_markers() == log.open_markers() != ()  # it was read before it was damaged
     with journal._store.write() as tables:
         tables.connection.run(f"UPDATE markers SET {column} = {value}")
     with pytest.raises(JournalError, match="cannot be read") as caught:

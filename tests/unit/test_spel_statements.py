@@ -23,6 +23,7 @@ from robolink_simulators.epson.spel.parser import (
     UNSIMULATED_FUNCTIONS,
     WINDOW_ONLY,
     _read,
+    _shape,
     filler,
     marked,
     parse,
@@ -259,12 +260,22 @@ LINES = [
     "Box 1, 0.5, 10.25, -5.5, 5.5, -100.5, 0.5",
     "Arc XY(1.5, 2.5, 3.5, 4.5), XY(5.5, 6.5, 7.5, 8.5) CP",
     "Go P1 !D50.5; On 3!",
+    "Print Tool, Motor, Power, Speed(1), SpeedS(1), 57",
+    "Print 1, 22, 335",
+    "Print RealPos, &H5, 5",
+    "Print Tool, 1.5, 005",
+    "Print 5; Speed 5, 15, 25",
+    "Box 1, 0.5, 10.25, -5.5, 5.5, -100.5, 5",
+    "On 5, 0.5, 5",
+    "Go P5, 5",
+    "Print 5, -5",
+    "Print 5 , 5 ",
 ]
 
 
 def ended(read, line):
     try:
-        return read(line)
+        return repr(read(line))  # 57 and 57.0 are equal, and printed otherwise
     except SpelRefusal as refusal:
         return str(refusal)
 
@@ -275,6 +286,16 @@ def test_a_filled_line_is_the_line_that_was_read(line):
     # And with other numbers, when its shape is known.
     other = line.replace("5", "7")
     assert ended(parse, other) == ended(_read, other)
+
+
+def test_a_question_with_another_number_is_not_read_anew():
+    parse("Print Tool, Speed(1), 1")
+    known = _shape.cache_info().misses
+    for number in range(10, 100):
+        (asked,) = parse(f"Print Tool, Speed(1), {number}")
+        assert repr(asked.items[-1]) == f"Literal(value={number})"
+        assert asked.items[0] is parse("Print Tool, Speed(1), 1")[0].items[0]
+    assert _shape.cache_info().misses == known
 
 
 def test_a_line_that_is_wrong_is_refused_by_its_own_text():

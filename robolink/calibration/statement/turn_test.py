@@ -54,6 +54,10 @@ SHOWN_IN: Final = 0.95
 _NODES: Final = tuple(step / 2 for step in range(-12, 13))
 """Nodes for integration over the error that all drifts have in common, in standard deviations."""
 
+_WEIGHTED: Final = tuple((node, math.exp(-node * node / 2)) for node in _NODES)
+_WHOLE: Final = sum(weight for _, weight in _WEIGHTED)
+_ROOT_2: Final = math.sqrt(2)
+
 _HALVINGS: Final = 16
 
 
@@ -110,15 +114,13 @@ def shows_from_mm(views: Sequence[View], coordinates: int, nu: float | None) -> 
 
 def _missed(shift_mm: float, limits: Sequence[tuple[View, float]]) -> float:
     """Return the probability that no drift shows a shift, whatever part they share."""
-    missed = whole = 0.0
-    for node in _NODES:
-        weight = math.exp(-node * node / 2)
-        whole += weight
+    missed = 0.0
+    for node, weight in _WEIGHTED:
         for one, limit_mm in limits:
             over = (limit_mm - shift_mm - node * one.shared_mm) / one.own_mm
-            weight *= math.erfc(-over / math.sqrt(2)) / 2
+            weight *= math.erfc(-over / _ROOT_2) / 2
         missed += weight
-    return missed / whole
+    return missed / _WHOLE
 
 
 FALSE_ALARMS: Final = 0.001

@@ -11,6 +11,7 @@ so keep theirs.
 
 import json
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from hashlib import sha256
 from typing import Final, NamedTuple
 
@@ -155,7 +156,9 @@ class MarkerRows:
         return tuple([(row.controller, _marker(row)) for row in found])
 
 
+@lru_cache(maxsize=256)
 def _marker(row: _Stored) -> Marker:
+    """Return the marker that a row holds; the same few rows are read before each command."""
     try:
         kind, details = MarkerKind(row.kind), json.loads(row.details)
         if not isinstance(details, dict):

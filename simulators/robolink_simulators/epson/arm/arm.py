@@ -71,6 +71,8 @@ class _Travel:
 
     def looks(self, since_ns: int, now_ns: int) -> list[int]:
         """Return when to observe the joints so that each one's last direction is seen."""
+        if now_ns <= since_ns:
+            return []
         instants = {t for end in (*self.ends_ns, now_ns) for t in (end - _LOOK_BACK_NS, end)}
         return sorted(t for t in instants if since_ns < t <= now_ns)
 

@@ -2,8 +2,8 @@
 
 Lines that differ in their numbers alone: read once, then filled with each other's numbers.
 
-A client sends the same few lines with another place in each, and reading a line takes a millisecond
-of the processor, filling it some microseconds.
+A client sends the same few lines with another place in each, or another number at the end, and
+reading a line takes a millisecond of the processor, filling it some microseconds.
 """
 
 import re
@@ -24,7 +24,9 @@ from robolink_simulators.epson.spel.line_tree import LineNode
 from robolink_simulators.epson.spel.source_text import ProgramFault, SourceLine
 from robolink_simulators.epson.spel.tree import Literal, Statement
 
-_NUMBER: Final = re.compile(r"(?<![\w.&$])\d{1,9}\.\d{1,9}(?![\w.])")
+_NUMBER: Final = re.compile(r"(?<![\w.&$])\d{1,9}\.\d{1,9}(?![\w.])|(?<=, )\d{1,9}\Z")
+"""A number with decimals, or a whole one at the end of a list, by which a client knows the answer
+to its question."""
 _QUOTES: Final = frozenset("\"'")
 
 Filler = Callable[[Sequence[Literal]], Any]
@@ -32,7 +34,9 @@ Filler = Callable[[Sequence[Literal]], Any]
 
 
 def marked(line: str) -> tuple[str, list[str]]:
-    """Return a line with a mark for each number with decimals, and those numbers.
+    """Return a line with a mark for each number that may differ, and those numbers.
+
+    These are the numbers with decimals, and a whole number at the end of a list.
 
     A line with a text or a comment in it has none: what stands there is no number.
 
@@ -40,6 +44,8 @@ def marked(line: str) -> tuple[str, list[str]]:
         >>> from robolink_simulators.epson.spel.parser import marked
         >>> marked("Go XY(300.5, -12.25, 7, 0)")
         ('Go XY(0.987654321, -1.987654321, 7, 0)', ['300.5', '12.25'])
+        >>> marked("Print Tool, Speed(1), 57")
+        ('Print Tool, Speed(1), 0.987654321', ['57'])
     """
     if not _QUOTES.isdisjoint(line):
         return line, []
@@ -83,10 +89,17 @@ def _filler(node: object, marks: dict[Any, int], found: list[int]) -> Filler | N
     else:
         return None
     fillers = [_filler(part, marks, found) for part in parts]
-    if not any(fillers):
+    filled = [(place, fill) for place, fill in enumerate(fillers) if fill is not None]
+    if not filled:
         return None
-    both = tuple(zip(parts, fillers, strict=True))
-    return lambda numbers: make(*(part if fill is None else fill(numbers) for part, fill in both))
+
+    def with_numbers(numbers: Sequence[Literal]) -> object:
+        values = list(parts)
+        for place, fill in filled:
+            values[place] = fill(numbers)
+        return make(*values)
+
+    return with_numbers
 
 
 _PROGRAM_WORDS = """

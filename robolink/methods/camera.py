@@ -1,9 +1,11 @@
 """camera: a calibrated, up-looking camera sees the tip."""
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar, cast
+from typing import TYPE_CHECKING, Annotated, ClassVar, Final, cast
+
+from annotated_types import MaxLen, MinLen
 
 from robolink.calibration import (
     Sighting,
@@ -12,9 +14,20 @@ from robolink.calibration import (
     seen_from,
     solvable_planes,
     solve_up_camera,
+    toward_zero,
 )
+from robolink.files.toml import Problem
 from robolink.messages import declared, tr
-from robolink.methods.method import Method, Needs, Site
+from robolink.methods.method import (
+    DEGREES,
+    Angle,
+    Check,
+    Help,
+    Method,
+    Needs,
+    Option,
+    Site,
+)
 from robolink.methods.shared_parameters import (
     PLACE,
     UNMEASURED_Z,
@@ -47,9 +60,55 @@ if TYPE_CHECKING:
     from robolink.procedures import TipSource
 
 
+LEAST_TEST_TURN_DEG: Final = 90.0
+"""Smallest turn from one of the measured angles to one of the turn test, degrees: less counts as
+tested at a small angle."""
+
+_APART_DEG: Final = 5.0
+"""Smallest turn from any measured angle to one of the turn test, degrees."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class CameraParameters(LookParameters):
     """How a calibrated camera looks at a tip."""
+
+    test_turns_deg: Annotated[
+        tuple[Angle, ...] | None,
+        MinLen(1),
+        MaxLen(8),
+        DEGREES,
+        Option(flag="--test-angles", metavar="15,90,.."),
+        Help(
+            declared(
+                "U of each look of the turn test, counted as those of the measurement; without "
+                "it, two between them."
+            )
+        ),
+    ] = None
+
+    def problems(self, check: Check) -> Iterator[Problem]:
+        """Check that the turn test can show anything."""
+        yield from super().problems(check)
+        for number, angle_deg in enumerate(self.test_turns_deg or (), start=1):
+            if min(abs(angle_deg - turn_deg) for turn_deg in self.turns_deg) < _APART_DEG:
+                yield Problem(
+                    f"test_turns_deg#{number}",
+                    tr(
+                        "must be at least {apart:g} degrees from each of {other}",
+                        apart=_APART_DEG,
+                        other=check.spell("turns_deg"),
+                    ),
+                )
+        turned = [abs(a - b) for a in self.test_turns_deg or () for b in self.turns_deg]
+        if turned and max(turned) < LEAST_TEST_TURN_DEG:
+            yield Problem(
+                "test_turns_deg",
+                tr(
+                    "must hold an angle that is at least {least:g} degrees from one of {other}",
+                    least=LEAST_TEST_TURN_DEG,
+                    other=check.spell("turns_deg"),
+                ),
+            )
 
     def no_residual(self) -> str:
         """Return why residuals cannot be judged, empty if they can."""
@@ -241,11 +300,14 @@ class CameraSource(RoundSource):
         plan: How the tip is brought before it.
         sigma_mm: Standard deviation of one coordinate of one look, where it is known.
         retake: Offer to take the look again that fits worst.
+        test_turns_deg: Angles U of the looks of the turn test, counted as those of the plan;
+            ``None`` for two between them.
     """
 
     plan: LookPlan = field(default_factory=LookPlan)
     sigma_mm: float | None = None
     retake: bool = False
+    test_turns_deg: tuple[float, ...] | None = None
 
     @property
     def sentence(self) -> str:
@@ -289,16 +351,37 @@ class CameraSource(RoundSource):
             sensor=self.sensor,
             station=self.station,
             plan=self.plan,
-            angles_deg=proof_angles(basis.result, basis.tool),
+            angles_deg=self._test_angles_deg(basis),
             camera_error_mm=camera_error_of(basis.result),
             radius_px=radius_of(basis.result),
         )
+
+    def _test_angles_deg(self, basis: ProofBasis) -> tuple[float, ...]:
+        """Return U of the new tool in the test, turned in the direction of the measurement.
+
+        A measurement that the arm could only make to the other side, or half as far, is tested
+        likewise.
+        """
+        if self.test_turns_deg is None:
+            return proof_angles(basis.result, basis.tool)
+        planned, measured = self.plan.turns_deg, basis.measured_deg
+        first = planned[0]
+        far = max(range(len(planned)), key=lambda index: abs(planned[index] - first))
+        if planned[far] == first:
+            return tuple(toward_zero(measured[0], turn - first) for turn in self.test_turns_deg)
+        share = (measured[far] - measured[0]) / (planned[far] - first)
+        return tuple(measured[0] + share * (turn - first) for turn in self.test_turns_deg)
 
 
 def _source(parameters: CameraParameters, site: Site) -> "TipSource":
     sensor, station = camera_at(parameters, site)
     return CameraSource(
-        sensor, station, parameters.look, sigma_mm=site.sigma_mm, retake=parameters.retake
+        sensor,
+        station,
+        parameters.look,
+        sigma_mm=site.sigma_mm,
+        retake=parameters.retake,
+        test_turns_deg=parameters.test_turns_deg,
     )
 
 

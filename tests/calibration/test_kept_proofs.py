@@ -14,9 +14,11 @@ from robolink.calibration import (
     Beam,
     BoardDrawing,
     Pin,
+    Sighting,
     flange_of,
     impact_on,
     rotation_of,
+    solve_camera_round,
     tip_pose,
     update_guard,
     uvw_deg,
@@ -47,7 +49,7 @@ from robolink.methods import (
 from robolink.methods.surface_touch.plane_procedure import PlaneTest
 from robolink.methods.surface_touch.sphere_procedure import SphereTest
 from robolink.model import Path, Pose, SpotUnit, ToolOffset, rotate_xy
-from robolink.procedures import MeasurementContext, TouchPlan
+from robolink.procedures import LookPlan, MeasurementContext, TouchPlan
 from robolink.procedures.tilt_proof import TiltingProof
 from robolink.runner import Ask, Move, TouchedAt
 from robolink.stations import BeamStation, CameraStation, TouchStation
@@ -232,6 +234,32 @@ def test_the_proof_of_a_length_turns_on_from_u_of_the_tool(measured):
     proof, written = kept(CASES["z-touch"], result, flange)
     turn_deg = ZTouchParameters().proof_turn_deg
     assert proof.angles_deg == pytest.approx((flange.u_deg + written.u_deg - turn_deg,))
+
+
+@pytest.mark.parametrize(
+    ("measured_at", "planned", "tested_at"),
+    [
+        ((0.0, 32.0, 64.0, 96.0), (0.0, 32.0, 64.0, 96.0), (90.0, 5.0)),
+        ((40.0, 8.0, -24.0, -56.0), (0.0, 32.0, 64.0, 96.0), (-50.0, 35.0)),
+        ((0.0, 16.0, 32.0, 48.0), (0.0, 32.0, 64.0, 96.0), (45.0, 2.5)),
+        ((10.0, -80.0, -20.0), (0.0, 90.0, 30.0), (-80.0, 5.0)),
+        ((-20.0,), (0.0,), (70.0, -15.0)),
+        ((30.0,), (0.0,), (-60.0, 25.0)),
+    ],
+    ids=["as planned", "to the other side", "half as far", "not in order", "one look", "toward 0"],
+)
+def test_a_camera_tests_at_the_planned_angles_as_it_measured(measured_at, planned, tested_at):
+    """What the arm could only do to the other side, or half as far, is tested there as well."""
+    written = ToolOffset(12, -4, -20, 8)
+    plan = LookPlan(turns_deg=planned)
+    source = CameraSource("eye", STATION, plan, test_turns_deg=(90.0, 5.0))
+    looks = []
+    for u_deg in measured_at:
+        dx, dy = rotate_xy(12, -4, u_deg)
+        looks.append(Sighting(Pose(300 - dx, 80 - dy, -10, u_deg, tool=0), 300.0, 80.0))
+    result = replace(solve_camera_round(looks), offset=written)
+    proof = source.proof(None, 1, result, tip=written, tolerance_mm=0.1)
+    assert proof.angles_deg == pytest.approx([angle + written.u_deg for angle in tested_at])
 
 
 @pytest.mark.parametrize(

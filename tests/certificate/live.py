@@ -415,6 +415,12 @@ def camera(cell: Any, _rng: random.Random) -> Any:
     return CameraSource(cell.url, camera_station(cell))
 
 
+def camera_quick(cell: Any, _rng: random.Random) -> Any:
+    """A camera, at four angles of less than a third of a turn: as the shipped recipe looks."""
+    plan = LookPlan(turns_deg=(0.0, 32.0, 64.0, 96.0), lift_mm=2.0, beside_mm=0.7)
+    return CameraSource(cell.url, camera_station(cell), plan, test_turns_deg=(90.0,))
+
+
 def camera_one_look(cell: Any, _rng: random.Random) -> Any:
     """A camera, at one."""
     return CameraSource(cell.url, camera_station(cell), LookPlan(turns_deg=(0.0,)))
@@ -488,6 +494,7 @@ COURSES: Final[tuple[Course, ...]] = (
             Course("beams --turn", kind, opened, beams_turned, ("place_mm", "bend_deg")),
             Course("z-touch", kind, opened, z_touch, ("plate_mm",)),
             Course("camera", kind, opened, camera, (*_SEEN, "place_mm")),
+            Course("camera, quick", kind, opened, camera_quick, (*_SEEN, "place_mm")),
             Course("camera, one look", kind, opened, camera_one_look, (*_SEEN, "place_mm")),
             Course("camera-affine", kind, opened, camera_affine, ("tip_image_px",)),
             Course("runout-table", kind, opened, runout_table, (*_SEEN, "place_mm")),

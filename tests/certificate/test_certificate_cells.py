@@ -217,7 +217,13 @@ CELLS = (
     *soak(
         *(
             Cell(what, course, REFUSED, CHANGED, with_tip_off(mm, wrong_by(by)))
-            for course in ("camera on EPSON", "camera on PLC", "camera, one look on EPSON")
+            for course in (
+                "camera on EPSON",
+                "camera on PLC",
+                "camera, quick on EPSON",
+                "camera, quick on PLC",
+                "camera, one look on EPSON",
+            )
             for what, mm, by in (
                 ("turned by 10 degrees, tip 0.9 off", 0.9, {"camera_turn_deg": (10.0,)}),
                 ("turned by -4 degrees, tip 0.9 off", 0.9, {"camera_turn_deg": (-4.0,)}),
@@ -241,7 +247,11 @@ CELLS = (
     Cell("bumped by 0.15 between", SURE_PERSON, TAKEN_BACK, CONTRADICTED[:1], bumped(0.15)),
     *(
         Cell(f"slips by {mm:g}", course, TAKEN_BACK, CONTRADICTED, at_write=slipped(mm))
-        for course, mm in (("camera on PLC", 0.08), ("camera on EPSON", 0.05))
+        for course, mm in (
+            ("camera on PLC", 0.08),
+            ("camera on EPSON", 0.05),
+            ("camera, quick on EPSON", 0.03),
+        )
     ),
     Cell(
         "slips up by 0.075",
@@ -259,6 +269,8 @@ CELLS = (
                 "beams once on EPSON",
                 "beams --turn on EPSON",
                 "camera on EPSON",
+                "camera, quick on EPSON",
+                "camera, quick on PLC",
                 "camera, one look on EPSON",
                 "camera-affine on EPSON",
                 "runout-table on PLC",
@@ -365,7 +377,14 @@ CELLS = (
                 faults(camera_still_share=1.0, camera_still_beside_px=beside_px),
             )
             for kind in ("EPSON", "PLC")
-            for method in ("camera", "camera, one look", "camera-affine", "runout-table", "board")
+            for method in (
+                "camera",
+                "camera, quick",
+                "camera, one look",
+                "camera-affine",
+                "runout-table",
+                "board",
+            )
             for beside_px in (0.0, 50.0)
         ),
     ),
@@ -437,6 +456,7 @@ def test_a_cell_in_which_the_tip_is_wrong_ends_as_it_must(cell):
         pytest.param(
             "beams once on EPSON", "(X, Y)", 0.032, id="beams once", marks=pytest.mark.soak
         ),
+        pytest.param("camera, quick on EPSON", "", 0.0135, id="camera, quick"),
         pytest.param("z-touch on EPSON", "", 0.05, id="z-touch"),
     ],
 )

@@ -57,6 +57,12 @@ RELATIONS = [
     ("n-angle", {"angles_deg": (0, 90, 90)}, "angles_deg", "must not hold the same angle"),
     ("n-angle", {"angles_deg": (0, 90, 180), "count": 4}, "count", "excludes"),
     ("camera", {"turns_deg": (0, 10)}, "turns_deg", "must spread over at least 30 degrees"),
+    (
+        "camera",
+        {"turns_deg": (0, 40, 80), "test_turns_deg": (10, 89)},
+        "test_turns_deg",
+        "must hold an angle that is at least 90 degrees from one of",
+    ),
     ("camera-affine", {"turns_deg": (0,)}, "turns_deg", "must spread over at least 30 degrees"),
     ("board", {"turns_deg": (0, 120)}, "fiducials_mm", "is missing: say where the fiducials"),
 ]

@@ -13,6 +13,7 @@ from robolink_simulators.hosting.in_process import softmotion as plc_in_process
 
 from robolink.journal import open_journal
 from robolink.model import EntryKind
+from robolink.recipe import load_recipe
 from tests.contract._camera_cell import recipe_here
 from tests.contract._sensor_cell import SensorCell
 from tests.faults._nozzle_cell import OLD_TIP, served_cell
@@ -75,7 +76,12 @@ def test_the_example_measures_writes_and_proves_a_nozzle(run, epson, capsys):
     )
     assert code == 0, messages
     simulator = in_process.simulator_named("camera-recipe")
-    told(capsys, "pick nozzle, camera recipe", in_process.clock_of("camera-recipe").now_ns() / 1e9)
+    seconds = in_process.clock_of("camera-recipe").now_ns() / 1e9
+    told(capsys, "pick nozzle, camera recipe", seconds)
+    assert seconds < 8.0  # by the simulated clock: 7.90 s, the same in each run
+    safe, stands = load_recipe(Path(CAMERA)).recipe.poses.safe, simulator.world.robot.flange()
+    assert stands.coordinates()[:3] == pytest.approx(safe.pose.coordinates()[:3], abs=0.01)
+    assert stands.u_deg == pytest.approx(safe.u_deg + 90.0, abs=0.01)
     found, true = simulator.machine.tools.get(1), simulator.world.tips[1]
     assert found is not None
     (tool,) = document["tools"]

@@ -253,6 +253,11 @@ ONE_LOOK = "turns_deg = [0]"
             "maps all pixels onto one line",
         ),
         (
+            with_(CAMERA, "[source]", "test_turns_deg = [90, 119]"),
+            "source.test_turns_deg#2",
+            "must be at least 5 degrees from each of turns_deg",
+        ),
+        (
             with_(CAMERA, "[source]", "turns_deg = [0, 20]"),
             "source.turns_deg",
             "must spread over at least 30 degrees",
